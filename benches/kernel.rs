@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 use zerkalo::bvh::Ray;
 use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
 use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
-use zerkalo::primitive::{Aggregate, Form};
+use zerkalo::primitive::{Aggregate, Form, SphereForm};
 use zerkalo::render::pass::{self, PassContext};
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
@@ -93,7 +93,8 @@ fn list_or_tree(c: &mut Criterion) {
     for n in [8, 16, 24, 32, 64, 256, 4096] {
         let mut random = Random(n as u64);
         let radius = 0.5 / (n as f64).cbrt();
-        let mut sphere = || Form::Sphere { center: random.direction() * random.next(), radius };
+        let mut sphere =
+            || Form::Sphere(SphereForm { center: random.direction() * random.next(), radius });
         let forms: Vec<Form> = (0..n).map(|_| sphere()).collect();
         let rays: Vec<Ray<Single>> = (0..256).map(|_| random.rays()).collect();
         let mut group = c.benchmark_group(format!("list or tree, {n} spheres"));

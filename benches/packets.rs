@@ -16,7 +16,7 @@ use zerkalo::asset::Mesh;
 use zerkalo::bvh::Ray;
 use zerkalo::film::{Display, Estimator, Film, Header, LightWeights};
 use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
-use zerkalo::primitive::{Aggregate, Form};
+use zerkalo::primitive::{Aggregate, Form, MeshForm};
 use zerkalo::render::pass::{self, PassContext};
 use zerkalo::render::wave::{Job, Wave};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
@@ -111,7 +111,7 @@ fn main() {
     }
     let mesh = Arc::new(Mesh::new(ball(132, 266)));
     let scene_from_mesh = DAffine3::IDENTITY;
-    forms.push(("mesh of 69,692", Form::Mesh { mesh, scene_from_mesh, smooth: false }));
+    forms.push(("mesh of 69,692", Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth: false })));
     for (name, form) in &forms {
         let rays = rays_towards(form);
         let mut tracers = (

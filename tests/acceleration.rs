@@ -47,6 +47,7 @@ fn crowd(numbers: &mut Numbers, count: usize) -> Scene {
         "cylinder = { base = [0.0, -0.5, 0.0], top = [0.0, 0.5, 0.0], radius = 0.3 }",
         "cone = { base = [0.0, -0.5, 0.0], apex = [0.0, 0.5, 0.0], radius = 0.5 }",
         "rectangle = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0], normal = [0.0, 0.0, 1.0] }",
+        "torus = { center = [0.0, 0.0, 0.0], axis = [0.0, 1.0, 0.2], ring = 0.4, tube = 0.1 }",
         "mesh = { file = \"\" }",
     ];
     let far = if numbers.below(3) == 0 { 1e4 } else { 0.0 };

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use support::{picture, rendered};
 use zerkalo::asset::Assets;
 use zerkalo::film::Replicates;
-use zerkalo::primitive::Form;
+use zerkalo::primitive::{Form, MeshForm};
 use zerkalo::scene::edit::{Target, add_object, set};
 use zerkalo::scene::{Scene, SceneFile};
 use zerkalo::world::{AnyWorld, FirstHit, Options, Precision};
@@ -368,7 +368,7 @@ fn invalid_file_name_is_rejected_and_valid_file_read_once() {
     }
     let named = typed(&edit.scene, "ball.obj").unwrap().scene;
     let mesh = |scene: &Scene| match scene.objects[1].form() {
-        Form::Mesh { mesh, .. } => mesh,
+        Form::Mesh(MeshForm { mesh, .. }) => mesh,
         other => panic!("{other:?}"),
     };
     let triangles = mesh(&named).mesh().triangles.len();

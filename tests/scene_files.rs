@@ -1,7 +1,7 @@
 //! The scene files in `scenes`, and the invalid ones in `tests/bad-scenes`.
 
 use std::path::{Path, PathBuf};
-use zerkalo::primitive::Form;
+use zerkalo::primitive::{ConvexPolyhedronForm, Form, SphereForm};
 use zerkalo::scene::{Document, Scene};
 
 fn files(folder: &str) -> Vec<PathBuf> {
@@ -86,7 +86,9 @@ fn scene_format_reference_is_up_to_date() {
 fn corners(scene: &Scene, name: &str) -> Vec<[f64; 3]> {
     let object = scene.objects.iter().find(|o| o.name == name).unwrap();
     match object.shape.form() {
-        Form::ConvexPolyhedron { corners, .. } => corners.iter().map(|c| c.to_array()).collect(),
+        Form::ConvexPolyhedron(ConvexPolyhedronForm { corners, .. }) => {
+            corners.iter().map(|c| c.to_array()).collect()
+        }
         other => panic!("{other:?}"),
     }
 }
@@ -186,5 +188,5 @@ fn reflecting_tracks_follow_their_formula() {
 }
 
 fn ball(center: [f64; 3], radius: f64) -> Form {
-    Form::Sphere { center: center.into(), radius }
+    Form::Sphere(SphereForm { center: center.into(), radius })
 }

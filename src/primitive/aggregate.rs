@@ -1,4 +1,4 @@
-//! All things of a scene, ready for rays: batches, and a tree over them where it pays.
+//! All primitives of a scene, compiled for rays: batches, and a tree over them where it pays.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -18,7 +18,7 @@ use std::ops::Range;
 pub const BVH_MIN_PRIMITIVES: usize = 96;
 
 impl PrimitiveSet {
-    /// Whether there are none.
+    /// Returns `true` if there are none.
     pub fn is_empty(&self) -> bool {
         self.ranges.is_empty() && !self.tree
     }
@@ -31,7 +31,7 @@ struct BatchRange<L: SimdFloat> {
     end: u32,
 }
 
-/// The things of a scene, compiled for one lane type.
+/// Primitives of a scene, compiled for one lane type.
 pub struct Aggregate<L: SimdFloat> {
     parts: Vec<BatchRange<L>>,
     all: PrimitiveSet,
@@ -160,12 +160,12 @@ impl<L: SimdFloat> Aggregate<L> {
         self.tree_items.iter().map(item).collect()
     }
 
-    /// Whether the bounded items stand in a tree.
+    /// Returns `true` if the bounded items stand in a tree.
     pub fn has_tree(&self) -> bool {
         self.tree.is_some()
     }
 
-    /// Whether there is neither a tree nor a box: nothing but lists.
+    /// Returns `true` if there is neither a tree nor a box: nothing but lists.
     pub fn has_no_tree(&self) -> bool {
         self.tree.is_none() && self.extents.is_empty()
     }
@@ -282,7 +282,7 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Which lanes of `wanted` meet any of some items at a distance in (0, limit).
+    /// Lanes of `wanted` that hit any of some items at a distance in (0, limit).
     #[inline(always)]
     pub fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, by: &PrimitiveSet) -> L::Mask {
         if !self.extents.is_empty() {
@@ -344,7 +344,7 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Where rays meet `item`, a compound's first part for all of it, nearer than `limit`.
+    /// Hits of rays with `item`, a compound's first part for all of it, nearer than `limit`.
     pub fn closest_to(&self, item: u32, ray: &Ray<L>, limit: L) -> Hit<L> {
         let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
         let (i, mut hit) = ((item - part.base) as usize, Hit::with_t_max(limit));
@@ -371,12 +371,12 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Whether light sees other normals than the surfaces' own anywhere: [`Aggregate::shading_normal`].
+    /// Returns `true` if light sees other normals than the surfaces' own anywhere: [`Aggregate::shading_normal`].
     pub fn is_smooth(&self) -> bool {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_smooth())
     }
 
-    /// Whether things have colours of their own: [`Aggregate::color`].
+    /// Returns `true` if primitives have colours of their own: [`Aggregate::color`].
     pub fn is_colored(&self) -> bool {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
     }
@@ -403,14 +403,15 @@ impl<L: SimdFloat> Aggregate<L> {
         (item >= base).then(|| meshes.color((item - base) as usize, facet))?
     }
 
-    /// The texture coordinates of its own that `item` has at `point`, near `facet`, if it has any.
+    /// Texture coordinates that `item` has of its own at `point`, near its triangles tagged `facet`; `None`
+    /// if it has none.
     pub fn uv(&self, item: u32, facet: L, point: Vec3<L>) -> Option<UvGradients<L>> {
-        let (meshes, base) = self.meshes()?;
-        (item >= base).then(|| meshes.uv((item - base) as usize, facet, point))?
+        let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
+        part.batch.uv((item - part.base) as usize, facet, point)
     }
 }
 
-/// Nothing met yet; what nobody wants goes no way.
+/// An empty hit; inactive lanes get a negative `t_max`.
 #[inline(always)]
 fn nearest_wanted<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
     Hit::with_t_max(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))

@@ -1,4 +1,4 @@
-//! What rays meet: one batch per form, all items of a form side by side, so that a form that does
+//! Batches of compiled primitives: one per form, all items of a form side by side, so that a form that does
 //! not occur costs nothing.
 
 use crate::bvh::{Hit, Ray};
@@ -9,11 +9,13 @@ use crate::primitive::csg::Compounds;
 use crate::primitive::ellipsoid::Ellipsoid;
 use crate::primitive::form::Form;
 use crate::primitive::mesh_instance::Meshes;
-use crate::primitive::planar::{Parallelogram, Plane};
+use crate::primitive::parallelogram::Parallelogram;
+use crate::primitive::plane::Plane;
 use crate::primitive::sphere::Sphere;
+use crate::primitive::torus::Torus;
 use std::ops::Range;
 
-/// Where a ray meets a surface.
+/// Surface at the point that a ray hits.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint<L> {
     /// The point, put back on the surface as exactly as the precision allows.
@@ -35,7 +37,7 @@ pub struct UvGradients<L> {
 }
 
 impl<L: SimdFloat> SurfacePoint<L> {
-    /// How far from the point rays start that leave the surface: a few roundings of the largest number
+    /// Distance from the point at which rays start that leave the surface: a few roundings of the largest number
     /// involved.
     #[inline(always)]
     pub fn ray_offset(&self) -> L {
@@ -43,7 +45,7 @@ impl<L: SimdFloat> SurfacePoint<L> {
     }
 }
 
-/// One thing that rays meet, compiled for the lane type.
+/// One primitive, compiled for the lane type.
 pub trait Primitive<L: SimdFloat> {
     /// Distance at which each line through a ray meets the item first in front of the ray's origin, and
     /// where it meets it; there, a distance that is not positive is no hit. `None`: it meets it nowhere.
@@ -51,43 +53,82 @@ pub trait Primitive<L: SimdFloat> {
 
     /// The surface at `point` (near it, from `ray.at(t)`).
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L>;
+
+    /// Texture coordinates that the primitive has of its own at `point`. Forms whose default mapping is
+    /// [`DefaultMapping::Uv`](crate::primitive::DefaultMapping::Uv) return them.
+    fn uv(&self, _point: Vec3<L>) -> Option<UvGradients<L>> {
+        None
+    }
 }
 
-/// All items of one form.
-pub enum PrimitiveBatch<L: SimdFloat> {
-    /// Parallelograms.
-    Parallelograms(Vec<Parallelogram<L::Scalar>>),
-    /// Infinite planes.
-    Planes(Vec<Plane<L::Scalar>>),
-    /// Spheres.
-    Spheres(Vec<Sphere<L::Scalar>>),
-    /// Ellipsoids.
-    Ellipsoids(Vec<Ellipsoid<L::Scalar>>),
-    /// Convex solids.
-    ConvexPolyhedron(Vec<ConvexPolyhedron<L::Scalar>>),
-    /// Tapered cylinders.
-    ConicalFrustum(Vec<ConicalFrustum<L::Scalar>>),
-    /// Compounds, whose items are parts.
-    Compounds(Compounds<L::Scalar>),
-    /// Meshes.
-    Meshes(Meshes<L::Scalar>),
-}
+macro_rules! batches {
+    ($($(#[$doc:meta])+ $kind:ident($item:ident)),+ $(,)?) => {
+        /// All primitives of one form.
+        pub enum PrimitiveBatch<L: SimdFloat> {
+            $($(#[$doc])+ $kind(Vec<$item<L::Scalar>>),)+
+            /// Compounds, whose items are parts.
+            Compounds(Compounds<L::Scalar>),
+            /// Meshes.
+            Meshes(Meshes<L::Scalar>),
+        }
 
-/// The same expression for the items of any form but compounds and meshes, and one for each of those.
-macro_rules! each {
-    ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
-        $meshes:ident => $third:expr) => {
-        match $batch {
-            PrimitiveBatch::Parallelograms($items) => $value,
-            PrimitiveBatch::Planes($items) => $value,
-            PrimitiveBatch::Spheres($items) => $value,
-            PrimitiveBatch::Ellipsoids($items) => $value,
-            PrimitiveBatch::ConvexPolyhedron($items) => $value,
-            PrimitiveBatch::ConicalFrustum($items) => $value,
-            PrimitiveBatch::Compounds($compounds) => $other,
-            PrimitiveBatch::Meshes($meshes) => $third,
+        /// Evaluates one expression for the primitives of any form but compounds and meshes, and one for
+        /// each of those.
+        macro_rules! each {
+            ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
+                $meshes:ident => $third:expr) => {
+                match $batch {
+                    $(PrimitiveBatch::$kind($items) => $value,)+
+                    PrimitiveBatch::Compounds($compounds) => $other,
+                    PrimitiveBatch::Meshes($meshes) => $third,
+                }
+            };
+        }
+
+        /// Compiles `forms` to one batch per form that occurs.
+        pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
+            let mut out = Vec::new();
+            $(
+                let items = forms.iter().enumerate().filter_map(|(form, f)| {
+                    Some((PrimitiveId { form, part: 0 }, $item::new(f)?))
+                });
+                let (sources, items): (Vec<_>, Vec<_>) = items.unzip();
+                out.extend(LabelledBatch::new(PrimitiveBatch::$kind(items), sources, forms));
+            )+
+            let sources_of = |wanted: fn(&Form) -> bool| -> Vec<_> {
+                let matching = forms.iter().enumerate().filter(|(_, f)| wanted(f));
+                let parts = |(form, f): (usize, &Form)| {
+                    (0..f.parts()).map(move |part| PrimitiveId { form, part })
+                };
+                matching.flat_map(parts).collect()
+            };
+            let sources = sources_of(|f| matches!(f, Form::Csg(_)));
+            let compounds = PrimitiveBatch::Compounds(Compounds::new(forms));
+            out.extend(LabelledBatch::new(compounds, sources, forms));
+            let sources = sources_of(|f| matches!(f, Form::Mesh(_)));
+            let meshes = PrimitiveBatch::Meshes(Meshes::new(forms));
+            out.extend(LabelledBatch::new(meshes, sources, forms));
+            out
         }
     };
+}
+
+// The list of compiled primitives, in the order in which items are numbered: a new one is a line here.
+batches! {
+    /// Parallelograms.
+    Parallelograms(Parallelogram),
+    /// Infinite planes.
+    Planes(Plane),
+    /// Spheres.
+    Spheres(Sphere),
+    /// Ellipsoids.
+    Ellipsoids(Ellipsoid),
+    /// Convex polyhedra.
+    ConvexPolyhedra(ConvexPolyhedron),
+    /// Conical frusta.
+    ConicalFrusta(ConicalFrustum),
+    /// Tori.
+    Tori(Torus),
 }
 
 impl<L: SimdFloat> PrimitiveBatch<L> {
@@ -100,7 +141,7 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.closest(range, base, ray, hit));
     }
 
-    /// Where a surface of the items in `range` lies at a distance in (0, limit) of the ray. May stop
+    /// Lanes that hit an item in `range` at a distance in (0, limit) of the ray. May stop
     /// early once all lanes of `wanted` are blocked.
     #[inline(always)]
     pub fn occluded(
@@ -123,6 +164,14 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             items => items[item].surface(point),
             compounds => compounds.surface(item, point),
             meshes => meshes.surface(item, facet, point))
+    }
+
+    /// Texture coordinates that `item` has of its own at `point`; `None` if it has none.
+    pub fn uv(&self, item: usize, facet: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+        each!(self,
+            items => items[item].uv(point),
+            compounds => compounds.uv(item, point),
+            meshes => meshes.uv(item, facet, point))
     }
 }
 
@@ -154,12 +203,12 @@ fn occluded<L: SimdFloat>(
     occluded
 }
 
-/// What an item came from.
+/// Origin of an item: its form and part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PrimitiveId {
     /// Position in the list given to `compile`.
     pub form: usize,
-    /// Which part of a compound; 0 for all other forms. Part 0 stands for the whole compound where
+    /// Part of a compound; 0 for all other forms. Part 0 stands for the whole compound where
     /// rays ask for items; its other parts never meet anything by themselves.
     pub part: usize,
 }
@@ -170,78 +219,26 @@ pub struct LabelledBatch<L: SimdFloat> {
     pub batch: PrimitiveBatch<L>,
     /// `sources[item]`: which form, which part of it.
     pub sources: Vec<PrimitiveId>,
-    /// How the inventory counts the items: singular and plural.
+    /// Singular and plural by which the inventory counts the items.
     pub noun: (&'static str, &'static str),
-    /// What it says behind that.
+    /// Words of the inventory behind that.
     pub detail: String,
     /// Items without an end, which no tree can hold.
     pub infinite: bool,
 }
 
-/// One batch per form that occurs in `forms`.
-pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
-    let mut out = Vec::new();
-    /// The items that `new` makes of some forms, as one batch.
-    macro_rules! add {
-        ($batch:ident, $item:ident, $noun:expr, $infinite:expr) => {
-            let made = forms
-                .iter()
-                .enumerate()
-                .filter_map(|(form, f)| Some((PrimitiveId { form, part: 0 }, $item::new(f)?)));
-            let (sources, items): (Vec<_>, Vec<_>) = made.unzip();
-            if !items.is_empty() {
-                let batch = PrimitiveBatch::$batch(items);
-                let detail = String::new();
-                out.push(LabelledBatch {
-                    batch,
-                    sources,
-                    noun: $noun,
-                    detail,
-                    infinite: $infinite,
-                });
-            }
+impl<L: SimdFloat> LabelledBatch<L> {
+    /// Creates the batch of the primitives that `sources` lists; `None` if there are none.
+    fn new(batch: PrimitiveBatch<L>, sources: Vec<PrimitiveId>, forms: &[Form]) -> Option<Self> {
+        let noun = forms[sources.first()?.form].noun();
+        let triangles: usize = sources.iter().map(|s| forms[s.form].triangles()).sum();
+        let detail = match triangles {
+            0 => String::new(),
+            n => format!(" of {} triangles", with_thousands_separators(n)),
         };
+        let infinite = sources.iter().any(|s| forms[s.form].bounds().is_none());
+        Some(Self { batch, sources, noun, detail, infinite })
     }
-    add!(Parallelograms, Parallelogram, ("rectangle", "rectangles"), false);
-    add!(Planes, Plane, ("plane", "planes"), true);
-    add!(Spheres, Sphere, ("sphere", "spheres"), false);
-    add!(Ellipsoids, Ellipsoid, ("ellipsoid", "ellipsoids"), false);
-    add!(ConvexPolyhedron, ConvexPolyhedron, ("convex solid", "convex solids"), false);
-    add!(
-        ConicalFrustum,
-        ConicalFrustum,
-        ("conical_frustum cylinder", "conical_frustum cylinders"),
-        false
-    );
-    let compounds = forms.iter().enumerate().filter(|(_, f)| matches!(f, Form::Csg(_)));
-    let sources: Vec<_> = compounds
-        .flat_map(|(form, f)| (0..f.parts()).map(move |part| PrimitiveId { form, part }))
-        .collect();
-    if !sources.is_empty() {
-        let batch = PrimitiveBatch::Compounds(Compounds::new(forms));
-        let (noun, detail) = (("compound", "compounds"), String::new());
-        out.push(LabelledBatch { batch, sources, noun, detail, infinite: false });
-    }
-    let mut triangles = 0;
-    let mut sources = Vec::new();
-    for (form, f) in forms.iter().enumerate() {
-        if let Form::Mesh { mesh, .. } = f {
-            triangles += mesh.mesh().triangles.len();
-            sources.push(PrimitiveId { form, part: 0 });
-        }
-    }
-    if !sources.is_empty() {
-        let batch = PrimitiveBatch::Meshes(Meshes::new(forms));
-        let detail = format!(" of {} triangles", with_thousands_separators(triangles));
-        out.push(LabelledBatch {
-            batch,
-            sources,
-            noun: ("mesh", "meshes"),
-            detail,
-            infinite: false,
-        });
-    }
-    out
 }
 
 /// `69,451`

@@ -1,4 +1,4 @@
-//! Where things are, roughly: enough to tell that some rays cannot meet them. In double precision, and
+//! Bounding volumes, enough to rule out that some rays hit a primitive. In double precision, and
 //! with room for the roundings of single: whatever a ray in lanes may meet is never ruled out.
 
 use crate::primitive::form::Form;
@@ -12,11 +12,11 @@ pub const F32_RAY_ERROR: f64 = 1e-5;
 pub struct BoundingSphere {
     /// Centre.
     pub center: DVec3,
-    /// Radius; infinite for things without an end.
+    /// Radius; infinite for forms without an end.
     pub radius: f64,
 }
 
-/// Where shadow rays lead.
+/// Target of shadow rays.
 #[derive(Clone, Copy, Debug)]
 pub enum LightTarget {
     /// To a point.
@@ -37,7 +37,7 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    /// Whether a ball may reach between the lines: into the cone around them, if that is narrower than a half
+    /// Returns `true` if a ball may reach between the lines: into the cone around them, if that is narrower than a half
     /// space; otherwise, as no circular cone is convex then, to the inner side of the four planes through the
     /// apex and neighbouring corners.
     fn meets(&self, ball: &BoundingSphere) -> bool {
@@ -59,26 +59,26 @@ impl Frustum {
     }
 }
 
-/// The surroundings of one thing.
+/// Bounding volume of one form.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundingVolume {
     ball: BoundingSphere,
-    /// Unit normal and offset of the plane that a flat thing lies in.
+    /// Unit normal and offset of the plane that a flat form lies in.
     plane: Option<(DVec3, f64)>,
     /// It does not see itself from outside.
     convex: bool,
-    /// How far rays end from where they are said to.
+    /// Largest distance between the end of a ray and its nominal end.
     slack: f64,
 }
 
 impl BoundingSphere {
-    fn around(points: &[DVec3]) -> Self {
+    pub(crate) fn around(points: &[DVec3]) -> Self {
         let center = points.iter().sum::<DVec3>() / points.len() as f64;
         let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
         Self { center, radius }
     }
 
-    /// Whether `point` lies inside or near the surface.
+    /// Returns `true` if `point` lies inside or near the surface.
     pub fn contains(&self, point: DVec3) -> bool {
         self.center.distance(point) <= self.radius + ray_error(self.center) + ray_error(point)
     }
@@ -94,39 +94,10 @@ fn ray_error(point: DVec3) -> f64 {
 }
 
 impl BoundingVolume {
-    /// Of a form.
+    /// Creates the bounding volume of a form.
     pub fn new(form: &Form) -> Self {
-        let ball = match form {
-            Form::Sphere { center, radius } => BoundingSphere { center: *center, radius: *radius },
-            Form::ConvexPolyhedron { corners, .. } => BoundingSphere::around(corners),
-            Form::Parallelogram { corner, u, v } => {
-                BoundingSphere::around(&[*corner, corner + u, corner + v, corner + u + v])
-            }
-            Form::Ellipsoid { scene_from_unit: map } => {
-                let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis]
-                    .map(|a| a.length_squared());
-                // The largest singular value is at most the root of the sum of squares.
-                BoundingSphere { center: map.translation, radius: (x + y + z).sqrt() }
-            }
-            Form::ConicalFrustum { .. } | Form::Csg(_) | Form::Mesh { .. } | Form::Plane { .. } => {
-                match form.bounds() {
-                    Some((low, high)) => BoundingSphere {
-                        center: 0.5 * (low + high),
-                        radius: 0.5 * low.distance(high),
-                    },
-                    None => BoundingSphere { center: DVec3::ZERO, radius: f64::INFINITY },
-                }
-            }
-        };
-        let plane = match form {
-            Form::Parallelogram { corner, u, v } => {
-                let normal = u.cross(*v).normalize();
-                Some((normal, normal.dot(*corner)))
-            }
-            Form::Plane { normal, offset } => Some((*normal, *offset)),
-            _ => None,
-        };
-        let convex = !matches!(form, Form::Csg(_) | Form::Mesh { .. });
+        let plane = form.plane().map(|plane| (plane.normal, plane.offset));
+        let (ball, convex) = (form.bounding_sphere(), form.is_convex());
         Self { ball, plane, convex, slack: 0.0 }
     }
 
@@ -135,12 +106,12 @@ impl BoundingVolume {
         self.ball
     }
 
-    /// Whether it is flat: a ray that leaves it does not meet it again.
+    /// Returns `true` if it is flat: a ray that leaves it does not hit it again.
     pub fn is_flat(&self) -> bool {
         self.plane.is_some()
     }
 
-    /// Whether it is convex: its outside does not see itself.
+    /// Returns `true` if it is convex: its outside does not see itself.
     pub fn is_convex(&self) -> bool {
         self.convex
     }
@@ -153,7 +124,7 @@ impl BoundingVolume {
             return None;
         }
         let room = ray_error(*apex) + ray_error(ball.center);
-        // Depths along `forward` between which the thing lies.
+        // Depths along `forward` between which the form lies.
         let middle = (ball.center - *apex).dot(*forward);
         let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
         if let Some((normal, offset)) = self.plane {
@@ -195,7 +166,7 @@ impl BoundingVolume {
         Self { ball, slack: self.slack + by, ..self }
     }
 
-    /// How far off a flat thing's plane rays that lead to `point` meet it.
+    /// Distance from the plane of a flat form at which rays that lead to `point` may hit it.
     fn ray_error(&self, point: DVec3) -> f64 {
         let BoundingSphere { center, radius } = self.ball;
         let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
@@ -203,7 +174,7 @@ impl BoundingVolume {
         self.slack + ray_error(point) + F32_RAY_ERROR * reach.max(offset)
     }
 
-    /// Whether it may stand between some point of `lit` and the light.
+    /// Returns `true` if it may stand between some point of `lit` and the light.
     pub fn may_occlude(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
         let slack = ray_error(lit.center) + F32_RAY_ERROR * lit.radius;
         let radius = lit.radius + slack;
@@ -258,7 +229,7 @@ struct Cone {
 }
 
 impl Cone {
-    /// Whether a ball may reach into the cone: it is not all behind the apex, and its centre is no
+    /// Returns `true` if a ball may reach into the cone: it is not all behind the apex, and its centre is no
     /// farther from the cone's side than its radius.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let to = ball.center - self.apex;
@@ -272,15 +243,16 @@ impl Cone {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::primitive::{ParallelogramForm, PlaneForm, SphereForm};
 
     fn ball(center: [f64; 3], radius: f64) -> Form {
-        Form::Sphere { center: center.into(), radius }
+        Form::Sphere(SphereForm { center: center.into(), radius })
     }
 
     /// A square of side 2 about `center`, facing up.
     fn tile(center: [f64; 3]) -> Form {
         let corner = DVec3::from(center) - DVec3::new(1.0, 0.0, 1.0);
-        Form::Parallelogram { corner, u: DVec3::Z * 2.0, v: DVec3::X * 2.0 }
+        Form::Parallelogram(ParallelogramForm { corner, u: DVec3::Z * 2.0, v: DVec3::X * 2.0 })
     }
 
     /// Looks from (0, 0, 5) along -z, 0.1 to each side at unit distance.
@@ -300,13 +272,13 @@ mod tests {
         assert!(part(&ball([1.4, 0.0, 0.0], 1.0)).is_some());
         assert!(part(&ball([2.0, 0.0, 0.0], 1.0)).is_none());
         assert!(part(&ball([0.0, 0.0, 7.0], 1.0)).is_none());
-        let wall = Form::Plane { normal: DVec3::Z, offset: 0.0 };
+        let wall = Form::Plane(PlaneForm { normal: DVec3::Z, offset: 0.0 });
         let seen = part(&wall).unwrap();
         // A square with half-sides 0.5.
         assert!(seen.center.length() < 1e-3 && (seen.radius - 0.5f64.sqrt()).abs() < 1e-3);
-        assert!(part(&Form::Plane { normal: DVec3::Z, offset: 6.0 }).is_none());
+        assert!(part(&Form::Plane(PlaneForm { normal: DVec3::Z, offset: 6.0 })).is_none());
         // Seen edge-on, without an end.
-        let floor = part(&Form::Plane { normal: DVec3::Y, offset: -0.1 }).unwrap();
+        let floor = part(&Form::Plane(PlaneForm { normal: DVec3::Y, offset: -0.1 })).unwrap();
         assert!(floor.radius.is_infinite());
     }
 
@@ -343,7 +315,9 @@ mod tests {
         let corners = ends.map(|(x, y)| DVec3::new(x, y, -1.0));
         let pencil = Frustum { apex, forward: DVec3::NEG_Z, corners };
         let meets = |center: DVec3, radius: f64| {
-            BoundingVolume::new(&Form::Sphere { center, radius }).clip_to(&pencil).is_some()
+            BoundingVolume::new(&Form::Sphere(SphereForm { center, radius }))
+                .clip_to(&pencil)
+                .is_some()
         };
         let (mut outside, mut inside) = (0, 0);
         for i in 0..=40 {
@@ -368,12 +342,12 @@ mod tests {
     #[test]
     fn a_plane_through_the_eye_is_not_ruled_out() {
         for offset in [5.0 - 1e-7, 5.0, 5.0 + 1e-7] {
-            let plane = BoundingVolume::new(&Form::Plane { normal: DVec3::Z, offset });
+            let plane = BoundingVolume::new(&Form::Plane(PlaneForm { normal: DVec3::Z, offset }));
             assert!(plane.clip_to(&pencil()).is_some(), "{offset}");
         }
     }
 
-    /// No point of a thing seen through the pencil lies outside the ball.
+    /// No point of a form seen through the pencil lies outside the ball.
     #[test]
     fn the_part_seen_holds_every_point_met() {
         let mut random = 1u64;
@@ -381,9 +355,10 @@ mod tests {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             (random >> 40) as f64 / 16_777_216.0
         };
-        let slanted = Form::Plane { normal: DVec3::new(0.3, 0.4, 0.5).normalize(), offset: 0.2 };
+        let slanted =
+            Form::Plane(PlaneForm { normal: DVec3::new(0.3, 0.4, 0.5).normalize(), offset: 0.2 });
         let part = BoundingVolume::new(&slanted).clip_to(&pencil()).unwrap();
-        let Form::Plane { normal, offset } = slanted else { unreachable!() };
+        let Form::Plane(PlaneForm { normal, offset }) = slanted else { unreachable!() };
         for _ in 0..1000 {
             let toward = DVec3::new(0.2 * unit() - 0.1, 0.2 * unit() - 0.1, -1.0);
             let t = (offset - normal.dot(pencil().apex)) / normal.dot(toward);

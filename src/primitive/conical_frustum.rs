@@ -5,10 +5,184 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
+use crate::primitive::bounding::BoundingSphere;
+use crate::primitive::canonical::{
+    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, bounds_of_points, box_distance,
+    extent_of_box, normals_of_solid, segment_distance, sphere_around_box,
+};
 use crate::primitive::ellipsoid::{rows, times};
-use crate::primitive::form::Form;
+use crate::primitive::form::{Form, cast_compiled};
 use crate::primitive::solid::{SolidPrimitive, Span};
-use glam::DVec3;
+use glam::{DAffine3, DMat3, DVec3};
+use std::f64::consts::TAU;
+
+/// The image under an invertible affine map of the solid with x^2 + y^2 <= (1 + (top - 1) z)^2 and
+/// 0 <= z <= 1. [`Form::conical_frustum`] makes one of any proportions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConicalFrustumForm {
+    /// From that solid's space to the scene's.
+    pub scene_from_unit: DAffine3,
+    /// Radius at z = 1 over radius at z = 0: from 0, a cone, to 1, a cylinder.
+    pub top_radius: f64,
+}
+
+impl Form {
+    /// The image under `scene_from_canonical` of the solid with x^2 + y^2 <= (1 + (s - 1) z)^2 and
+    /// 0 <= z <= 1, for any s >= 0.
+    pub fn conical_frustum(scene_from_canonical: DAffine3, s: f64) -> Self {
+        let (scene_from_unit, top_radius) = if s <= 1.0 {
+            (scene_from_canonical, s)
+        } else {
+            // Upside down, with the wider end as the base.
+            let linear = DMat3::from_diagonal(DVec3::new(s, s, -1.0));
+            let flip = DAffine3::from_mat3_translation(linear, DVec3::Z);
+            (scene_from_canonical * flip, 1.0 / s)
+        };
+        ConicalFrustumForm { scene_from_unit, top_radius }.into()
+    }
+}
+
+/// Number of normals that stand for the circle of them at the tip of a cone.
+pub(crate) const AROUND_TIP: u32 = 64;
+
+impl CanonicalShape for ConicalFrustumForm {
+    const NOUN: (&'static str, &'static str) = ("tapered cylinder", "tapered cylinders");
+
+    fn transformed(self, map: &DAffine3) -> Form {
+        Self { scene_from_unit: *map * self.scene_from_unit, ..self }.into()
+    }
+
+    fn parts(&self) -> usize {
+        1
+    }
+
+    fn bounds(&self) -> Option<Bounds> {
+        // Half-widths of the base's disc: lengths of the rows of the first two columns.
+        let m = &self.scene_from_unit;
+        let rows = m.matrix3.transpose();
+        let half = DVec3::new(
+            rows.x_axis.truncate().length(),
+            rows.y_axis.truncate().length(),
+            rows.z_axis.truncate().length(),
+        );
+        let (base, cap) = (m.translation, m.translation + m.matrix3.z_axis);
+        let narrow = half * self.top_radius;
+        bounds_of_points(&[base - half, base + half, cap - narrow, cap + narrow])
+    }
+
+    fn bounding_sphere(&self) -> BoundingSphere {
+        sphere_around_box(self.bounds())
+    }
+
+    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
+        Some((self.scene_from_unit, (DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE)))
+    }
+
+    fn plane(&self) -> Option<HalfSpace> {
+        None
+    }
+
+    fn is_convex(&self) -> bool {
+        true
+    }
+
+    fn thickness(&self) -> f64 {
+        // Between the faces of the box around the canonical solid: 2 by 2 by 1.
+        let rows = self.scene_from_unit.matrix3.inverse().transpose();
+        let across = rows.x_axis.length().max(rows.y_axis.length());
+        (2.0 / across).min(rows.z_axis.length().recip())
+    }
+
+    fn clearance(&self, point: DVec3) -> Option<f64> {
+        let away = box_distance(self.bounds()?, point);
+        let inside = || surface_distance(&self.scene_from_unit, self.top_radius, point);
+        Some(if away > 0.0 { away } else { inside() })
+    }
+
+    fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
+        let top = self.top_radius;
+        let unit_from_scene = self.scene_from_unit.inverse();
+        let normal_of = |n: DVec3| unit_from_scene.matrix3.transpose() * n;
+        let p = unit_from_scene.transform_point3(point);
+        let (rho, slope) = (p.x.hypot(p.y), top - 1.0);
+        let up = normal_of(DVec3::Z);
+        let (height, up) = (up.length().recip(), up.normalize());
+        let mut sides = vec![(-p.z * height, -up)];
+        if top > 0.0 {
+            sides.push(((p.z - 1.0) * height, up));
+        }
+        let mut side = |out: DVec3| {
+            let normal = normal_of(DVec3::new(out.x, out.y, -slope));
+            let beside = (rho - (1.0 + slope * p.z)) / normal.length();
+            sides.push((beside, normal.normalize()));
+        };
+        let across = normal_of(DVec3::new(p.x, p.y, 0.0) / rho).length();
+        if rho > 2.0 * slack * across {
+            side(DVec3::new(p.x / rho, p.y / rho, 0.0));
+        } else {
+            for i in 0..AROUND_TIP {
+                let (sin, cos) = (TAU * f64::from(i) / f64::from(AROUND_TIP)).sin_cos();
+                side(DVec3::new(cos, sin, 0.0));
+            }
+        }
+        normals_of_solid(sides, slack)
+    }
+
+    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        cast_compiled((*self).into(), origin, direction)
+    }
+
+    fn default_mapping(&self) -> DefaultMapping {
+        DefaultMapping::Cylindrical
+    }
+
+    fn proxies(&self) -> Vec<Proxy> {
+        self.bounds().map(Proxy::around).into_iter().collect()
+    }
+
+    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
+        extent_of_box(self.bounds(), axis)
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        Vec::new()
+    }
+
+    fn triangles(&self) -> usize {
+        0
+    }
+}
+
+/// Distance of `point` from the image of a frustum. The surface is made of outlines of three segments, from
+/// the middle of the base over both rims to the middle of the cap, one for each angle.
+fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
+    const ANGLES: usize = 64;
+    let place = |x, y, z| scene_from_unit.transform_point3(DVec3::new(x, y, z));
+    let (base, cap) = (place(0.0, 0.0, 0.0), place(0.0, 0.0, 1.0));
+    let outline_distance = |angle: f64| {
+        let (sin, cos) = angle.sin_cos();
+        let (low, high) = (place(cos, sin, 0.0), place(top * cos, top * sin, 1.0));
+        let sides = [[base, low], [low, high], [high, cap]];
+        sides.map(|side| segment_distance(side, point)).into_iter().fold(f64::INFINITY, f64::min)
+    };
+    let step = TAU / ANGLES as f64;
+    let sampled: Vec<f64> = (0..ANGLES).map(|i| outline_distance(i as f64 * step)).collect();
+    let mut least = f64::INFINITY;
+    for i in 0..ANGLES {
+        let beside = sampled[(i + 1) % ANGLES].min(sampled[(i + ANGLES - 1) % ANGLES]);
+        if sampled[i] > beside {
+            continue;
+        }
+        // The least value lies between the neighbours.
+        let (mut low, mut high) = ((i as f64 - 1.0) * step, (i as f64 + 1.0) * step);
+        for _ in 0..80 {
+            let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+            if outline_distance(a) < outline_distance(b) { high = b } else { low = a }
+        }
+        least = least.min(sampled[i]).min(outline_distance(0.5 * (low + high)));
+    }
+    least
+}
 
 /// One solid. Matrices by rows.
 #[derive(Clone, Copy)]
@@ -34,7 +208,10 @@ const AROUND2: f64 = 1.26;
 impl<S: Float> ConicalFrustum<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
-        let Form::ConicalFrustum { scene_from_unit: m, top_radius } = form else { return None };
+        let Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit: m, top_radius }) = form
+        else {
+            return None;
+        };
         let inverse = m.matrix3.inverse();
         let up = inverse.transpose() * DVec3::Z;
         let center = m.transform_point3(DVec3::new(0.0, 0.0, 0.5));
@@ -50,7 +227,7 @@ impl<S: Float> ConicalFrustum<S> {
     }
 }
 
-/// Where a line crosses a solid.
+/// Crossings of a line with a solid.
 struct Chord<L: SimdFloat> {
     /// The point of the line nearest to the middle of the axis, and its direction, of unit length in
     /// the canonical space.
@@ -62,7 +239,7 @@ struct Chord<L: SimdFloat> {
     /// Steps from `point` to both ends.
     enter: L,
     leave: L,
-    /// Where an end lies on the side, not on a flat end.
+    /// Lanes whose end lies on the side, not on a flat end.
     enters_side: L::Mask,
     leaves_side: L::Mask,
     meets: L::Mask,
@@ -188,7 +365,9 @@ impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
 }
 
 impl<L: SimdFloat> SolidPrimitive<L> for ConicalFrustum<L::Scalar> {
-    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+    type Spans = Option<Span<L>>;
+
+    fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let s = self;
         let interval = interval(s, ray)?;
         let (enter, leave) = interval.distances();

@@ -3,9 +3,120 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
+use crate::primitive::bounding::BoundingSphere;
+use crate::primitive::canonical::{
+    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
+    extent_of_points, half_space, normals_of_solid,
+};
 use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
+
+/// A bounded convex solid: the intersection of half-spaces, with its corners.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConvexPolyhedronForm {
+    /// Half-spaces behind the faces.
+    pub faces: Vec<HalfSpace>,
+    /// Corners.
+    pub corners: Vec<DVec3>,
+}
+
+impl CanonicalShape for ConvexPolyhedronForm {
+    const NOUN: (&'static str, &'static str) = ("convex solid", "convex solids");
+
+    fn transformed(self, map: &DAffine3) -> Form {
+        let normals = map.matrix3.inverse().transpose();
+        let face = |face: &HalfSpace| {
+            let on_plane = map.transform_point3(face.normal * face.offset);
+            half_space(on_plane, normals * face.normal)
+        };
+        Self {
+            faces: self.faces.iter().map(face).collect(),
+            corners: self.corners.iter().map(|c| map.transform_point3(*c)).collect(),
+        }
+        .into()
+    }
+
+    fn parts(&self) -> usize {
+        1
+    }
+
+    fn bounds(&self) -> Option<Bounds> {
+        bounds_of_points(&self.corners)
+    }
+
+    fn bounding_sphere(&self) -> BoundingSphere {
+        BoundingSphere::around(&self.corners)
+    }
+
+    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
+        None
+    }
+
+    fn plane(&self) -> Option<HalfSpace> {
+        None
+    }
+
+    fn is_convex(&self) -> bool {
+        true
+    }
+
+    fn thickness(&self) -> f64 {
+        let behind = |face: &HalfSpace| {
+            let depths = self.corners.iter().map(|c| face.offset - face.normal.dot(*c));
+            depths.fold(0.0, f64::max)
+        };
+        self.faces.iter().map(behind).fold(f64::INFINITY, f64::min)
+    }
+
+    fn clearance(&self, point: DVec3) -> Option<f64> {
+        let heights = self.faces.iter().map(|f| f.normal.dot(point) - f.offset);
+        Some(heights.fold(f64::NEG_INFINITY, f64::max).abs())
+    }
+
+    fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
+        let side = |f: &HalfSpace| (f.normal.dot(point) - f.offset, f.normal);
+        normals_of_solid(self.faces.iter().map(side).collect(), slack)
+    }
+
+    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
+        for face in &self.faces {
+            let height = face.normal.dot(origin) - face.offset;
+            let rise = face.normal.dot(direction);
+            if rise < 0.0 {
+                enter = enter.max(-height / rise);
+            } else if rise > 0.0 {
+                leave = leave.min(-height / rise);
+            } else if height > 0.0 {
+                return None;
+            }
+        }
+        let t = if enter > 0.0 { enter } else { leave };
+        (enter <= leave && t > 0.0 && t.is_finite()).then_some(t)
+    }
+
+    fn default_mapping(&self) -> DefaultMapping {
+        DefaultMapping::Box
+    }
+
+    fn proxies(&self) -> Vec<Proxy> {
+        let faces = self.faces.iter().copied().map(ProxyFace::Flat).collect();
+        vec![Proxy::new(faces, self.bounds())]
+    }
+
+    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
+        extent_of_points(&self.corners, axis)
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        self.corners.clone()
+    }
+
+    fn triangles(&self) -> usize {
+        0
+    }
+}
 
 /// The points p with low <= normal . (p - center) <= high.
 struct Slab<S> {
@@ -32,7 +143,9 @@ pub struct ConvexPolyhedron<S> {
 impl<S: Float> ConvexPolyhedron<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
-        let Form::ConvexPolyhedron { faces, corners } = form else { return None };
+        let Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners }) = form else {
+            return None;
+        };
         let low = corners.iter().copied().fold(DVec3::INFINITY, DVec3::min);
         let high = corners.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
         let center = 0.5 * (low + high);
@@ -147,7 +260,9 @@ impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
 }
 
 impl<L: SimdFloat> SolidPrimitive<L> for ConvexPolyhedron<L::Scalar> {
-    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+    type Spans = Option<Span<L>>;
+
+    fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let (enter, leave, meets) = self.chord(ray)?;
         let from_center = ray.origin - Vec3::splat(self.center);
         // The face at an end is the one that is nearest there, of those that the line crosses in

@@ -12,16 +12,18 @@
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
+use crate::primitive::batch::{Primitive, SurfacePoint, UvGradients, max_coordinate};
+use crate::primitive::canonical::CanonicalShape;
 use crate::primitive::conical_frustum::ConicalFrustum;
 use crate::primitive::convex_polyhedron::ConvexPolyhedron;
 use crate::primitive::csg_interval::{Event, Interval, Transition, events, insert, with_scratch};
 use crate::primitive::csg_tree::{CsgSolid, CsgTree};
 use crate::primitive::ellipsoid::Ellipsoid;
 use crate::primitive::form::Form;
-use crate::primitive::planar::Plane;
+use crate::primitive::plane::Plane;
 use crate::primitive::solid::SolidPrimitive;
 use crate::primitive::sphere::Sphere;
+use crate::primitive::torus::Torus;
 use std::ops::Range;
 
 /// Surfaces that are so many roundings of the largest coordinate apart lie on each other: two faces
@@ -41,44 +43,57 @@ enum Op {
     Minus,
 }
 
-/// What a part is.
-enum CsgLeaf<S> {
-    Sphere(Sphere<S>),
-    Ellipsoid(Ellipsoid<S>),
-    ConvexPolyhedron(ConvexPolyhedron<S>),
-    ConicalFrustum(ConicalFrustum<S>),
-    /// The half-space behind it.
-    Plane(Plane<S>),
-}
+macro_rules! leaves {
+    ($($kind:ident($spans:literal)),+ $(,)?) => {
+        /// The solid of a part.
+        enum CsgLeaf<S> {
+            $($kind($kind<S>),)+
+        }
 
-/// The same expression for a solid of any form.
-macro_rules! each {
-    ($solid:expr, $item:ident => $value:expr) => {
-        match $solid {
-            CsgLeaf::Sphere($item) => $value,
-            CsgLeaf::Ellipsoid($item) => $value,
-            CsgLeaf::ConvexPolyhedron($item) => $value,
-            CsgLeaf::ConicalFrustum($item) => $value,
-            CsgLeaf::Plane($item) => $value,
+        /// Evaluates one expression for a solid of any form.
+        macro_rules! each {
+            ($solid:expr, $item:ident => $value:expr) => {
+                match $solid {
+                    $(CsgLeaf::$kind($item) => $value,)+
+                }
+            };
+        }
+
+        impl<S: Float> CsgLeaf<S> {
+            /// Compiles a part; `None` if its form is no solid that compounds can be made of.
+            fn new(form: &Form) -> Option<Self> {
+                None$(.or_else(|| $kind::new(form).map(Self::$kind)))+
+            }
+
+            /// Largest number of spans of one line.
+            fn max_spans(&self) -> usize {
+                match self {
+                    $(Self::$kind(_) => $spans,)+
+                }
+            }
         }
     };
 }
 
-impl<S: Float> CsgLeaf<S> {
-    /// `None`: the form is no convex solid.
-    fn new(form: &Form) -> Option<Self> {
-        (Sphere::new(form).map(Self::Sphere))
-            .or_else(|| Ellipsoid::new(form).map(Self::Ellipsoid))
-            .or_else(|| ConvexPolyhedron::new(form).map(Self::ConvexPolyhedron))
-            .or_else(|| ConicalFrustum::new(form).map(Self::ConicalFrustum))
-            .or_else(|| Plane::new(form).map(Self::Plane))
-    }
+// The list of solids that can be parts of compounds, with the largest number of spans of one line: a new
+// one is a line here.
+leaves! {
+    Sphere(1),
+    Ellipsoid(1),
+    ConvexPolyhedron(1),
+    ConicalFrustum(1),
+    Torus(2),
+    // The half-space behind it.
+    Plane(1),
 }
 
-/// A part: its solid, and whether the whole's outside is on the solid's inside.
+/// A part of a compound.
 struct Part<S> {
     solid: CsgLeaf<S>,
+    /// The whole's outside is on the solid's inside.
     reversed: bool,
+    /// Places of its spans among those of the compound.
+    spans: Range<usize>,
 }
 
 /// One compound: a ball around it and the ranges of its parts and operations.
@@ -88,11 +103,13 @@ struct SolidOperand<S> {
     reach: S,
     parts: Range<usize>,
     ops: Range<usize>,
+    /// Largest number of spans of all parts.
+    spans: usize,
     /// Entries on the stack at most.
     depth: usize,
 }
 
-/// All compounds of a scene. Every part is an item of its own, so that a hit tells the part; the
+/// All compounds of a scene. Every part is an item of its own, so that a hit names the part; the
 /// first one of a compound stands for it where rays ask for items.
 pub struct Compounds<S> {
     compounds: Vec<SolidOperand<S>>,
@@ -117,9 +134,12 @@ impl<S: Float> Compounds<S> {
 
     fn add(&mut self, compound: &CsgSolid) {
         let (first_part, first_op) = (self.parts.len(), self.ops.len());
+        let mut spans = 0;
         for (i, part) in compound.parts.iter().enumerate() {
-            let solid = CsgLeaf::new(part).expect("parts are convex solids");
-            self.parts.push(Part { solid, reversed: false });
+            let solid = CsgLeaf::new(part).expect("parts are solids that compounds are made of");
+            let first = spans;
+            spans += solid.max_spans();
+            self.parts.push(Part { solid, reversed: false, spans: first..spans });
             self.first.push((i == 0).then_some(self.compounds.len() as u32));
         }
         let depth = self.build(&compound.tree, first_part, false);
@@ -131,6 +151,7 @@ impl<S: Float> Compounds<S> {
             reach: S::from_f64(compound.parts.iter().map(max_coordinate).fold(0.0, f64::max)),
             parts: first_part..self.parts.len(),
             ops: first_op..self.ops.len(),
+            spans,
             depth,
         });
     }
@@ -160,7 +181,18 @@ impl<S: Float> Compounds<S> {
         depth
     }
 
-    /// Where the point at distance `t` of each line is inside the whole.
+    /// Spans of part number `i` of a compound.
+    #[inline(always)]
+    fn spans_of<'a, L>(
+        &self,
+        one: &SolidOperand<S>,
+        spans: &'a [Interval<L>],
+        i: u32,
+    ) -> &'a [Interval<L>] {
+        &spans[self.parts[one.parts.start + i as usize].spans.clone()]
+    }
+
+    /// Lanes whose point at distance `t` is inside the whole.
     #[inline(always)]
     fn inside<L: SimdFloat<Scalar = S>>(
         &self,
@@ -172,7 +204,7 @@ impl<S: Float> Compounds<S> {
             let mut top = 0;
             for op in &self.ops[one.ops.clone()] {
                 if let Op::Part(i) = op {
-                    stack[top] = spans[*i as usize].at(t);
+                    stack[top] = inside_any(self.spans_of(one, spans, *i), t);
                     top += 1;
                     continue;
                 }
@@ -188,7 +220,7 @@ impl<S: Float> Compounds<S> {
         })
     }
 
-    /// What is to be seen of the surface between the distances `before` and `after`.
+    /// Visible change of the surface between the distances `before` and `after`.
     fn change<L: SimdFloat<Scalar = S>>(
         &self,
         one: &SolidOperand<S>,
@@ -207,9 +239,13 @@ impl<S: Float> Compounds<S> {
             let mut top = 0;
             for op in &self.ops[one.ops.clone()] {
                 if let Op::Part(i) = op {
-                    let span = &spans[*i as usize];
-                    let (was, is) = (span.at(before), span.at(after));
-                    let t = L::select(is, span.enter, span.leave);
+                    let spans = self.spans_of(one, spans, *i);
+                    let (was, is) = (inside_any(spans, before), inside_any(spans, after));
+                    let mut t = spans[0].leave;
+                    for span in spans {
+                        t = L::select(span.at(before).and_not(is), span.leave, t);
+                        t = L::select(span.at(after), span.enter, t);
+                    }
                     let tag = L::from_id(base + one.parts.start as u32 + i);
                     stack[top] = Transition { before: was, after: is, t, tag };
                     top += 1;
@@ -250,22 +286,23 @@ impl<S: Float> Compounds<S> {
         let parts = &self.parts[one.parts.clone()];
         let outside = Interval { enter: never, leave: always };
         let end = Event { t: never, tie: L::zero() };
-        with_scratch(parts.len(), outside, |spans| {
-            with_scratch(2 * parts.len(), end, |ends| {
+        with_scratch(one.spans, outside, |spans| {
+            with_scratch(2 * one.spans, end, |ends| {
                 let tie =
                     ray.origin.max_abs().max(L::splat(one.reach)) * L::from_f64(TIE * L::EPSILON);
                 let mut count = 0;
-                for (span, part) in spans.iter_mut().zip(parts) {
-                    let found = each!(&part.solid, solid => solid.span(ray));
-                    let Some(found) = found else { continue };
-                    *span = Interval {
-                        enter: L::select(found.meets, found.enter, never),
-                        leave: L::select(found.meets, found.leave, always),
-                    };
-                    for end in events(&found, tie) {
-                        insert(end, ends, count);
-                        count += 1;
-                    }
+                for part in parts {
+                    let slots = &mut spans[part.spans.clone()];
+                    each!(&part.solid, solid => for (span, found) in slots.iter_mut().zip(solid.spans(ray)) {
+                        *span = Interval {
+                            enter: L::select(found.meets, found.enter, never),
+                            leave: L::select(found.meets, found.leave, always),
+                        };
+                        for end in events(&found, tie) {
+                            insert(end, ends, count);
+                            count += 1;
+                        }
+                    });
                 }
                 self.sweep_events(one, (&*spans, &ends[..count]), base, near, hit);
             });
@@ -331,7 +368,7 @@ impl<S: Float> Compounds<S> {
         }
     }
 
-    /// Where a surface of the compounds that begin in `range` lies at a distance in (0, limit) of the
+    /// Lanes with a surface of the compounds that begin in `range` at a distance in (0, limit) of the
     /// ray, of the lanes in `wanted`.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
@@ -366,4 +403,20 @@ impl<S: Float> Compounds<S> {
         let normal = if part.reversed { -surface.normal } else { surface.normal };
         SurfacePoint { normal, ..surface }
     }
+
+    /// Texture coordinates that a part has of its own at `point`; `None` if it has none.
+    pub fn uv<L: SimdFloat<Scalar = S>>(
+        &self,
+        part: usize,
+        point: Vec3<L>,
+    ) -> Option<UvGradients<L>> {
+        each!(&self.parts[part].solid, solid => solid.uv(point))
+    }
+}
+
+/// Lanes whose point at distance `t` lies in any of `spans`.
+#[inline(always)]
+fn inside_any<L: SimdFloat>(spans: &[Interval<L>], t: L) -> L::Mask {
+    let [first, others @ ..] = spans else { return L::mask(false) };
+    others.iter().fold(first.at(t), |inside, span| inside | span.at(t))
 }

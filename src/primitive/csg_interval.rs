@@ -1,10 +1,10 @@
-//! What compounds are computed with: spans' ends in order, parts of lines inside, and what changes
+//! Interval algebra of compounds: spans' ends in order, parts of lines inside, and what changes
 //! from one to the next.
 
 use crate::lanes::SimdFloat;
 use crate::primitive::solid::Span;
 
-/// The least cosine that a tie is widened for: what a line meets flatter than that is not told apart.
+/// Least cosine that a tie is widened for: surfaces that a line hits flatter than that are not distinguished.
 const FLATTEST: f64 = 1e-9;
 
 /// The end of a span: its distance, and how near another end must be to happen at once.
@@ -28,12 +28,12 @@ impl<L: SimdFloat> Interval<L> {
     }
 }
 
-/// What happens to a part of the tree at a surface.
+/// Change of a part of the tree at a surface.
 #[derive(Clone, Copy)]
 pub struct Transition<L: SimdFloat> {
     pub before: L::Mask,
     pub after: L::Mask,
-    /// Where, and which part is to be seen; if nothing changes it means nothing.
+    /// Distance and part that is visible there; meaningless if nothing changes.
     pub t: L,
     pub tag: L,
 }

@@ -1,9 +1,13 @@
 //! Compound solids as what they are computed from: parts and how they are combined.
 
-use crate::primitive::Form;
+use crate::primitive::bounding::BoundingSphere;
+use crate::primitive::canonical::{
+    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, extent_of_box, sphere_around_box,
+};
+use crate::primitive::form::{Form, cast_compiled};
 use glam::{DAffine3, DVec3};
 
-/// How parts are combined.
+/// Combination of parts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CsgTree {
     /// A part, by its position in [`CsgSolid::parts`].
@@ -32,27 +36,85 @@ impl CsgTree {
 /// A solid made of solids.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CsgSolid {
-    /// Convex solids: `Sphere`, `Ellipsoid`, `Convex`, `Tapered`, and `Plane` for the half-space
+    /// Solids: `Sphere`, `Ellipsoid`, `ConvexPolyhedron`, `ConicalFrustum`, `Torus`, and `Plane` for the half-space
     /// behind it.
     pub parts: Vec<Form>,
     /// Every part occurs once, in order.
     pub tree: CsgTree,
 }
 
-impl CsgSolid {
-    /// After the invertible affine map `map`.
-    pub(crate) fn transformed(self, map: &DAffine3) -> Self {
+impl CanonicalShape for CsgSolid {
+    const NOUN: (&'static str, &'static str) = ("compound", "compounds");
+
+    fn transformed(self, map: &DAffine3) -> Form {
         let parts = self.parts.into_iter().map(|p| p.transformed(map)).collect();
-        Self { parts, tree: self.tree }
+        Self { parts, tree: self.tree }.into()
     }
 
-    /// Corners of an axis-parallel box around it; `None` if it has no end as far as the boxes of its
-    /// parts tell.
-    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+    fn parts(&self) -> usize {
+        self.parts.len()
+    }
+
+    fn bounds(&self) -> Option<Bounds> {
         self.bounds_of(&self.tree)
     }
 
-    fn bounds_of(&self, tree: &CsgTree) -> Option<(DVec3, DVec3)> {
+    fn bounding_sphere(&self) -> BoundingSphere {
+        sphere_around_box(self.bounds())
+    }
+
+    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
+        None
+    }
+
+    fn plane(&self) -> Option<HalfSpace> {
+        None
+    }
+
+    fn is_convex(&self) -> bool {
+        false
+    }
+
+    fn thickness(&self) -> f64 {
+        self.parts.iter().map(Form::thickness).fold(f64::INFINITY, f64::min)
+    }
+
+    fn clearance(&self, point: DVec3) -> Option<f64> {
+        self.parts.iter().filter_map(|part| part.clearance(point)).reduce(f64::min)
+    }
+
+    fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
+        self.parts.iter().flat_map(|part| part.normals_at(point, slack)).collect()
+    }
+
+    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        cast_compiled(self.clone().into(), origin, direction)
+    }
+
+    fn default_mapping(&self) -> DefaultMapping {
+        DefaultMapping::Box
+    }
+
+    /// Those of the parts.
+    fn proxies(&self) -> Vec<Proxy> {
+        self.parts.iter().flat_map(Form::proxies).collect()
+    }
+
+    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
+        extent_of_box(self.bounds(), axis)
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        Vec::new()
+    }
+
+    fn triangles(&self) -> usize {
+        0
+    }
+}
+
+impl CsgSolid {
+    fn bounds_of(&self, tree: &CsgTree) -> Option<Bounds> {
         match tree {
             CsgTree::Part(i) => self.parts[*i].bounds(),
             CsgTree::Union(list) => {

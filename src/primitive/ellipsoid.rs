@@ -3,10 +3,138 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
+use crate::primitive::bounding::BoundingSphere;
+use crate::primitive::canonical::{
+    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, box_distance, extent_of_box,
+    normals_of_solid,
+};
 use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
-use crate::primitive::sphere::intersections;
-use glam::DMat3;
+use crate::primitive::sphere::{cast_at_unit_sphere, intersections};
+use glam::{DAffine3, DMat3, DVec3};
+
+/// The image of the unit sphere at the origin under an invertible affine map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EllipsoidForm {
+    /// From the unit sphere's space to the scene's.
+    pub scene_from_unit: DAffine3,
+}
+
+impl CanonicalShape for EllipsoidForm {
+    const NOUN: (&'static str, &'static str) = ("ellipsoid", "ellipsoids");
+
+    fn transformed(self, map: &DAffine3) -> Form {
+        Self { scene_from_unit: *map * self.scene_from_unit }.into()
+    }
+
+    fn parts(&self) -> usize {
+        1
+    }
+
+    fn bounds(&self) -> Option<Bounds> {
+        // Half-widths of the image of the unit sphere: the lengths of the matrix's rows.
+        let m = &self.scene_from_unit;
+        let rows = m.matrix3.transpose();
+        let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+        Some((m.translation - half, m.translation + half))
+    }
+
+    fn bounding_sphere(&self) -> BoundingSphere {
+        let map = &self.scene_from_unit;
+        let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis]
+            .map(|a| a.length_squared());
+        // The largest singular value is at most the root of the sum of squares.
+        BoundingSphere { center: map.translation, radius: (x + y + z).sqrt() }
+    }
+
+    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
+        Some((self.scene_from_unit, (DVec3::NEG_ONE, DVec3::ONE)))
+    }
+
+    fn plane(&self) -> Option<HalfSpace> {
+        None
+    }
+
+    fn is_convex(&self) -> bool {
+        true
+    }
+
+    fn thickness(&self) -> f64 {
+        self.bounds().map_or(f64::INFINITY, |(low, high)| (high - low).min_element())
+    }
+
+    fn clearance(&self, point: DVec3) -> Option<f64> {
+        let away = box_distance(self.bounds()?, point);
+        Some(if away > 0.0 { away } else { surface_distance(&self.scene_from_unit, point) })
+    }
+
+    fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
+        let unit_from_scene = self.scene_from_unit.inverse();
+        let on_unit = unit_from_scene.transform_point3(point);
+        let distance = on_unit.length();
+        let steepness = unit_from_scene.matrix3.transpose() * (on_unit / distance);
+        let height = (distance - 1.0) / steepness.length();
+        normals_of_solid(vec![(height, steepness.normalize())], slack)
+    }
+
+    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        let unit_from_scene = self.scene_from_unit.inverse();
+        cast_at_unit_sphere(
+            unit_from_scene.transform_point3(origin),
+            unit_from_scene.transform_vector3(direction),
+        )
+    }
+
+    fn default_mapping(&self) -> DefaultMapping {
+        DefaultMapping::Spherical
+    }
+
+    fn proxies(&self) -> Vec<Proxy> {
+        self.bounds().map(Proxy::around).into_iter().collect()
+    }
+
+    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
+        extent_of_box(self.bounds(), axis)
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        Vec::new()
+    }
+
+    fn triangles(&self) -> usize {
+        0
+    }
+}
+
+/// Distance of `point` from the image of the unit sphere. With Q = (M M^T)^-1 and p from the centre, the nearest point q of
+/// q^T Q q = 1 is (I + l Q)^-1 p for the only l at which it lies there and I + l Q is positive definite: q^T Q q
+/// falls with l. (Eberly 2013, *Distance from a Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid*.)
+fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
+    let inverse = scene_from_unit.matrix3.inverse();
+    let q = inverse.transpose() * inverse;
+    let size = q.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+    // In the middle several points are the nearest; a little aside one of them is.
+    let aside = DVec3::new(0.6, 0.5, 0.7) * (1e-8 / size.sqrt());
+    let p = point - scene_from_unit.translation + aside;
+    // The smallest half-axis is at least 1 / sqrt(size) and at most 3^(1/4) times that.
+    let (mut low, mut high) = (-1.8 / size, 0.25 * p.length_squared() + 1.0 / size);
+    let mut nearest = p;
+    for _ in 0..160 {
+        let middle = 0.5 * (low + high);
+        let matrix = DMat3::IDENTITY + q * middle;
+        let [x, y, _] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+        let definite = x.x > 0.0 && x.x * y.y - x.y * y.x > 0.0 && matrix.determinant() > 0.0;
+        if definite {
+            nearest = matrix.inverse() * p;
+        }
+        if !definite || nearest.dot(q * nearest) > 1.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    nearest.distance(p)
+}
 
 /// One ellipsoid. Matrices by rows.
 #[derive(Clone, Copy)]
@@ -31,7 +159,7 @@ pub(crate) fn times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L
 impl<S: Float> Ellipsoid<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
-        let Form::Ellipsoid { scene_from_unit: m } = form else { return None };
+        let Form::Ellipsoid(EllipsoidForm { scene_from_unit: m }) = form else { return None };
         Some(Self {
             center: m.translation.to_array().map(S::from_f64),
             unit_from_scene: rows(m.matrix3.inverse()),
@@ -76,7 +204,9 @@ impl<L: SimdFloat> Primitive<L> for Ellipsoid<L::Scalar> {
 }
 
 impl<L: SimdFloat> SolidPrimitive<L> for Ellipsoid<L::Scalar> {
-    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+    type Spans = Option<Span<L>>;
+
+    fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let (enter, leave, meets) = chord(self, ray)?;
         let cosine = |t: L| self.surface(ray.at(t)).normal.dot(ray.direction).abs();
         let (enter_cosine, leave_cosine) = (cosine(enter), cosine(leave));

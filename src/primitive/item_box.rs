@@ -1,28 +1,28 @@
-//! What is asked before a thing is asked whether a ray meets it.
+//! Bounding boxes tested before a primitive's own intersection.
 
 use crate::bvh::Ray;
 use crate::bvh::packet::SlabPacket;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::form::Form;
 use crate::value::Choice;
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// How rays are kept from things that they cannot meet. No way changes a picture, only its time.
+/// Acceleration structure. Every choice renders the same image; only speed differs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Acceleration {
-    /// What has been measured to be fastest: a tree for many things, else for each part of the picture
-    /// the things that its rays may meet.
+    /// The fastest by measurement: a tree for many primitives, else for each part of the picture
+    /// the primitives that its rays may hit.
     #[default]
     Auto,
     /// Every ray meets everything.
     None,
-    /// Camera rays meet what stands on their part of the screen: each thing has a rectangle there.
+    /// Camera rays test the primitives on their part of the screen: each has a rectangle there.
     ScreenBounds,
-    /// Each thing has a box in its own space.
+    /// Each primitive has a box in its own space.
     Obb,
-    /// Each thing has a box in the scene's space.
+    /// Each primitive has a box in the scene's space.
     Aabb,
     /// A tree of boxes.
     Bvh,
@@ -69,7 +69,7 @@ impl Acceleration {
     }
 }
 
-/// A box around one thing.
+/// A box around one primitive.
 pub struct ItemBox<S> {
     low: [S; 3],
     high: [S; 3],
@@ -83,7 +83,7 @@ struct BoxFrame<S> {
     rows: [[S; 3]; 3],
     /// For each row the sum of its magnitudes: coordinates grow by so much at most.
     growth: [S; 3],
-    /// Largest magnitude of a coordinate of the thing in the scene.
+    /// Largest magnitude of a coordinate of the primitive in the scene.
     reach: S,
 }
 
@@ -95,12 +95,12 @@ pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
     [low - pad, high + pad]
 }
 
-/// What faces and corners of one solid may differ by, as a part of its extent: in a scene far from the
+/// Difference between faces and corners of one solid at most, as a part of its extent: in a scene far from the
 /// origin of its file both were rounded to what double precision has there.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> ItemBox<S> {
-    /// Of a form, in its own space if `own` and if it has one; `None`: it has no end.
+    /// Creates the box of a form, in its own space if `own` and if it has one; `None`: it has no end.
     pub fn new(form: &Form, own: bool) -> Option<Self> {
         let bounds = form.bounds()?;
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
@@ -108,7 +108,7 @@ impl<S: Float> ItemBox<S> {
             let [low, high] = padded(bounds, S::EPSILON.max(GIVEN)).map(vector);
             Self { low, high, space }
         };
-        let Some((scene_from_own, (low, high))) = form.own_box().filter(|_| own) else {
+        let Some((scene_from_own, (low, high))) = form.oriented_box().filter(|_| own) else {
             return Some(made(bounds, None));
         };
         let rows = scene_from_own.matrix3.inverse().transpose();
@@ -123,7 +123,7 @@ impl<S: Float> ItemBox<S> {
         Some(made((low - middle, high - middle), Some(space)))
     }
 
-    /// Which rays may meet the thing no farther than `limit`.
+    /// Rays that may hit the primitive no farther than `limit`.
     #[inline(always)]
     pub fn meets<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L) -> L::Mask {
         let far = ray.origin.max_abs();
@@ -134,7 +134,7 @@ impl<S: Float> ItemBox<S> {
             }
             Some(space) => {
                 // What origin, direction and centre lose on their way into the space, at most, by the
-                // time the ray has come to the thing.
+                // time the ray has come to the primitive.
                 let lost = (far + L::splat(space.reach)) * L::from_f64(64.0 * L::EPSILON);
                 let rows = space.rows.map(Vec3::splat);
                 let of = |v: Vec3<L>| Vec3::new(rows[0].dot(v), rows[1].dot(v), rows[2].dot(v));
@@ -146,25 +146,5 @@ impl<S: Float> ItemBox<S> {
             }
         };
         beam.enters(Vec3::splat(self.low), Vec3::splat(self.high), limit)
-    }
-}
-
-impl Form {
-    /// The space in which a form was described, and a box around it there, if it still has one: those
-    /// that keep their map do.
-    fn own_box(&self) -> Option<(DAffine3, (DVec3, DVec3))> {
-        match self {
-            Self::Ellipsoid { scene_from_unit } => {
-                Some((*scene_from_unit, (DVec3::NEG_ONE, DVec3::ONE)))
-            }
-            Self::ConicalFrustum { scene_from_unit, .. } => {
-                Some((*scene_from_unit, (DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE)))
-            }
-            Self::Mesh { mesh, scene_from_mesh, .. } => {
-                let [low, high] = mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
-                Some((*scene_from_mesh, (low, high)))
-            }
-            _ => None,
-        }
     }
 }

@@ -3,16 +3,211 @@
 //! Coordinates of a mesh are in single precision whatever the lanes; all computation is in the lanes'.
 
 use crate::asset;
-use crate::bvh::{Hit, Ray};
+use crate::bvh::{Hit, LEAF_FLAG, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::batch::{SurfacePoint, UvGradients, max_coordinate};
-use crate::primitive::form::Form;
+use crate::primitive::bounding::BoundingSphere;
+use crate::primitive::canonical::{
+    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, box_distance, extent_of_box,
+    segment_distance, sphere_around_box,
+};
+use crate::primitive::form::{Form, cast_compiled};
 use crate::primitive::item_box::ItemBox;
 use crate::primitive::keep_visible;
 use crate::primitive::triangle_mesh;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use std::ops::Range;
 use std::sync::Arc;
+
+/// Ratio of the extent of a mesh to that of its details, as assumed for the choice of the precision.
+const EXTENT_PER_DETAIL: f64 = 64.0;
+
+/// The image of a mesh under an invertible affine map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshForm {
+    /// The triangles.
+    pub mesh: Arc<asset::Mesh>,
+    /// From the space of the mesh's coordinates to the scene's.
+    pub scene_from_mesh: DAffine3,
+    /// Light sees normals interpolated between vertices, not the triangles' own.
+    pub smooth: bool,
+}
+
+impl CanonicalShape for MeshForm {
+    const NOUN: (&'static str, &'static str) = ("mesh", "meshes");
+
+    fn transformed(self, map: &DAffine3) -> Form {
+        Self { scene_from_mesh: *map * self.scene_from_mesh, ..self }.into()
+    }
+
+    fn parts(&self) -> usize {
+        1
+    }
+
+    fn bounds(&self) -> Option<Bounds> {
+        let m = &self.scene_from_mesh;
+        let rows = m.matrix3.transpose();
+        let rows = [rows.x_axis, rows.y_axis, rows.z_axis].map(|r| r.to_array());
+        let high = rows.map(|r| self.mesh.support(r));
+        let low = rows.map(|r| -self.mesh.support(r.map(|x| -x)));
+        Some((m.translation + DVec3::from(low), m.translation + DVec3::from(high)))
+    }
+
+    fn bounding_sphere(&self) -> BoundingSphere {
+        sphere_around_box(self.bounds())
+    }
+
+    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
+        let [low, high] = self.mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
+        Some((self.scene_from_mesh, (low, high)))
+    }
+
+    fn plane(&self) -> Option<HalfSpace> {
+        None
+    }
+
+    fn is_convex(&self) -> bool {
+        false
+    }
+
+    fn thickness(&self) -> f64 {
+        let [low, high] = self.mesh.mesh().bounds.map(|corner| DVec3::from(corner.map(f64::from)));
+        let m = self.scene_from_mesh.matrix3;
+        let stretched = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
+        let size = ((high - low) * DVec3::from(stretched)).to_array();
+        let longest = size.into_iter().fold(0.0, f64::max);
+        // Needles and thin sheets; what is flat altogether has no inside.
+        let thinnest = size.into_iter().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
+        thinnest.min(longest / EXTENT_PER_DETAIL)
+    }
+
+    fn clearance(&self, point: DVec3) -> Option<f64> {
+        let away = box_distance(self.bounds()?, point);
+        let inside = || surface_distance(&self.mesh, &self.scene_from_mesh, point);
+        Some(if away > 0.0 { away } else { inside() })
+    }
+
+    fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
+        let Some((low, high)) = self.bounds() else { return Vec::new() };
+        if point.cmplt(low - slack).any() || point.cmpgt(high + slack).any() {
+            return Vec::new();
+        }
+        let mesh = self.mesh.mesh();
+        let corner = |i: u32| {
+            let position = mesh.positions[i as usize].map(f64::from);
+            self.scene_from_mesh.transform_point3(DVec3::from(position))
+        };
+        let mut normals: Vec<DVec3> = Vec::new();
+        for triangle in &mesh.triangles {
+            let Some(normal) = normal_of_triangle(triangle.map(corner), point, slack) else {
+                continue;
+            };
+            if normals.iter().all(|known| known.distance(normal) > 1e-3) {
+                normals.push(normal);
+            }
+        }
+        if normals.is_empty() { Vec::new() } else { vec![normals] }
+    }
+
+    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        cast_compiled(self.clone().into(), origin, direction)
+    }
+
+    fn default_mapping(&self) -> DefaultMapping {
+        match self.mesh.mesh().uvs {
+            Some(_) => DefaultMapping::Uv,
+            None => DefaultMapping::Box,
+        }
+    }
+
+    /// None: the faces are triangles, whose corners are in single precision.
+    fn proxies(&self) -> Vec<Proxy> {
+        Vec::new()
+    }
+
+    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
+        extent_of_box(self.bounds(), axis)
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        Vec::new()
+    }
+
+    fn triangles(&self) -> usize {
+        self.mesh.mesh().triangles.len()
+    }
+}
+
+/// The unit normal of a triangle that passes `point` within `slack`.
+fn normal_of_triangle([a, b, c]: [DVec3; 3], point: DVec3, slack: f64) -> Option<DVec3> {
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    if normal.dot(point - a).abs() > slack {
+        return None;
+    }
+    // Beyond an edge by no more than the slack.
+    let inside = [(a, b), (b, c), (c, a)].into_iter().all(|(from, to)| {
+        let inward = normal.cross(to - from);
+        inward.dot(point - from) >= -slack * inward.length()
+    });
+    inside.then_some(normal)
+}
+
+fn triangle_distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
+    let (u, v, to) = (b - a, c - a, point - a);
+    let normal = u.cross(v);
+    let size2 = normal.length_squared();
+    let (s, t) = (to.cross(v).dot(normal) / size2, u.cross(to).dot(normal) / size2);
+    if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
+        return normal.dot(to).abs() / size2.sqrt();
+    }
+    [[a, b], [b, c], [c, a]]
+        .map(|edge| segment_distance(edge, point))
+        .into_iter()
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// Distance of `point` from the nearest triangle.
+fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
+    let inverse = scene_from_mesh.inverse();
+    let inside = inverse.transform_point3(point);
+    // Lengths in the scene are at least those in the mesh's space times this.
+    let columns = inverse.matrix3.to_cols_array();
+    let shrinks = columns.iter().map(|x| x * x).sum::<f64>().sqrt().recip();
+    let mut least = f64::INFINITY;
+    let mut todo = vec![(0u32, 0.0)];
+    while let Some((branch, bound)) = todo.pop() {
+        if bound >= least {
+            continue;
+        }
+        let branch = &mesh.boxes().nodes()[branch as usize];
+        let first = todo.len();
+        for i in branch.children() {
+            let corner =
+                |from: usize| DVec3::from([0, 1, 2].map(|a| f64::from(branch.bounds[a + from][i])));
+            let away = (corner(0) - inside).max(inside - corner(3)).max(DVec3::ZERO).length();
+            let bound = away * shrinks;
+            if bound >= least {
+                continue;
+            }
+            if branch.child[i] & LEAF_FLAG == 0 {
+                todo.push((branch.child[i], bound));
+                continue;
+            }
+            let leaf = &mesh.leaves()[(branch.child[i] & !LEAF_FLAG) as usize];
+            for place in 0..leaf.corners[0][0].len() {
+                let corners = leaf.corners.map(|corner| {
+                    scene_from_mesh
+                        .transform_point3(DVec3::from(corner.map(|axis| f64::from(axis[place]))))
+                });
+                // Places without a triangle hold NaN.
+                least = least.min(triangle_distance(corners, point));
+            }
+        }
+        // The nearest box last, to be looked at first.
+        todo[first..].sort_by(|a, b| b.1.total_cmp(&a.1));
+    }
+    least
+}
 
 /// One mesh in its place.
 struct MeshInstance<S> {
@@ -41,7 +236,7 @@ struct Triangle<L> {
 
 impl<S: Float> MeshInstance<S> {
     fn new(form: &Form) -> Option<Self> {
-        let Form::Mesh { mesh, scene_from_mesh, smooth } = form else { return None };
+        let Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth }) = form else { return None };
         let [low, high] = mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
         let middle = (0.5 * (low + high)).as_vec3().as_dvec3();
         let inverse = scene_from_mesh.matrix3.inverse();
@@ -175,7 +370,7 @@ impl<S: Float> Meshes<S> {
             }
             let (inner, length) = item.ray(ray);
             // Beyond by what the way into the mesh's space and back rounds off: what is known decides only
-            // here below, in the scene's distances, so that the order of things does not matter.
+            // here below, in the scene's distances, so that the order of primitives does not matter.
             let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
             let limit = L::select(near, limit, L::from_f64(-1.0));
             let found = triangle_mesh::closest(&item.mesh, &inner, limit);
@@ -186,7 +381,7 @@ impl<S: Float> Meshes<S> {
         }
     }
 
-    /// Which of the `wanted` lanes meet one of the meshes in `range` at a distance in (0, limit).
+    /// Lanes of `wanted` that hit one of the meshes in `range` at a distance in (0, limit).
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
@@ -293,13 +488,30 @@ impl<S: Float> Meshes<S> {
         }))
     }
 
-    /// Whether light sees anything but the triangles' own normals.
+    /// Returns `true` if light sees any normals but the triangles' own.
     pub fn is_smooth(&self) -> bool {
         self.items.iter().any(|item| item.smooth)
     }
 
-    /// Whether a file names colours.
+    /// Returns `true` if a file names colours.
     pub fn is_colored(&self) -> bool {
         self.items.iter().any(|item| item.mesh.mesh().color(0).is_some())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangle_distance_to_face_edge_and_corner() {
+        let point = DVec3::new(0.3, 0.2, 0.1);
+        let [a, b, c] = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        assert!((triangle_distance([a, b, c], point) - 0.1).abs() < 1e-15);
+        assert!(
+            (triangle_distance([a, b, c], DVec3::new(1.0, 1.0, 0.0)) - 0.5f64.sqrt()).abs() < 1e-15
+        );
+        assert!((triangle_distance([a, b, c], DVec3::new(-1.0, 0.0, 0.0)) - 1.0).abs() < 1e-15);
+        assert!((triangle_distance([a, b, c], DVec3::new(0.5, -2.0, 0.0)) - 2.0).abs() < 1e-15);
     }
 }

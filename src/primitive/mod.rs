@@ -1,8 +1,9 @@
-//! Primitives: what rays intersect. One kind a file, with its bounds and its intersection.
+//! Primitives that rays intersect. Each has one file with its canonical form, its compiled kernel and its tests.
 
 mod aggregate;
 pub(crate) mod batch;
 mod bounding;
+mod canonical;
 pub(crate) mod conical_frustum;
 pub(crate) mod convex_polyhedron;
 pub(crate) mod csg;
@@ -12,19 +13,30 @@ pub(crate) mod ellipsoid;
 pub(crate) mod form;
 pub(crate) mod item_box;
 pub(crate) mod mesh_instance;
-pub(crate) mod normals_at;
-pub(crate) mod planar;
-mod ray_query;
+mod parallelogram;
+mod plane;
 mod scene_bvh;
 mod shading_normal;
 pub(crate) mod solid;
 pub(crate) mod sphere;
+mod torus;
 pub mod triangle_mesh;
 
 pub use aggregate::{Aggregate, BVH_MIN_PRIMITIVES, PrimitiveSet};
 pub use batch::{PrimitiveId, SurfacePoint, UvGradients};
 pub use bounding::{BoundingSphere, BoundingVolume, F32_RAY_ERROR, Frustum, LightTarget};
+pub use canonical::{
+    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, box_distance,
+};
+pub use conical_frustum::ConicalFrustumForm;
+pub use convex_polyhedron::ConvexPolyhedronForm;
 pub use csg_tree::{CsgSolid, CsgTree};
-pub use form::{Form, HalfSpace};
+pub use ellipsoid::EllipsoidForm;
+pub use form::Form;
 pub use item_box::Acceleration;
+pub use mesh_instance::MeshForm;
+pub use parallelogram::ParallelogramForm;
+pub use plane::PlaneForm;
 pub use shading_normal::keep_visible;
+pub use sphere::SphereForm;
+pub use torus::TorusForm;

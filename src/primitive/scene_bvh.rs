@@ -22,7 +22,7 @@ pub struct SceneBvh {
     boxes: Bvh8,
     /// For each leaf its item.
     items: Vec<u32>,
-    /// How much the rays of a packet that goes together differ at most for each lane, in direction and in
+    /// Largest difference for each lane between the rays of a packet that goes together, in direction and in
     /// origin.
     turn: f64,
     shift: f64,
@@ -84,7 +84,7 @@ impl SceneBvh {
         });
     }
 
-    /// Whether the wanted rays of a packet are worth going together.
+    /// Returns `true` if the wanted rays of a packet are worth going together.
     #[inline(always)]
     fn is_together<L: SimdFloat>(&self, ray: &Ray<L>, wanted: u32) -> bool {
         if L::WIDTH == 1 || wanted.count_ones() < 2 {

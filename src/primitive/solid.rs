@@ -1,10 +1,10 @@
-//! Where lines are inside convex solids: what compounds are computed from.
+//! Intervals of lines inside solids, from which compounds are computed.
 
 use crate::bvh::Ray;
 use crate::lanes::SimdFloat;
 use crate::primitive::batch::Primitive;
 
-/// The part of a packet's lines inside a convex solid.
+/// A part of a packet's lines inside a solid.
 #[derive(Clone, Copy, Debug)]
 pub struct Span<L: SimdFloat> {
     /// Distance at which the line enters; `-L::MAX`: it comes from inside.
@@ -15,12 +15,15 @@ pub struct Span<L: SimdFloat> {
     pub enter_cosine: L,
     /// The same where it leaves.
     pub leave_cosine: L,
-    /// The lines that have such a part; what is said of others means nothing.
+    /// Lines that have such a part; the other fields are meaningless for all others.
     pub meets: L::Mask,
 }
 
-/// A convex solid.
+/// A solid that compounds can be made of.
 pub trait SolidPrimitive<L: SimdFloat>: Primitive<L> {
-    /// Where lines are inside it; `None`: no line of the packet meets it.
-    fn span(&self, ray: &Ray<L>) -> Option<Span<L>>;
+    /// Spans of one packet of lines, in ascending order and without overlap.
+    type Spans: IntoIterator<Item = Span<L>>;
+
+    /// Parts of the lines inside the solid; none if no line of the packet hits it.
+    fn spans(&self, ray: &Ray<L>) -> Self::Spans;
 }

@@ -3,8 +3,114 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
+use crate::primitive::bounding::BoundingSphere;
+use crate::primitive::canonical::{
+    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, normals_of_solid,
+    similarity,
+};
+use crate::primitive::ellipsoid::EllipsoidForm;
 use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
+use glam::{DAffine3, DVec3};
+
+/// A sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SphereForm {
+    /// Centre.
+    pub center: DVec3,
+    /// Radius, greater than zero.
+    pub radius: f64,
+}
+
+impl CanonicalShape for SphereForm {
+    const NOUN: (&'static str, &'static str) = ("sphere", "spheres");
+
+    fn transformed(self, map: &DAffine3) -> Form {
+        let Self { center, radius } = self;
+        match similarity(&map.matrix3) {
+            Some(scale) => {
+                Self { center: map.transform_point3(center), radius: radius * scale }.into()
+            }
+            None => EllipsoidForm {
+                scene_from_unit: *map
+                    * DAffine3::from_translation(center)
+                    * DAffine3::from_scale(DVec3::splat(radius)),
+            }
+            .into(),
+        }
+    }
+
+    fn parts(&self) -> usize {
+        1
+    }
+
+    fn bounds(&self) -> Option<Bounds> {
+        Some((self.center - self.radius, self.center + self.radius))
+    }
+
+    fn bounding_sphere(&self) -> BoundingSphere {
+        BoundingSphere { center: self.center, radius: self.radius }
+    }
+
+    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
+        None
+    }
+
+    fn plane(&self) -> Option<HalfSpace> {
+        None
+    }
+
+    fn is_convex(&self) -> bool {
+        true
+    }
+
+    fn thickness(&self) -> f64 {
+        2.0 * self.radius
+    }
+
+    fn clearance(&self, point: DVec3) -> Option<f64> {
+        Some((point.distance(self.center) - self.radius).abs())
+    }
+
+    fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
+        let from_center = point - self.center;
+        let distance = from_center.length();
+        normals_of_solid(vec![(distance - self.radius, from_center / distance)], slack)
+    }
+
+    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        cast_at_unit_sphere((origin - self.center) / self.radius, direction / self.radius)
+    }
+
+    fn default_mapping(&self) -> DefaultMapping {
+        DefaultMapping::Spherical
+    }
+
+    fn proxies(&self) -> Vec<Proxy> {
+        vec![Proxy::new(vec![ProxyFace::Round(self.bounding_sphere())], self.bounds())]
+    }
+
+    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
+        let middle = axis.dot(self.center);
+        Some((middle - self.radius, middle + self.radius))
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        Vec::new()
+    }
+
+    fn triangles(&self) -> usize {
+        0
+    }
+}
+
+/// Smallest t > 0 with |o + t d| = 1.
+pub fn cast_at_unit_sphere(o: DVec3, d: DVec3) -> Option<f64> {
+    let (a, b, c) = (d.length_squared(), o.dot(d), o.length_squared() - 1.0);
+    let root = (b * b - a * c).sqrt();
+    // NaN (no crossing) compares false.
+    [(-b - root) / a, (-b + root) / a].into_iter().find(|t| *t > 0.0 && t.is_finite())
+}
 
 /// One sphere, rounded to the precision of the kernel.
 #[derive(Clone, Copy)]
@@ -18,7 +124,7 @@ pub struct Sphere<S> {
 impl<S: Float> Sphere<S> {
     /// `None`: the form is another.
     pub fn new(form: &Form) -> Option<Self> {
-        let Form::Sphere { center, radius } = form else { return None };
+        let Form::Sphere(SphereForm { center, radius }) = form else { return None };
         Some(Self {
             center: center.to_array().map(S::from_f64),
             radius: S::from_f64(*radius),
@@ -72,7 +178,9 @@ impl<L: SimdFloat> Primitive<L> for Sphere<L::Scalar> {
 }
 
 impl<L: SimdFloat> SolidPrimitive<L> for Sphere<L::Scalar> {
-    fn span(&self, ray: &Ray<L>) -> Option<Span<L>> {
+    type Spans = Option<Span<L>>;
+
+    fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let f = ray.origin - Vec3::splat(self.center);
         let (enter, leave, meets) = intersections(f, ray.direction, L::splat(self.radius2))?;
         // Half the chord over the radius.

@@ -55,7 +55,7 @@ impl<L: SimdFloat> ShearedRay<L> {
         Self { origin: ray.origin, frame: Frame::around(ray.direction) }
     }
 
-    /// Of each lane what describes its ray: origin and frame.
+    /// Ray of each lane: origin and frame.
     #[inline(always)]
     fn each(&self) -> [[[L::Scalar; 3]; 4]; MAX_WIDTH] {
         let Frame { t, b, n } = self.frame;
@@ -73,7 +73,7 @@ impl<L: SimdFloat> ShearedRay<L> {
         Self { origin, frame: Frame { t, b, n } }
     }
 
-    /// Where the ray meets a triangle, at a positive distance, on either side.
+    /// Hit of the ray with a triangle, at a positive distance, on either side.
     ///
     /// The corners are projected along the ray onto the plane through its origin. A corner has one
     /// projection, whichever triangle it belongs to, and the sign of each edge's area is that of the
@@ -236,7 +236,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     }
 }
 
-/// Whether the wanted rays of a packet are worth going together.
+/// Returns `true` if the wanted rays of a packet are worth going together.
 #[inline(always)]
 fn is_together<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     if L::WIDTH == 1 || wanted.count_ones() < 2 {
@@ -256,7 +256,7 @@ pub fn closest<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> TriangleHit
     MeshTraversal::<false> { mesh }.run(ray, limit)
 }
 
-/// Which lanes meet a triangle nearer than `limit`.
+/// Lanes that hit a triangle nearer than `limit`.
 #[inline(never)]
 pub fn occluded<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
     MeshTraversal::<true> { mesh }.run(ray, limit).t.lt(limit)

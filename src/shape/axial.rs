@@ -61,9 +61,11 @@ pub(super) fn height(base: [f64; 3], top: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::primitive::ConicalFrustumForm;
 
     fn ends(form: &Form) -> (DVec3, DVec3, f64) {
-        let Form::ConicalFrustum { scene_from_unit: m, top_radius: top } = form else {
+        let Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit: m, top_radius: top }) = form
+        else {
             panic!("{form:?}")
         };
         (m.translation, m.translation + m.matrix3.z_axis, *top)
@@ -91,7 +93,9 @@ mod tests {
             assert!((low - DVec3::new(1.0 - r, -r, 0.0)).length() < 1e-15, "{s}: {low}");
             assert!((high - DVec3::new(1.0 + r, r, 1.0)).length() < 1e-15, "{s}: {high}");
             // The image of a rim point at z = 1 is at distance `s` from the axis.
-            let Form::ConicalFrustum { scene_from_unit: m, top_radius: top } = form else {
+            let Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit: m, top_radius: top }) =
+                form
+            else {
                 panic!("{form:?}")
             };
             let at_one = if s > 1.0 { DVec3::X } else { DVec3::new(top, 0.0, 1.0) };

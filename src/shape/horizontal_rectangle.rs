@@ -1,6 +1,6 @@
 //! Platform: a horizontal rectangle, such as the ground.
 
-use crate::primitive::Form;
+use crate::primitive::{Form, ParallelogramForm};
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::on_plane;
 use crate::value::{Description, ValidationError, description};
@@ -22,11 +22,11 @@ impl ShapeDesc for HorizontalRectangle {
 
     fn form(&self) -> Form {
         let [x, z] = self.size;
-        Form::Parallelogram {
+        Form::Parallelogram(ParallelogramForm {
             corner: DVec3::from_array(self.center) - DVec3::new(x, 0.0, z) / 2.0,
             u: DVec3::new(0.0, 0.0, z),
             v: DVec3::new(x, 0.0, 0.0),
-        }
+        })
     }
 
     fn faults(&self) -> Vec<ValidationError> {

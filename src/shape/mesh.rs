@@ -1,7 +1,7 @@
 //! Triangle meshes from files.
 
 use crate::asset::{AssetError, Mesh, TriangleMesh};
-use crate::primitive::Form;
+use crate::primitive::{Form, MeshForm};
 use crate::shape::{Shape, ShapeDesc};
 use crate::value::{ValidationError, choices, description};
 use glam::{DAffine3, DVec3};
@@ -93,11 +93,11 @@ impl ShapeDesc for MeshDesc {
 
     fn form(&self) -> Form {
         let mesh = self.mesh().clone();
-        Form::Mesh {
+        Form::Mesh(MeshForm {
             scene_from_mesh: DAffine3::from_translation(mesh.mesh().center.into()),
             smooth: self.normals == Normals::Smooth,
             mesh,
-        }
+        })
     }
 
     fn faults(&self) -> Vec<ValidationError> {

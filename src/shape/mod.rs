@@ -17,9 +17,11 @@ mod registry;
 mod sphere;
 mod tapered_cylinder;
 mod texture_space;
+mod torus;
 mod transform;
 mod unit_frustum;
 
+pub use crate::primitive::DefaultMapping;
 pub use cone::Cone;
 pub use csg::{CsgOperand, Difference, Intersection, MAX_DEPTH, Union};
 pub use cube::Cube;
@@ -34,7 +36,8 @@ pub use rectangle::Rectangle;
 pub use registry::{EXAMPLES, KINDS, Shape, ShapeDesc};
 pub use sphere::Sphere;
 pub use tapered_cylinder::TaperedCylinder;
-pub use texture_space::{DefaultMapping, TextureSpace};
+pub use texture_space::TextureSpace;
+pub use torus::Torus;
 pub use transform::{Rotate, Scale, TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
 pub use unit_frustum::UnitFrustum;
 

@@ -1,6 +1,6 @@
-//! Tests of `primitive/normals_at.rs` with every shape.
+//! Tests of `Form::normals_at` with every shape.
 
-use crate::primitive::normals_at::AROUND_TIP;
+use crate::primitive::conical_frustum::AROUND_TIP;
 use crate::shape::{EXAMPLES, Shape};
 use glam::DVec3;
 

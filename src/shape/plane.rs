@@ -1,6 +1,6 @@
 //! Infinite plane.
 
-use crate::primitive::Form;
+use crate::primitive::{Form, PlaneForm};
 use crate::shape::ShapeDesc;
 use crate::shape::texture_space::on_plane;
 use crate::value::{description, turned, unit};
@@ -22,7 +22,7 @@ impl ShapeDesc for Plane {
 
     fn form(&self) -> Form {
         let normal = unit(self.normal).unwrap_or(DVec3::Y);
-        Form::Plane { normal, offset: normal.dot(DVec3::from_array(self.point)) }
+        Form::Plane(PlaneForm { normal, offset: normal.dot(DVec3::from_array(self.point)) })
     }
 
     /// Creates the horizontal plane through `base`.
@@ -41,7 +41,7 @@ impl ShapeDesc for Plane {
 
     fn texture_axes(&self) -> DMat3 {
         match self.form() {
-            Form::Plane { normal, .. } => on_plane(normal),
+            Form::Plane(PlaneForm { normal, .. }) => on_plane(normal),
             _ => DMat3::IDENTITY,
         }
     }

@@ -1,6 +1,6 @@
 //! Polygonal prisms and frusta on a horizontal base: shared code of cube, box, pyramid and prism.
 
-use crate::primitive::{Form, HalfSpace};
+use crate::primitive::{ConvexPolyhedronForm, Form, HalfSpace};
 use crate::value::{round_nice, sin_cos_degrees};
 use glam::{DVec2, DVec3};
 
@@ -51,7 +51,7 @@ pub(super) fn prismoid(
         let normal = DVec3::new(outward.x, up, outward.y).normalize();
         faces.push(through(corners[i], normal));
     }
-    Form::ConvexPolyhedron { faces, corners }
+    Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners })
 }
 
 /// Returns the corner of a base `width` wide and `depth` deep around `base`, half of both away towards
@@ -63,13 +63,13 @@ pub(super) fn corner_of_centered(base: DVec3, width: f64, depth: f64) -> [f64; 3
 
 #[cfg(test)]
 mod tests {
-    use crate::primitive::{Form, HalfSpace};
+    use crate::primitive::{ConvexPolyhedronForm, Form, HalfSpace};
     use crate::shape::{Cube, Cuboid, Prism, Pyramid, ShapeDesc};
     use glam::DVec3;
 
     fn parts(form: Form) -> (Vec<HalfSpace>, Vec<DVec3>) {
         match form {
-            Form::ConvexPolyhedron { faces, corners } => (faces, corners),
+            Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners }) => (faces, corners),
             other => panic!("{other:?}"),
         }
     }

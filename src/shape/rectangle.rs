@@ -1,6 +1,6 @@
 //! Rectangle in any orientation, such as a flat mirror.
 
-use crate::primitive::Form;
+use crate::primitive::{Form, ParallelogramForm};
 use crate::shape::ShapeDesc;
 use crate::value::{Description, ValidationError, description, turned, unit};
 use glam::{DMat3, DVec3};
@@ -44,7 +44,11 @@ impl ShapeDesc for Rectangle {
     fn form(&self) -> Form {
         let [right, up, _] = self.frame().unwrap_or([DVec3::X, DVec3::Y, DVec3::Z]);
         let (u, v) = (right * self.size[0], up * self.size[1]);
-        Form::Parallelogram { corner: DVec3::from_array(self.center) - (u + v) / 2.0, u, v }
+        Form::Parallelogram(ParallelogramForm {
+            corner: DVec3::from_array(self.center) - (u + v) / 2.0,
+            u,
+            v,
+        })
     }
 
     fn faults(&self) -> Vec<ValidationError> {
@@ -93,7 +97,7 @@ mod tests {
 
     fn sides(form: Form) -> (DVec3, DVec3, DVec3) {
         match form {
-            Form::Parallelogram { corner, u, v } => (corner, u, v),
+            Form::Parallelogram(ParallelogramForm { corner, u, v }) => (corner, u, v),
             other => panic!("{other:?}"),
         }
     }

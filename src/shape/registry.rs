@@ -6,7 +6,7 @@ use crate::shape::{
     Cone, Cube, Cuboid, Cylinder, Difference, HorizontalRectangle, Intersection, MeshDesc, Plane,
     Prism, Pyramid,
 };
-use crate::shape::{Rectangle, Sphere, TaperedCylinder, Union, UnitFrustum};
+use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, Union, UnitFrustum};
 use crate::value::{Description, Field, FieldValue, ValidationError, ValueType, rounded_to};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
@@ -151,6 +151,7 @@ kinds! {
     "cone" => Cone,
     "tapered_cylinder" => TaperedCylinder,
     "unit_frustum" => UnitFrustum,
+    "torus" => Torus,
     "platform" => HorizontalRectangle,
     "rectangle" => Rectangle,
     "plane" => Plane,

@@ -1,6 +1,6 @@
 //! Sphere: the points at distance `radius` from `center`.
 
-use crate::primitive::Form;
+use crate::primitive::{Form, SphereForm};
 use crate::shape::ShapeDesc;
 use crate::value::{Description, ValidationError, description, round_nice};
 use glam::DVec3;
@@ -19,7 +19,7 @@ impl ShapeDesc for Sphere {
     const EXAMPLE: &'static str = "shape.sphere = { center = [0.0, 1.0, 0.0], radius = 1.0 }";
 
     fn form(&self) -> Form {
-        Form::Sphere { center: DVec3::from_array(self.center), radius: self.radius }
+        Form::Sphere(SphereForm { center: DVec3::from_array(self.center), radius: self.radius })
     }
 
     fn faults(&self) -> Vec<ValidationError> {

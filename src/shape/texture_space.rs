@@ -1,25 +1,10 @@
 //! Coordinate systems in which textures are mapped onto shapes.
 
-use crate::primitive::Form;
+use crate::primitive::DefaultMapping;
 use crate::shape::Shape;
 use crate::shape::csg::parts_of;
 use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
-
-/// Mapping that a shape uses for `mapping = "auto"`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DefaultMapping {
-    /// Planar, for flat shapes.
-    Planar,
-    /// Spherical, for spheres and ellipsoids.
-    Spherical,
-    /// Cylindrical, for solids of revolution.
-    Cylindrical,
-    /// Box, for solids with flat faces and for any other form.
-    Box,
-    /// Texture coordinates of a mesh.
-    Uv,
-}
 
 /// Texture space of a simple shape: x to the right, y up or along its axis, z to the front or along
 /// its normal. Its unit is the scene unit before the object's transform.
@@ -39,13 +24,7 @@ impl TextureSpace {
         let form = shape.form();
         let shape_from_texture = DAffine3::from_mat3(shape.texture_axes());
         let texture_from_shape = shape_from_texture.inverse();
-        let default_mapping = match &form {
-            Form::Parallelogram { .. } | Form::Plane { .. } => DefaultMapping::Planar,
-            Form::Sphere { .. } | Form::Ellipsoid { .. } => DefaultMapping::Spherical,
-            Form::ConicalFrustum { .. } => DefaultMapping::Cylindrical,
-            Form::Mesh { mesh, .. } if mesh.mesh().uvs.is_some() => DefaultMapping::Uv,
-            Form::ConvexPolyhedron { .. } | Form::Csg(_) | Form::Mesh { .. } => DefaultMapping::Box,
-        };
+        let default_mapping = form.default_mapping();
         let point = texture_from_shape.transform_point3(shape.position());
         let corners = form.transformed(&texture_from_shape).bounds().unwrap_or((point, point));
         Self { shape_from_texture, corners: corners.into(), default_mapping }

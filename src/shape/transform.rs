@@ -1,6 +1,6 @@
 //! Transforms: steps that move, rotate and scale an object or a part of one, applied in order.
 
-use crate::primitive::Form;
+use crate::primitive::{Form, PlaneForm};
 use crate::shape::Shape;
 use crate::value::{
     Description, Field, FieldValue, NumberRange, ValidationError, Validator, ValueType,
@@ -199,7 +199,7 @@ pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<Validatio
         (_, Some((low, high))) => {
             (low.abs().max(high.abs()).max_element(), (high - low).max_element())
         }
-        (Form::Plane { offset, .. }, None) => (offset.abs(), f64::INFINITY),
+        (Form::Plane(PlaneForm { offset, .. }), None) => (offset.abs(), f64::INFINITY),
         (_, None) => (0.0, f64::INFINITY),
     };
     if !NumberRange::COORDINATE.holds(max_coordinate) {

@@ -27,7 +27,7 @@ pub(super) struct OnSurface<S> {
 }
 
 impl<S: Float> OnSurface<S> {
-    /// Of a lamp at `position` among `forms`, both around `origin`, where coordinates are rounded to
+    /// Creates the record of a lamp at `position` among `forms`, both around `origin`, where coordinates are rounded to
     /// `epsilon`; `None`: it lies on none.
     pub fn new(forms: &[Form], position: DVec3, origin: DVec3, epsilon: f64) -> Option<Self> {
         let mut solids = Vec::new();
@@ -35,10 +35,7 @@ impl<S: Float> OnSurface<S> {
         // What the scene's own coordinates, in double precision, round off.
         let given = f64::EPSILON * origin.abs().max_element();
         for form in forms {
-            let reach = match form {
-                Form::Plane { offset, .. } => offset.abs(),
-                _ => form.bounds().map_or(0.0, |(l, h)| l.abs().max(h.abs()).max_element()),
-            };
+            let reach = form.max_coordinate();
             let rounding = (epsilon * reach.max(position.abs().max_element())).max(given);
             let normals = form.normals_at(position, ON * rounding);
             if !normals.is_empty() {
@@ -52,7 +49,7 @@ impl<S: Float> OnSurface<S> {
         (!solids.is_empty()).then_some(Self { position, solids, lift })
     }
 
-    /// How far from the lamp shadow rays end at most.
+    /// Largest distance from the lamp at which shadow rays end.
     pub fn farthest(&self) -> f64 {
         SHARPEST * self.lift.to_f64() * self.solids.len() as f64
     }

@@ -1,33 +1,34 @@
-//! Which precision a scene needs: single precision as long as nothing that it blurs can be seen.
+//! Choice of the precision: single as long as nothing that it blurs can be seen.
 //!
 //! In single precision a coordinate is known to some 2^-23 of the scene's extent, and rays that leave a
 //! surface start 2^-20 of the extent above it. What is smaller than a few times that is lost: thin
-//! things, gaps between things, the surroundings of a lamp, and what a pixel shows of a thing close
+//! objects, gaps between objects, the surroundings of a lamp, and what a pixel shows of an object close
 //! to the eye. Each of them has its ratio here; `tests/extremes/precision.rs` measures what single
 //! precision gets wrong at each.
 
 use crate::camera::PinholeCamera;
-use crate::primitive::Form;
+use crate::primitive::{BoundingSphere, Form, HalfSpace, Proxy, ProxyFace};
 use crate::scene::Scene;
-use crate::world::clearance::{clearance, clearance_of};
+use crate::world::clearance::clearance;
 use glam::DVec3;
 use std::ops::Range;
 
-/// The largest extent over the thinnest thing: rays start 1/128 of it above a surface.
+/// Largest ratio of scene extent to thickness for single precision. At this ratio a ray's offset is 1/128 of
+/// the thickness.
 const MAX_EXTENT_PER_THICKNESS: f64 = 8192.0;
 
-/// The largest extent over the narrowest gap between things: eight times the height at which rays start.
+/// The largest extent over the narrowest gap between objects: eight times the height at which rays start.
 const MAX_EXTENT_PER_GAP: f64 = 131_072.0;
 
-/// The largest extent over what a pixel shows of the thing nearest to the eye: 32 times the height at
+/// The largest extent over what a pixel shows of the object nearest to the eye: 32 times the height at
 /// which rays start.
 const MAX_EXTENT_PER_PIXEL: f64 = 32_768.0;
 
-/// How much closer the eye may be to flat things: points are put back on a plane almost exactly, and its
+/// Factor by which the eye may be closer to flat objects: points are put back on a plane almost exactly, and its
 /// normal is the same everywhere.
 const FLAT: f64 = 8.0;
 
-/// The largest extent over the distance of a lamp from things: the height at which rays start is then
+/// The largest extent over the distance of a lamp from objects: the height at which rays start is then
 /// 1/512 of it, and so is the error of the light's angle.
 const MAX_EXTENT_PER_LIGHT_DISTANCE: f64 = 2048.0;
 
@@ -38,25 +39,20 @@ const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 /// numbers that were meant to be equal.
 const COINCIDENT_GAP: f64 = 1.0 / 17_592_186_044_416.0;
 
-/// The extent of a mesh over that of its details.
-const MESH_DETAILS: f64 = 64.0;
-
-/// The most pairs of things that are looked at for gaps; a scene that crowded has no room for more.
+/// Largest number of pairs of objects that are searched for gaps; a scene that crowded has no room for more.
 const MOST_PAIRS: usize = 1 << 20;
 
-/// Whether single precision shows `scene` as well as double does, as far as its proportions tell.
-/// `forms`: all things, around `origin`; `extent`: the largest coordinate of things and eye there.
+/// Returns `true` if single precision shows `scene` as well as double does, as far as its proportions show.
+/// `forms` are all objects, around `origin`; `extent` is the largest coordinate of objects and eye there.
 pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
-    let thinnest = forms.iter().map(thickness).fold(f64::INFINITY, f64::min);
+    let thinnest = forms.iter().map(Form::thickness).fold(f64::INFINITY, f64::min);
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
         return false;
     }
     let view = PinholeCamera::new(&scene.camera, scene.film.size, origin);
     let angle = view.pixel_angle();
-    let distance = |form: &Form| {
-        let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
-        Some(clearance_of(form, view.eye())? * if flat { FLAT } else { 1.0 })
-    };
+    let distance =
+        |form: &Form| Some(form.clearance(view.eye())? * if form.is_flat() { FLAT } else { 1.0 });
     let seen_from =
         forms.iter().filter_map(distance).fold(f64::INFINITY, f64::min).max(scene.camera.near);
     if angle < LEAST_ANGLE || extent > MAX_EXTENT_PER_PIXEL * angle * seen_from {
@@ -73,107 +69,12 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     !has_gap(forms, narrow, pixel)
 }
 
-/// The smallest thickness of a solid, or the smaller edge of a flat thing. Of a compound that of its
-/// thinnest part: what is left between cuts is found as a gap.
-fn thickness(form: &Form) -> f64 {
-    match form {
-        Form::Parallelogram { u, v, .. } => u.length().min(v.length()),
-        Form::ConvexPolyhedron { faces, corners } => faces
-            .iter()
-            .map(|f| {
-                let depths = corners.iter().map(|c| f.offset - f.normal.dot(*c));
-                depths.fold(0.0, f64::max)
-            })
-            .fold(f64::INFINITY, f64::min),
-        Form::Plane { .. } => f64::INFINITY,
-        Form::Sphere { radius, .. } => 2.0 * radius,
-        Form::Ellipsoid { .. } => {
-            form.bounds().map_or(f64::INFINITY, |(l, h)| (h - l).min_element())
-        }
-        Form::ConicalFrustum { scene_from_unit: m, .. } => {
-            // Between the faces of the box around the canonical solid: 2 by 2 by 1.
-            let rows = m.matrix3.inverse().transpose();
-            let across = rows.x_axis.length().max(rows.y_axis.length());
-            (2.0 / across).min(rows.z_axis.length().recip())
-        }
-        Form::Mesh { mesh, scene_from_mesh, .. } => {
-            let [low, high] = mesh.mesh().bounds.map(|corner| DVec3::from(corner.map(f64::from)));
-            let m = scene_from_mesh.matrix3;
-            let stretched = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
-            let size = ((high - low) * DVec3::from(stretched)).to_array();
-            let longest = size.into_iter().fold(0.0, f64::max);
-            // Needles and thin sheets; what is flat altogether has no inside.
-            let thinnest = size.into_iter().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
-            // Details are taken to be as large as this part of the whole.
-            thinnest.min(longest / MESH_DETAILS)
-        }
-        Form::Csg(compound) => compound.parts.iter().map(thickness).fold(f64::INFINITY, f64::min),
-    }
+/// Returns `true` if two boxes are no farther than `limit` from each other along any axis.
+fn are_near(a: &Proxy, b: &Proxy, limit: f64) -> bool {
+    (a.low - b.high).max(b.low - a.high).max_element() <= limit
 }
 
-/// A surface that another may come close to, within a box.
-enum ProxyFace {
-    Flat { normal: DVec3, offset: f64 },
-    Round { center: DVec3, radius: f64 },
-}
-
-/// A simple thing: its sides and its box.
-struct Proxy {
-    sides: Vec<ProxyFace>,
-    low: DVec3,
-    high: DVec3,
-}
-
-impl Proxy {
-    fn new(form: &Form) -> Self {
-        let (low, high) =
-            form.bounds().unwrap_or((DVec3::splat(f64::NEG_INFINITY), DVec3::splat(f64::INFINITY)));
-        let sides = match form {
-            Form::Sphere { center, radius } => {
-                vec![ProxyFace::Round { center: *center, radius: *radius }]
-            }
-            Form::Plane { normal, offset } => {
-                vec![ProxyFace::Flat { normal: *normal, offset: *offset }]
-            }
-            Form::ConvexPolyhedron { faces, .. } => faces
-                .iter()
-                .map(|f| ProxyFace::Flat { normal: f.normal, offset: f.offset })
-                .collect(),
-            Form::Parallelogram { corner, u, v } => {
-                let normal = u.cross(*v).normalize();
-                vec![ProxyFace::Flat { normal, offset: normal.dot(*corner) }]
-            }
-            // Where the box touches it.
-            Form::Ellipsoid { .. } | Form::ConicalFrustum { .. } => DVec3::AXES
-                .into_iter()
-                .flat_map(|axis| [(axis, axis.dot(high)), (-axis, -axis.dot(low))])
-                .map(|(normal, offset)| ProxyFace::Flat { normal, offset })
-                .collect(),
-            Form::Mesh { .. } | Form::Csg(_) => Vec::new(),
-        };
-        Self { sides, low, high }
-    }
-
-    /// The sides that may come close to others', of a compound those of its parts. Those of a mesh are
-    /// its triangles, whose corners are in single precision.
-    fn all(forms: &[Form]) -> Vec<Self> {
-        let mut out = Vec::new();
-        for form in forms {
-            match form {
-                Form::Mesh { .. } => {}
-                Form::Csg(compound) => out.extend(compound.parts.iter().map(Self::new)),
-                simple => out.push(Self::new(simple)),
-            }
-        }
-        out
-    }
-
-    fn near(&self, other: &Self, limit: f64) -> bool {
-        (self.low - other.high).max(other.low - self.high).max_element() <= limit
-    }
-}
-
-/// Where two sides are closest to each other.
+/// Closest place of two faces.
 struct Clearance {
     width: f64,
     /// For sides that bend away from each other: the place, and the radius of a ball that would bend away
@@ -182,7 +83,7 @@ struct Clearance {
 }
 
 impl Clearance {
-    /// Whether it is narrow, and wherever it is narrow so is more than half a pixel around: a ball beside
+    /// Returns `true` if it is narrow, and wherever it is narrow so is more than half a pixel around: a ball beside
     /// another, or on a floor, is close to it in a spot too small to see.
     fn is_seen(&self, narrow: &Range<f64>, pixel: &impl Fn(DVec3) -> f64) -> bool {
         let wide =
@@ -194,13 +95,14 @@ impl Clearance {
 /// The gaps between two sides that run side by side.
 fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
     match (a, b) {
-        (ProxyFace::Flat { normal: n, offset: o }, ProxyFace::Flat { normal: m, offset: p }) => {
-            let along = n.dot(*m);
-            let width = (o - along.signum() * p).abs();
+        (ProxyFace::Flat(a), ProxyFace::Flat(b)) => {
+            let along = a.normal.dot(b.normal);
+            let width = (a.offset - along.signum() * b.offset).abs();
             [(along.abs() >= 1.0 - 1e-9).then_some(Clearance { width, round: None }), None]
         }
-        (ProxyFace::Round { center, radius }, ProxyFace::Flat { normal, offset })
-        | (ProxyFace::Flat { normal, offset }, ProxyFace::Round { center, radius }) => {
+        (ProxyFace::Round(ball), ProxyFace::Flat(plane))
+        | (ProxyFace::Flat(plane), ProxyFace::Round(ball)) => {
+            let (BoundingSphere { center, radius }, HalfSpace { normal, offset }) = (ball, plane);
             let height = normal.dot(*center) - offset;
             let place = center - normal * radius.copysign(height);
             [
@@ -211,9 +113,10 @@ fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
                 None,
             ]
         }
-        (ProxyFace::Round { center: c, radius: r }, ProxyFace::Round { center: d, radius: s }) => {
-            let between = c.distance(*d);
-            let place = c + (d - c).normalize_or(DVec3::X) * r;
+        (ProxyFace::Round(a), ProxyFace::Round(b)) => {
+            let (r, s) = (a.radius, b.radius);
+            let between = a.center.distance(b.center);
+            let place = a.center + (b.center - a.center).normalize_or(DVec3::X) * r;
             let gap = |distance: f64, radius: f64| {
                 Some(Clearance { width: (between - distance).abs(), round: Some((place, radius)) })
             };
@@ -223,22 +126,24 @@ fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
     }
 }
 
-/// Whether sides of two things run at a distance within `narrow` of each other where that can be seen;
+/// Returns `true` if faces of two objects run at a distance within `narrow` of each other where that can be seen;
 /// `pixel`: what a pixel shows at a place.
 fn has_gap(forms: &[Form], narrow: Range<f64>, pixel: impl Fn(DVec3) -> f64) -> bool {
     let seen = |a: &ProxyFace, b: &ProxyFace| {
         gaps(a, b).iter().flatten().any(|gap| gap.is_seen(&narrow, &pixel))
     };
-    let mut pieces = Proxy::all(forms);
-    pieces.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
+    let mut proxies: Vec<Proxy> = forms.iter().flat_map(Form::proxies).collect();
+    proxies.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
     let mut pairs = 0;
-    for (i, a) in pieces.iter().enumerate() {
-        for b in pieces[i + 1..].iter().take_while(|b| b.low.x <= a.high.x + narrow.end) {
+    for (i, a) in proxies.iter().enumerate() {
+        for b in proxies[i + 1..].iter().take_while(|b| b.low.x <= a.high.x + narrow.end) {
             pairs += 1;
             if pairs > MOST_PAIRS {
                 return false;
             }
-            if a.near(b, narrow.end) && a.sides.iter().any(|s| b.sides.iter().any(|t| seen(s, t))) {
+            if are_near(a, b, narrow.end)
+                && a.faces.iter().any(|s| b.faces.iter().any(|t| seen(s, t)))
+            {
                 return true;
             }
         }

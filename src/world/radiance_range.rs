@@ -22,9 +22,9 @@ use crate::camera::PinholeCamera;
 use crate::lanes::Float;
 use crate::light::DeltaLight;
 use crate::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
-use crate::primitive::Form;
+use crate::primitive::{Form, box_distance};
 use crate::scene::{RayTypes, Scene};
-use crate::world::clearance::{box_distance, clearance, clearance_of};
+use crate::world::clearance::clearance;
 use crate::world::compile::RecenteredGeometry;
 use glam::DVec3;
 use std::f64::consts::{FRAC_1_PI, PI};
@@ -250,20 +250,19 @@ impl<'a> SceneDistances<'a> {
         for (form, response) in self.forms.iter().zip(&self.responses) {
             let Some(response) = response else { continue };
             // A light in a surface does not illuminate it: shading starts above the light.
-            if let Some(distance) = clearance_of(form, position).filter(|d| *d > self.ray_offset) {
+            if let Some(distance) = form.clearance(position).filter(|d| *d > self.ray_offset) {
                 let radiance = radiance_at(distance.max(min_distance));
                 out.brightest = out.brightest.max(radiance * response.most);
                 out.spots = out.spots.max(radiance_at(distance) * response.most);
                 out.extreme = out.extreme.max(radiance * response.peak * self.gain);
             }
             // Inside of the bounding box, half its diagonal stands for the distance.
-            let half_diagonal =
-                || form.bounds().map_or(0.0, |(low, high)| 0.5 * low.distance(high));
-            let far =
-                box_distance(form, position).filter(|d| *d > 0.0).unwrap_or_else(half_diagonal);
-            let far = match form {
-                Form::Plane { .. } => clearance_of(form, position).unwrap_or(far),
-                _ => far,
+            let far = match form.bounds() {
+                Some(bounds) => match box_distance(bounds, position) {
+                    away if away > 0.0 => away,
+                    _ => 0.5 * bounds.0.distance(bounds.1),
+                },
+                None => form.clearance(position).unwrap_or(0.0),
             };
             let radiance = radiance_at(far.max(min_distance));
             out.dimmest = out.dimmest.min(radiance * response.least * self.faintest);

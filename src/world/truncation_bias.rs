@@ -1,7 +1,6 @@
-//! What the limits of path tracing leave out, as a bound.
+//! Bound of the bias by the limits of path tracing.
 
 use crate::material::{Fresnel, Material};
-use crate::primitive::Form;
 use crate::scene::{Object, RayTypes, Scene};
 use glam::DVec3;
 
@@ -22,22 +21,22 @@ fn max_albedo(material: &Material, flat: bool) -> f64 {
     }
 }
 
-/// What matters of an object's geometry.
+/// Properties of an object's geometry that the bound needs.
 struct ObjectTraits {
     flat: bool,
-    /// It may see itself from outside.
-    compound: bool,
+    /// The outside may see itself.
+    concave: bool,
     /// Paths may begin inside.
     contains_eye: bool,
 }
 
-/// How far beside its place rounding to single precision may put the eye, as a share of the scene's extent.
+/// Largest displacement of the eye by rounding to single precision, as a share of the scene's extent.
 const ROUNDING: f64 = 1e-6;
 
 impl ObjectTraits {
     fn new(object: &Object, scene: &Scene) -> Self {
         let form = object.form();
-        let flat = matches!(form, Form::Parallelogram { .. } | Form::Plane { .. });
+        let flat = form.is_flat();
         let eye = DVec3::from(scene.camera.eye);
         let within = form.bounds().is_some_and(|(low, high)| {
             let extent = low.abs().max(high.abs()).max(eye.abs()).max_element();
@@ -46,21 +45,21 @@ impl ObjectTraits {
         });
         Self {
             flat,
-            compound: matches!(form, Form::Csg(_) | Form::Mesh { .. }),
+            concave: !form.is_convex(),
             contains_eye: !flat && (within || scene.camera.near > 0.0),
         }
     }
 
-    /// Whether a path may meet the object twice in a row. Every thing but a compound or a mesh is convex, so only
+    /// Returns `true` if a path may hit the object twice in a row. The outside of a convex form cannot see itself: only
     /// its inside sees itself, and only paths that begin inside, or are let in, get there. Bumps do not change
     /// that: what they would reflect into the surface leaves it, and what they would keep outside goes in.
     fn sees_itself(&self, material: &Material) -> bool {
         let let_in = !self.flat && material.transmission > 0.0;
-        self.compound || let_in || self.contains_eye && material.two_sided
+        self.concave || let_in || self.contains_eye && material.two_sided
     }
 }
 
-/// What surfaces send on.
+/// Shares of light that surfaces send on.
 struct Reach {
     /// The largest share of one surface.
     first: f64,
@@ -132,10 +131,10 @@ impl Reach {
 /// which one sees the other. So all paths that have met n surfaces weigh at most
 /// w(n) = pair^(n/2) together, for odd n that of n - 1 times the largest share, and all of n and
 /// more at most (w(n) + w(n + 1)) / (1 - pair). What they add is at most that times the brightest surface (or the
-/// background, if that is brighter). So nothing is cut only where nothing sends light on, or a flat or convex thing
+/// background, if that is brighter). So nothing is cut only where nothing sends light on, or a flat or convex form
 /// does alone, which is met once.
 ///
-/// Of a transparent ball it is not claimed that light leaves it where it comes to its surface again: the angles are
+/// A transparent ball carries no claim that light leaves it where it comes to its surface again: the angles are
 /// equal there, but at the rim rounding decides whether the critical angle is passed, and bumps change them.
 pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
     let reach = Reach::new(scene);

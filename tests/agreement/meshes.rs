@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use std::collections::HashMap;
-use zerkalo::primitive::Form;
+use zerkalo::primitive::{Form, MeshForm};
 use zerkalo::shape::{MeshDesc, ShapeDesc};
 
 /// Smallest cosine between the shading normal and the direction to the viewer.
@@ -38,7 +38,7 @@ fn around(corners: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
 impl Triangles {
     /// Loads the triangles of a file.
     pub fn new(file: &MeshDesc) -> Self {
-        let Form::Mesh { mesh, scene_from_mesh, smooth } = file.form() else {
+        let Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth }) = file.form() else {
             unreachable!("a mesh description has a mesh form")
         };
         let mesh = mesh.mesh();

@@ -125,6 +125,7 @@ impl Canvas {
             Shape::Cylinder(c) => (around(v(c.top) - v(c.base)), Mapping::Cylindrical),
             Shape::TaperedCylinder(c) => (around(v(c.top) - v(c.base)), Mapping::Cylindrical),
             Shape::Cone(c) => (around(v(c.apex) - v(c.base)), Mapping::Cylindrical),
+            Shape::Torus(t) => (around(v(t.axis)), Mapping::Uv),
             Shape::UnitFrustum(_) => (around(DVec3::Z), Mapping::Cylindrical),
             Shape::Cube(c) => (turned(c.rotation), Mapping::Box),
             Shape::Prism(p) => (turned(p.rotation), Mapping::Box),
@@ -164,6 +165,9 @@ fn ends(leaf: &Leaf, along: DVec3) -> (f64, f64) {
         Piece::Plane(point, _) => vec![(point.dot(along), 0.0)],
         Piece::Disc(center, normal, radius) => {
             vec![(center.dot(along), radius * normal.cross(along).length())]
+        }
+        Piece::Torus(center, axis, [ring, tube], _) => {
+            vec![(center.dot(along), ring * axis.normalize().cross(along).length() + tube)]
         }
         // The discs at its ends bound it.
         Piece::Side(..) => Vec::new(),
@@ -215,6 +219,12 @@ impl Spot<'_> {
                     a if a.y >= a.x => DVec2::new(p.x, if n.y > 0.0 { back.z } else { p.z }),
                     _ => DVec2::new(if n.x > 0.0 { back.z } else { p.z }, p.y),
                 }
+            }
+            // Once around the ring, once around the tube.
+            Mapping::Uv if matches!(self.leaf.pieces[..], [Piece::Torus(..), _]) => {
+                let Piece::Torus(_, _, [ring, _], _) = self.leaf.pieces[0] else { unreachable!() };
+                let beyond = from_middle.x.hypot(from_middle.z) - ring;
+                DVec2::new(turns, 0.5 + from_middle.y.atan2(beyond) / TAU)
             }
             // From edge to edge of a flat shape.
             Mapping::Uv => from_low.truncate() / size.truncate(),

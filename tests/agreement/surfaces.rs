@@ -18,6 +18,8 @@ pub enum Piece {
     Disc(DVec3, DVec3, f64),
     /// Side of a cone: start of the axis, its direction, its length, and the radii at both ends.
     Side(DVec3, DVec3, f64, [f64; 2]),
+    /// Half of the crossings of a torus, the first two or the last two: centre, axis, radii of ring and tube.
+    Torus(DVec3, DVec3, [f64; 2], usize),
 }
 
 /// Distance in lengths of the direction, and normal. Hits behind the origin are optional.
@@ -62,6 +64,16 @@ impl Piece {
                 };
                 [hit_at((-b - root) / a), hit_at((-b + root) / a)]
             }
+            Self::Torus(center, axis, radii, half) => {
+                let height = |t: f64| above_torus(origin + direction * t - center, *axis, *radii);
+                let all = torus_crossings(origin - center, direction, radii[0] + radii[1], &height);
+                let normal = |t: f64| {
+                    let p = origin + direction * t - center;
+                    let across = p - *axis * p.dot(*axis);
+                    (p - across.normalize() * radii[0]).normalize()
+                };
+                [2 * half, 2 * half + 1].map(|i| all.get(i).map(|t| (*t, normal(*t))))
+            }
             Self::Plane(point, normal) => [flat(*point, *normal, origin, direction), None],
             Self::Polygon(corners, normal) => {
                 // The point is on the same side of all edges, in either orientation.
@@ -86,6 +98,9 @@ impl Piece {
         match self {
             Self::Sphere(center, radius) => point.distance(*center) <= *radius,
             Self::Polygon(corners, normal) => normal.dot(point - corners[0]) <= 0.0,
+            Self::Torus(center, axis, radii, _) => {
+                above_torus(point - center, *axis, *radii) <= 0.0
+            }
             Self::Plane(on, normal) | Self::Disc(on, normal, _) => normal.dot(point - on) <= 0.0,
             Self::Side(base, axis, height, [r0, r1]) => {
                 let z = axis.dot(point - base);
@@ -93,6 +108,46 @@ impl Piece {
             }
         }
     }
+}
+
+/// Distance from the tube of a torus about the origin, negative inside.
+fn above_torus(p: DVec3, axis: DVec3, [ring, tube]: [f64; 2]) -> f64 {
+    let along = p.dot(axis);
+    ((p - axis * along).length() - ring).hypot(along) - tube
+}
+
+/// Distances at which a line crosses a torus: changes of sign between small steps through the ball around it,
+/// made exact by bisection.
+fn torus_crossings(
+    from_center: DVec3,
+    direction: DVec3,
+    reach: f64,
+    height: &dyn Fn(f64) -> f64,
+) -> Vec<f64> {
+    const STEPS: usize = 200;
+    let length2 = direction.length_squared();
+    let middle = -from_center.dot(direction) / length2;
+    let nearest = (from_center + direction * middle).length_squared();
+    let half = ((reach * reach - nearest) / length2).sqrt() * 1.001;
+    if half.is_nan() {
+        return Vec::new();
+    }
+    let place = |i: usize| middle + half * (2.0 * i as f64 / STEPS as f64 - 1.0);
+    let mut out = Vec::new();
+    let mut before = height(place(0));
+    for i in 1..=STEPS {
+        let after = height(place(i));
+        if (before < 0.0) != (after < 0.0) {
+            let (mut low, mut high) = (place(i - 1), place(i));
+            for _ in 0..60 {
+                let t = 0.5 * (low + high);
+                if (height(t) < 0.0) == (before < 0.0) { low = t } else { high = t }
+            }
+            out.push(0.5 * (low + high));
+        }
+        before = after;
+    }
+    out
 }
 
 fn flat(point: DVec3, normal: DVec3, origin: DVec3, direction: DVec3) -> Meeting {
@@ -149,6 +204,11 @@ pub fn pieces(shape: &Shape) -> Result<Vec<Piece>, String> {
         Shape::Cone(c) => round(v(c.base), v(c.apex), [c.radius, 0.0]),
         Shape::TaperedCylinder(c) => round(v(c.base), v(c.top), [c.base_radius, c.top_radius]),
         Shape::UnitFrustum(c) => round(DVec3::ZERO, DVec3::Z, [1.0, c.s]),
+        Shape::Torus(t) => {
+            let half =
+                |half| Piece::Torus(v(t.center), v(t.axis).normalize(), [t.ring, t.tube], half);
+            vec![half(0), half(1)]
+        }
         Shape::Cuboid(b) => {
             let [x, y, z] = b.size;
             let base = vec![[0.0, 0.0], [x, 0.0], [x, -z], [0.0, -z]];

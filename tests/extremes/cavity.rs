@@ -5,11 +5,11 @@ use crate::compound::{block, difference, geometry};
 use crate::rays::{Line, closest};
 use glam::DVec3;
 use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::primitive::Form;
+use zerkalo::primitive::{Form, SphereForm};
 use zerkalo::shape::{Cylinder, ShapeDesc};
 
 fn ball(radius: f64) -> Form {
-    Form::Sphere { center: DVec3::ZERO, radius }
+    Form::Sphere(SphereForm { center: DVec3::ZERO, radius })
 }
 
 /// From inside the hollow of a solid whose walls are at least 0.2 thick: the wall is met where it

@@ -5,11 +5,14 @@ use crate::rays::{Line, LineHit, blocked, closest};
 use crate::report::report;
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::primitive::{Aggregate, CsgSolid, CsgTree as Tree, Form};
+use zerkalo::primitive::{
+    Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, CsgSolid, CsgTree as Tree, EllipsoidForm,
+    Form, PlaneForm, SphereForm,
+};
 use zerkalo::shape::{Cuboid, ShapeDesc};
 
 pub fn ball(x: f64, y: f64, z: f64, radius: f64) -> Form {
-    Form::Sphere { center: DVec3::new(x, y, z), radius }
+    Form::Sphere(SphereForm { center: DVec3::new(x, y, z), radius })
 }
 
 pub fn block(center: [f64; 3], size: [f64; 3]) -> Form {
@@ -92,7 +95,7 @@ fn random_solid(numbers: &mut Numbers) -> Form {
     let place = numbers.in_cube(0.8);
     let size = numbers.between(0.3, 1.2);
     let form = match numbers.below(5) {
-        0 => return Form::Sphere { center: place, radius: size },
+        0 => return Form::Sphere(SphereForm { center: place, radius: size }),
         1 => block([0.0; 3], [1.3, 0.9, 1.1]),
         2 => Form::conical_frustum(DAffine3::IDENTITY, numbers.between(0.0, 2.0)),
         3 => ball(0.0, 0.0, 0.0, 1.0),
@@ -124,16 +127,18 @@ fn random_tree(numbers: &mut Numbers, depth: usize, parts: &mut Vec<Form>) -> Tr
 
 fn contains(part: &Form, p: DVec3) -> bool {
     match part {
-        Form::Sphere { center, radius } => p.distance(*center) <= *radius,
-        Form::Ellipsoid { scene_from_unit } => {
+        Form::Sphere(SphereForm { center, radius }) => p.distance(*center) <= *radius,
+        Form::Ellipsoid(EllipsoidForm { scene_from_unit }) => {
             scene_from_unit.inverse().transform_point3(p).length() <= 1.0
         }
-        Form::ConvexPolyhedron { faces, .. } => faces.iter().all(|f| f.normal.dot(p) <= f.offset),
-        Form::ConicalFrustum { scene_from_unit, top_radius: top } => {
+        Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, .. }) => {
+            faces.iter().all(|f| f.normal.dot(p) <= f.offset)
+        }
+        Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit, top_radius: top }) => {
             let q = scene_from_unit.inverse().transform_point3(p);
             (0.0..=1.0).contains(&q.z) && q.truncate().length() <= 1.0 + (top - 1.0) * q.z
         }
-        Form::Plane { normal, offset } => normal.dot(p) <= *offset,
+        Form::Plane(PlaneForm { normal, offset }) => normal.dot(p) <= *offset,
         _ => unreachable!("no solid"),
     }
 }

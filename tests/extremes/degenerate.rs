@@ -5,33 +5,32 @@ use crate::rays::{Line, any_line, blocked, bounding_sphere, closest, every_kind,
 use crate::report::{precision, report};
 use glam::DVec3;
 use zerkalo::lanes::{Double, SimdFloat, Single};
-use zerkalo::primitive::{Aggregate, Form};
+use zerkalo::primitive::{
+    Aggregate, ConicalFrustumForm, ConvexPolyhedronForm, EllipsoidForm, Form, SphereForm,
+};
 use zerkalo::shape::{Cuboid, ShapeDesc};
 
 /// Convex solids: compounds and meshes have tests of their own.
 fn is_solid(form: &Form) -> bool {
-    !matches!(
-        form,
-        Form::Parallelogram { .. } | Form::Plane { .. } | Form::Csg(_) | Form::Mesh { .. }
-    )
+    form.is_solid() && form.is_convex()
 }
 
 /// A point well inside a solid.
 fn inside(numbers: &mut Numbers, form: &Form) -> DVec3 {
     match form {
-        Form::Sphere { center, radius } => {
+        Form::Sphere(SphereForm { center, radius }) => {
             *center + numbers.direction() * (0.99 * radius * numbers.unit().cbrt())
         }
-        Form::Ellipsoid { scene_from_unit } => {
+        Form::Ellipsoid(EllipsoidForm { scene_from_unit }) => {
             scene_from_unit.transform_point3(numbers.direction() * (0.99 * numbers.unit().cbrt()))
         }
-        Form::ConicalFrustum { scene_from_unit, top_radius: top } => {
+        Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit, top_radius: top }) => {
             let z = numbers.between(0.01, 0.99);
             let r = 0.99 * (1.0 + (top - 1.0) * z) * numbers.unit().sqrt();
             let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();
             scene_from_unit.transform_point3(DVec3::new(r * cos, r * sin, z))
         }
-        Form::ConvexPolyhedron { corners, .. } => {
+        Form::ConvexPolyhedron(ConvexPolyhedronForm { corners, .. }) => {
             let weights: Vec<f64> =
                 corners.iter().map(|_| 1e-3 - (1.0 - numbers.unit()).ln()).collect();
             let sum: f64 = weights.iter().sum();

@@ -11,7 +11,7 @@ use std::fmt::Write;
 use std::sync::Arc;
 use zerkalo::asset::{Assets, Mesh};
 use zerkalo::lanes::{Double, Mask, SimdFloat, Single};
-use zerkalo::primitive::{Aggregate, Form};
+use zerkalo::primitive::{Aggregate, Form, MeshForm};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options};
 
@@ -80,7 +80,7 @@ fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
 /// meet it, as a camera or as a shadow asks.
 fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: usize) -> usize {
     const BLOCK: usize = 1 << 14;
-    let form = Form::Mesh { mesh: mesh.clone(), scene_from_mesh: place, smooth: false };
+    let form = Form::Mesh(MeshForm { mesh: mesh.clone(), scene_from_mesh: place, smooth: false });
     let geometry = Aggregate::<L>::new(&[form]);
     let triangles = &mesh.mesh().triangles;
     let corner = |i: u32| DVec3::from(mesh.mesh().positions[i as usize].map(f64::from));

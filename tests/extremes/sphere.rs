@@ -7,7 +7,7 @@ use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::camera::{Camera, PinholeCamera, ViewAngle};
 use zerkalo::lanes::{Double, SimdFloat, Single, Vec3};
-use zerkalo::primitive::{Aggregate, Form};
+use zerkalo::primitive::{Aggregate, Form, SphereForm};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 /// An unevaluated sum of two doubles: about 106 bits (Dekker 1971, Knuth).
@@ -70,7 +70,7 @@ fn check_far<L: SimdFloat>(far: f64, seed: u64) -> f64 {
     let tolerance = 4.0 * L::EPSILON * far.max(1.0);
     for _ in 0..20 {
         let center = rounded(numbers.in_cube(1.0));
-        let form = Form::Sphere { center, radius: 1.0 };
+        let form = Form::Sphere(SphereForm { center, radius: 1.0 });
         let geometry = Aggregate::<L>::new(&[form]);
         let lines: Vec<Line> = (0..5000)
             .map(|i| {
@@ -143,10 +143,10 @@ fn extreme_02_sphere_as_ground() {
     let dip = (height * (2.0 * radius + height)).sqrt() / radius;
     let plane_height = 2.0 * 20f64.to_radians().tan();
     let row = 240.0 + dip / plane_height * 480.0;
-    let ground = Aggregate::<Double>::new(&[Form::Sphere {
+    let ground = Aggregate::<Double>::new(&[Form::Sphere(SphereForm {
         center: DVec3::new(0.0, -radius, 0.0) + DVec3::Y * radius,
         radius,
-    }]);
+    })]);
     let eye = DVec3::Y * (radius + height);
     let meets = |row: f64| {
         let d = DVec3::new(0.0, (240.0 - row) / 480.0 * plane_height, -1.0).normalize();
@@ -188,7 +188,7 @@ fn extreme_02_sphere_as_ground() {
 /// the sphere, against pi r^2 sqrt(D^2 - r^2) / (c_z^2 - r^2)^(3/2); and the exact mask
 /// (v.c)^2 >= (c^2 - r^2) v^2.
 fn check_silhouette(center: DVec3, radius: f64, rays: usize, seed: u64) -> f64 {
-    let geometry = Aggregate::<Double>::new(&[Form::Sphere { center, radius }]);
+    let geometry = Aggregate::<Double>::new(&[Form::Sphere(SphereForm { center, radius })]);
     let distance = center.length();
     let image = DVec3::new(center.x, center.y, 0.0) / -center.z;
     let near = (center.z * center.z - radius * radius).sqrt();
@@ -255,7 +255,7 @@ fn closed_form_10_every_pixel_of_a_sphere() {
     };
     let (center, radius) = (DVec3::new(0.4, 0.1, -0.5), 1.3);
     let view = PinholeCamera::new(&camera, [320, 200], DVec3::ZERO);
-    let geometry = Aggregate::<Double>::new(&[Form::Sphere { center, radius }]);
+    let geometry = Aggregate::<Double>::new(&[Form::Sphere(SphereForm { center, radius })]);
     let eye = DVec3::from(camera.eye);
     let [u, v, w] = view.frame();
     let c = center - eye;
@@ -291,7 +291,8 @@ fn longest_touch<L: SimdFloat>() -> f64 {
 fn check_tangents<L: SimdFloat>() {
     let mut numbers = Numbers::new(5);
     let (limit, mut longest) = (longest_touch::<L>(), 0f64);
-    let geometry = Aggregate::<L>::new(&[Form::Sphere { center: DVec3::ZERO, radius: 1.0 }]);
+    let geometry =
+        Aggregate::<L>::new(&[Form::Sphere(SphereForm { center: DVec3::ZERO, radius: 1.0 })]);
     let signs = |bits: u64| {
         DVec3::new(
             if bits & 1 == 0 { 1.0 } else { -1.0 },

@@ -7,7 +7,7 @@ use crate::report::report;
 use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::PI;
 use zerkalo::lanes::Double;
-use zerkalo::primitive::Form;
+use zerkalo::primitive::{Form, PlaneForm};
 use zerkalo::shape::{Cylinder, ShapeDesc};
 
 /// The volume of what stands in the cube from -half to half, by the chords of parallel lines, one in
@@ -47,13 +47,13 @@ fn extreme_09_volumes() {
     };
     let rod =
         |end: [f64; 3], radius: f64| Cylinder { base: end.map(|x| -x), top: end, radius }.form();
-    let above = |height: f64| Form::Plane { normal: DVec3::Y, offset: height };
-    let below = |height: f64| Form::Plane { normal: DVec3::NEG_Y, offset: -height };
+    let above = |height: f64| Form::Plane(PlaneForm { normal: DVec3::Y, offset: height });
+    let below = |height: f64| Form::Plane(PlaneForm { normal: DVec3::NEG_Y, offset: -height });
     // A ball pierced by a rod so that a ring of height 1.2 is left.
     let ring: f64 = 1.2;
     let hole = (1.0 - ring * ring / 4.0).sqrt();
     let cone = Form::conical_frustum(DAffine3::from_translation(DVec3::new(0.0, 0.0, -0.5)), 0.0);
-    let half_space = |normal: DVec3, offset| Form::Plane { normal, offset };
+    let half_space = |normal: DVec3, offset| Form::Plane(PlaneForm { normal, offset });
     for (n, (name, form, expected)) in [
         (
             "lens",

@@ -123,6 +123,11 @@ fn inside(shape: &Shape) -> Inside {
         Shape::UnitFrustum(c) => {
             Box::new(move |p| (p.x.hypot(p.y) - (1.0 + (c.s - 1.0) * p.z)).max(-p.z).max(p.z - 1.0))
         }
+        Shape::Torus(t) => Box::new(move |p| {
+            let (axis, q) = (v(t.axis).normalize(), p - v(t.center));
+            let along = axis.dot(q);
+            ((q - axis * along).length() - t.ring).hypot(along) - t.tube
+        }),
         Shape::Union(u) => {
             let parts = parts(&u.of);
             Box::new(move |p| parts.iter().map(|f| f(p)).fold(f64::MAX, f64::min))

@@ -190,6 +190,35 @@ fn b6_plane() {
     );
 }
 
+#[test]
+fn b15_torus() {
+    shapes(
+        "torus.toml",
+        &[
+            (
+                "a thinner tube",
+                "upright",
+                "torus = { center = [-0.1, 1.08, -1.1], axis = [0.45, 0.0, 1.0], ring = 0.8, tube = 0.27 }",
+            ),
+            (
+                "lying down",
+                "upright",
+                "torus = { center = [-0.1, 1.08, -1.1], axis = [0.0, 1.0, 0.0], ring = 0.8, tube = 0.28 }",
+            ),
+            (
+                "without its hole",
+                "upright",
+                "sphere = { center = [-0.1, 1.08, -1.1], radius = 1.08 }",
+            ),
+            (
+                "a groove that is a cut",
+                "grooved ball",
+                "sphere = { center = [1.75, 0.62, -0.35], radius = 0.62 }",
+            ),
+        ],
+    );
+}
+
 fn as_union(scene: &mut Scene) {
     replace_operation(scene, |of| Shape::Union(Union { of }));
 }

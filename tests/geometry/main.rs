@@ -8,5 +8,6 @@ mod rays;
 mod bits;
 mod light;
 mod mirror;
+mod torus;
 mod transforms;
 mod tree;

@@ -5,7 +5,7 @@ use crate::common::Numbers;
 use crate::rays::{Line, packets};
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single};
-use zerkalo::primitive::{Acceleration, Aggregate, Form};
+use zerkalo::primitive::{Acceleration, Aggregate, Form, SphereForm};
 
 /// A random scene of `count` items of every kind, crowded in the ball of radius 10 or lined up on a
 /// lattice, where many faces lie in common planes.
@@ -15,7 +15,7 @@ fn crowd(numbers: &mut Numbers, count: usize) -> Vec<Form> {
     (0..count)
         .map(|_| {
             let form = &kinds[numbers.below(kinds.len())].1;
-            if matches!(form, Form::Plane { .. }) && numbers.below(50) != 0 {
+            if matches!(form, Form::Plane(_)) && numbers.below(50) != 0 {
                 return kinds[0]
                     .1
                     .clone()
@@ -106,10 +106,15 @@ fn trees_boxes_and_lists_give_identical_hits() {
 fn tree_and_list_agree_at_limbs() {
     let mut numbers = Numbers::new(77);
     let forms: Vec<Form> = (0..60)
-        .map(|_| Form::Sphere { center: numbers.in_cube(10.0), radius: numbers.between(0.1, 1.0) })
+        .map(|_| {
+            Form::Sphere(SphereForm {
+                center: numbers.in_cube(10.0),
+                radius: numbers.between(0.1, 1.0),
+            })
+        })
         .collect();
     let mut line = || {
-        let Form::Sphere { center, radius } = forms[numbers.below(forms.len())] else {
+        let Form::Sphere(SphereForm { center, radius }) = forms[numbers.below(forms.len())] else {
             unreachable!("all are spheres")
         };
         let (axis, along) = (numbers.below(3), 1 + numbers.below(2));

@@ -10,7 +10,7 @@ use std::ops::Range;
 use toml::{Table, Value};
 use zerkalo::camera::{Camera, ViewAngle};
 use zerkalo::light::{Directional, Falloff, Light, Point};
-use zerkalo::primitive::Form;
+use zerkalo::primitive::{ConvexPolyhedronForm, Form, ParallelogramForm, PlaneForm, SphereForm};
 use zerkalo::scene::{
     Acceleration, Document, FilmSettings, IntegratorSettings, Object, Scale, Scene, TRACE_FIELDS,
     TransformOp,
@@ -52,15 +52,17 @@ impl Spots {
 
 fn on_surface(numbers: &mut Numbers, form: &Form) -> DVec3 {
     match form {
-        Form::Sphere { center, radius } => {
+        Form::Sphere(SphereForm { center, radius }) => {
             *center + *radius * pick(numbers, &[DVec3::Y, DVec3::X, DVec3::Z])
         }
-        Form::Plane { normal, offset } => {
+        Form::Plane(PlaneForm { normal, offset }) => {
             let across = normal.any_orthonormal_vector() * numbers.between(-2.0, 2.0);
             *normal * *offset + across
         }
-        Form::Parallelogram { corner, u, v } => *corner + (*u + *v) * pick(numbers, &[0.5, 0.0]),
-        Form::ConvexPolyhedron { faces, corners } => {
+        Form::Parallelogram(ParallelogramForm { corner, u, v }) => {
+            *corner + (*u + *v) * pick(numbers, &[0.5, 0.0])
+        }
+        Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners }) => {
             let face = &faces[numbers.below(faces.len())];
             let near = |c: &&DVec3| (face.normal.dot(**c) - face.offset).abs() < 1e-9 * c.length();
             let face_corners: Vec<_> = corners.iter().filter(near).collect();

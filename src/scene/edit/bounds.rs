@@ -54,13 +54,8 @@ pub fn scene_bounds(scene: &Scene) -> BoundingSphere {
 /// Returns the box around the solids, or else around all finite objects.
 fn middle(scene: &Scene) -> Option<Extent> {
     let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
-    let solids = forms.iter().filter(|form| is_solid(form)).filter_map(Form::bounds);
+    let solids = forms.iter().filter(|form| form.is_solid()).filter_map(Form::bounds);
     solids.reduce(union).or_else(|| forms.iter().filter_map(Form::bounds).reduce(union))
-}
-
-/// Returns `true` if a form encloses space.
-pub(super) fn is_solid(form: &Form) -> bool {
-    !matches!(form, Form::Parallelogram { .. } | Form::Plane { .. })
 }
 
 pub(super) fn union(a: Extent, b: Extent) -> Extent {

@@ -4,7 +4,7 @@ use crate::camera::{Camera, ViewAngle};
 use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::{Bump, Material, Texture};
 use crate::scene::Scene;
-use crate::scene::edit::bounds::{is_solid, scene_bounds};
+use crate::scene::edit::bounds::scene_bounds;
 use crate::scene::edit::set::{finish, replace};
 use crate::scene::edit::toml_view::{insert_value, read};
 use crate::scene::edit::{Edit, EditError, Target};
@@ -102,7 +102,7 @@ fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
             let usual = size.max_element();
             let whole = size.map(|s| if s > 1e-9 * usual { s } else { usual });
             let middle = (low + high) / 2.0;
-            let base = if is_solid(&form) { low.y } else { middle.y - size.y / 2.0 };
+            let base = if form.is_solid() { low.y } else { middle.y - size.y / 2.0 };
             (DVec3::new(middle.x, base, middle.z), whole)
         }
         None => (shape.position(), DVec3::splat(scene_bounds(scene).radius / 2.0)),

@@ -28,7 +28,7 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     // A rectangle of any orientation; the ground (`platform`) does not count.
     let rectangle = |i: &usize| {
         let object = &scene.objects[*i];
-        object.shape.key() == "rectangle" && matches!(object.form(), Form::Parallelogram { .. })
+        object.shape.key() == "rectangle" && matches!(object.form(), Form::Parallelogram(_))
     };
     let mut all = 0..scene.objects.len();
     if let Some(name) = all.clone().filter(rectangle).find_map(reflecting) {

@@ -2,7 +2,7 @@
 
 use crate::camera::Camera;
 use crate::primitive::Form;
-use crate::scene::edit::bounds::{BoundingSphere, Extent, is_solid, scene_bounds};
+use crate::scene::edit::bounds::{BoundingSphere, Extent, scene_bounds};
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{floor_log10, round_significant, rounded_to};
@@ -82,13 +82,7 @@ fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let flat = |p: DVec3| DVec2::new(p.x, p.z);
     let middle = flat(low + (high - low) / 2.0);
     let mut support_points = vec![middle];
-    let corners = match form {
-        Form::ConvexPolyhedron { corners, .. } => corners.clone(),
-        Form::Parallelogram { corner, u, v } => {
-            vec![*corner, corner + u, corner + v, corner + u + v]
-        }
-        _ => Vec::new(),
-    };
+    let corners = form.corners();
     let near = 1e-9 * (high - low).max_element();
     let lowest = corners.iter().filter(|c| c.y - low.y <= near).map(|c| flat(*c));
     // Slightly inside, so that neighbours that only touch give no support.
@@ -105,8 +99,8 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
     let aim = eye + forward * crate::scene::edit::focus_distance(scene);
     let solids: Vec<Extent> =
-        forms.iter().filter(|f| is_solid(f)).filter_map(Form::bounds).collect();
-    let walls: Vec<&Form> = forms.iter().filter(|form| !is_solid(form)).collect();
+        forms.iter().filter(|f| f.is_solid()).filter_map(Form::bounds).collect();
+    let walls: Vec<&Form> = forms.iter().filter(|form| !form.is_solid()).collect();
     let floors: Vec<&Form> = walls.iter().copied().filter(|form| is_level(form)).collect();
     // New positions are round numbers: whole centimetres for an object of one metre.
     let grid = floor_log10(size.min_element()) - 2;
@@ -145,11 +139,7 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
 
 /// Returns `true` if a flat form is level within 60 degrees and can carry objects.
 fn is_level(form: &Form) -> bool {
-    match form {
-        Form::Plane { normal, .. } => normal.y.abs() > 0.5,
-        Form::Parallelogram { u, v, .. } => u.cross(*v).normalize().y.abs() > 0.5,
-        _ => false,
-    }
+    form.plane().is_some_and(|plane| plane.normal.y.abs() > 0.5)
 }
 
 /// Returns the height of the highest of `floors` below `at`, else of the lowest above it.

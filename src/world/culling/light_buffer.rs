@@ -202,7 +202,7 @@ pub(crate) struct ShadowRays<L: SimdFloat> {
 mod tests {
     use super::*;
     use crate::lanes::{Double, Single, Vec3};
-    use crate::primitive::Form;
+    use crate::primitive::{Form, SphereForm};
     use crate::world::culling::light_projection::tests::Random;
     use glam::DVec3;
 
@@ -222,7 +222,8 @@ mod tests {
         balls: &[BoundingSphere],
         random: &mut Random,
     ) -> usize {
-        let form = |b: &BoundingSphere| Form::Sphere { center: b.center, radius: b.radius };
+        let form =
+            |b: &BoundingSphere| Form::Sphere(SphereForm { center: b.center, radius: b.radius });
         let forms: Vec<Form> = balls.iter().map(form).collect();
         let geometry = Aggregate::<L>::with_tree(&forms, true);
         let Some(buffer) = LightBuffer::<L::Scalar>::new(target, &occluders(balls)) else {
@@ -319,7 +320,7 @@ mod tests {
             BoundingSphere { center: DVec3::ZERO, radius: 1.0 },
             BoundingSphere { center: DVec3::X * 5.0, radius: 1.0 },
         ];
-        let forms = balls.map(|b| Form::Sphere { center: b.center, radius: b.radius });
+        let forms = balls.map(|b| Form::Sphere(SphereForm { center: b.center, radius: b.radius }));
         let geometry = Aggregate::<Single>::with_tree(&forms, true);
         let target = LightTarget::Point(DVec3::Y * 9.0);
         let buffer = LightBuffer::<f32>::new(&target, &occluders(&balls)).expect("a buffer");

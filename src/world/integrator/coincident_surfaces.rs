@@ -15,7 +15,7 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
-use crate::primitive::{Aggregate, Form, PrimitiveId};
+use crate::primitive::{Aggregate, Form, PrimitiveId, SphereForm};
 use crate::world::integrator::nested_dielectrics::MediumStack;
 use glam::DVec3;
 
@@ -161,7 +161,7 @@ impl<S: Float> Contacts<S> {
         }
         let mut touching = vec![Vec::new(); forms.len()];
         for (a, b) in pairs(forms, |a, b| transmits[a] || transmits[b]) {
-            let rounding = (epsilon * max_coordinate(&forms[a]).max(max_coordinate(&forms[b])))
+            let rounding = (epsilon * forms[a].max_coordinate().max(forms[b].max_coordinate()))
                 .max(input_error);
             if may_touch(&forms[a], &forms[b], 4.0 * TIE * rounding) {
                 let tie = TIE * rounding;
@@ -174,8 +174,7 @@ impl<S: Float> Contacts<S> {
         }
         let count = forms.len() as f64;
         let kind = |(item, source): (usize, &PrimitiveId)| {
-            let flat =
-                matches!(forms[source.form], Form::Parallelogram { .. } | Form::Plane { .. });
+            let flat = forms[source.form].is_flat();
             let number = source.form as f64;
             let (kind, layer) = match (priority_of[item], flat, transparent[item]) {
                 (0, true, true) => (SurfaceKind::Pane, 1.0 + number),
@@ -330,29 +329,18 @@ impl<S: Float> Contacts<S> {
     }
 }
 
-/// Returns the largest magnitude of a coordinate from which a form's surface is computed.
-fn max_coordinate(form: &Form) -> f64 {
-    match form {
-        Form::Plane { offset, .. } => offset.abs(),
-        _ => form.bounds().map_or(0.0, |(low, high)| low.abs().max(high.abs()).max_element()),
-    }
-}
-
 /// Returns the bounding box of a form, infinite where the form is unbounded. Planes perpendicular
 /// to an axis are bounded along it.
 fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
     let (low, high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
-    match form {
-        Form::Plane { normal, offset } => {
-            let point = *normal * *offset;
-            let is_normal = |axis: &DVec3| normal.dot(*axis).abs() == 1.0;
-            DVec3::AXES.iter().find(|axis| is_normal(axis)).map_or((low, high), |axis| {
-                let bounded = axis.cmpne(DVec3::ZERO);
-                (DVec3::select(bounded, point, low), DVec3::select(bounded, point, high))
-            })
-        }
-        _ => form.bounds().unwrap_or((low, high)),
-    }
+    form.bounds().unwrap_or_else(|| {
+        let Some(plane) = form.plane() else { return (low, high) };
+        let is_normal = |axis: &&DVec3| plane.normal.dot(**axis).abs() == 1.0;
+        DVec3::AXES.iter().find(is_normal).map_or((low, high), |axis| {
+            let (bounded, point) = (axis.cmpne(DVec3::ZERO), plane.normal * plane.offset);
+            (DVec3::select(bounded, point, low), DVec3::select(bounded, point, high))
+        })
+    })
 }
 
 /// Returns the pairs of forms for which `wanted` is true and whose bounding boxes overlap or nearly
@@ -384,49 +372,20 @@ fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, u
     out
 }
 
-/// Returns conservative bounds of `axis . p` over a form; `None` if it is unbounded along `axis`.
-fn span(form: &Form, axis: DVec3) -> Option<(f64, f64)> {
-    let span_of_points = |points: &[DVec3]| {
-        let heights = points.iter().map(|p| axis.dot(*p));
-        (heights.clone().fold(f64::INFINITY, f64::min), heights.fold(f64::NEG_INFINITY, f64::max))
-    };
-    match form {
-        Form::Sphere { center, radius } => {
-            Some((axis.dot(*center) - radius, axis.dot(*center) + radius))
-        }
-        Form::ConvexPolyhedron { corners, .. } => Some(span_of_points(corners)),
-        Form::Parallelogram { corner, u, v } => {
-            Some(span_of_points(&[*corner, corner + u, corner + v, corner + u + v]))
-        }
-        Form::Plane { normal, offset } => {
-            let along = normal.dot(axis);
-            let parallel = along.abs() > 1.0 - 1e-12;
-            parallel.then_some((along.signum() * offset, along.signum() * offset))
-        }
-        _ => {
-            let (low, high) = form.bounds()?;
-            let (center, half) = (0.5 * (low + high), 0.5 * (high - low));
-            let (middle, half_span) = (axis.dot(center), axis.abs().dot(half));
-            Some((middle - half_span, middle + half_span))
-        }
-    }
-}
-
 /// Returns `true` if the surfaces of two forms may come within `slack` of each other.
 fn may_touch(a: &Form, b: &Form, slack: f64) -> bool {
-    let normal = |form: &Form| match form {
-        Form::Parallelogram { u, v, .. } => Some(u.cross(*v).normalize()),
-        Form::Plane { normal, .. } => Some(*normal),
-        _ => None,
-    };
-    let separated = |axis: DVec3| match (span(a, axis), span(b, axis)) {
+    let normal = |form: &Form| form.plane().map(|plane| plane.normal);
+    let separated = |axis: DVec3| match (a.extent_along(axis), b.extent_along(axis)) {
         (Some(a), Some(b)) => a.0 > b.1 + slack || b.0 > a.1 + slack,
         _ => false,
     };
     if DVec3::AXES.into_iter().chain(normal(a)).chain(normal(b)).any(separated) {
         return false;
     }
-    if let (Form::Sphere { center, radius }, Form::Sphere { center: other, radius: size }) = (a, b)
+    if let (
+        Form::Sphere(SphereForm { center, radius }),
+        Form::Sphere(SphereForm { center: other, radius: size }),
+    ) = (a, b)
     {
         let distance = center.distance(*other);
         // The balls touch side by side, or one inside the other.
@@ -438,12 +397,14 @@ fn may_touch(a: &Form, b: &Form, slack: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::primitive::PlaneForm;
     use crate::shape::Shape;
 
     #[test]
     fn contacts_are_pairs_of_touching_forms() {
-        let ball = |y: f64, radius| Form::Sphere { center: DVec3::new(0.0, y, 0.0), radius };
-        let plane = |normal: DVec3, offset| Form::Plane { normal, offset };
+        let ball =
+            |y: f64, radius| Form::Sphere(SphereForm { center: DVec3::new(0.0, y, 0.0), radius });
+        let plane = |normal: DVec3, offset| Form::Plane(PlaneForm { normal, offset });
         let cube = Shape::fitted_to("cube", DVec3::ZERO, DVec3::ONE).unwrap().form();
         let slanted = DVec3::new(0.6, 0.8, 0.0);
         for (a, b, touch) in [

@@ -149,7 +149,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         }
         let mut indices = vec![None; forms.len() + 1];
         let priority_of = primitives.iter().zip(bsdf_of).map(|(id, bsdf)| {
-            let flat = matches!(forms[id.form], Form::Parallelogram { .. } | Form::Plane { .. });
+            let flat = forms[id.form].is_flat();
             let priority = id.form + 1;
             match transmission_of(*bsdf) {
                 Some(transmission) if !flat => {

@@ -1,0 +1,174 @@
+//! Flat parallelograms: rectangles and platforms.
+
+use crate::bvh::Ray;
+use crate::lanes::{Float, SimdFloat, Vec3};
+use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
+use crate::primitive::bounding::BoundingSphere;
+use crate::primitive::canonical::{
+    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
+    extent_of_points, segment_distance,
+};
+use crate::primitive::form::Form;
+use glam::{DAffine3, DVec3};
+
+/// The flat parallelogram `corner + a u + b v`, 0 <= a, b <= 1. Its front is the side of u x v.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParallelogramForm {
+    /// Corner that both edges leave.
+    pub corner: DVec3,
+    /// First edge.
+    pub u: DVec3,
+    /// Second edge.
+    pub v: DVec3,
+}
+
+impl CanonicalShape for ParallelogramForm {
+    const NOUN: (&'static str, &'static str) = ("rectangle", "rectangles");
+
+    fn transformed(self, map: &DAffine3) -> Form {
+        let linear = map.matrix3;
+        let (u, v) = (linear * self.u, linear * self.v);
+        let corner = map.transform_point3(self.corner);
+        // A map that mirrors space would turn the front to the back: exchange the edges.
+        let (u, v) = if linear.determinant() < 0.0 { (v, u) } else { (u, v) };
+        Self { corner, u, v }.into()
+    }
+
+    fn parts(&self) -> usize {
+        1
+    }
+
+    fn bounds(&self) -> Option<Bounds> {
+        bounds_of_points(&self.corners())
+    }
+
+    fn bounding_sphere(&self) -> BoundingSphere {
+        BoundingSphere::around(&self.corners())
+    }
+
+    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
+        None
+    }
+
+    fn plane(&self) -> Option<HalfSpace> {
+        let normal = self.u.cross(self.v).normalize();
+        Some(HalfSpace { normal, offset: normal.dot(self.corner) })
+    }
+
+    fn is_convex(&self) -> bool {
+        true
+    }
+
+    fn thickness(&self) -> f64 {
+        self.u.length().min(self.v.length())
+    }
+
+    fn clearance(&self, point: DVec3) -> Option<f64> {
+        let Self { corner, u, v } = *self;
+        let (normal, to) = (u.cross(v), point - corner);
+        let size2 = normal.length_squared();
+        let (a, b) = (to.cross(v).dot(normal) / size2, u.cross(to).dot(normal) / size2);
+        if (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b) {
+            return Some(normal.dot(to).abs() / size2.sqrt());
+        }
+        let corners = [corner, corner + u, corner + u + v, corner + v];
+        (0..4).map(|i| segment_distance([corners[i], corners[(i + 1) % 4]], point)).reduce(f64::min)
+    }
+
+    fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
+        let normal = self.u.cross(self.v).normalize();
+        let Some((low, high)) = self.bounds() else { return Vec::new() };
+        let away = (low - point).max(point - high).max_element();
+        let on = normal.dot(point - self.corner).abs() <= slack && away <= slack;
+        if on { vec![vec![normal]] } else { Vec::new() }
+    }
+
+    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        let Self { corner, u, v } = *self;
+        let normal = u.cross(v);
+        let t = normal.dot(corner - origin) / normal.dot(direction);
+        let hit_point = origin + direction * t - corner;
+        // Coordinates along u and v by Cramer's rule in the parallelogram's plane.
+        let area = normal.length_squared();
+        let a = hit_point.cross(v).dot(normal) / area;
+        let b = u.cross(hit_point).dot(normal) / area;
+        let inside = (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b);
+        (t > 0.0 && t.is_finite() && inside).then_some(t)
+    }
+
+    fn default_mapping(&self) -> DefaultMapping {
+        DefaultMapping::Planar
+    }
+
+    fn proxies(&self) -> Vec<Proxy> {
+        let faces = self.plane().into_iter().map(ProxyFace::Flat).collect();
+        vec![Proxy::new(faces, self.bounds())]
+    }
+
+    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
+        extent_of_points(&self.corners(), axis)
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        let Self { corner, u, v } = *self;
+        vec![corner, corner + u, corner + v, corner + u + v]
+    }
+
+    fn triangles(&self) -> usize {
+        0
+    }
+}
+
+/// One parallelogram. A point p of its plane has the coordinates (p - corner) . dual, both in 0..1
+/// inside.
+#[derive(Clone, Copy)]
+pub struct Parallelogram<S> {
+    corner: [S; 3],
+    normal: [S; 3],
+    dual_u: [S; 3],
+    dual_v: [S; 3],
+    reach: S,
+}
+
+impl<S: Float> Parallelogram<S> {
+    /// `None`: the form is another.
+    pub fn new(form: &Form) -> Option<Self> {
+        let Form::Parallelogram(ParallelogramForm { corner, u, v }) = form else { return None };
+        let n = u.cross(*v);
+        let area2 = n.length_squared();
+        let of = |v: DVec3| v.to_array().map(S::from_f64);
+        Some(Self {
+            corner: of(*corner),
+            normal: of(n.normalize()),
+            dual_u: of(v.cross(n) / area2),
+            dual_v: of(n.cross(*u) / area2),
+            reach: S::from_f64(max_coordinate(form)),
+        })
+    }
+}
+
+impl<L: SimdFloat> Primitive<L> for Parallelogram<L::Scalar> {
+    #[inline(always)]
+    fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+        let normal = Vec3::splat(self.normal);
+        let from_corner = ray.origin - Vec3::splat(self.corner);
+        // Parallel rays divide by zero: infinite or NaN distances fail every comparison.
+        let t = -from_corner.dot(normal) / ray.direction.dot(normal);
+        let at = ray.direction.mul_add(t, from_corner);
+        let a = at.dot(Vec3::splat(self.dual_u));
+        let b = at.dot(Vec3::splat(self.dual_v));
+        let inside = a.ge(L::zero()) & a.le(L::one()) & b.ge(L::zero()) & b.le(L::one());
+        Some((t, inside))
+    }
+
+    #[inline(always)]
+    fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
+        let normal = Vec3::splat(self.normal);
+        let above = (point - Vec3::splat(self.corner)).dot(normal);
+        SurfacePoint {
+            point: normal.mul_add(-above, point),
+            normal,
+            max_coordinate: L::splat(self.reach),
+        }
+    }
+}

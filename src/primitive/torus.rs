@@ -1,0 +1,503 @@
+//! Tori under any affine map. The ray goes back to the space of the torus about the y axis with a ring of
+//! radius 1 and a tube of radius r:
+//!   (rho - 1)^2 + y^2 <= r^2, rho^2 = x^2 + z^2
+//!
+//! With s the distance along the line from its point nearest to the centre, half the derivative of the left
+//! side is s - rho'(s). rho is the norm of an affine function, a hyperbola whose second derivative is
+//! largest at the point nearest to the axis and exceeds 1 between two known places. So the derivative is
+//! monotone on three pieces of the line and has one or three zeros, and the quartic is monotone between
+//! those: each of its roots has a bracket, and Newton's method kept inside it finds the root (bracketing by
+//! the derivative after Yuksel 2022, *High-Performance Polynomial Root Finding for Graphics*, with the
+//! distance from the ring in place of coefficients, which cancel for thin tubes).
+
+use crate::bvh::Ray;
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::primitive::batch::{Primitive, SurfacePoint, UvGradients, max_coordinate};
+use crate::primitive::bounding::BoundingSphere;
+use crate::primitive::canonical::{
+    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, box_distance, extent_of_box,
+    normals_of_solid, similarity, sphere_around_box,
+};
+use crate::primitive::ellipsoid::{rows, times};
+use crate::primitive::form::{Form, cast_compiled};
+use crate::primitive::solid::{SolidPrimitive, Span};
+use glam::{DAffine3, DVec3};
+use std::f64::consts::TAU;
+
+/// The image under an invertible affine map of a torus about the y axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorusForm {
+    /// From the space of the torus, with its centre at the origin, to the scene's.
+    pub scene_from_torus: DAffine3,
+    /// Radius of the circle in the middle of the tube, greater than 0.
+    pub ring: f64,
+    /// Radius of the tube, greater than 0, at most `ring`.
+    pub tube: f64,
+}
+
+impl TorusForm {
+    /// From the space in which the ring has radius 1 to the scene's.
+    fn scene_from_unit(&self) -> DAffine3 {
+        self.scene_from_torus * DAffine3::from_scale(DVec3::splat(self.ring))
+    }
+
+    /// Distance of `point`, in the space of the torus, from the circle in the middle of the tube, and the
+    /// unit vector from there.
+    fn ring_distance(&self, point: DVec3) -> (f64, DVec3) {
+        let outward = DVec3::new(point.x, 0.0, point.z).normalize_or(DVec3::X);
+        let across = point - outward * self.ring;
+        (across.length(), across.normalize_or(outward))
+    }
+}
+
+impl CanonicalShape for TorusForm {
+    const NOUN: (&'static str, &'static str) = ("torus", "tori");
+
+    fn transformed(self, map: &DAffine3) -> Form {
+        Self { scene_from_torus: *map * self.scene_from_torus, ..self }.into()
+    }
+
+    fn parts(&self) -> usize {
+        1
+    }
+
+    /// The solid is the sum of a disc's rim and a ball: half-widths of both add.
+    fn bounds(&self) -> Option<Bounds> {
+        let m = &self.scene_from_torus;
+        let rows = m.matrix3.transpose();
+        let half = [rows.x_axis, rows.y_axis, rows.z_axis]
+            .map(|row| self.ring * row.x.hypot(row.z) + self.tube * row.length());
+        let half = DVec3::from(half);
+        Some((m.translation - half, m.translation + half))
+    }
+
+    fn bounding_sphere(&self) -> BoundingSphere {
+        match similarity(&self.scene_from_torus.matrix3) {
+            Some(scale) => BoundingSphere {
+                center: self.scene_from_torus.translation,
+                radius: (self.ring + self.tube) * scale,
+            },
+            None => sphere_around_box(self.bounds()),
+        }
+    }
+
+    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
+        let outer = self.ring + self.tube;
+        let half = DVec3::new(outer, self.tube, outer);
+        Some((self.scene_from_torus, (-half, half)))
+    }
+
+    fn plane(&self) -> Option<HalfSpace> {
+        None
+    }
+
+    fn is_convex(&self) -> bool {
+        false
+    }
+
+    /// That of the box around a ball in the tube.
+    fn thickness(&self) -> f64 {
+        let rows = self.scene_from_torus.matrix3.inverse().transpose();
+        let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
+        2.0 * self.tube / rows.map(DVec3::length).into_iter().fold(0.0, f64::max)
+    }
+
+    /// Exact for similarities; for other maps the distance in the space of the torus times the least
+    /// factor by which the map scales lengths.
+    fn clearance(&self, point: DVec3) -> Option<f64> {
+        let inverse = self.scene_from_torus.inverse();
+        let (distance, _) = self.ring_distance(inverse.transform_point3(point));
+        let distance = (distance - self.tube).abs();
+        if let Some(scale) = similarity(&self.scene_from_torus.matrix3) {
+            return Some(distance * scale);
+        }
+        let columns = inverse.matrix3.to_cols_array();
+        let shrinks = columns.iter().map(|x| x * x).sum::<f64>().sqrt().recip();
+        Some(box_distance(self.bounds()?, point).max(distance * shrinks))
+    }
+
+    fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
+        let inverse = self.scene_from_torus.inverse();
+        let (distance, outward) = self.ring_distance(inverse.transform_point3(point));
+        let steepness = inverse.matrix3.transpose() * outward;
+        let height = (distance - self.tube) / steepness.length();
+        normals_of_solid(vec![(height, steepness.normalize())], slack)
+    }
+
+    fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        cast_compiled((*self).into(), origin, direction)
+    }
+
+    /// u: angle around the ring, v: angle around the tube, both from 0 to 1.
+    fn default_mapping(&self) -> DefaultMapping {
+        DefaultMapping::Uv
+    }
+
+    fn proxies(&self) -> Vec<Proxy> {
+        self.bounds().map(Proxy::around).into_iter().collect()
+    }
+
+    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
+        extent_of_box(self.bounds(), axis)
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        Vec::new()
+    }
+
+    fn triangles(&self) -> usize {
+        0
+    }
+}
+
+/// One torus. Matrices by rows.
+#[derive(Clone, Copy)]
+pub struct Torus<S> {
+    center: [S; 3],
+    /// To the space in which the ring has radius 1.
+    unit_from_scene: [[S; 3]; 3],
+    scene_from_unit: [[S; 3]; 3],
+    /// Radius of the tube in that space.
+    tube: S,
+    /// 1 over the radius of the ring.
+    inverse_ring: S,
+    reach: S,
+}
+
+impl<S: Float> Torus<S> {
+    /// Compiles a torus; `None` if the form is another.
+    pub fn new(form: &Form) -> Option<Self> {
+        let Form::Torus(torus) = form else { return None };
+        let DAffine3 { matrix3, translation } = torus.scene_from_unit();
+        Some(Self {
+            center: translation.to_array().map(S::from_f64),
+            unit_from_scene: rows(matrix3.inverse()),
+            scene_from_unit: rows(matrix3),
+            tube: S::from_f64(torus.tube / torus.ring),
+            inverse_ring: S::from_f64(torus.ring.recip()),
+            reach: S::from_f64(max_coordinate(form)),
+        })
+    }
+}
+
+/// Roundings of 1 by which the bounds of the roots are larger than the torus.
+const ROOM: f64 = 64.0;
+
+/// Steps of a root search at most: bisection alone needs 54 in double precision.
+const MAX_STEPS: usize = 64;
+
+/// A line in the space of the torus.
+#[derive(Clone, Copy)]
+struct UnitLine<L: SimdFloat> {
+    /// Point nearest to the centre.
+    point: Vec3<L>,
+    /// Unit direction.
+    direction: Vec3<L>,
+    /// Squared length of the direction across the axis.
+    across2: L,
+    /// Place of the ray's origin on the line.
+    origin: L,
+    /// Length in the scene of a step of length 1.
+    scale: L,
+    tube: L,
+    /// Places between which the line is close to the torus.
+    low: L,
+    high: L,
+    /// Lines that come close.
+    near: L::Mask,
+}
+
+/// Places that separate the roots, in ascending order, with the lanes whose place lies inside the torus.
+struct Separators<L: SimdFloat> {
+    places: [L; 5],
+    inside: [L::Mask; 5],
+}
+
+impl<L: SimdFloat> UnitLine<L> {
+    /// The line of a ray; `None` if no line of the packet comes close.
+    #[inline(always)]
+    fn new(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<Self> {
+        let f = times(&torus.unit_from_scene, ray.origin - Vec3::splat(torus.center));
+        let d = times(&torus.unit_from_scene, ray.direction);
+        let scale = L::one() / d.length_squared().sqrt();
+        let d = d * scale;
+        // Twice: what the first step rounds off along the direction, the second takes away.
+        let back = -f.dot(d);
+        let p = d.mul_add(back, f);
+        let again = -p.dot(d);
+        let p = d.mul_add(again, p);
+        let tube = L::splat(torus.tube);
+        let room = L::from_f64(ROOM * L::EPSILON);
+        let reach = L::one() + tube + room;
+        let chord2 = reach * reach - p.length_squared();
+        let near = chord2.gt(L::zero());
+        if near.none() {
+            return None;
+        }
+        let chord = chord2.max(L::zero()).sqrt();
+        // Between the planes above and below.
+        let inverse = L::one() / d.y.abs().max(L::from_f64(1e-30)).copysign(d.y);
+        let half = tube + room;
+        let (y0, y1) = ((-half - p.y) * inverse, (half - p.y) * inverse);
+        let (low, high) = (y0.min(y1).max(-chord), y0.max(y1).min(chord));
+        let near = near & low.lt(high);
+        if near.none() {
+            return None;
+        }
+        Some(Self {
+            point: p,
+            direction: d,
+            across2: d.x.mul_add(d.x, d.z * d.z),
+            origin: -(back + again),
+            scale,
+            tube,
+            low,
+            high,
+            near,
+        })
+    }
+
+    /// Distance from the axis less 1, height, and the derivative of that distance at `s`.
+    #[inline(always)]
+    fn place(&self, s: L) -> (L, L, L, L) {
+        let p = self.direction.mul_add(s, self.point);
+        let rho = p.x.mul_add(p.x, p.z * p.z).sqrt();
+        let inward = L::one() / rho.max(L::from_f64(1e-30));
+        let limit = self.across2.sqrt();
+        let speed = p.x.mul_add(self.direction.x, p.z * self.direction.z) * inward;
+        (rho - L::one(), p.y, speed.max(-limit).min(limit), inward)
+    }
+
+    /// Squared distance from the ring less that of the surface, and its derivative.
+    #[inline(always)]
+    fn height(&self, s: L) -> (L, L) {
+        let (beyond, y, speed, _) = self.place(s);
+        let height = beyond.mul_add(beyond, (y - self.tube) * (y + self.tube));
+        let slope = beyond.mul_add(speed, y * self.direction.y);
+        (height, slope + slope)
+    }
+
+    /// Half the derivative of the height, and its own derivative.
+    #[inline(always)]
+    fn slope(&self, s: L) -> (L, L) {
+        let (beyond, y, speed, inward) = self.place(s);
+        let slope = beyond.mul_add(speed, y * self.direction.y);
+        (slope, L::one() - (self.across2 - speed * speed) * inward)
+    }
+
+    /// Lanes whose place lies inside or on the surface.
+    #[inline(always)]
+    fn inside(&self, s: L) -> L::Mask {
+        self.height(s).0.le(L::zero())
+    }
+
+    /// Places of the extremes of the height: least, largest, least; where there is but one, thrice the same.
+    #[inline(always)]
+    fn extremes(&self) -> [L; 3] {
+        let (zero, one) = (L::zero(), L::one());
+        let tiny = L::from_f64(1e-30);
+        let a2 = self.across2.max(tiny);
+        let a = a2.sqrt();
+        let (p, d) = (self.point, self.direction);
+        // The point nearest to the axis, and its distance from there.
+        let middle = -(p.x.mul_add(d.x, p.z * d.z)) / a2;
+        let least = (p.x.mul_add(d.z, -(p.z * d.x)) / a).abs();
+        // rho'' > 1 where rho^3 < (a least)^2; the cube root by y <- (y x)^(1/4).
+        let bends = a2.gt(least);
+        let cube = a2 * least * least;
+        let mut root = one;
+        for _ in 0..10 {
+            root = (root * cube).sqrt().sqrt();
+        }
+        let half2 = (root * root - least * least) / a2;
+        let half = half2.max(zero).sqrt().max(L::from_f64(8.0 * L::EPSILON));
+        let left = L::select(bends, (middle - half).max(-a).min(a), a);
+        let right = L::select(bends, (middle + half).max(-a).min(a), a);
+        let (rises, falls) = (self.slope(left).0.gt(zero), self.slope(right).0.lt(zero));
+        let early = rises | !bends;
+        let three = bends & rises & falls;
+        let first = self.root(
+            L::select(early, -a, right),
+            L::select(early, left, a),
+            one,
+            self.near,
+            Self::slope,
+        );
+        let several = three & self.near;
+        if several.none() {
+            return [first; 3];
+        }
+        let second = self.root(left, right, -one, several, Self::slope);
+        let third = self.root(right, a, one, several, Self::slope);
+        [first, L::select(three, second, first), L::select(three, third, first)]
+    }
+
+    /// Zero of `function` between `low`, where `sign` times it is negative, and `high`, where it is positive,
+    /// in the lanes of `open`: by Newton's method, or by bisection where that leaves the bracket or is slow.
+    /// A lane's steps do not depend on the others.
+    #[inline(always)]
+    fn root(
+        &self,
+        mut low: L,
+        mut high: L,
+        sign: L,
+        mut open: L::Mask,
+        function: impl Fn(&Self, L) -> (L, L),
+    ) -> L {
+        let half = L::from_f64(0.5);
+        let mut place = half * low + half * high;
+        let mut step_before = (high - low).abs();
+        for _ in 0..MAX_STEPS {
+            let (value, slope) = function(self, place);
+            let (value, slope) = (value * sign, slope * sign);
+            let below = value.lt(L::zero());
+            low = L::select(below, place, low);
+            high = L::select(below, high, place);
+            let newton = place - value / slope;
+            let slow = (value + value).abs().gt((step_before * slope).abs());
+            let sound = newton.gt(low) & newton.lt(high) & !slow;
+            let next = L::select(sound, newton, half * low + half * high);
+            let step = (next - place).abs();
+            place = L::select(open, next, place);
+            step_before = step;
+            open = open & step.gt(L::from_f64(2.0 * L::EPSILON));
+            if open.none() {
+                break;
+            }
+        }
+        place
+    }
+
+    /// Separators of the roots at `start` or beyond.
+    #[inline(always)]
+    fn separators(&self, start: L) -> Separators<L> {
+        let within = |s: L| s.max(self.low).min(self.high).max(start);
+        let [first, second, third] = self.extremes().map(within);
+        let places = [self.low.max(start), first, second, third, self.high.max(start)];
+        // Both ends lie outside, but for a start inside.
+        let inside = [
+            start.gt(self.low) & self.inside(places[0]),
+            self.inside(first),
+            self.inside(second),
+            self.inside(third),
+            L::mask(false),
+        ];
+        Separators { places, inside }
+    }
+
+    /// Distance along the ray of a place on the line.
+    #[inline(always)]
+    fn distance(&self, s: L) -> L {
+        (s - self.origin) * self.scale
+    }
+}
+
+impl<L: SimdFloat> Primitive<L> for Torus<L::Scalar> {
+    #[inline(never)]
+    fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
+        let line = UnitLine::new(self, ray)?;
+        let ahead = line.near & line.origin.lt(line.high);
+        if ahead.none() {
+            return None;
+        }
+        let Separators { places, inside } = line.separators(line.origin);
+        // The first bracket at whose ends the line is on different sides.
+        let (mut low, mut high, mut sign) = (places[0], places[4], L::one());
+        let mut open = ahead;
+        for i in 0..4 {
+            let (before, after) = (inside[i], inside[i + 1]);
+            let crosses = open & (before.and_not(after) | after.and_not(before));
+            low = L::select(crosses, places[i], low);
+            high = L::select(crosses, places[i + 1], high);
+            sign = L::select(crosses & after, -L::one(), sign);
+            open = open.and_not(crosses);
+        }
+        let hits = ahead.and_not(open);
+        if hits.none() {
+            return None;
+        }
+        let root = line.root(low, high, sign, hits, UnitLine::height);
+        Some((line.distance(root), hits))
+    }
+
+    #[inline(always)]
+    fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
+        let center = Vec3::splat(self.center);
+        let p = times(&self.unit_from_scene, point - center);
+        let rho = p.x.mul_add(p.x, p.z * p.z).sqrt();
+        let on_axis = rho.le(L::zero());
+        let inverse = L::one() / L::select(on_axis, L::one(), rho);
+        let ring = Vec3::new(L::select(on_axis, L::one(), p.x * inverse), L::zero(), p.z * inverse);
+        let outward = (p - ring).normalize();
+        // The normal of the image is the inverse transpose times the normal: columns of the inverse.
+        let m = &self.unit_from_scene;
+        let normal = Vec3::splat(m[0]) * outward.x
+            + Vec3::splat(m[1]) * outward.y
+            + Vec3::splat(m[2]) * outward.z;
+        let on_surface = outward.mul_add(L::splat(self.tube), ring);
+        SurfacePoint {
+            point: times(&self.scene_from_unit, on_surface) + center,
+            normal: normal.normalize(),
+            max_coordinate: L::splat(self.reach),
+        }
+    }
+
+    fn uv(&self, point: Vec3<L>) -> Option<UvGradients<L>> {
+        let p = times(&self.unit_from_scene, point - Vec3::splat(self.center));
+        let rho2 = p.x.mul_add(p.x, p.z * p.z).max(L::from_f64(1e-12));
+        let rho = rho2.sqrt();
+        let beyond = rho - L::one();
+        let (turn, half) = (L::from_f64(1.0 / TAU), L::from_f64(0.5));
+        let per = L::splat(self.inverse_ring) * turn;
+        let around_ring = per / rho2;
+        let across2 = beyond.mul_add(beyond, p.y * p.y);
+        let around_tube = per / across2.max(L::from_f64(1e-30));
+        let inward = -(p.y * around_tube) / rho;
+        Some(UvGradients {
+            uv: [p.x.atan2(p.z).mul_add(turn, half), p.y.atan2(beyond).mul_add(turn, half)],
+            gradients: [
+                Vec3::new(p.z * around_ring, L::zero(), -(p.x * around_ring)),
+                Vec3::new(p.x * inward, beyond * around_tube, p.z * inward),
+            ],
+        })
+    }
+}
+
+impl<L: SimdFloat> SolidPrimitive<L> for Torus<L::Scalar> {
+    type Spans = std::iter::Flatten<std::option::IntoIter<[Span<L>; 2]>>;
+
+    fn spans(&self, ray: &Ray<L>) -> Self::Spans {
+        spans(self, ray).into_iter().flatten()
+    }
+}
+
+/// The two spans of each line, of which the second may be empty, or both.
+#[inline(never)]
+fn spans<L: SimdFloat>(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<[Span<L>; 2]> {
+    let line = UnitLine::new(torus, ray)?;
+    let Separators { places, inside } = line.separators(line.low);
+    let near = line.near;
+    let one = L::one();
+    let whole = inside[1] & inside[2] & inside[3];
+    let (first, second) = (near & inside[1], (near & inside[3]).and_not(whole));
+    let root = |i: usize, sign: L, open: L::Mask| {
+        if open.none() {
+            return places[i];
+        }
+        line.root(places[i], places[i + 1], sign, open, UnitLine::height)
+    };
+    let enter_first = root(0, -one, first);
+    let leave_first = root(1, one, first.and_not(whole));
+    let enter_second = root(2, -one, second);
+    let leave_last = root(3, one, second | (first & whole));
+    let cosine = |t: L| torus.surface(ray.at(t)).normal.dot(ray.direction).abs();
+    let span = |enter: L, leave: L, meets: L::Mask| {
+        let (enter, leave) = (line.distance(enter), line.distance(leave));
+        let (enter_cosine, leave_cosine) = (cosine(enter), cosine(leave));
+        Span { enter, leave, enter_cosine, leave_cosine, meets }
+    };
+    Some([
+        span(enter_first, L::select(whole, leave_last, leave_first), first),
+        span(enter_second, leave_last, second),
+    ])
+}

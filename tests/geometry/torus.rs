@@ -1,0 +1,336 @@
+//! Tori: rays against the roots of the quartic's coefficients in double precision, measures against closed
+//! forms, shadows that a torus casts on itself, and cuts.
+
+use crate::common::Numbers;
+use crate::rays::{Line, blocked, closest};
+use glam::{DAffine3, DQuat, DVec3};
+use std::f64::consts::PI;
+use zerkalo::lanes::{Double, SimdFloat, Single};
+use zerkalo::primitive::{
+    Aggregate, BoundingVolume, CsgSolid, CsgTree, Form, PlaneForm, SphereForm, TorusForm,
+};
+
+/// Ratios of tube to ring.
+const TUBES: [f64; 6] = [1e-3, 1e-2, 0.1, 0.4, 0.9, 1.0];
+
+fn torus(tube: f64) -> Form {
+    TorusForm { scene_from_torus: DAffine3::IDENTITY, ring: 1.0, tube }.into()
+}
+
+fn geometry<L: SimdFloat>(form: &Form) -> Aggregate<L> {
+    Aggregate::new(std::slice::from_ref(form))
+}
+
+/// Height of a point over the surface.
+fn height(p: DVec3, tube: f64) -> f64 {
+    (p.x.hypot(p.z) - 1.0).hypot(p.y) - tube
+}
+
+/// Real roots in ascending order of a polynomial, lowest coefficient first: bisection between the roots of
+/// its derivative.
+fn roots(coefficients: &[f64]) -> Vec<f64> {
+    let value = |x: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
+    if coefficients.len() == 2 {
+        return vec![-coefficients[0] / coefficients[1]];
+    }
+    let derivative: Vec<f64> =
+        coefficients.iter().enumerate().skip(1).map(|(i, c)| c * i as f64).collect();
+    let mut ends = vec![-4.0];
+    ends.extend(roots(&derivative));
+    ends.push(4.0);
+    let mut out = Vec::new();
+    for pair in ends.windows(2) {
+        let (mut low, mut high) = (pair[0], pair[1]);
+        if (value(low) < 0.0) == (value(high) < 0.0) {
+            continue;
+        }
+        let rising = value(low) < 0.0;
+        for _ in 0..80 {
+            let middle = 0.5 * (low + high);
+            if (value(middle) < 0.0) == rising { low = middle } else { high = middle }
+        }
+        out.push(0.5 * (low + high));
+    }
+    out
+}
+
+/// Coefficients of (|p|^2 + 1 - tube^2)^2 - 4 (x^2 + z^2) along a line, by the distance from its point
+/// nearest to the origin, and the distance of that from the line's origin.
+fn quartic((origin, d): Line, tube: f64) -> ([f64; 5], f64) {
+    let start = -origin.dot(d);
+    let p = origin + d * start;
+    let k = p.length_squared() + 1.0 - tube * tube;
+    let a = d.x * d.x + d.z * d.z;
+    let b = p.x * d.x + p.z * d.z;
+    let c = p.x * p.x + p.z * p.z;
+    ([k * k - 4.0 * c, -8.0 * b, 2.0 * k - 4.0 * a, 0.0, 1.0], start)
+}
+
+/// A line near the torus: through its box, or along a tangent a little above or below the surface.
+fn line(numbers: &mut Numbers, tube: f64) -> Line {
+    let angles = [numbers.between(0.0, 2.0 * PI), numbers.between(0.0, 2.0 * PI)];
+    let outward = DVec3::new(angles[0].cos(), 0.0, angles[0].sin());
+    let normal = outward * angles[1].cos() + DVec3::Y * angles[1].sin();
+    let on_surface = outward + normal * tube;
+    let far = [0.5, 4.0, 100.0][numbers.below(3)];
+    if numbers.below(2) == 0 {
+        let d = numbers.direction();
+        return (on_surface - d * far, d);
+    }
+    let tangent = numbers.direction().cross(normal).normalize();
+    let above = tube * [0.1, 1e-2, 1e-4, -1e-2, -1e-4][numbers.below(5)];
+    (on_surface + normal * above - tangent * far, tangent)
+}
+
+/// Every hit lies on the surface, and is the first of the quartic's roots where rounding cannot decide.
+fn hits_are_roots<L: SimdFloat>(tube: f64, count: usize) {
+    let geometry = geometry::<L>(&torus(tube));
+    let mut numbers = Numbers::new(17);
+    let rounded =
+        |v: DVec3| -> DVec3 { if L::EPSILON > 1e-10 { v.as_vec3().as_dvec3() } else { v } };
+    let lines: Vec<Line> = (0..count)
+        .map(|_| line(&mut numbers, tube))
+        .map(|(o, d)| (rounded(o), rounded(d)))
+        .collect();
+    let (mut compared, mut seen) = (0, 0);
+    for (line, hit) in lines.iter().zip(closest(&geometry, &lines)) {
+        // The kernel takes directions to have unit length; the rest of the world rounds them so.
+        let room = 64.0 * L::EPSILON * (1.0 + line.0.length());
+        let (coefficients, start) = quartic((line.0, line.1.normalize()), tube);
+        let at = |s: f64| line.0 + line.1.normalize() * (start + s);
+        let derivative: Vec<f64> =
+            coefficients.iter().enumerate().skip(1).map(|(i, c)| c * i as f64).collect();
+        if let Some(hit) = hit {
+            seen += 1;
+            let away = height(line.0 + line.1 * hit.t, tube).abs();
+            assert!(away <= room, "{tube} {}: {line:?} {hit:?} {away}", L::NAME);
+            let on_surface = height(hit.point, tube).abs();
+            assert!(on_surface <= 16.0 * L::EPSILON, "{tube} {}: {line:?} {hit:?}", L::NAME);
+        }
+        // Coefficients of thin tubes lose digits by 1 / tube.
+        let margin = room + 1e-13 / tube;
+        let unsure = roots(&derivative).into_iter().any(|s| height(at(s), tube).abs() <= margin)
+            || height(line.0, tube).abs() <= margin;
+        if unsure {
+            continue;
+        }
+        compared += 1;
+        let first = roots(&coefficients).into_iter().find(|s| start + s > 0.0);
+        let (Some(first), Some(hit)) = (first, hit) else {
+            assert!(first.is_none() && hit.is_none(), "{tube} {}: {line:?} {hit:?}", L::NAME);
+            continue;
+        };
+        let normal = hit.normal.dot(line.1).abs();
+        let apart = (hit.t - (start + first)).abs();
+        // A root moves by the height's error over the slope, at most by its root.
+        let allowed = (2.0 * margin / normal.max(1e-9)).min(8.0 * margin.sqrt());
+        assert!(apart <= allowed, "{tube} {}: {line:?} {hit:?} {apart} > {allowed}", L::NAME);
+    }
+    assert!(compared > count / 3 && seen > count / 4, "{tube} {}: {compared} {seen}", L::NAME);
+}
+
+#[test]
+fn torus_hits_are_roots_of_the_quartic() {
+    for tube in TUBES {
+        hits_are_roots::<Single>(tube, 10_000);
+        hits_are_roots::<Double>(tube, 10_000);
+    }
+}
+
+/// Lanes do not depend on the other lanes of their packet, nor on its width.
+#[test]
+fn torus_hits_do_not_depend_on_company() {
+    let mut numbers = Numbers::new(3);
+    let lines: Vec<Line> = (0..4000).map(|_| line(&mut numbers, 0.3)).collect();
+    let bits = |all: Vec<Option<crate::rays::LineHit>>| -> Vec<Option<u64>> {
+        all.into_iter().map(|hit| hit.map(|hit| hit.t.to_bits())).collect()
+    };
+    let form = torus(0.3);
+    let single = bits(closest(&geometry::<Single>(&form), &lines));
+    assert_eq!(single, bits(closest(&geometry::<f32>(&form), &lines)));
+    let double = bits(closest(&geometry::<Double>(&form), &lines));
+    assert_eq!(double, bits(closest(&geometry::<f64>(&form), &lines)));
+}
+
+/// All hits along a line from outside, one after the other.
+fn all_hits<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<f64>> {
+    let mut out = vec![Vec::new(); lines.len()];
+    for (hits, (origin, d)) in out.iter_mut().zip(lines) {
+        let mut from = 0.0;
+        while let Some(hit) = closest(geometry, &[(*origin + *d * from, *d)])[0] {
+            hits.push(from + hit.t);
+            from += hit.t + 1e-9;
+            assert!(hits.len() < 16, "{origin} {d}: {hits:?}");
+        }
+    }
+    out
+}
+
+/// Lines along `d` through an even grid of `side` by `side` points of a square of half-width `half`.
+fn grid(d: DVec3, half: f64, side: usize) -> Vec<Line> {
+    let (u, v) = d.any_orthonormal_pair();
+    let place = |i: usize| half * (2.0 * (i as f64 + 0.5) / side as f64 - 1.0);
+    (0..side * side).map(|i| (u * place(i % side) + v * place(i / side) - d * 5.0, d)).collect()
+}
+
+#[test]
+fn torus_volume_and_projected_area_are_those_of_the_formulas() {
+    for tube in [0.1, 0.4, 1.0] {
+        let geometry = geometry::<Double>(&torus(tube));
+        let (half, side) = (1.0 + tube, 300);
+        let cell = (2.0 * half / side as f64).powi(2);
+        let oblique = DVec3::new(0.3, 0.8, -0.5).normalize();
+        for (d, area) in [
+            (DVec3::Y, Some(4.0 * PI * tube)),
+            (DVec3::X, Some(4.0 * tube + PI * tube * tube)),
+            (oblique, None),
+        ] {
+            let hits = all_hits(&geometry, &grid(d, half, side));
+            let pairs = |hits: &Vec<f64>| hits.chunks(2).map(|pair| pair[1] - pair[0]).sum::<f64>();
+            let volume = hits.iter().map(pairs).sum::<f64>() * cell;
+            let expected = 2.0 * PI * PI * tube * tube;
+            assert!((volume / expected - 1.0).abs() < 3e-3, "{tube} {d}: {volume} {expected}");
+            let seen = hits.iter().filter(|hits| !hits.is_empty()).count() as f64 * cell;
+            if let Some(area) = area {
+                assert!((seen / area - 1.0).abs() < 3e-2, "{tube} {d}: {seen} {area}");
+            }
+        }
+    }
+}
+
+/// Points on the inner side of the hole see the other side; shadow rays across it are blocked.
+#[test]
+fn torus_casts_shadows_on_itself() {
+    let form = torus(0.3);
+    assert!(!form.is_convex() && !BoundingVolume::new(&form).is_convex());
+    let inner = DVec3::new(0.7 - 1e-6, 0.0, 0.0);
+    let rays =
+        [(inner, DVec3::NEG_X), (inner, DVec3::Y), (DVec3::new(1.3 + 1e-6, 0.0, 0.0), DVec3::X)];
+    assert_eq!(blocked(&geometry::<Single>(&form), &rays, 10.0), [true, false, false]);
+    assert_eq!(blocked(&geometry::<Double>(&form), &rays, 10.0), [true, false, false]);
+}
+
+/// Rays that leave the surface by the offset of their precision meet it again only from inside a bend.
+#[test]
+fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
+    fn check<L: SimdFloat>(tube: f64) {
+        let geometry = geometry::<L>(&torus(tube));
+        let mut numbers = Numbers::new(9);
+        let mut lines = Vec::new();
+        for _ in 0..20_000 {
+            let turn = numbers.between(0.0, 2.0 * PI);
+            let outward = DVec3::new(turn.cos(), 0.0, turn.sin());
+            // On the outside of the ring, where the torus is convex.
+            let tilt = numbers.between(-0.5 * PI, 0.5 * PI);
+            let normal = outward * tilt.cos() + DVec3::Y * tilt.sin();
+            let tangent = numbers.direction().cross(normal).normalize();
+            let rise = [0.0, 1e-4, 1e-2, 0.5][numbers.below(4)];
+            let offset = 8.0 * L::EPSILON * (1.0 + tube);
+            let start = outward + normal * (tube + offset);
+            lines.push((start, (tangent + normal * rise).normalize()));
+        }
+        for (line, hit) in lines.iter().zip(closest(&geometry, &lines)) {
+            let again = hit.is_some_and(|hit| hit.t < 0.1 * tube);
+            assert!(!again, "{tube} {}: {line:?} {hit:?}", L::NAME);
+        }
+    }
+    for tube in [0.01, 0.1, 0.4, 1.0] {
+        check::<Single>(tube);
+        check::<Double>(tube);
+    }
+}
+
+/// Compounds of a torus with a ball and a half-space: between surfaces, each point is on the side that its
+/// parts say.
+#[test]
+fn torus_in_compounds_has_two_intervals() {
+    let contains = |part: usize, p: DVec3| match part {
+        0 => height(p, 0.35) <= 0.0,
+        1 => p.distance(DVec3::new(0.9, 0.1, 0.2)) <= 0.5,
+        _ => p.dot(DVec3::new(0.0, 0.6, 0.8)) <= 0.05,
+    };
+    let ball = SphereForm { center: DVec3::new(0.9, 0.1, 0.2), radius: 0.5 };
+    let parts: Vec<Form> = vec![
+        torus(0.35),
+        ball.into(),
+        PlaneForm { normal: DVec3::new(0.0, 0.6, 0.8), offset: 0.05 }.into(),
+    ];
+    let leaves = || vec![CsgTree::Part(0), CsgTree::Part(1)];
+    let mut numbers = Numbers::new(5);
+    let lines: Vec<Line> = (0..3000)
+        .map(|_| {
+            let d = numbers.direction();
+            (numbers.in_cube(1.2) - d * 5.0, d)
+        })
+        .collect();
+    type Inside<'a> = &'a dyn Fn(&[bool; 3]) -> bool;
+    let trees: [(CsgTree, Inside); 4] = [
+        (CsgTree::Union(leaves()), &|c| c[0] || c[1]),
+        (CsgTree::Intersection(leaves()), &|c| c[0] && c[1]),
+        (CsgTree::Difference(leaves()), &|c| c[0] && !c[1]),
+        (CsgTree::Difference(vec![CsgTree::Part(1), CsgTree::Part(0)]), &|c| c[1] && !c[0]),
+    ];
+    let mut several = 0;
+    for (tree, inside) in trees {
+        let swapped = matches!(&tree, CsgTree::Difference(list) if list[0] == CsgTree::Part(1));
+        let used =
+            if swapped { vec![parts[1].clone(), parts[0].clone()] } else { parts[..2].to_vec() };
+        let tree = if swapped { CsgTree::Difference(leaves()) } else { tree };
+        let cut = CsgTree::Intersection(vec![tree, CsgTree::Part(2)]);
+        let used = [used, vec![parts[2].clone()]].concat();
+        let form = Form::Csg(CsgSolid { parts: used, tree: cut });
+        for ((origin, d), hits) in lines.iter().zip(all_hits(&geometry::<Double>(&form), &lines)) {
+            assert!(hits.len().is_multiple_of(2), "{origin} {d} {hits:?}");
+            several += usize::from(hits.len() > 2);
+            let ends = [vec![0.0], hits, vec![12.0]].concat();
+            for (n, gap) in ends.windows(2).enumerate().filter(|(_, gap)| gap[1] - gap[0] > 1e-6) {
+                let p = *origin + *d * (0.5 * (gap[0] + gap[1]));
+                let at = [0, 1, 2].map(|part| contains(part, p));
+                assert_eq!(inside(&at) && at[2], n % 2 == 1, "{origin} {d} {ends:?}");
+            }
+        }
+    }
+    assert!(several > 30, "{several}");
+}
+
+/// Bounds touch the image of the surface under any map, clearance is no more than the distance of its points,
+/// and normals are there where rays hit.
+#[test]
+fn torus_bounds_clearance_and_normals_agree_with_its_points() {
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);
+    let uneven = DVec3::new(1.0, -0.3, 2.5);
+    let maps = [
+        DAffine3::from_rotation_translation(turn, DVec3::new(3.0, -1.0, 2.0)),
+        DAffine3::from_scale_rotation_translation(uneven, turn, DVec3::X),
+        DAffine3::from_rotation_translation(turn, DVec3::ZERO) * DAffine3::from_scale(uneven),
+    ];
+    for map in maps {
+        let form = torus(0.3).transformed(&map);
+        let points: Vec<DVec3> = (0..400 * 200)
+            .map(|i| (f64::from(i % 400) / 400.0, f64::from(i / 400) / 200.0))
+            .map(|(u, v)| ((2.0 * PI * u).sin_cos(), (2.0 * PI * v).sin_cos()))
+            .map(|((su, cu), (sv, cv))| {
+                let outward = DVec3::new(cu, 0.0, su);
+                map.transform_point3(outward * (1.0 + 0.3 * cv) + DVec3::Y * (0.3 * sv))
+            })
+            .collect();
+        let (low, high) = form.bounds().unwrap();
+        let least = points.iter().copied().reduce(DVec3::min).unwrap();
+        let most = points.iter().copied().reduce(DVec3::max).unwrap();
+        assert!((least - low).min_element() > -1e-12 && (least - low).max_element() < 2e-3);
+        assert!((high - most).min_element() > -1e-12 && (high - most).max_element() < 2e-3);
+        let ball = form.bounding_sphere();
+        assert!(points.iter().all(|p| p.distance(ball.center) <= ball.radius * (1.0 + 1e-12)));
+        for point in points.iter().step_by(997) {
+            let normals = form.normals_at(*point, 1e-9);
+            assert_eq!(normals.concat().len(), 1, "{point}");
+            assert!(form.clearance(*point).unwrap() < 1e-9);
+            let aside = *point + normals[0][0] * 0.05;
+            let nearest = points.iter().map(|p| p.distance(aside)).fold(f64::INFINITY, f64::min);
+            assert!(form.clearance(aside).unwrap() <= nearest * (1.0 + 1e-9));
+            assert!(form.normals_at(aside, 1e-3).is_empty());
+            let t = form.cast(aside, -normals[0][0]).unwrap();
+            assert!((t - 0.05).abs() < 1e-9, "{t}");
+        }
+    }
+}
