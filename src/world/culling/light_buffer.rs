@@ -135,17 +135,16 @@ impl<S: Float> LightBuffer<S> {
         rays: &ShadowRays<L>,
         candidates: &PrimitiveSet,
     ) -> L::Mask {
-        let ShadowRays { ray, start_item, starts_outside, t_max, active } = rays;
-        let (t_max, active) = (*t_max, *active);
-        let mut occluded = geometry.occluded_linear(ray, t_max, active, candidates);
+        let ShadowRays { ray, start_item, starts_outside, t_max, active } = *rays;
+        let mut occluded = geometry.occluded_linear(&ray, t_max, active, candidates);
         let out_of_bounds = ray.origin.max_abs().gt(L::splat(self.max_coordinate));
         // Lanes that have to traverse the BVH.
         let mut use_bvh = active.and_not(occluded) & out_of_bounds;
         let mut remaining = active.and_not(occluded | use_bvh);
-        let (cell, depth) = self.projection.lookup(ray, t_max, self.side);
+        let (cell, depth) = self.projection.lookup(&ray, t_max, self.side);
         // Primitive on whose outside all rays start.
-        let common_start = match next_distinct(*start_item, active) {
-            Some((item, lanes)) if active.and_not(lanes & *starts_outside).none() => Some(item),
+        let common_start = match next_distinct(start_item, active) {
+            Some((item, lanes)) if active.and_not(lanes & starts_outside).none() => Some(item),
             _ => None,
         };
         while remaining.any() {
@@ -169,7 +168,7 @@ impl<S: Float> LightBuffer<S> {
                     continue;
                 }
                 let unoccluded = active.and_not(occluded);
-                let hits = geometry.occluded_by(entry.number, ray, t_max, unoccluded);
+                let hits = geometry.occluded_by(entry.number, &ray, t_max, unoccluded);
                 occluded = occluded | (hits & unoccluded);
                 if in_cell.and_not(occluded).none() {
                     break;
@@ -179,7 +178,7 @@ impl<S: Float> LightBuffer<S> {
         }
         use_bvh = use_bvh.and_not(occluded);
         if use_bvh.any() {
-            occluded = occluded | (geometry.occluded(ray, t_max, use_bvh, candidates) & use_bvh);
+            occluded = occluded | (geometry.occluded(&ray, t_max, use_bvh, candidates) & use_bvh);
         }
         occluded
     }
