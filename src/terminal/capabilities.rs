@@ -153,9 +153,9 @@ mod tests {
             ("xterm-256color", "truecolor", "1", Colors::Mono),
             ("", "", "", Colors::Indexed),
         ] {
-            let found =
+            let actual =
                 environment(&[("TERM", term), ("COLORTERM", color_term), ("NO_COLOR", no_color)]);
-            assert_eq!(found.colors(), expected, "{term} {color_term} {no_color}");
+            assert_eq!(actual.colors(), expected, "{term} {color_term} {no_color}");
         }
     }
 

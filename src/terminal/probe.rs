@@ -61,33 +61,36 @@ pub fn probe(
     is_ending: &dyn Fn() -> bool,
 ) -> io::Result<Capabilities> {
     let patience = if environment.ssh.is_some() { PATIENCE_OVER_SSH } else { PATIENCE };
-    let mut found = Capabilities::from_environment(environment);
+    let mut capabilities = Capabilities::from_environment(environment);
     let sent_at = Instant::now();
-    let is_minimal = ["linux", "vt"].iter().any(|term| found.environment.term.starts_with(term));
-    let through = match found.environment.multiplexer {
+    let is_minimal =
+        ["linux", "vt"].iter().any(|term| capabilities.environment.term.starts_with(term));
+    let through = match capabilities.environment.multiplexer {
         Some(Multiplexer::Tmux) => REQUESTS_THROUGH_TMUX,
         _ => "",
     };
     let requests = if is_minimal { "" } else { REQUESTS };
     tty.write([through, requests, ATTRIBUTES].concat().as_bytes())?;
     listen(keyboard, sent_at + patience, is_ending, |at, reply| {
-        found.round_trip.get_or_insert(at.saturating_duration_since(sent_at));
-        found.learn(reply);
+        capabilities.round_trip.get_or_insert(at.saturating_duration_since(sent_at));
+        capabilities.learn(reply);
         matches!(reply, Reply::Attributes(_))
     })?;
-    if let (Some(_), Some(multiplexer)) = (&found.environment.ssh, found.environment.multiplexer) {
+    if let (Some(_), Some(multiplexer)) =
+        (&capabilities.environment.ssh, capabilities.environment.multiplexer)
+    {
         let sent_at = Instant::now();
         tty.write(cursor_request(Some(multiplexer)).as_bytes())?;
         listen(keyboard, sent_at + PATIENCE, is_ending, |at, reply| {
-            found.learn(reply);
+            capabilities.learn(reply);
             let is_reply = matches!(reply, Reply::Cursor { .. });
             if is_reply {
-                found.passthrough = Some(at.saturating_duration_since(sent_at));
+                capabilities.passthrough = Some(at.saturating_duration_since(sent_at));
             }
             is_reply
         })?;
     }
-    Ok(found)
+    Ok(capabilities)
 }
 
 /// Passes replies to `take` until it returns `true`, `deadline` has passed, or `is_ending` returns `true`.

@@ -269,10 +269,12 @@ mod tests {
         }
     }
 
-    /// Returns a screen and its output.
-    fn screen() -> (Screen, SharedWriter) {
+    /// Returns a screen, its output, and a lock against the panic of another test, which would leave it.
+    fn screen() -> (Screen, SharedWriter, MutexGuard<'static, ()>) {
+        static TURN: Mutex<()> = Mutex::new(());
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let out = SharedWriter::default();
-        (Screen::over(Box::new(out.clone()), None).unwrap(), out)
+        (Screen::over(Box::new(out.clone()), None).unwrap(), out, turn)
     }
 
     /// Returns `parts` after each other, each `[` standing for [`ENTER`] and `]` for [`LEAVE`].
@@ -289,7 +291,7 @@ mod tests {
 
     #[test]
     fn screen_is_left_once() {
-        let (screen, out) = screen();
+        let (screen, out, _turn) = screen();
         let tty = screen.tty();
         tty.write(b"frame").unwrap();
         drop(screen);
@@ -300,7 +302,7 @@ mod tests {
 
     #[test]
     fn exit_sequence_is_sent_once_before_leaving() {
-        let (screen, out) = screen();
+        let (screen, out, _turn) = screen();
         let tty = screen.tty();
         tty.set_exit_sequence(b"old");
         tty.set_exit_sequence(b"the picture goes");
@@ -312,7 +314,7 @@ mod tests {
 
     #[test]
     fn suspended_screen_is_resumed() {
-        let (screen, out) = screen();
+        let (screen, out, _turn) = screen();
         let tty = screen.tty();
         assert!(tty.suspend() && !tty.suspend());
         tty.write(b"a frame while suspended").unwrap();
@@ -343,7 +345,7 @@ mod tests {
 
     #[test]
     fn panic_in_any_thread_restores_the_terminal_and_is_reported() {
-        let (screen, out) = screen();
+        let (screen, out, _turn) = screen();
         assert!(screen.left().try_recv().is_err());
         thread::spawn(|| panic!("as the test wants it")).join().unwrap_err();
         screen.left().recv_timeout(Duration::from_secs(10)).expect("a message about the panic");
@@ -354,7 +356,7 @@ mod tests {
 
     #[test]
     fn terminal_that_does_not_read_does_not_delay_the_end() {
-        let (screen, _) = screen();
+        let (screen, _, _turn) = screen();
         let tty = screen.tty();
         let _busy = tty.out.lock().unwrap();
         let start = Instant::now();

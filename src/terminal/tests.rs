@@ -152,13 +152,13 @@ fn replies_are_decoded() {
 
 #[test]
 fn replies_set_capabilities() {
-    let mut found = Capabilities::from_environment(Environment::default());
-    assert_eq!(found.colors, Colors::Indexed);
+    let mut capabilities = Capabilities::from_environment(Environment::default());
+    assert_eq!(capabilities.colors, Colors::Indexed);
     let replies = "\x1bP1$r0;48:2::1:2:3m\x1b\\\x1bP>|XTerm(379)\x1b\\\x1b]11;rgb:ff/ff/ff\x07\
                    \x1b[?2026;2$y\x1b_Gi=31;OK\x1b\\\x1b[6;20;10t\x1b[?62;4c";
     for event in all_at_once(replies) {
         if let Event::Reply(reply) = event {
-            found.learn(&reply);
+            capabilities.learn(&reply);
         }
     }
     let expected = Capabilities {
@@ -171,7 +171,7 @@ fn replies_set_capabilities() {
         cell_px: Some([10, 20]),
         ..Capabilities::from_environment(Environment::default())
     };
-    assert_eq!(found, expected);
+    assert_eq!(capabilities, expected);
     // Only some terminals behind tmux show pictures among text.
     let multiplexer = Some(Multiplexer::Tmux);
     for (version, expected) in [
@@ -231,9 +231,9 @@ fn lone_escape_is_a_key_after_timeout() {
     for next in ["[", "]", "q", "O", "P", "_", "]]]", "[["] {
         assert_eq!(decoder.take(b"\x1b"), []);
         assert_eq!(keys(&decoder.give_up()), ["Esc"]);
-        let mut found = decoder.take(next.as_bytes());
-        found.extend(decoder.give_up());
-        assert_eq!(keys(&found).concat(), next);
+        let mut events = decoder.take(next.as_bytes());
+        events.extend(decoder.give_up());
+        assert_eq!(keys(&events).concat(), next);
     }
     assert_eq!(keys(&decoder.take(b"\x1b\x1b\x1b[A")), ["Esc", "Esc", "Up"]);
 }
@@ -433,6 +433,6 @@ proptest! {
 
 #[test]
 fn shifted_character_is_its_capital_without_modifier() {
-    let found = all_at_once("\x1b[65;2u");
-    assert_eq!(found, [Event::Key(Key::plain(Code::Char('A')))]);
+    let events = all_at_once("\x1b[65;2u");
+    assert_eq!(events, [Event::Key(Key::plain(Code::Char('A')))]);
 }

@@ -58,15 +58,15 @@ mod tests {
         let (mut plain, mut mixed) = (0.0, 0.0);
         for step in 0..64u8 {
             let rgb = [40 + 3 * step, 90 + step, 200 - 2 * step];
-            let wanted = Oklab::of(rgb);
+            let target = Oklab::of(rgb);
             let raster = Raster::from_fn(8, 8, |_| rgb);
             let mut mean = [0.0f32; 3];
             for index in dithered(&raster) {
-                let got = linear(palette256::rgb(index));
-                (0..3).for_each(|c| mean[c] += got[c] / 64.0);
+                let color = linear(palette256::rgb(index));
+                (0..3).for_each(|c| mean[c] += color[c] / 64.0);
             }
-            mixed += Oklab::of_linear(mean).distance(wanted);
-            plain += Oklab::of(palette256::rgb(palette256::nearest(rgb))).distance(wanted);
+            mixed += Oklab::of_linear(mean).distance(target);
+            plain += Oklab::of(palette256::rgb(palette256::nearest(rgb))).distance(target);
         }
         assert!(mixed < 0.6 * plain, "{mixed} after {plain}");
     }

@@ -85,13 +85,14 @@ mod tests {
         let v6 = "   1: 0000000000000000FFFF00000200000A:0016 0000000000000000FFFF00000100000A:1389 \
                   01 00000010:00000000 01:00000014\n";
         let table = format!("{head}{v4}{v6}");
-        let found = |text: &str| TcpSendQueue::parse(text).and_then(|queue| queue.bytes_in(&table));
-        assert_eq!(found("10.0.0.1 5000 10.0.0.2 22"), Some(16_000));
-        assert_eq!(found("10.0.0.1 5001 10.0.0.2 22"), Some(16));
-        assert_eq!(found("::ffff:10.0.0.1 5001 ::ffff:10.0.0.2 22"), Some(16));
-        assert_eq!(found("10.0.0.1 5002 10.0.0.2 22"), None);
+        let bytes_of =
+            |text: &str| TcpSendQueue::parse(text).and_then(|queue| queue.bytes_in(&table));
+        assert_eq!(bytes_of("10.0.0.1 5000 10.0.0.2 22"), Some(16_000));
+        assert_eq!(bytes_of("10.0.0.1 5001 10.0.0.2 22"), Some(16));
+        assert_eq!(bytes_of("::ffff:10.0.0.1 5001 ::ffff:10.0.0.2 22"), Some(16));
+        assert_eq!(bytes_of("10.0.0.1 5002 10.0.0.2 22"), None);
         for wrong in ["", "10.0.0.1 22", "a b c d", "10.0.0.1 5000 10.0.0.2 99999"] {
-            assert_eq!(found(wrong), None, "{wrong}");
+            assert_eq!(bytes_of(wrong), None, "{wrong}");
         }
         assert_eq!(
             TcpSendQueue::parse("10.0.0.1 5000 10.0.0.2 22").unwrap().bytes_in("nonsense\n0:\n"),
@@ -110,7 +111,7 @@ mod tests {
         let text = format!("{} {} {} {}", remote.ip(), remote.port(), from.ip(), from.port());
         let Some(queue) = TcpSendQueue::find(&text) else {
             // Some containers hide the table.
-            assert!(!std::path::Path::new("/proc/net/tcp").exists(), "{text} is not found");
+            assert!(!std::path::Path::new("/proc/net/tcp").exists(), "{text} is not bytes_of");
             return;
         };
         assert_eq!(queue.bytes(), Some(0));

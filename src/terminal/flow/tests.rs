@@ -65,12 +65,13 @@ fn rate_is_measured_and_connection_kept_busy() {
         });
         let mut wire = Wire { rate, round_trip: ms(round_trip), free_at: Duration::ZERO };
         let (busy, waited) = saturate(&mut flow, &mut wire, 70, false);
-        let found = flow.reading().unwrap().rate;
-        let what = format!("{rate} B/s, {round_trip} ms: {found:.0}, busy {busy:.2}, {waited:?}");
+        let rate_found = flow.reading().unwrap().rate;
+        let what =
+            format!("{rate} B/s, {round_trip} ms: {rate_found:.0}, busy {busy:.2}, {waited:?}");
         // Frame size and interval are limited, so the fastest connections are not filled.
         let expected = (BUDGET[2] / 0.033 / rate).min(1.0);
         assert!(busy > 0.6 * expected, "{what}");
-        assert!(found > 0.6 * rate.min(8e6) && found < 1.6 * rate, "{what}");
+        assert!(rate_found > 0.6 * rate.min(8e6) && rate_found < 1.6 * rate, "{what}");
         assert!(waited < ms(400), "{what}");
     }
 }
