@@ -1,21 +1,20 @@
 //! Materials: description of a surface and its compiled BSDF.
 
 mod bsdf;
-mod bsdf_eval;
 mod fresnel;
 mod mapping;
+mod microfacet;
 mod properties;
 mod refraction;
 mod texture;
 mod texture_eval;
 
 pub use bsdf::{
-    Bsdf, MicrofacetDistribution, ReflectionLobe, SMOOTH_ALPHA, SpecularModel, Transmission,
-    one_minus_cos_of_tan,
+    Bsdf, BsdfSample, ReflectionLobe, SpecularModel, Transmission, one_minus_cos_of_tan,
 };
-pub use bsdf_eval::BsdfSample;
 pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
 pub use mapping::{Projection, TexCoord, TextureMapping};
+pub use microfacet::{MicrofacetDistribution, SMOOTH_ALPHA};
 pub use properties::{BsdfProperties, Energy};
 pub use refraction::{FresnelSplit, Interface};
 pub use texture::{

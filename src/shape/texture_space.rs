@@ -43,7 +43,7 @@ impl TextureSpace {
 }
 
 impl Shape {
-    /// Returns the texture spaces of its parts, in the order of [`Form::parts`]. The shape has no
+    /// Returns the texture spaces of its parts, in the order of [`Form::parts`](crate::primitive::Form::parts). The shape has no
     /// faults.
     pub fn texture_spaces(&self) -> Vec<TextureSpace> {
         let Some(of) = parts_of(self) else { return vec![TextureSpace::new(self)] };

@@ -1,15 +1,15 @@
-//! The thirty numbered tests are all there: each stands where its tools are.
+//! Audit of the thirty numbered tests: each exists once, in the file that the table names.
 
 use crate::report::report;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What each number is about, what is asked, the test that holds it, and its file. Further tests may
+/// Subject, criterion, test name without its prefix, and file of each number. Further tests may
 /// share a number.
 const EXTREMES: [(&str, &str, &str, &str); 30] = [
     (
         "a unit sphere from 1e2 .. 1e9 away",
-        "hits right but within a rounding of the limb; points 1e-9 r from the surface",
+        "right hits except within a rounding of the limb; points 1e-9 r from the surface",
         "sphere_far_away",
         "tests/extremes/sphere.rs",
     ),
@@ -86,7 +86,7 @@ const EXTREMES: [(&str, &str, &str, &str); 30] = [
         "tests/extremes/cauchy.rs",
     ),
     (
-        "closed meshes met on edges and corners",
+        "closed meshes hit on edges and corners",
         "no ray gets through",
         "mesh_watertight",
         "tests/extremes/mesh.rs",
@@ -189,23 +189,24 @@ const EXTREMES: [(&str, &str, &str, &str); 30] = [
     ),
 ];
 
-fn files(folder: &Path, out: &mut Vec<PathBuf>) {
+/// Appends every Rust file under `folder` to `out`.
+fn rust_files(folder: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
-            files(&path, out);
+            rust_files(&path, out);
         } else if path.extension().is_some_and(|e| e == "rs") {
             out.push(path);
         }
     }
 }
 
-/// Names and files of all tests that begin with `extreme_`, but those that run on demand only.
-fn found() -> Vec<(String, String)> {
+/// Returns the names and files of all tests that begin with `extreme_`, except ignored ones.
+fn extreme_tests() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut paths = Vec::new();
     for folder in ["src", "tests"] {
-        files(&root.join(folder), &mut paths);
+        rust_files(&root.join(folder), &mut paths);
     }
     let mut found = Vec::new();
     for path in paths {
@@ -223,8 +224,8 @@ fn found() -> Vec<(String, String)> {
 }
 
 #[test]
-fn all_thirty_are_there() {
-    let found = found();
+fn all_thirty_extremes_have_tests() {
+    let found = extreme_tests();
     for (i, (about, criterion, name, file)) in EXTREMES.iter().enumerate() {
         let name = format!("extreme_{:02}_{name}", i + 1);
         let places = found.iter().filter(|(n, f)| *n == name && f == file).count();

@@ -1,4 +1,4 @@
-//! Brightness at its extremes: samples that the film can hold, and those that it cannot.
+//! Extremes of brightness: samples within the range of the film, and samples beyond it.
 
 use crate::report::report;
 use crate::support::{begin, parsed, picture, pool, rendered, uniform};
@@ -10,8 +10,8 @@ use zerkalo::world::Precision;
 
 const PRECISIONS: [Precision; 2] = [Precision::Auto, Precision::Double];
 
-/// Nothing was left out or made darker.
-fn is_whole(rendering: &RenderState, name: &str) {
+/// Checks that no sample is bad and none is saturated.
+fn assert_no_sample_lost(rendering: &RenderState, name: &str) {
     let film = &rendering.film;
     let bad = film.bad_samples();
     assert_eq!(
@@ -21,17 +21,18 @@ fn is_whole(rendering: &RenderState, name: &str) {
     );
 }
 
-/// The mean of all pixels in green.
+/// Returns the mean of all pixels in green.
 fn mean(rendering: &RenderState) -> f64 {
     let pixels = picture(rendering, Replicates::Both);
     pixels.iter().map(|p| p[1]).sum::<f64>() / pixels.len() as f64
 }
 
-/// The colour of things without a material.
+/// Colour of objects without a material.
 const MATT: f64 = 0.8;
 
-/// A picture that looks straight down on a surface from `height`, with a lamp beside the eye; the view angle is
-/// small, so that all pixels have the radiance [`MATT`] intensity / (pi height^2).
+/// Returns a scene that looks straight down on a surface from `height`, with a lamp beside the eye.
+/// The view angle is small, so that every pixel has the radiance [`MATT`] intensity / (pi
+/// height^2).
 fn below_a_lamp(height: f64, place: [f64; 3], object: &str) -> Scene {
     parsed(&to_toml(height, place, object))
 }
@@ -49,9 +50,10 @@ fn to_toml(height: f64, [x, y, z]: [f64; 3], object: &str) -> String {
     )
 }
 
-/// The earth, a lamp 6 above the ground; and lamps close to walls inside the box of things.
+/// Cases: the earth with a lamp 6 above the ground, and lamps close to walls inside the scene's
+/// bounding box.
 #[test]
-fn what_a_close_lamp_lights_is_bright_however_large_the_scene() {
+fn surface_near_lamp_is_lit_at_every_scene_extent() {
     let cases = [
         (
             "earth",
@@ -92,7 +94,7 @@ fn what_a_close_lamp_lights_is_bright_however_large_the_scene() {
         let scene = below_a_lamp(height, place, object);
         for precision in PRECISIONS {
             let rendering = rendered(&scene, 1, precision, 8);
-            is_whole(&rendering, name);
+            assert_no_sample_lost(&rendering, name);
             let found = mean(&rendering);
             assert!((found - 1.0).abs() < 2e-3, "{name} in {precision:?}: {found}");
             worst = worst.max((found - 1.0).abs());
@@ -101,14 +103,14 @@ fn what_a_close_lamp_lights_is_bright_however_large_the_scene() {
     report(30, "both", &format!("close lamps in large scenes: {worst:.0e} off"));
 }
 
-/// A room whose walls are triangles.
+/// A room with walls of triangles.
 #[test]
-fn a_lamp_close_to_the_wall_of_a_mesh_lights_it() {
+fn mesh_wall_near_lamp_is_lit() {
     let folder = tempfile::tempdir().unwrap();
     let mut room = String::new();
     for corner in 0..8 {
-        let at = |axis: u32| if corner >> axis & 1 == 0 { -500 } else { 500 };
-        room += &format!("v {} {} {}\n", at(0), at(1), at(2));
+        let coordinate = |axis: u32| if corner >> axis & 1 == 0 { -500 } else { 500 };
+        room += &format!("v {} {} {}\n", coordinate(0), coordinate(1), coordinate(2));
     }
     for face in ["1 2 4 3", "5 6 8 7", "1 2 6 5", "3 4 8 7", "1 3 7 5", "2 4 8 6"] {
         room += &format!("f {face}\n");
@@ -123,11 +125,11 @@ fn a_lamp_close_to_the_wall_of_a_mesh_lights_it() {
     fs::write(&path, text).unwrap();
     let scene = Scene::read(&path).unwrap_or_else(|e| panic!("{e}"));
     let rendering = rendered(&scene, 1, Precision::Auto, 8);
-    is_whole(&rendering, "mesh");
+    assert_no_sample_lost(&rendering, "mesh");
     assert!((mean(&rendering) - 1.0).abs() < 2e-3, "{}", mean(&rendering));
 }
 
-/// A white floor in light of `intensity`, of a colour.
+/// Returns a floor of the material `material` in directional light of `intensity`.
 fn floor(material: &str, intensity: f64) -> Scene {
     parsed(&format!(
         "film = {{ size = [8, 8] }}\n\
@@ -139,34 +141,34 @@ fn floor(material: &str, intensity: f64) -> Scene {
     ))
 }
 
-/// A colour and a light that undo each other give white.
+/// A colour and the light's reciprocal intensity give white.
 #[test]
-fn dim_colours_in_bright_light_are_seen() {
+fn dim_colour_in_bright_light_is_white() {
     for colour in [1e-15, 1e-9, 1e-6, 0.002, 1.0, 50.0, 1e6] {
         let scene = floor(&format!("color = [{colour}, {colour}, {colour}]"), 1.0 / colour);
         for precision in PRECISIONS {
             let rendering = rendered(&scene, 1, precision, 8);
-            is_whole(&rendering, "colour");
+            assert_no_sample_lost(&rendering, "colour");
             let found = mean(&rendering);
             assert!((found - 1.0).abs() < 1e-4, "{colour:e} in {precision:?}: {found}");
         }
     }
 }
 
-/// A colour of 1e6 after a million samples per pixel, in two pixels.
+/// A colour of 1e6 does not saturate the film after a million samples in two pixels.
 #[test]
-fn bright_colours_do_not_fill_the_sums() {
+fn bright_colour_does_not_saturate_film() {
     let mut scene = floor("color = [1e6, 1e6, 1e6]", 1e-6);
     scene.film.size = [2, 1];
     let mut rendering = begin(&scene, 1, Precision::Single);
     uniform(&mut rendering, 0, 1 << 18, &pool(2));
-    is_whole(&rendering, "colour 1e6");
+    assert_no_sample_lost(&rendering, "colour 1e6");
     assert!((mean(&rendering) - 1.0).abs() < 1e-6, "{}", mean(&rendering));
 }
 
-/// Two facing mirrors that amplify, before a white background: white to the eye, and finite.
+/// Two facing mirrors that amplify in front of a white background show white, and finite radiance.
 #[test]
-fn mirrors_that_amplify_are_white() {
+fn amplifying_mirrors_give_finite_white() {
     let text = |k: f64, depth: u32| {
         format!(
             "film = {{ size = [12, 9] }}\ntrace = {{ max_depth = {depth} }}\n\
@@ -190,7 +192,7 @@ fn mirrors_that_amplify_are_white() {
             assert_eq!(rendering.film.saturated_samples() > 0, saturates, "{name}");
             let pixels = picture(&rendering, Replicates::Both);
             assert!(pixels.iter().all(|p| p[0] > 1.0 && p[0].is_finite()), "{name}: {pixels:?}");
-            // What is too bright poisons no estimate.
+            // Saturated samples leave the noise estimate finite.
             let noise = rendering.film.noise(&rendering.mix, &Display::default()).unwrap();
             assert!(
                 noise.rmse_codes.is_finite() && noise.rmse_linear.is_finite(),
@@ -200,9 +202,9 @@ fn mirrors_that_amplify_are_white() {
     }
 }
 
-/// What is added to a scene far from its lamp leaves what is near it as it is.
+/// An object far from the lamp leaves the picture near the lamp unchanged.
 #[test]
-fn a_far_thing_changes_nothing_near_the_lamp() {
+fn distant_object_leaves_surface_near_lamp_unchanged() {
     let ball = "shape.sphere = { center = [0.0, -1.0, 0.0], radius = 1.0 }";
     let far = "\n[[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 9e8 }";
     let alone = below_a_lamp(0.5, [0.0; 3], ball);
@@ -211,10 +213,10 @@ fn a_far_thing_changes_nothing_near_the_lamp() {
     assert!((alone - both).abs() < 1e-4 && (alone - 1.0).abs() < 0.01, "{alone} {both}");
 }
 
-/// Lights that are 2^40 times as strong, or as weak, give the same picture: of a film whose scale is not the
-/// usual one, too.
+/// Lights 2^40 times as strong or as weak give the same picture up to that factor, also in a film
+/// whose scale is not the default.
 #[test]
-fn strength_in_powers_of_two_does_not_matter() {
+fn light_intensity_in_powers_of_two_scales_picture_exactly() {
     let scenes = [
         floor("color = [1e-9, 0.5, 1e3]", 1.0),
         below_a_lamp(
@@ -224,13 +226,13 @@ fn strength_in_powers_of_two_does_not_matter() {
         ),
     ];
     for scene in scenes {
-        let of = |scene: &Scene| picture(&rendered(scene, 1, Precision::Auto, 8), Replicates::Both);
-        let expected = of(&scene);
+        let pixels_of = |scene: &Scene| picture(&rendered(scene, 1, Precision::Auto, 8), Replicates::Both);
+        let expected = pixels_of(&scene);
         for ev in [-40, 40] {
             let factor = f64::from(ev).exp2();
             let mut other = scene.clone();
             other.lights[0].intensity *= factor;
-            let scaled: Vec<_> = of(&other).iter().map(|p| p.map(|c| c / factor)).collect();
+            let scaled: Vec<_> = pixels_of(&other).iter().map(|p| p.map(|c| c / factor)).collect();
             assert_eq!(scaled, expected, "{ev}");
         }
     }

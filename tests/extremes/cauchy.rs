@@ -1,5 +1,5 @@
 //! Isotropic uniform lines: a convex body with surface S and volume V, inside a convex body with
-//! surface S', is met by the share S / S' of the lines that meet the outer one, and the mean chord
+//! surface S', is hit by the share S / S' of the lines that hit the outer body, and its mean chord
 //! is 4 V / S (Cauchy, Crofton). Every registered kind is tested.
 
 use crate::common::Numbers;
@@ -14,7 +14,7 @@ use zerkalo::primitive::{
 };
 use zerkalo::shape::{Cuboid, Prism, Pyramid, ShapeDesc};
 
-/// Area of one face: the corners on it, sorted around their middle.
+/// Returns the area of one face from the corners on it, sorted around their middle.
 fn face_area(face: &HalfSpace, corners: &[DVec3], size: f64) -> f64 {
     let near = |c: &&DVec3| (face.normal.dot(**c) - face.offset).abs() < 1e-12 * size;
     let mut on: Vec<DVec3> = corners.iter().filter(near).copied().collect();
@@ -27,7 +27,8 @@ fn face_area(face: &HalfSpace, corners: &[DVec3], size: f64) -> f64 {
     0.5 * wedges.sum::<DVec3>().length()
 }
 
-/// Surface of the image of the unit sphere: the integral of |cofactor(M) n| over all n.
+/// Returns the surface area of the image of the unit sphere: the integral of |cofactor(M) n| over
+/// all n.
 fn ellipsoid_surface(m: DMat3) -> f64 {
     let cofactor = m.inverse().transpose() * m.determinant().abs();
     let (rows, columns) = (2000, 400);
@@ -43,11 +44,11 @@ fn ellipsoid_surface(m: DMat3) -> f64 {
     sum * 4.0 * PI / f64::from(rows * columns)
 }
 
-/// Surface and volume of the image of the canonical tapered cylinder.
+/// Returns surface area and volume of the image of the canonical tapered cylinder.
 fn tapered(m: DMat3, top: f64) -> (f64, f64) {
     let volume = m.determinant().abs() * PI * (1.0 + top + top * top) / 3.0;
     let disc = PI * m.x_axis.cross(m.y_axis).length();
-    // The side: u over the angle, z along the axis.
+    // Side: u is the angle, z runs along the axis.
     let (rings, steps) = (400, 2000);
     let mut side = 0.0;
     for ring in 0..rings {
@@ -63,7 +64,8 @@ fn tapered(m: DMat3, top: f64) -> (f64, f64) {
     (disc * (1.0 + top * top) + side, volume)
 }
 
-/// Surface (both sides of flat things) and volume; `None`: it has no end.
+/// Returns surface area (both sides of flat shapes) and volume; `None` if the form is infinite or
+/// not convex.
 fn surface_and_volume(form: &Form) -> Option<(f64, f64)> {
     match form {
         Form::Sphere(SphereForm { radius: r, .. }) => {
@@ -87,7 +89,7 @@ fn surface_and_volume(form: &Form) -> Option<(f64, f64)> {
         Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit: m, top_radius: top }) => {
             Some(tapered(m.matrix3, *top))
         }
-        // Not convex: measured by their chords in `compound.rs`.
+        // Not convex: `compound.rs` checks their chords.
         Form::Csg(_) => None,
         // Not convex in general.
         Form::Mesh(_) => None,
@@ -95,24 +97,25 @@ fn surface_and_volume(form: &Form) -> Option<(f64, f64)> {
             Some((2.0 * u.cross(*v).length(), 0.0))
         }
         Form::Plane(_) => None,
-        // Not convex: measured in `tests/geometry/torus.rs`.
+        // Not convex: `tests/geometry/torus.rs` checks them.
         Form::Torus(_) => None,
     }
 }
 
-/// What lines met.
+/// Hits and chords of lines.
 #[derive(Default)]
 struct Tally {
     lines: f64,
     hits: f64,
     chord: f64,
     chord2: f64,
-    /// Lines whose two ends contradict each other.
-    odd: usize,
+    /// Lines whose hits from both ends contradict each other.
+    inconsistent: usize,
 }
 
 impl Tally {
-    /// Each line from both of its ends: `(middle, direction)`, `far` away from the middle.
+    /// Adds each line `(middle, direction)`, traced from both of its ends at distance `far` from
+    /// the middle.
     fn add<L: SimdFloat>(&mut self, geometry: &Aggregate<L>, lines: &[Line], far: f64, flat: bool) {
         let ends = |sign: f64| -> Vec<Line> {
             lines.iter().map(|(p, d)| (*p - *d * (sign * far), *d * sign)).collect()
@@ -121,7 +124,7 @@ impl Tally {
         self.lines += lines.len() as f64;
         for ((line, a), b) in lines.iter().zip(forward).zip(backward) {
             let (Some(a), Some(b)) = (a, b) else {
-                self.odd += usize::from(a.is_some() || b.is_some());
+                self.inconsistent += usize::from(a.is_some() || b.is_some());
                 continue;
             };
             let chord = 2.0 * far - a.t - b.t;
@@ -132,27 +135,28 @@ impl Tally {
                 let proper = chord >= -16.0 * L::EPSILON * far
                     && a.normal.dot(line.1) < 0.0
                     && b.normal.dot(line.1) > 0.0;
-                self.odd += usize::from(!proper);
+                self.inconsistent += usize::from(!proper);
             }
         }
     }
 
-    /// The larger deviation in standard deviations.
+    /// Checks share and mean chord; returns the larger deviation in standard deviations.
     fn check(&self, name: &str, share: f64, mean_chord: f64) -> f64 {
         let found = self.hits / self.lines;
         let sigma = (share * (1.0 - share) / self.lines).sqrt();
-        let of_share = (found - share) / sigma;
-        let z = of_share;
+        let share_deviation = (found - share) / sigma;
+        let z = share_deviation;
         assert!(z.abs() < 4.0, "{name}: share {found}, expected {share}: {z} sigma");
         let mean = self.chord / self.hits;
         let variance = self.chord2 / self.hits - mean * mean;
         let z = (mean - mean_chord) / (variance / self.hits).sqrt().max(1e-14);
         assert!(z.abs() < 4.0, "{name}: chord {mean}, expected {mean_chord}: {z} sigma");
-        z.abs().max(of_share.abs())
+        z.abs().max(share_deviation.abs())
     }
 }
 
-/// Lines through a ball: any direction, any place on the disc across it.
+/// Returns a line through a ball with a uniform direction and a uniform point of the disc across
+/// it.
 fn through_ball(numbers: &mut Numbers, center: DVec3, radius: f64) -> Line {
     let d = numbers.direction();
     let (u, v) = d.any_orthonormal_pair();
@@ -160,7 +164,7 @@ fn through_ball(numbers: &mut Numbers, center: DVec3, radius: f64) -> Line {
     (center + (u * cos + v * sin) * (radius * numbers.unit().sqrt()), d)
 }
 
-/// Lines through a box: a uniform point of its surface and a direction inward by the cosine law.
+/// Returns a line through a box from a uniform point of its surface, inward by the cosine law.
 fn through_box(numbers: &mut Numbers, center: DVec3, half: DVec3) -> Line {
     let areas = [half.y * half.z, half.z * half.x, half.x * half.y];
     let mut pick = numbers.unit() * areas.iter().sum::<f64>();
@@ -206,11 +210,11 @@ fn tally<L: SimdFloat>(
     tally
 }
 
-/// Closed form 8.
+/// Closed form 8: Cauchy's laws.
 #[test]
 fn extreme_07_cauchy() {
     let mut worst = [0f64; 2];
-    let mut odd = 0;
+    let mut inconsistent = 0;
     for (i, (name, form)) in every_kind().into_iter().enumerate() {
         let (Some((center, radius)), Some((surface, volume))) =
             (bounding_sphere(&form), surface_and_volume(&form))
@@ -223,19 +227,19 @@ fn extreme_07_cauchy() {
             through_ball(n, center, radius)
         });
         worst[0] = worst[0].max(double.check(name, share, chord));
-        assert_eq!(double.odd, 0, "{name}: both ends of a line must agree");
+        assert_eq!(double.inconsistent, 0, "{name}: both ends of a line must agree");
         let single = tally::<Single>(&form, 2.0 * radius, 180 + i as u64, LINES, |n| {
             through_ball(n, center, radius)
         });
         worst[1] = worst[1].max(single.check(name, share, chord));
-        odd += single.odd;
-        // A line that passes an edge nearer than rounding may be seen from one end only, or have its
-        // point on the next face: about a share of the rounding.
+        inconsistent += single.inconsistent;
+        // A line that passes an edge within rounding may hit from one end only, or have its point
+        // on the next face: about a share of the rounding.
         let limit = 100.0 * f64::from(f32::EPSILON) * single.lines;
-        assert!(single.odd as f64 <= limit, "{name}: {} lines of {LINES}", single.odd);
+        assert!(single.inconsistent as f64 <= limit, "{name}: {} lines of {LINES}", single.inconsistent);
     }
     report(7, "double", &format!("{:.1} sigma at most, 0 lines out of order", worst[0]));
-    report(7, "single", &format!("{:.1} sigma at most, {odd} lines out of order", worst[1]));
+    report(7, "single", &format!("{:.1} sigma at most, {inconsistent} lines out of order", worst[1]));
 }
 
 #[test]
@@ -261,12 +265,12 @@ fn cauchy_for_ellipsoids_and_skewed_solids() {
             through_box(n, 0.5 * (low + high), half)
         });
         found.check(name, surface / outer, 4.0 * volume / surface);
-        assert_eq!(found.odd, 0, "{name}");
+        assert_eq!(found.inconsistent, 0, "{name}");
     }
 }
 
 #[test]
-fn an_endless_plane_is_met_by_one_half_of_every_line() {
+fn infinite_plane_is_hit_by_one_half_of_every_line() {
     let mut planes = 0;
     for (name, form) in every_kind() {
         let Form::Plane(PlaneForm { normal, offset }) = form else { continue };
@@ -287,7 +291,7 @@ fn an_endless_plane_is_met_by_one_half_of_every_line() {
     assert_eq!(bounded + planes, every_kind().len(), "every kind has a law");
 }
 
-/// Boxes, prisms and pyramids with sides one millionth of each other.
+/// Returns boxes, prisms and pyramids with sides one millionth of each other.
 fn slivers() -> Vec<(&'static str, Form)> {
     let thin = 1e-6;
     let corner = [-0.5, -0.5, 0.5];
@@ -319,8 +323,9 @@ fn extreme_13_slivers() {
             through_box(n, 0.5 * (low + high), half)
         });
         worst = worst.max(found.check(name, surface / outer, 4.0 * volume / surface));
-        // Parity. Coordinates about 1 are known to 1e-16 x the distance of 4: 1e-9 of the thin side.
-        assert_eq!(found.odd, 0, "{name}: {} of {} lines", found.odd, found.lines);
+        // Parity. Coordinates about 1 are rounded to 1e-16 times the distance of 4: 1e-9 of the
+        // thin side.
+        assert_eq!(found.inconsistent, 0, "{name}: {} of {} lines", found.inconsistent, found.lines);
     }
     report(13, "double", &format!("{worst:.1} sigma at most, 0 lines out of order"));
     report(13, "single", LEFT_TO_DOUBLE);

@@ -1,6 +1,6 @@
-//! The extremes: sizes, places and proportions at which programs of this kind fail. The thirty numbered
-//! tests (`audit.rs` knows where each stands), the choice of precision, scenes scaled and
-//! shifted, and how fast the error falls.
+//! Sizes, places and proportions at which renderers fail: the thirty numbered tests (`audit.rs`
+//! lists the file of each), the choice of precision, scaled and shifted scenes, and the rate at
+//! which the error falls.
 
 #[path = "../common/mod.rs"]
 mod common;

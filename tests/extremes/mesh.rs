@@ -1,5 +1,4 @@
-//! Closed meshes: no ray gets out between two triangles, at their edges, at their corners, or where
-//! they are slivers.
+//! Watertight meshes: no ray passes between two triangles, at edges, at corners or in slivers.
 
 use crate::common::Numbers;
 use crate::rays::{Line, closest, packets};
@@ -15,8 +14,9 @@ use zerkalo::primitive::{Aggregate, Form, MeshForm};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options};
 
-/// An icosahedron around the origin, each of its triangles cut in four `times` times, its corners on
-/// the ellipsoid with these half-axes; and whether `auto` traces a scene of it in double precision.
+/// Returns an icosahedron around the origin with each triangle cut in four `times` times, its
+/// corners on the ellipsoid with the half-axes `axes`; and `true` if `auto` traces a scene of it in
+/// double precision.
 fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
     let golden = 0.5 * (1.0 + 5f64.sqrt());
     let mut corners = Vec::new();
@@ -76,8 +76,8 @@ fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
     (Assets::default().mesh(&path).unwrap(), double)
 }
 
-/// How many of `rays` rays from inside the mesh to its corners, its edges and into its triangles do not
-/// meet it, as a camera or as a shadow asks.
+/// Returns the number of `rays` rays that miss the mesh, counted by closest hits and by occlusion.
+/// Rays start inside the mesh and point to its corners, its edges and into its triangles.
 fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: usize) -> usize {
     const BLOCK: usize = 1 << 14;
     let form = Form::Mesh(MeshForm { mesh: mesh.clone(), scene_from_mesh: place, smooth: false });
@@ -100,7 +100,7 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
                 (from, (to - from).normalize())
             })
             .collect();
-        let lost = closest(&geometry, &lines).iter().filter(|met| met.is_none()).count();
+        let lost = closest(&geometry, &lines).iter().filter(|hit| hit.is_none()).count();
         let lit: usize = packets::<L>(&lines)
             .map(|(ray, count)| {
                 let blocked =
@@ -113,9 +113,9 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
     (0..rays.div_ceil(BLOCK)).into_par_iter().map(block).sum()
 }
 
-/// The meshes: fine and coarse, turned and far from the origin for their size, and drawn out to a needle
-/// of 1e-6 and squeezed to a sheet of 1e-6, whose triangles are slivers. Of such a thing single precision
-/// knows the inside to a tenth of its thickness; it loses one ray in a million, and `auto` takes double.
+/// Checks fine and coarse meshes, one turned and far from the origin for its size, a needle of 1e-6
+/// and a sheet of 1e-6, whose triangles are slivers. Single precision resolves the inside of a
+/// sliver to a tenth of its thickness and loses one ray in a million there; `auto` takes double.
 fn check(rays: usize) {
     let turned = DAffine3::from_scale_rotation_translation(
         DVec3::splat(3.7),
@@ -150,7 +150,8 @@ fn check(rays: usize) {
     );
 }
 
-/// Two million rays, each asked twice; ten times as many below.
+/// Two million rays, each traced by closest hit and by occlusion. The ignored test below traces ten
+/// times as many.
 #[test]
 fn extreme_14_mesh_watertight() {
     check(200_000);

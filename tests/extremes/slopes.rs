@@ -1,4 +1,4 @@
-//! How fast the error falls with the number of samples, on the scenes that are made to show it.
+//! Convergence rate: the slope of the error against the number of samples, in scenes made for it.
 
 use crate::support::{begin_with, pool, shipped, sized, uniform};
 use zerkalo::film::Display;
@@ -11,10 +11,10 @@ const SIZE: [u32; 2] = [24, 16];
 /// Samples per pixel, both replicates together.
 const FIRST: u32 = 64;
 const LAST: u32 = 2048;
-/// The reference has so many times the samples of the last point.
+/// Samples of the reference over those of the last point.
 const REFERENCE: u32 = 64;
 
-/// The slope of log RMSE against log samples, of several pictures by different seeds together.
+/// Returns the slope of log RMSE against log samples, over several pictures with different seeds.
 fn slope(scene: &Scene, kind: SamplerKind, reference: &Reference) -> Slope {
     const SEEDS: u64 = 6;
     let pool = pool(2);
@@ -23,7 +23,7 @@ fn slope(scene: &Scene, kind: SamplerKind, reference: &Reference) -> Slope {
     while n <= LAST {
         let mut sum = 0.0;
         for seed in 0..SEEDS {
-            // Seeds of its own, so that the points scatter independently.
+            // Different seeds for each point, so that the points scatter independently.
             let settings = SampleSettings { seed: u64::from(n) + seed, kind };
             let mut rendering = begin_with(scene, settings, Precision::Auto);
             uniform(&mut rendering, 0, n / 2, &pool);
@@ -40,33 +40,33 @@ fn slope(scene: &Scene, kind: SamplerKind, reference: &Reference) -> Slope {
     slope
 }
 
-/// The slopes by Sobol points and by random numbers.
+/// Returns the slopes with Sobol points and with random numbers.
 fn slopes(name: &str) -> [Slope; 2] {
     let scene = sized(shipped(name), SIZE);
     let settings = SampleSettings { seed: 77, kind: SamplerKind::Sobol };
     let mut best = begin_with(&scene, settings, Precision::Auto);
     uniform(&mut best, 0, REFERENCE * LAST / 2, &pool(2));
     let reference = Reference::of_film(&best.film, &best.mix, &Display::default());
-    println!("{name}: the reference's own RMSE is {:.1e}", reference.noise_linear());
+    println!("{name}: the RMSE of the reference is {:.1e}", reference.noise_linear());
     [SamplerKind::Sobol, SamplerKind::Random].map(|kind| slope(&scene, kind, &reference))
 }
 
 fn check(name: &str, at_most: f64) {
     let [sobol, random] = slopes(name);
     assert!(sobol.value + 2.0 * sobol.standard_error <= at_most, "{name}: {sobol:?}");
-    // Of six points, four degrees of freedom: three standard errors are 96 %.
+    // Six points leave four degrees of freedom: three standard errors are 96 %.
     let error = 3.0 * random.standard_error;
     assert!((random.value + 0.5).abs() <= error, "{name}, random: {random:?}");
 }
 
-/// Two dimensions: where in the lobe.
+/// Samples have two dimensions: the direction in the lobe.
 #[test]
-fn a_lobe_alone_converges_like_two_dimensions() {
+fn lobe_error_converges_like_two_dimensions() {
     check("slope-lobe.toml", -0.70);
 }
 
-/// Four: where in the pixel and where in the lobe.
+/// Samples have four dimensions: the position in the pixel and the direction in the lobe.
 #[test]
-fn a_lobe_with_anti_aliasing_converges_like_four_dimensions() {
+fn lobe_error_with_anti_aliasing_converges_like_four_dimensions() {
     check("slope-aa.toml", -0.58);
 }

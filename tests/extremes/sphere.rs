@@ -1,4 +1,4 @@
-//! Spheres from far, from inside, from their ground, at their limb.
+//! Spheres seen from afar, from inside, as ground, and at the limb.
 
 use crate::common::Numbers;
 use crate::rays::{Line, Traced, closest, scene};
@@ -46,8 +46,8 @@ fn dot(a: [Dd; 3], b: [Dd; 3]) -> Dd {
     a[0].times(b[0]).plus(a[1].times(b[1])).plus(a[2].times(b[2]))
 }
 
-/// Signed distance of the line beyond the sphere's limb, and the nearer meeting point seen from the
-/// centre (not finite for a miss), for exactly these numbers.
+/// Returns the signed distance of the line beyond the sphere's limb, and the nearer hit point
+/// relative to the centre (not finite for a miss), computed exactly for these numbers.
 fn exact((origin, d): Line, center: DVec3, radius: f64) -> (f64, DVec3) {
     let f: [Dd; 3] = std::array::from_fn(|i| Dd::sum(origin[i], -center[i]));
     let d: [Dd; 3] = std::array::from_fn(|i| Dd(d[i], 0.0));
@@ -60,13 +60,13 @@ fn exact((origin, d): Line, center: DVec3, radius: f64) -> (f64, DVec3) {
     (across2.0.sqrt() - radius, DVec3::from_array(point))
 }
 
-/// Rays at a unit sphere from the distance `far`: within 0.7 of the radius, and near the limb. How far
-/// their meeting points are off the surface at most.
+/// Checks rays at a unit sphere from the distance `far`, within 0.7 of the radius and near the
+/// limb. Returns the largest distance of a hit point from the surface.
 fn check_far<L: SimdFloat>(far: f64, seed: u64) -> f64 {
     let mut worst = 0f64;
     let mut numbers = Numbers::new(seed);
     let rounded = |v: DVec3| if L::EPSILON > 1e-10 { v.as_vec3().as_dvec3() } else { v };
-    // What rounds is the ray: its direction is one of this precision, and so is f . d.
+    // The ray is rounded: its direction has this precision, and so has f . d.
     let tolerance = 4.0 * L::EPSILON * far.max(1.0);
     for _ in 0..20 {
         let center = rounded(numbers.in_cube(1.0));
@@ -87,21 +87,21 @@ fn check_far<L: SimdFloat>(far: f64, seed: u64) -> f64 {
                 (eye, rounded((target - eye).normalize()))
             })
             .collect();
-        for (i, (line, met)) in lines.iter().zip(closest(&geometry, &lines)).enumerate() {
-            let (beyond, at) = exact(*line, center, 1.0);
-            let told = format!("{}, far {far}, seed {seed}: {line:?}", L::NAME);
+        for (i, (line, hit)) in lines.iter().zip(closest(&geometry, &lines)).enumerate() {
+            let (beyond, true_point) = exact(*line, center, 1.0);
+            let context = format!("{}, far {far}, seed {seed}: {line:?}", L::NAME);
             if beyond.abs() > tolerance {
-                assert_eq!(met.is_some(), beyond < 0.0, "{told}: {beyond} beyond the limb");
+                assert_eq!(hit.is_some(), beyond < 0.0, "{context}: {beyond} beyond the limb");
             }
-            let Some(met) = met else { continue };
-            let from_center = met.point - center;
+            let Some(hit) = hit else { continue };
+            let from_center = hit.point - center;
             let off = (from_center.length() - 1.0).abs();
-            assert!(off <= 8.0 * L::EPSILON, "{told}: {off} off the surface");
+            assert!(off <= 8.0 * L::EPSILON, "{context}: {off} off the surface");
             worst = worst.max(off);
             if i % 2 == 0 {
-                // Up to 0.7 of the radius the surface is inclined by at most 45 degrees.
-                let wrong = (from_center - at).length();
-                assert!(wrong <= 4.0 * tolerance, "{told}: {wrong} from the true point");
+                // Within 0.7 of the radius the surface is inclined by at most 45 degrees.
+                let wrong = (from_center - true_point).length();
+                assert!(wrong <= 4.0 * tolerance, "{context}: {wrong} from the true point");
             }
         }
     }
@@ -115,8 +115,8 @@ fn extreme_01_sphere_far_away() {
         worst = worst.max(check_far::<Double>(far, 10 + i as u64));
     }
     report(1, "double", &format!("hits right, {worst:.0e} r off at most"));
-    // Single precision ends where a rounding of the distance is a thousandth of the radius; the
-    // choice of precision leaves it before.
+    // Single precision is limited to where a rounding of the distance is a thousandth of the
+    // radius; `auto` takes double before.
     let mut worst = 0f64;
     for (i, far) in [1e2, 1e3, 8192.0].into_iter().enumerate() {
         worst = worst.max(check_far::<Single>(far, 30 + i as u64));
@@ -148,21 +148,21 @@ fn extreme_02_sphere_as_ground() {
         radius,
     })]);
     let eye = DVec3::Y * (radius + height);
-    let meets = |row: f64| {
+    let hits_ground = |row: f64| {
         let d = DVec3::new(0.0, (240.0 - row) / 480.0 * plane_height, -1.0).normalize();
         closest(&ground, &[(eye, d)])[0].is_some()
     };
     let (mut above, mut below) = (230.0, 250.0);
-    assert!(!meets(above) && meets(below));
+    assert!(!hits_ground(above) && hits_ground(below));
     while below - above > 1e-9 {
         let middle = 0.5 * (above + below);
-        if meets(middle) { below = middle } else { above = middle }
+        if hits_ground(middle) { below = middle } else { above = middle }
     }
     assert!((below - row).abs() < 0.01, "horizon in row {below}, expected {row}");
 
     for light in ["[0.0, -1.0, 0.0]", "[0.3, -0.2, 0.1]", "[1.0, -0.001, 0.0]"] {
         let scene = scene(&text(light));
-        // Single precision knows such a ground to 100: `auto` takes double.
+        // Single precision resolves such a ground to 100: `auto` takes double.
         let auto = AnyWorld::compile(&scene, &Options::default());
         assert!(matches!(auto, AnyWorld::Double(_)));
         let traced = Traced::new(&scene, Precision::Double);
@@ -184,9 +184,10 @@ fn extreme_02_sphere_as_ground() {
     report(2, "single", LEFT_TO_DOUBLE);
 }
 
-/// Share of the rays through points of the square around the image of `center` on z = -1 that meet
-/// the sphere, against pi r^2 sqrt(D^2 - r^2) / (c_z^2 - r^2)^(3/2); and the exact mask
-/// (v.c)^2 >= (c^2 - r^2) v^2.
+/// Checks the share of rays that hit the sphere, among rays through points of the square around the
+/// image of `center` on z = -1, against pi r^2 sqrt(D^2 - r^2) / (c_z^2 - r^2)^(3/2); and each ray
+/// against the exact mask (v.c)^2 >= (c^2 - r^2) v^2. Returns the measured share over the expected
+/// one.
 fn check_silhouette(center: DVec3, radius: f64, rays: usize, seed: u64) -> f64 {
     let geometry = Aggregate::<Double>::new(&[Form::Sphere(SphereForm { center, radius })]);
     let distance = center.length();
@@ -202,11 +203,11 @@ fn check_silhouette(center: DVec3, radius: f64, rays: usize, seed: u64) -> f64 {
         })
         .collect();
     let mut hits = 0;
-    for (line, met) in lines.iter().zip(closest(&geometry, &lines)) {
-        hits += usize::from(met.is_some());
+    for (line, hit) in lines.iter().zip(closest(&geometry, &lines)) {
+        hits += usize::from(hit.is_some());
         let (beyond, _) = exact(*line, center, radius);
         if beyond.abs() > 8.0 * f64::EPSILON * distance {
-            assert_eq!(met.is_some(), beyond < 0.0, "{line:?}: {beyond} beyond the limb");
+            assert_eq!(hit.is_some(), beyond < 0.0, "{line:?}: {beyond} beyond the limb");
         }
     }
     let area = PI * radius * radius * (distance * distance - radius * radius).sqrt() / near.powi(3);
@@ -244,7 +245,7 @@ fn closed_form_10_silhouettes() {
     }
 }
 
-/// The mask of a whole picture, by the compiled camera.
+/// The mask of a whole picture through the compiled camera is exact.
 #[test]
 fn closed_form_10_every_pixel_of_a_sphere() {
     let camera = Camera {
@@ -266,7 +267,7 @@ fn closed_form_10_every_pixel_of_a_sphere() {
             let (o, d) =
                 view.rays(Vec3::<f64>::splat(view.pixel_corner_direction((x, y))), (0.5, 0.5));
             let line = (DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z));
-            let met = closest(&geometry, &[line])[0].is_some();
+            let hit = closest(&geometry, &[line])[0].is_some();
             let step = 2.0 * half / 320.0;
             let (i, j) = (f64::from(x) + 0.5 - 160.0, 100.0 - f64::from(y) - 0.5);
             let ray = w + u * (i * step) + v * (j * step);
@@ -274,20 +275,21 @@ fn closed_form_10_every_pixel_of_a_sphere() {
             let inside =
                 along * along - (c.length_squared() - radius * radius) * ray.length_squared();
             if inside.abs() > 1e-12 {
-                assert_eq!(met, inside > 0.0 && along > 0.0, "pixel {x} {y}");
+                assert_eq!(hit, inside > 0.0 && along > 0.0, "pixel {x} {y}");
             }
-            covered += usize::from(met);
+            covered += usize::from(hit);
         }
     }
     assert!((5_000..30_000).contains(&covered), "{covered} pixels covered");
 }
 
-/// A line 8 away is known to 4 x 8 roundings across; as much under the surface, a chord is this long.
+/// Returns the longest chord of a tangent. A line 8 away is rounded to 4 x 8 roundings across; a
+/// line as much below the surface has this chord.
 fn longest_touch<L: SimdFloat>() -> f64 {
     2.0 * (2.0 * 32.0 * L::EPSILON).sqrt()
 }
 
-/// Lines that touch: either a miss or a chord no longer than rounding makes it.
+/// Checks tangents: each misses or has a chord no longer than rounding makes it.
 fn check_tangents<L: SimdFloat>() {
     let mut numbers = Numbers::new(5);
     let (limit, mut longest) = (longest_touch::<L>(), 0f64);
@@ -316,9 +318,9 @@ fn check_tangents<L: SimdFloat>() {
         };
         let line = (touching - d * ahead, d);
         let ends = closest(&geometry, &[line, (touching + d * 8.0, -d)]);
-        for met in ends.iter().flatten() {
-            assert!(met.t.is_finite() && met.t >= 0.0, "{line:?}: {met:?}");
-            assert!(met.point.is_finite() && met.normal.is_finite(), "{line:?}: {met:?}");
+        for hit in ends.iter().flatten() {
+            assert!(hit.t.is_finite() && hit.t >= 0.0, "{line:?}: {hit:?}");
+            assert!(hit.point.is_finite() && hit.normal.is_finite(), "{line:?}: {hit:?}");
         }
         if let [Some(near), Some(back)] = ends[..] {
             let chord = ahead + 8.0 - near.t - back.t;

@@ -1,4 +1,4 @@
-//! Volumes of compounds by the chords of lines.
+//! Volumes of compounds from the chords of lines.
 
 use crate::common::Numbers;
 use crate::compound::{ball, block, chords, difference, intersection, lines, union};
@@ -10,8 +10,8 @@ use zerkalo::lanes::Double;
 use zerkalo::primitive::{Form, PlaneForm};
 use zerkalo::shape::{Cylinder, ShapeDesc};
 
-/// The volume of what stands in the cube from -half to half, by the chords of parallel lines, one in
-/// each cell of a lattice, and its standard error.
+/// Returns the volume of `form` in the cube from -`half` to `half`, and its standard error: from
+/// the chords of parallel lines, one in each cell of a lattice.
 fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
     let mut numbers = Numbers::new(seed);
     let side = 400;
@@ -24,9 +24,9 @@ fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
     for row in 0..side {
         let lines: Vec<Line> = (0..side)
             .map(|column| {
-                let at =
+                let coordinate =
                     |i: i32, n: &mut Numbers| reach * (cell * (f64::from(i) + n.unit()) - half);
-                let (u, v) = (at(row, &mut numbers), at(column, &mut numbers));
+                let (u, v) = (coordinate(row, &mut numbers), coordinate(column, &mut numbers));
                 (turn * DVec3::new(u, v, -4.0 * half), turn * DVec3::Z)
             })
             .collect();
@@ -38,7 +38,7 @@ fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
     (sum * area, squares.sqrt() * area)
 }
 
-/// Closed form 9.
+/// Closed form 9: volumes of compounds.
 #[test]
 fn extreme_09_volumes() {
     let mut worst = 0f64;
@@ -49,7 +49,7 @@ fn extreme_09_volumes() {
         |end: [f64; 3], radius: f64| Cylinder { base: end.map(|x| -x), top: end, radius }.form();
     let above = |height: f64| Form::Plane(PlaneForm { normal: DVec3::Y, offset: height });
     let below = |height: f64| Form::Plane(PlaneForm { normal: DVec3::NEG_Y, offset: -height });
-    // A ball pierced by a rod so that a ring of height 1.2 is left.
+    // Ball pierced by a rod that leaves a ring of height 1.2.
     let ring: f64 = 1.2;
     let hole = (1.0 - ring * ring / 4.0).sqrt();
     let cone = Form::conical_frustum(DAffine3::from_translation(DVec3::new(0.0, 0.0, -0.5)), 0.0);
@@ -124,7 +124,7 @@ fn extreme_09_volumes() {
     report(9, "double", &format!("volumes {worst:.1} sigma off at most"));
 }
 
-/// V(A or B) + V(A and B) = V(A) + V(B), on every line.
+/// Inclusion and exclusion on every line: V(A or B) + V(A and B) = V(A) + V(B).
 #[test]
 fn extreme_09_inclusion_and_exclusion() {
     let solids = [
@@ -144,11 +144,12 @@ fn extreme_09_inclusion_and_exclusion() {
             let first = chords::<Double>("minus", &difference(pair()), &lines);
             for n in 0..lines.len() {
                 let sum = alone[i][n] + alone[j][n];
-                let told = || format!("{i} {j} {:?}", lines[n]);
-                // What is thinner than a tie is nothing; along a flat line that is some length.
+                let context = || format!("{i} {j} {:?}", lines[n]);
+                // Intervals thinner than the tie tolerance are dropped; along a grazing line they
+                // have some length.
                 let close = |a: f64, b: f64| (a - b).abs() < 1e-5;
-                assert!(close(either[n] + both[n], sum), "{}: {}", told(), either[n] + both[n]);
-                assert!(close(first[n] + both[n], alone[i][n]), "{}", told());
+                assert!(close(either[n] + both[n], sum), "{}: {}", context(), either[n] + both[n]);
+                assert!(close(first[n] + both[n], alone[i][n]), "{}", context());
             }
         }
     }

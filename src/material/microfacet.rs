@@ -1,0 +1,115 @@
+//! Microfacet distributions: Beckmann and GGX, with V-cavity and Smith masking.
+
+use crate::lanes::{Float, Mask, SimdFloat};
+use crate::material::Masking;
+use crate::sampling::warp;
+use std::f64::consts::PI;
+
+/// Smallest microfacet alpha. Below it the reflection lobe is a mirror, and the highlights of lights use
+/// this value.
+pub const SMOOTH_ALPHA: f64 = 1e-3;
+
+/// A distribution of microfacets.
+#[derive(Clone, Copy, Debug)]
+pub struct MicrofacetDistribution<S> {
+    /// `true` for GGX, `false` for Beckmann.
+    pub ggx: bool,
+    /// Roughness parameter alpha, at least [`SMOOTH_ALPHA`].
+    pub alpha: S,
+    /// Square of `alpha`.
+    pub alpha2: S,
+    /// Inverse square of `alpha`.
+    pub inverse_alpha2: S,
+    /// Masking and shadowing between microfacets.
+    pub masking: Masking,
+}
+
+impl<S: Float> MicrofacetDistribution<S> {
+    /// Creates a distribution with the parameter `alpha`.
+    pub fn new(ggx: bool, alpha: f64, masking: Masking) -> Self {
+        let alpha2 = alpha * alpha;
+        let [alpha, alpha2, inverse_alpha2] = [alpha, alpha2, 1.0 / alpha2].map(S::from_f64);
+        Self { ggx, alpha, alpha2, inverse_alpha2, masking }
+    }
+}
+
+/// Terms of a microfacet BSDF in SIMD lanes.
+pub trait MicrofacetEval<L: SimdFloat> {
+    /// Returns D [1/sr]; `tan2` is the squared tangent of the angle between facet normal and surface
+    /// normal.
+    fn density(&self, tan2: L) -> L;
+    /// Returns G, the fraction of facets with normal h visible from both directions, as numerator and
+    /// denominator. `nh`, `nv`, `nl`, `vh` are positive cosines; `nh` and `vh` may have a common factor.
+    fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L);
+    /// Returns Smith's Lambda for a direction with the cosine `c` > 0 to the normal.
+    fn lambda(&self, c: L) -> L;
+}
+
+/// Value of 1 / (alpha tan) from which Beckmann's Lambda is below 3e-10.
+const STEEP: f64 = 4.0;
+
+/// Returns Beckmann's Lambda (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)) for 0 < a < [`STEEP`] (Heitz
+/// 2014, eq. 57); undefined for larger `a`.
+///
+/// Computed as exp(-a^2) k(a) / (2 a sqrt(pi) (1 + 2 a^2)) with a smooth k between 0.6 and 1, approximated
+/// by a Chebyshev fit of degree 10 in 2 - 6 / (a + 2). The error is below 1e-8 (1 + Lambda).
+#[inline(always)]
+fn beckmann_lambda<L: SimdFloat>(a: L) -> L {
+    const K: [f64; 11] = [
+        0.726_383_531_676_393_2,
+        0.221_492_853_638_683_35,
+        0.159_588_281_416_975_67,
+        -0.247_616_611_436_622_9,
+        0.093_493_669_224_564_09,
+        -0.000_193_709_867_889_302_33,
+        -0.006_363_589_005_963_344,
+        -0.000_203_411_755_586_691,
+        0.000_456_536_003_607_954_65,
+        5.661_643_591_547_971e-5,
+        -2.270_107_819_080_595_3e-5,
+    ];
+    let x = L::from_f64(2.0) - L::from_f64(6.0) / (a + L::from_f64(2.0));
+    let k = K.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::from_f64(*k)));
+    let a2 = a * a;
+    let below = a * a2.mul_add(L::from_f64(4.0 * PI.sqrt()), L::from_f64(2.0 * PI.sqrt()));
+    (-a2).exp() * k / below
+}
+
+impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
+    #[inline(always)]
+    fn density(&self, tan2: L) -> L {
+        let inverse_alpha2 = L::splat(self.inverse_alpha2);
+        if self.ggx {
+            warp::ggx_d(tan2, inverse_alpha2)
+        } else {
+            warp::beckmann_d(tan2, inverse_alpha2)
+        }
+    }
+
+    /// Torrance and Sparrow 1967 (V-cavities): min(1, 2 N.H min(N.V, N.L) / V.H); Heitz 2014,
+    /// *Understanding the Masking-Shadowing Function* (height-correlated Smith): 1 / (1 + Lambda(V) +
+    /// Lambda(L)).
+    #[inline(always)]
+    fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L) {
+        match self.masking {
+            Masking::VCavity => ((L::from_f64(2.0) * nh * nv.min(nl)).min(vh), vh),
+            Masking::Smith => (L::one(), L::one() + self.lambda(nv) + self.lambda(nl)),
+        }
+    }
+
+    /// Lambda as a function of a = 1 / (alpha tan).
+    #[inline(always)]
+    fn lambda(&self, c: L) -> L {
+        let alpha2 = L::splat(self.alpha2);
+        let (cos2, sin2) = (c * c, (L::one() - c * c).max(L::zero()));
+        if self.ggx {
+            return ((alpha2 * sin2 / cos2 + L::one()).sqrt() - L::one()) * L::from_f64(0.5);
+        }
+        // Most packets see the surface steeply in all lanes: nothing is masked.
+        let grazing = cos2.lt(sin2 * alpha2 * L::from_f64(STEEP * STEEP));
+        if grazing.none() {
+            return L::zero();
+        }
+        beckmann_lambda(c / (alpha2 * sin2).sqrt()).masked(grazing)
+    }
+}
