@@ -184,7 +184,7 @@ fn single_glass_ball_has_unbounded_depth_bias() {
     let bumped = parsed(&text(bump, whole));
     let difference = max_difference(&values(&bumped), &values(&deeper(&bumped)));
     assert!(
-        difference > 0.01 && reported_bias(&bumped, "depth") == Bias::Unbounded,
+        difference > 0.01 && reported_bias(&bumped, "max_depth") == Bias::Unbounded,
         "{difference}"
     );
     // The silhouette is at cos = 1/5 from the axis. There rounding decides if light leaves the
@@ -205,7 +205,7 @@ fn single_glass_ball_has_unbounded_depth_bias() {
         );
         let rim =
             parsed(&text(&format!("index = {index:?}"), &camera).replace("\"center\"", "\"box\""));
-        assert!(reported_bias(&rim, "depth") == Bias::Unbounded);
+        assert!(reported_bias(&rim, "max_depth") == Bias::Unbounded);
         cut += u32::from(max_difference(&values(&rim), &values(&deeper(&rim))) > 0.0);
     }
     println!("at the silhouette depth 2 has an effect in {cut} of {rounds} pictures");
@@ -234,7 +234,7 @@ fn single_mirror_has_no_depth_bias() {
             numbers.between(0.0, 180.0)
         );
         let mut scene = parsed(&text);
-        if reported_bias(&scene, "depth") != Bias::Zero {
+        if reported_bias(&scene, "max_depth") != Bias::Zero {
             continue;
         }
         // Grazing view along the surface.

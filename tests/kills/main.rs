@@ -249,7 +249,7 @@ fn recover(folder: &Path, kept: &str) -> Result<(), String> {
     let offered = !is_saved();
     let mut pty = Pty::open(folder);
     if offered {
-        pty.wait_for_text("broke off")?;
+        pty.wait_for_text("ended unexpectedly")?;
         pty.send(b"r");
         pty.wait_for_text("recovered")?;
         pty.send(b"\x13");
