@@ -1,4 +1,4 @@
-//! Cache of asset files, shared between compilations of scenes.
+//! Cache of asset files (meshes and images), shared between compilations of scenes.
 
 use crate::asset::error::AssetError;
 use crate::asset::file::{FileContents, MAX_BYTES, read_error};
@@ -11,20 +11,21 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::SystemTime;
 
-/// Memory for files that no scene uses any more, kept for undone edits [bytes]: 256 MiB.
+/// Largest memory for files that no scene uses any more, in bytes: 256 MiB. Such files are kept
+/// because an edit may be undone.
 const UNUSED_BYTES: usize = 256 << 20;
 
-/// Largest image file [bytes]: 512 MiB.
+/// Largest size of an image file in bytes: 512 MiB.
 const MAX_IMAGE_BYTES: u64 = 512 << 20;
 
-/// Stages of loading a file that take time.
+/// Stage of loading a file that can take a noticeable time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LoadProgress {
     /// The file is being read.
     Reading {
         /// Path of the file.
         file: PathBuf,
-        /// Length of the file.
+        /// Length of the file in bytes.
         bytes: u64,
     },
     /// The BVH of a mesh is being built.
@@ -51,7 +52,8 @@ impl fmt::Display for LoadProgress {
     }
 }
 
-/// Identity of a file's content: another modification time or length is another content.
+/// Cache key: identity of the content of a file. A file with another modification time or length
+/// has other content.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Key {
     path: PathBuf,
@@ -59,10 +61,11 @@ struct Key {
     bytes: u64,
 }
 
-/// Slot for the content of a file, or the error of reading it.
+/// Cache entry: the content of a file or the error of reading it. Empty until the file has been
+/// read.
 type CacheEntry<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
 
-/// LRU cache of files of one type; each entry has the number of its last use.
+/// LRU cache of files of one type. The second value of each entry is the number of its last use.
 struct Cache<T> {
     files: HashMap<Key, (CacheEntry<T>, u64)>,
     last_used: u64,
@@ -75,7 +78,7 @@ impl<T> Default for Cache<T> {
 }
 
 impl<T> Cache<T> {
-    /// Returns the entry of a file and removes older contents of the same file.
+    /// Returns the entry for `key`. Removes entries for older content of the same file.
     fn entry(&mut self, key: &Key) -> CacheEntry<T> {
         self.last_used += 1;
         self.files.retain(|k, _| k.path != key.path || k == key);
@@ -84,7 +87,8 @@ impl<T> Cache<T> {
         entry.clone()
     }
 
-    /// Evicts unused files, least recently used first, until at most [`UNUSED_BYTES`] of them are left.
+    /// Evicts unused files, least recently used first, until the remaining unused ones take at most
+    /// [`UNUSED_BYTES`].
     fn evict(&mut self, bytes_of: impl Fn(&T) -> usize) {
         let mut unused: Vec<(u64, usize, Key)> = self
             .files
@@ -109,8 +113,9 @@ impl<T> Cache<T> {
     }
 }
 
-/// All files that scenes name. Each file is read once for all scenes and threads until it changes on
-/// disk; errors are cached as well. Unused files are evicted when they take too much memory.
+/// Cache of all files that scenes name. Each file is read once for all scenes and threads, and
+/// again only if it changes on disk. Errors are cached as well. Unused files are evicted if they
+/// take more than 256 MiB.
 pub struct Assets {
     meshes: Mutex<Cache<Mesh>>,
     images: Mutex<Cache<Image>>,
@@ -133,8 +138,8 @@ impl fmt::Debug for Assets {
 }
 
 impl Assets {
-    /// Creates an empty cache. `progress` is called at the beginning of each [`LoadProgress`], on the thread
-    /// that loads the file.
+    /// Creates an empty cache. `progress` is called at the start of each stage of loading, on the
+    /// thread that loads the file.
     pub fn new(progress: impl Fn(&LoadProgress) + Send + Sync + 'static) -> Self {
         Self { meshes: Mutex::default(), images: Mutex::default(), progress: Box::new(progress) }
     }
@@ -168,12 +173,14 @@ impl Assets {
     }
 }
 
-/// Locks a cache. A poisoned lock is valid, because no method leaves a cache half changed.
+/// Locks a cache. The cache of a poisoned lock is valid, because no method leaves a cache half
+/// changed.
 fn locked<T>(cache: &Mutex<Cache<T>>) -> MutexGuard<'_, Cache<T>> {
     cache.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the file at `path` from `cache`, read without holding the cache's lock if it is new.
+/// Returns the file at `path` from `cache`. A new file is read by `read`, without holding the lock
+/// of the cache.
 fn load<T>(
     cache: &Mutex<Cache<T>>,
     path: &Path,

@@ -4,34 +4,35 @@ use crate::value::sanitized;
 use std::fmt;
 use std::path::PathBuf;
 
-/// Place in a file.
+/// Location in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileLocation {
     /// The file as a whole.
     Whole,
-    /// A line, from 1.
+    /// A line, counted from 1.
     Line(usize),
-    /// A byte, from 0.
+    /// A byte, counted from 0.
     Byte(usize),
-    /// A named part: `vertex 17`, `accessors[3]`.
+    /// A named part, such as `vertex 17` or `accessors[3]`.
     Part(String),
 }
 
-/// Error in a file that a scene names.
+/// Error in an asset file that a scene names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssetError {
     /// The file.
     pub file: PathBuf,
-    /// Place in the file.
+    /// Location of the error in the file.
     pub place: FileLocation,
-    /// Phrase that states the error.
+    /// Phrase that states what is wrong in the file.
     pub found: String,
-    /// Phrase that states the valid content.
+    /// Phrase that states the content that would be valid.
     pub expected: String,
 }
 
 impl AssetError {
-    /// Returns file, place and error: `bunny.obj:12: face names vertex 9, of 8`.
+    /// Returns the file, the location and the error, such as `bunny.obj:12: face names vertex 9, of
+    /// 8`.
     pub fn what(&self) -> String {
         let file = self.file.display();
         let place = match &self.place {

@@ -1,11 +1,11 @@
-//! Reads whole files within a limit and resolves the names of files inside files.
+//! Reading of whole files up to a size limit, and resolution of file names that occur inside files.
 
 use crate::asset::error::{AssetError, FileLocation};
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 
-/// Largest file that is read \[bytes\]: 2 GiB.
+/// Largest size in bytes of a file that is read: 2 GiB.
 pub const MAX_BYTES: u64 = 2 << 30;
 
 /// A file in memory.
@@ -17,10 +17,10 @@ pub struct FileContents {
 }
 
 impl FileContents {
-    /// Reads the file at `path`, at most `limit` bytes.
+    /// Reads the file at `path`, which may have at most `limit` bytes.
     ///
     /// # Errors
-    /// If the file cannot be read, is not a regular file, or is larger.
+    /// If the file cannot be read, is not a regular file, or has more than `limit` bytes.
     pub fn read(path: &Path, limit: u64) -> Result<Self, AssetError> {
         let metadata = std::fs::metadata(path).map_err(|e| read_error(path, &e))?;
         let error = |found: String, expected: &str| {
@@ -38,10 +38,11 @@ impl FileContents {
             let found = format!("the file has {} MiB", metadata.len() >> 20);
             return error(found, &format!("at most {} MiB", limit >> 20));
         }
-        // Opened after the check: opening a pipe would block until it has a writer.
+        // The file is opened only after the check for a regular file, because opening a pipe would
+        // block until the pipe has a writer.
         let file = File::open(path).map_err(|e| read_error(path, &e))?;
         let mut bytes = Vec::with_capacity(metadata.len() as usize);
-        // One byte more than the limit shows that the file grew meanwhile.
+        // One byte more than the limit is read, to detect that the file grew meanwhile.
         file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| read_error(path, &e))?;
         if bytes.len() as u64 > limit {
             let found = "the file grew while it was read".to_string();
@@ -50,7 +51,7 @@ impl FileContents {
         Ok(Self { path: path.to_path_buf(), bytes })
     }
 
-    /// Creates an error at `place` of this file.
+    /// Creates an error at location `place` in this file.
     pub fn error(
         &self,
         place: FileLocation,
@@ -65,21 +66,22 @@ impl FileContents {
         }
     }
 
-    /// Resolves a file name in this file, relative to this file's folder. `None` if `name` leads out of
-    /// that folder (an absolute path, `..`, a URL).
+    /// Resolves `name`, a file name that occurs in this file, relative to the folder of this file.
+    /// Returns `None` if `name` leads out of this folder: an absolute path, a path with `..`, or a
+    /// URL.
     pub fn resolve_relative(&self, name: &str) -> Option<PathBuf> {
         let name = name.replace('\\', "/");
         let inside = Path::new(&name)
             .components()
             .all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-        // `C:` and `http:` alike.
+        // `true` for a drive such as `C:` and for a URL such as `http:`.
         let drive = name.split('/').next().is_some_and(|first| first.contains(':'));
         let folder = self.path.parent().unwrap_or(Path::new(""));
         (inside && !drive && !name.is_empty()).then(|| folder.join(name))
     }
 }
 
-/// Converts an I/O error of reading the file at `path`.
+/// Converts an I/O error that occurred while the file at `path` was read.
 pub fn read_error(path: &Path, error: &std::io::Error) -> AssetError {
     let (found, expected) = match error.kind() {
         ErrorKind::NotFound => ("there is no such file".to_string(), "the path of a file"),

@@ -10,14 +10,16 @@ use std::sync::LazyLock;
 /// Largest number of pixels in a row or column.
 pub const MAX_SIDE: u32 = 32_768;
 
-/// Largest number of pixels: 64 Mi, at most 402 MB when decoded and 940 MB while the file is read.
+/// Largest number of pixels: 64 Mi. An image of this size takes at most 402 MB when decoded, and
+/// 940 MB while the file is read.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// Largest number of pixels per byte of a file: deflate compresses at most 1032 times, from at least an
-/// eighth of a byte per pixel; a JPEG needs at least one bit for 64 pixels.
+/// Largest number of pixels per byte of a file. In a PNG a pixel takes at least an eighth of a
+/// byte, which deflate compresses by a factor of at most 1032. A JPEG needs at least one bit for 64
+/// pixels.
 const PIXELS_PER_BYTE: u64 = 8 * 1032;
 
-/// Pixels in the bit depth of the file: one number for grey, three for colour.
+/// Pixels in the bit depth of the file. A grey pixel is one number, a coloured one three.
 #[derive(Clone, Debug, PartialEq)]
 enum Texels {
     Bytes(Vec<u8>),
@@ -32,7 +34,7 @@ pub struct Image {
     texels: Texels,
 }
 
-/// Returns the linear light of every sRGB level from 0 to `last`.
+/// Returns the linear light, 0..=1, of every sRGB level from 0 to `last`.
 fn linear_table(last: u16) -> Vec<f32> {
     let linear = |level| linear_from_srgb(f64::from(level) / f64::from(last)) as f32;
     (0..=last).map(linear).collect()
@@ -42,7 +44,7 @@ static BYTES: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(255));
 static WORDS: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(65535));
 
 impl Image {
-    /// Decodes a file in memory; its first bytes determine the format.
+    /// Decodes a file in memory. The format is determined by the first bytes of the file.
     ///
     /// # Errors
     /// Any error in the file.
@@ -78,7 +80,7 @@ impl Image {
             DynamicImage::ImageLuma16(i) => (1, Texels::Words(i.into_raw())),
             DynamicImage::ImageRgb8(i) => (3, Texels::Bytes(i.into_raw())),
             DynamicImage::ImageRgb16(i) => (3, Texels::Words(i.into_raw())),
-            // Alpha is dropped.
+            // The alpha channel is dropped.
             i @ DynamicImage::ImageLumaA8(_) => (1, Texels::Bytes(i.into_luma8().into_raw())),
             i @ DynamicImage::ImageLumaA16(_) => (1, Texels::Words(i.into_luma16().into_raw())),
             i @ DynamicImage::ImageRgba16(_) => (3, Texels::Words(i.into_rgb16().into_raw())),
@@ -92,7 +94,7 @@ impl Image {
         self.size
     }
 
-    /// Returns the memory of the pixels \[bytes\].
+    /// Returns the memory of the pixels in bytes.
     pub fn bytes(&self) -> usize {
         match &self.texels {
             Texels::Bytes(t) => t.len(),
@@ -100,8 +102,8 @@ impl Image {
         }
     }
 
-    /// Returns the linear light of the pixel in column `x` and row `y` from the top, from 0 to 1. The
-    /// file's numbers are sRGB levels.
+    /// Returns the linear light, 0..=1, of the pixel in column `x` and row `y`, counted from the
+    /// top. The numbers of the file are interpreted as sRGB levels.
     ///
     /// # Panics
     /// If the image has no such pixel.
@@ -114,8 +116,9 @@ impl Image {
         if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
     }
 
-    /// Returns the height at the pixel in column `x` and row `y` from the top, from 0 to 1: the number in
-    /// the file, without sRGB decoding; the mean of the channels for a colour image.
+    /// Returns the height, 0..=1, that the pixel in column `x` and row `y`, counted from the top,
+    /// has in a height map. It is the number in the file, without sRGB decoding. For a colour image
+    /// it is the mean of the channels.
     ///
     /// # Panics
     /// If the image has no such pixel.
@@ -183,7 +186,8 @@ mod tests {
         assert!((r - BYTES[200]).abs() < 0.02 && r > g && g > b);
     }
 
-    /// PNG file whose header declares `side` x `side` pixels, with a valid checksum but no such pixels.
+    /// Returns a PNG file whose header declares `side` x `side` pixels. The checksum of the header
+    /// is valid, but the data has only one pixel.
     fn png_declaring(side: u32) -> FileContents {
         let mut source = file(image::GrayImage::new(1, 1).into(), ImageFormat::Png);
         source.bytes[16..20].copy_from_slice(&side.to_be_bytes());

@@ -1,11 +1,12 @@
-//! Asset files of scenes, read into plain data: meshes and images.
+//! Asset files of scenes: meshes and images, read into plain data.
 //!
-//! All content is checked: counts against limits and against the length of the file before memory is
-//! allocated, indices against the number of vertices, coordinates against NaN and infinities. Every error
-//! becomes an [`AssetError`] with the file and the place in it.
+//! All content is checked. Before memory is allocated, counts are compared with limits and with the
+//! length of the file. Indices must be below the number of vertices, and coordinates must be
+//! finite. Every error is reported as an [`AssetError`] with the file and the location in the file.
 //!
-//! A file may name others (the MTL of an OBJ, the buffers of a glTF) in its own folder or below, by
-//! relative paths without `..`. Other files and URLs are never read.
+//! A file may name other files: an OBJ its MTL files, a glTF its buffers. These files must be in
+//! the folder of the first file or below, named by relative paths without `..`. Other files and
+//! URLs are never read.
 
 mod cache;
 mod error;

@@ -1,8 +1,8 @@
-//! Eight-wide BVH (BVH8): nodes and build.
+//! Eight-wide BVH (BVH8): node layout and build.
 //!
-//! A node stores the bounds of its eight children as structure of arrays. One ray, or the interval
-//! bounds of a packet, is tested against all of them at once. The build collapses the binary BVH of
-//! a library into few, full nodes.
+//! A node stores the bounds of its eight children as a structure of arrays. A single ray, or the
+//! interval bounds of a packet, is tested against all eight boxes at once. The build takes the
+//! binary BVH of a library and collapses it into few nodes with many children each.
 
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
@@ -15,7 +15,7 @@ use std::time::Duration;
 /// Number of children of a node.
 pub const BVH_WIDTH: usize = 8;
 
-/// Marks a child that is a leaf.
+/// Bit of a child index that marks a leaf.
 pub const LEAF_FLAG: u32 = 1 << 31;
 
 /// Inner node: bounds of up to eight children. Unused slots hold empty boxes, which no ray
@@ -23,9 +23,9 @@ pub const LEAF_FLAG: u32 = 1 << 31;
 #[derive(Clone, Debug)]
 #[repr(align(32))]
 pub struct Bvh8Node {
-    /// Smallest coordinates of the children's boxes on the three axes, then the largest.
+    /// Bounds of the children: smallest x, y and z of the boxes, then largest x, y and z.
     pub bounds: [[f32; BVH_WIDTH]; 6],
-    /// Index of each child: of a node, or of a leaf with [`LEAF_FLAG`].
+    /// Index of each child. It is the index of a node, or of a leaf if [`LEAF_FLAG`] is set.
     pub child: [u32; BVH_WIDTH],
 }
 
@@ -42,7 +42,7 @@ const EMPTY_NODE: Bvh8Node = Bvh8Node {
 };
 
 impl Bvh8Node {
-    /// Slots in use.
+    /// Iterates over the slots in use.
     pub fn children(&self) -> impl Iterator<Item = usize> {
         (0..BVH_WIDTH).filter(|i| self.bounds[0][*i] <= self.bounds[3][*i])
     }
@@ -55,19 +55,19 @@ pub struct Bvh8 {
     depth: usize,
 }
 
-/// Result of a build.
+/// Result of a build: the hierarchy and the primitives of its leaves.
 pub struct Bvh8Build {
     /// The hierarchy.
     pub bvh: Bvh8,
-    /// Indices of the primitives, in the order of the leaves.
+    /// Indices of the primitives, sorted by leaf.
     pub order: Vec<u32>,
-    /// First position in `order` and number of primitives of each leaf.
+    /// Range of each leaf in `order`: first position, and number of primitives.
     pub leaves: Vec<(u32, u32)>,
 }
 
 impl Bvh8 {
-    /// Builds the hierarchy of `count` primitives, at least one. `corners` returns the low and high
-    /// corner of a primitive's bounding box. A leaf holds at most `in_leaf` primitives.
+    /// Builds the hierarchy of `count` primitives, at least one. `corners` returns the low and the
+    /// high corner of a primitive's bounding box. A leaf holds at most `in_leaf` primitives.
     pub fn build(
         count: usize,
         corners: impl Fn(usize) -> [[f32; 3]; 2],
@@ -91,7 +91,7 @@ impl Bvh8 {
         built
     }
 
-    /// The inner nodes; the first is the root.
+    /// Inner nodes; the first one is the root.
     pub fn nodes(&self) -> &[Bvh8Node] {
         &self.nodes
     }
@@ -101,7 +101,7 @@ impl Bvh8 {
         self.depth
     }
 
-    /// Size of the nodes \[bytes\].
+    /// Memory size of the nodes \[bytes\].
     pub fn bytes(&self) -> usize {
         size_of::<Bvh8Node>() * self.nodes.len()
     }
@@ -142,23 +142,25 @@ impl Bvh8Build {
     }
 }
 
-/// Optimal collapse of a binary BVH into wide nodes: minimises the sum of the nodes' surface areas,
-/// and with it the expected number of nodes that a random ray visits (Ylitie, Karras and Laine
-/// 2017, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*, without their
-/// choice of leaves).
+/// Optimal collapse of a binary BVH into wide nodes. It minimises the sum of the surface areas of
+/// the nodes, and thereby the expected number of nodes that a random ray visits (Ylitie, Karras and
+/// Laine 2017, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*). Unlike
+/// there, leaves are those of the binary BVH.
 struct CollapsePlan {
-    /// Split of `n` slots, 1 to [`BVH_WIDTH`], between the subtrees of each binary node's two
-    /// children, at index `n - 1`. `[0, 0]`: the binary node takes one slot itself. At index 0 is
-    /// the split of all slots of the wide node that the binary node becomes.
+    /// Optimal splits for each binary node. Entry `n - 1` is the split of `n` slots, 1 to
+    /// [`BVH_WIDTH`], between the subtrees of the node's two children; `[0, 0]` means that the node
+    /// itself takes one slot. Entry 0 is the split of all slots of the wide node that the binary
+    /// node becomes.
     splits: Vec<[[u8; 2]; BVH_WIDTH]>,
 }
 
 impl CollapsePlan {
     fn new(nodes: &[Bvh2Node]) -> Self {
         let mut splits = vec![[[0; 2]; BVH_WIDTH]; nodes.len()];
-        // Smallest sum of areas of a node's subtree, by the number of slots that it may take.
+        // Smallest sum of areas of a binary node's subtree, for each number of slots that it may
+        // take.
         let mut costs = vec![[0.0f32; BVH_WIDTH]; nodes.len()];
-        // Wide nodes whose boxes have no area have a cost as well.
+        // Wide nodes whose boxes have no area also have a cost.
         let least_area = 1e-7 * nodes[0].aabb().half_area() + f32::MIN_POSITIVE;
         let mut order = vec![0];
         for position in 0.. {
@@ -197,7 +199,7 @@ impl CollapsePlan {
         Self { splits }
     }
 
-    /// Collects the binary nodes that become the children of the wide node of `node`.
+    /// Collects the binary nodes that become children of the wide node made from `node`.
     fn children(&self, nodes: &[Bvh2Node], node: usize, out: &mut Vec<usize>) {
         let mut todo = Vec::with_capacity(BVH_WIDTH);
         let split = |todo: &mut Vec<(usize, u8)>, node: usize, [left, right]: [u8; 2]| {
@@ -222,14 +224,16 @@ impl CollapsePlan {
 mod tests {
     use super::*;
 
-    /// Corners of boxes of about `size` along a spiral, every three of them concentric.
+    /// Returns the corners of box `i`. Boxes have about the side `size` and form a spiral; every
+    /// three of them are concentric.
     fn corners(i: usize, size: f32) -> [[f32; 3]; 2] {
         let angle = (i - i % 3) as f32;
         let center = [angle.sin() * angle, angle.cos() * angle, 0.3 * angle];
         [center.map(|x| x - size), center.map(|x| x + size * (1.0 + (i % 5) as f32))]
     }
 
-    /// Checks that every primitive is in one leaf, and inside of all boxes on the path to it.
+    /// Checks that every primitive is in exactly one leaf, and inside of all boxes on the path to
+    /// that leaf.
     fn check_build(count: usize, size: f32, in_leaf: usize) {
         let built = Bvh8::build(count, |i| corners(i, size), in_leaf, BvhBuildParams::fast_build());
         let (bvh, mut visits) = (&built.bvh, vec![0; count]);

@@ -1,28 +1,28 @@
 //! Packet BVH traversal with interval culling.
 //!
-//! A coherent packet is tested against a node's eight boxes at once by interval bounds: the
-//! smallest and the largest of its rays' origins and inverse directions on each axis (Boulos, Wald
-//! and Shirley 2006, *Geometric and Arithmetic Culling Methods for Entire Ray Packets*). The rays
-//! themselves are tested against the remaining boxes only. The single-ray traversal (`single.rs`)
-//! tests eight boxes by the same operations, as a packet whose bounds coincide.
+//! A coherent packet is tested against the eight boxes of a node at once, by interval bounds: the
+//! smallest and the largest origin and inverse direction of its rays on each axis (Boulos, Wald and
+//! Shirley 2006, *Geometric and Arithmetic Culling Methods for Entire Ray Packets*). The individual
+//! rays are tested only against the boxes that the bounds may enter. Single-ray traversal
+//! (`single.rs`) uses the same test, with bounds that contain one ray.
 
 use crate::bvh::Ray;
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 
-/// Ray packet prepared for slab tests.
+/// Ray packet in the form that slab tests need.
 #[derive(Clone, Copy)]
 pub struct SlabPacket<L> {
-    /// Origins, plus and minus the padding of the boxes.
+    /// Ray origins plus the padding of the boxes (`above`), and minus the padding (`below`).
     pub(crate) above: Vec3<L>,
     pub(crate) below: Vec3<L>,
-    /// Reciprocals of the directions, always finite.
+    /// Reciprocals of the directions. They are finite also for axis-parallel rays.
     pub(crate) inverse: Vec3<L>,
 }
 
 impl<L: SimdFloat> SlabPacket<L> {
-    /// Prepares rays. Tests treat boxes as larger by `pad` on both sides of each axis; this covers
-    /// the rounding of the primitives' own tests.
+    /// Prepares the rays of `ray`. Tests enlarge boxes by `pad` on both sides of each axis, which
+    /// covers the rounding errors of the primitives' own intersection tests.
     #[inline(always)]
     pub fn new(ray: &Ray<L>, pad: Vec3<L>) -> Self {
         let safe = |d: L| L::one() / d.abs().max(L::from_f64(1e-30)).copysign(d);
@@ -31,7 +31,7 @@ impl<L: SimdFloat> SlabPacket<L> {
         Self { above: ray.origin + pad, below: ray.origin - pad, inverse }
     }
 
-    /// Mask of rays that enter box `i` of a node at a distance of at most `limit`.
+    /// Returns the rays that enter box `i` of a node at a distance of at most `limit`.
     #[inline(always)]
     fn enters_child(&self, node: &Bvh8Node, i: usize, limit: L) -> L::Mask {
         let corner = |k: usize| {
@@ -41,7 +41,7 @@ impl<L: SimdFloat> SlabPacket<L> {
         self.enters(corner(0), corner(3), limit)
     }
 
-    /// Mask of rays that enter the box between the corners `low` and `high` at a distance of at
+    /// Returns the rays that enter the box between the corners `low` and `high` at a distance of at
     /// most `limit`.
     #[inline(always)]
     pub fn enters(&self, low: Vec3<L>, high: Vec3<L>, limit: L) -> L::Mask {
@@ -53,21 +53,23 @@ impl<L: SimdFloat> SlabPacket<L> {
     }
 }
 
-/// Interval bounds of one or several rays whose directions have equal signs on each axis.
+/// Interval bounds of one or several rays. The directions of all rays have equal signs on each
+/// axis.
 #[derive(Clone, Copy, Default)]
 pub struct PacketBounds<S> {
-    /// Index into [`Bvh8Node::bounds`] of the near and the far side of boxes, by axis.
+    /// Indices into [`Bvh8Node::bounds`] of the near and of the far side of a box, for each axis.
     pub(crate) near: [usize; 3],
     pub(crate) far: [usize; 3],
-    /// Origins subtracted from near and far sides.
+    /// Padded origins that are subtracted from the near and from the far sides.
     pub(crate) near_origin: [S; 3],
     pub(crate) far_origin: [S; 3],
-    /// Smallest and largest reciprocals of the directions.
+    /// Smallest and largest reciprocals of the directions, for each axis.
     pub(crate) inverse: [[S; 3]; 2],
 }
 
 impl<S: Float> PacketBounds<S> {
-    /// Bounds the rays of `lanes`, at least one; `None` if the signs of their directions differ.
+    /// Computes the bounds of the rays of `lanes`, at least one. Returns `None` if the signs of
+    /// their directions differ.
     #[inline(always)]
     pub fn around<L: SimdFloat<Scalar = S>>(packet: &SlabPacket<L>, lanes: u32) -> Option<Self> {
         let d = packet.inverse;
@@ -95,12 +97,13 @@ impl<S: Float> PacketBounds<S> {
         })
     }
 
-    /// Returns the smallest distance at which a ray may enter each box, and the mask of boxes that
-    /// a ray may enter at a distance of at most `limit`. `side` returns the boxes' sides, numbered
-    /// as in [`Bvh8Node::bounds`]. `ONE` is `true` for the bounds of a single ray.
+    /// Returns two results for each box of a node: the smallest distance at which a ray may enter
+    /// it, and whether a ray may enter it at a distance of at most `limit`. `side` returns a side
+    /// of all boxes, numbered as in [`Bvh8Node::bounds`]. `ONE` is `true` if the bounds contain a
+    /// single ray.
     ///
-    /// Rounded differences and products are monotonic, so that the bounds are conservative for
-    /// [`SlabPacket::enters`].
+    /// The result is conservative for [`SlabPacket::enters`], because rounded differences and
+    /// products are monotonic.
     #[inline(always)]
     pub fn enters<const ONE: bool, L: SimdFloat<Scalar = S>>(
         &self,
@@ -123,7 +126,8 @@ impl<S: Float> PacketBounds<S> {
     }
 }
 
-/// Smallest and largest coordinates in the lanes of `mask`, of which `first` is one.
+/// Returns the smallest and the largest coordinates over the lanes of `mask`. `first` is one of
+/// these lanes.
 #[inline(always)]
 fn min_max<L: SimdFloat>(
     v: Vec3<L>,
@@ -135,40 +139,41 @@ fn min_max<L: SimdFloat>(
     ([x.0, y.0, z.0], [x.1, y.1, z.1])
 }
 
-/// Factor of far distances that covers rounding, so that no hit is lost (Ize 2013, *Robust BVH Ray
-/// Traversal*).
+/// Returns the factor by which far distances are enlarged to cover rounding, so that no hit is lost
+/// (Ize 2013, *Robust BVH Ray Traversal*).
 #[inline(always)]
 fn far_scale<L: SimdFloat>() -> L {
     L::from_f64(1.0 + 8.0 * L::EPSILON)
 }
 
-/// The number `x` in all lanes.
+/// Returns `x` in all lanes.
 #[inline(always)]
 pub fn broadcast<L: SimdFloat>(x: f32) -> L {
     L::splat(L::Scalar::from_f64(f64::from(x)))
 }
 
-/// Loads part `part` of eight numbers. Lanes beyond the eight repeat them.
+/// Loads `WIDTH` of eight numbers, from position `part * WIDTH` on. Lanes beyond the eighth number
+/// repeat the numbers from the start.
 #[inline(always)]
 pub fn load_wide<L: SimdFloat>(numbers: &[f32; BVH_WIDTH], part: usize) -> L {
     L::from_fn(|i| L::Scalar::from_f64(f64::from(numbers[(part * L::WIDTH + i) % BVH_WIDTH])))
 }
 
-/// Bits of the lanes that do not repeat numbers in [`load_wide`].
+/// Mask bits of the lanes that hold no repeated numbers after [`load_wide`].
 #[inline(always)]
 pub const fn valid_lanes() -> u32 {
     (1 << BVH_WIDTH) - 1
 }
 
-/// Child that waits on the traversal stack, with its entry distance.
+/// Child on the traversal stack, with the distance at which rays may enter it.
 #[derive(Clone, Copy, Default)]
 pub struct StackEntry<S> {
     child: u32,
     near: S,
 }
 
-/// Calls `traverse` with a stack of `per_level` entries for each level of the hierarchy. Up to
-/// `LARGE` entries are on the call stack, more on the heap.
+/// Calls `traverse` with a stack of `per_level` entries for each level of the hierarchy. A stack of
+/// up to `LARGE` entries is on the call stack, a larger one on the heap.
 #[inline(always)]
 pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     per_level: usize,
@@ -203,10 +208,10 @@ fn push_sorted<S: Float>(
     *top += 1;
 }
 
-/// Traverses the hierarchy with a packet. Calls `leaf(index, limit)` for leaves whose boxes a ray
-/// may enter at a distance of at most `limit`, in the order of their entry distances by `bounds`.
-/// `leaf` returns the new limits. `bounds` are those of the lanes with a limit of at least zero;
-/// `None` if these are incoherent.
+/// Traverses the hierarchy with a packet. Calls `leaf(index, limit)` for each leaf whose box a ray
+/// may enter at a distance of at most its limit, ordered by the entry distances of the bounds.
+/// `leaf` returns the new limits. `bounds` contains the rays whose limit is at least zero; `None`
+/// if these rays are incoherent.
 #[inline(always)]
 pub fn traverse_packet<L: SimdFloat>(
     bvh: &Bvh8,
@@ -228,7 +233,7 @@ pub fn traverse_packet<L: SimdFloat>(
                 let side = |k: usize| load_wide(&node.bounds[k], part);
                 let (near, candidates) = match bounds {
                     Some(bounds) => bounds.enters::<false, L>(side, L::splat(farthest)),
-                    // Without bounds there is no order, but empty slots are excluded.
+                    // Without bounds there is no order. This test only excludes empty slots.
                     None => (L::zero(), side(0).le(side(3))),
                 };
                 let mut bits = candidates.bits() & valid_lanes() & ((1 << L::WIDTH) - 1);

@@ -12,15 +12,15 @@ pub struct Ray<L> {
 }
 
 impl<L: SimdFloat> Ray<L> {
-    /// The point at distance `t`.
+    /// Returns the point at distance `t` along each ray.
     #[inline(always)]
     pub fn at(&self, t: L) -> Vec3<L> {
         self.direction.mul_add(t, self.origin)
     }
 
-    /// Returns `true` if the rays of `lanes`, at least one, are coherent: they differ by at most
-    /// `max_turn` in direction (length of the difference of unit vectors) and `max_shift` in any
-    /// coordinate of the origin.
+    /// Returns `true` if the rays of `lanes`, at least one, are coherent. Their directions differ
+    /// by at most `max_turn` (length of the difference of unit vectors), and each coordinate of
+    /// their origins by at most `max_shift`.
     #[inline(always)]
     pub(crate) fn is_coherent(&self, lanes: u32, max_turn: f64, max_shift: f64) -> bool {
         let lane = lanes.trailing_zeros() as usize;
@@ -32,31 +32,33 @@ impl<L: SimdFloat> Ray<L> {
     }
 }
 
-/// Closest hits found so far.
+/// Closest hits of a packet found so far.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit<L> {
     /// Distance along the ray; `L::MAX` for a miss.
     pub t: L,
-    /// Id of the primitive; undefined for a miss.
+    /// Id of the primitive. Undefined for a miss.
     pub item: L,
-    /// Id of the triangle, if the primitive is a mesh; undefined elsewhere.
+    /// Id of the triangle if the primitive is a mesh. Undefined for other primitives and for a
+    /// miss.
     pub triangle: L,
 }
 
 impl<L: SimdFloat> Hit<L> {
-    /// Misses in all lanes.
+    /// Returns misses in all lanes.
     #[inline(always)]
     pub fn none() -> Self {
         Self::with_t_max(L::from_f64(L::MAX))
     }
 
-    /// An empty hit that accepts distances below `t` only; inactive lanes get a negative `t`.
+    /// Returns misses that later accept only hits at distances below `t`. Inactive lanes have a
+    /// negative `t`.
     #[inline(always)]
     pub(crate) fn with_t_max(t: L) -> Self {
         Self { t, item: L::from_id(0), triangle: L::from_id(0) }
     }
 
-    /// Replaces distance and ids of primitive and triangle in `lanes`.
+    /// Replaces distance, primitive id and triangle id in `lanes`.
     #[inline(always)]
     pub fn take_in(&mut self, lanes: L::Mask, t: L, (item, triangle): (L, L)) {
         self.t = L::select(lanes, t, self.t);
@@ -64,7 +66,8 @@ impl<L: SimdFloat> Hit<L> {
         self.triangle = L::select(lanes, triangle, self.triangle);
     }
 
-    /// Accepts `t` and `item` in lanes of `mask` where `t` is positive and closer.
+    /// Accepts a hit on `item` at distance `t` in the lanes of `mask` where `t` is positive and
+    /// smaller than the current distance.
     #[inline(always)]
     pub(crate) fn keep_closer(&mut self, mask: L::Mask, t: L, item: u32) {
         let nearer = mask & t.gt(L::zero()) & t.lt(self.t);
@@ -72,12 +75,13 @@ impl<L: SimdFloat> Hit<L> {
         self.item = L::select(nearer, L::from_id(item), self.item);
     }
 
-    /// Accepts `other` where it is closer, or equally close with a smaller id.
+    /// Accepts the hits of `other` that are closer, or equally close with a smaller primitive id.
     #[inline(always)]
     pub(crate) fn merge(&mut self, other: &Self) {
         let mut nearer = other.t.lt(self.t);
         let tie = (other.t.le(self.t) & other.t.lt(L::from_f64(L::MAX))).and_not(nearer);
-        // Rare. Ids are subnormal numbers as floats, which some processors compare slowly.
+        // This is rare. Ids are subnormal numbers if read as floats, and some processors compare
+        // these slowly.
         if tie.any() {
             nearer = nearer | (tie & other.item.lt(self.item));
         }

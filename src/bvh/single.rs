@@ -1,30 +1,31 @@
-//! Single-ray BVH traversal, interleaved across lanes: while one ray waits for its next node or
-//! leaf from memory, the others advance.
+//! Single-ray BVH traversal, interleaved across the lanes of a packet: while one ray waits for a
+//! node or leaf from memory, the others advance.
 //!
 //! A ray is tested against the eight boxes of a node at once and continues with the nearest child.
-//! The other children wait in an unsorted stack frame; the nearest of them is selected without
-//! branches when it is needed. Besides memory latency, mispredicted branches are the main cost of
-//! incoherent rays.
+//! The other children wait in a stack frame, unsorted. When the ray returns to the frame, the
+//! nearest of them is selected without branches. Mispredicted branches are the main cost of
+//! incoherent rays, besides memory latency.
 
 use crate::bvh::packet::{PacketBounds, SlabPacket, load_wide, valid_lanes};
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 
-/// Children of a node that the ray enters and has not visited.
+/// Stack frame: children of a node that the ray enters and has not visited yet.
 #[derive(Clone, Copy, Default)]
 pub struct StackFrame {
-    /// Keys by slot: the bits of the entry distance, rounded down, with the slot in the last three.
-    /// The least key is the nearest child. Slots without a child have [`NO_KEY`] or a larger key.
+    /// Key of each slot: the bits of the entry distance, rounded down, with the slot number in the
+    /// last three bits. The smallest key belongs to the nearest child. Slots without a child have
+    /// [`NO_KEY`] or a larger key.
     keys: [u32; BVH_WIDTH],
     node: u32,
-    /// Number of children that remain.
+    /// Number of children that have not been visited.
     remaining: u32,
 }
 
-/// Key of an empty slot: the bits of infinity.
+/// Key of an empty slot: the bits of infinity in single precision.
 const NO_KEY: u32 = 0x7f80_0000;
 
-/// Mask of the bits of a key that hold the slot.
+/// Mask of the bits of a key that hold the slot number.
 const SLOT_MASK: u32 = BVH_WIDTH as u32 - 1;
 
 /// Traversal state of one ray.
@@ -32,16 +33,17 @@ const SLOT_MASK: u32 = BVH_WIDTH as u32 - 1;
 struct RayTraversal<S> {
     bounds: PacketBounds<S>,
     limit: S,
-    /// Next node or leaf.
+    /// Index of the next node or leaf, as in [`Bvh8Node::child`].
     child: u32,
-    /// Number of frames on its stack.
+    /// Number of frames on the ray's stack.
     frames: usize,
 }
 
-/// Traverses the hierarchy with the rays of `lanes`. Calls `leaf(lane, index, limit)` for leaves
-/// whose boxes the ray of a lane enters at a distance of at most its limit, from near to far.
-/// `leaf` returns the ray's new limit. `prefetch_leaf(index)` is called some time before the leaf
-/// is visited. `frames` has one entry per lane and level.
+/// Traverses the hierarchy with the rays of `lanes`, each separately. Calls
+/// `leaf(lane, index, limit)` for each leaf whose box the ray of a lane enters at a distance of at
+/// most its limit, from near to far. `leaf` returns the new limit of the ray. Calls
+/// `prefetch_leaf(index)` some time before it visits the leaf. `frames` has one entry for each lane
+/// and level.
 #[inline(never)]
 pub fn traverse_rays<L: SimdFloat>(
     bvh: &Bvh8,
@@ -53,7 +55,7 @@ pub fn traverse_rays<L: SimdFloat>(
 ) {
     let levels = bvh.depth();
     let mut rays = RayTraversal::each(packet, limit);
-    // Bits of the lanes whose next child is a node, and of those whose next child is a leaf.
+    // Bits of the lanes whose next child is a node (`at_node`) or a leaf (`at_leaf`).
     let (mut at_node, mut at_leaf) = (lanes, 0u32);
     while at_node | at_leaf != 0 {
         let (mut node_lanes, mut leaf_lanes) = (at_node, at_leaf);
@@ -97,7 +99,7 @@ fn prefetch_node(node: &Bvh8Node) {
     prefetch(&node.child);
 }
 
-/// Removes the least key and returns it.
+/// Removes the smallest key and returns it.
 #[inline(always)]
 fn pop_least(keys: &mut [u32; BVH_WIDTH]) -> u32 {
     let least = keys.iter().fold(u32::MAX, |least, key| least.min(*key));
@@ -106,7 +108,7 @@ fn pop_least(keys: &mut [u32; BVH_WIDTH]) -> u32 {
 }
 
 impl<S: Float> RayTraversal<S> {
-    /// Initial states of all lanes, at the root.
+    /// Returns the initial states of all lanes, at the root.
     #[inline(always)]
     fn each<L: SimdFloat<Scalar = S>>(packet: &SlabPacket<L>, limit: L) -> [Self; MAX_WIDTH] {
         let d = packet.inverse;
@@ -132,8 +134,8 @@ impl<S: Float> RayTraversal<S> {
         each
     }
 
-    /// Visits the current node: continues with the nearest child that the ray enters, and pushes a
-    /// frame with the others. Returns `false` if the ray enters no child.
+    /// Visits the current node. The ray continues with the nearest child that it enters; a frame
+    /// with the other children is pushed. Returns `false` if the ray enters no child.
     #[inline(always)]
     fn expand<L: SimdFloat<Scalar = S>>(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         let node = &bvh.nodes()[self.child as usize];
@@ -143,8 +145,8 @@ impl<S: Float> RayTraversal<S> {
             let (near, enters) = self.bounds.enters::<true, L>(side, L::splat(self.limit));
             let first = part * L::WIDTH;
             entered |= (enters.bits() & valid_lanes()) << first;
-            // Reduced by more than rounding to single precision adds: no key is larger than the
-            // distance.
+            // The distance is reduced by more than the rounding error of single precision, so that
+            // no key exceeds the true distance.
             let near =
                 L::select(enters, near * L::from_f64(1.0 - 2e-7), L::from_f64(f64::INFINITY));
             for (i, key) in keys[first..].iter_mut().enumerate().take(L::WIDTH) {
@@ -156,7 +158,7 @@ impl<S: Float> RayTraversal<S> {
             return false;
         }
         let slot = pop_least(&mut keys) & SLOT_MASK;
-        // Written even if no child remains, which saves a branch.
+        // The frame is written even if no child remains, which saves a branch.
         let remaining = entered.count_ones() - 1;
         frames[self.frames] = StackFrame { keys, node: self.child, remaining };
         self.frames += usize::from(remaining != 0);
@@ -164,8 +166,8 @@ impl<S: Float> RayTraversal<S> {
         true
     }
 
-    /// Continues with the nearest child of the topmost frame that has one within the limit. Returns
-    /// `false` if the stack has none.
+    /// Continues with the nearest child of the topmost frame that has a child within the limit.
+    /// Returns `false` if no frame has one.
     #[inline(always)]
     fn next(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         while self.frames > 0 {

@@ -52,8 +52,8 @@ fn view_angle() -> ViewAngle {
     ViewAngle::Vertical(40.0)
 }
 
-/// Camera of a scene file without `[camera]`: it looks at the origin. (A `[camera]` needs `target` or
-/// `direction`.)
+/// Creates the camera of a scene file without `[camera]`, which looks at the origin. A `[camera]`
+/// in a file needs `target` or `direction`.
 impl Default for Camera {
     fn default() -> Self {
         Self {
@@ -95,7 +95,7 @@ impl FieldValue for ViewAngle {
 }
 
 impl ViewAngle {
-    /// Returns its key and its angle in degrees.
+    /// Returns the key of the angle, `vertical` or `horizontal`, and the angle in degrees.
     pub fn key_degrees(&self) -> (&'static str, f64) {
         match *self {
             Self::Vertical(degrees) => ("vertical", degrees),
@@ -105,8 +105,8 @@ impl ViewAngle {
 }
 
 impl Camera {
-    /// Returns the unit vector of the view direction; `None` if `target` is the eye itself, `direction`
-    /// is zero, or not exactly one of them is given.
+    /// Returns the unit vector of the view direction. Returns `None` if `target` is the eye itself,
+    /// if `direction` is zero, or if not exactly one of `target` and `direction` is given.
     pub fn view(&self) -> Option<DVec3> {
         let look = match (self.target, self.direction) {
             (Some(target), None) => DVec3::from_array(target) - DVec3::from_array(self.eye),
@@ -116,7 +116,7 @@ impl Camera {
         unit(look)
     }
 
-    /// Returns the errors of the camera.
+    /// Returns the validation errors of the camera.
     pub fn faults(&self) -> Vec<ValidationError> {
         let given = match (&self.target, &self.direction) {
             (None, None) => Some(ValidationError::new(
@@ -136,7 +136,8 @@ impl Camera {
         checks.and(degenerate).errors()
     }
 
-    /// Returns the error that makes a picture impossible although every number is in its range.
+    /// Returns the error of a camera whose numbers are all in range but do not define the axes of
+    /// the picture: the target is the eye, or `up` is parallel to the view direction.
     fn orientation_error(&self) -> Option<ValidationError> {
         let Some(view) = self.view() else {
             return Some(ValidationError::new(
@@ -146,7 +147,8 @@ impl Camera {
             ));
         };
         let up = unit(self.up)?;
-        // Within 1e-6 of parallel, rounding errors determine the picture's axes.
+        // If the vectors are parallel within 1e-6, rounding errors would determine the picture's
+        // axes.
         (view.cross(up).length() <= 1e-6).then(|| {
             ValidationError::new(
                 "up",

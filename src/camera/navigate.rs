@@ -1,22 +1,24 @@
 //! Interactive camera movements: orbit, pan, dolly, fly, look, roll, zoom, frame.
 //!
-//! Every function returns a camera in the form of the old one (target or direction), with numbers
-//! rounded to about a millionth of the distance to the pivot. A movement that would give an invalid
-//! camera (coordinates out of range, no distance left) returns the old one. Rotations are relative to
-//! `up`; the view direction stays at least 0.1 degrees away from it.
+//! Every function returns a moved camera, which has `target` or `direction` as the old one has. The
+//! pivot of a movement is the target; for a camera with a direction it is the point at a given
+//! distance ahead. Numbers are rounded to about a millionth of the distance to the pivot. A
+//! movement to an invalid camera (coordinates out of range, no distance left) returns the old
+//! camera. Rotations are relative to `up`; the view direction stays at least 0.1 degrees away from
+//! `up`.
 
 use crate::camera::{Camera, ViewAngle};
 use crate::value::{floor_log10, round_significant, rounded_to, unit};
 use glam::DVec3;
 
-/// Steepest view up or down, in degrees above or below the plane across `up`.
+/// Steepest view up or down, in degrees above or below the plane perpendicular to `up`.
 const MAX_PITCH: f64 = 89.9;
 /// Narrowest and widest opening angle of a zoom, in degrees.
 const ZOOM_ANGLES: [f64; 2] = [0.1, 170.0];
 
 impl Camera {
-    /// Returns orthonormal vectors to the right, up in the picture, and forward, also for a camera with
-    /// faults.
+    /// Returns orthonormal vectors to the right, up in the picture, and forward. They are also
+    /// defined for an invalid camera.
     pub fn frame(&self) -> [DVec3; 3] {
         let forward = self.view().unwrap_or(DVec3::NEG_Z);
         let up = unit(self.up).unwrap_or(DVec3::Y);
@@ -36,8 +38,8 @@ impl Camera {
         }
     }
 
-    /// Orbits the pivot at constant distance, `right` degrees to the right and `up` degrees upwards. The
-    /// pivot is the target, or the point `distance` ahead.
+    /// Orbits the pivot at constant distance, `right` degrees to the right and `up` degrees
+    /// upwards. The pivot of a camera without a target is the point `distance` ahead.
     pub fn orbit(&self, right: f64, up: f64, distance: f64) -> Self {
         let distance = self.pivot_distance(distance);
         // The view direction rotates against the movement of the eye.
@@ -47,16 +49,17 @@ impl Camera {
         self.placed(pivot - forward * distance, forward, distance)
     }
 
-    /// Moves across the view direction by `right` and `up`, as fractions of the distance to the pivot
-    /// (the target, or the point `distance` ahead).
+    /// Moves across the view direction by `right` and `up`, as fractions of the distance to the
+    /// pivot. The pivot of a camera without a target is the point `distance` ahead.
     pub fn pan(&self, right: f64, up: f64, distance: f64) -> Self {
         let distance = self.pivot_distance(distance);
         let [x, y, _] = self.frame();
         self.shifted((x * right + y * up) * distance, distance)
     }
 
-    /// Multiplies the distance to the pivot (the target, or the point `distance` ahead) by `factor`; less
-    /// than 1 is nearer. The camera stays on its side of the pivot.
+    /// Multiplies the distance to the pivot by `factor`; less than 1 is nearer. The pivot of a
+    /// camera without a target is the point `distance` ahead. The camera stays on its side of the
+    /// pivot.
     pub fn dolly(&self, factor: f64, distance: f64) -> Self {
         let old = self.pivot_distance(distance);
         if !(factor > 0.0 && factor.is_finite()) {
@@ -73,15 +76,15 @@ impl Camera {
         self.placed(pivot - forward * new, forward, new)
     }
 
-    /// Moves eye and target to the right, up in the picture and forward, in scene units.
+    /// Moves eye and target by `right`, `up` (in the picture) and `ahead`, in scene units.
     pub fn fly(&self, [right, up, ahead]: [f64; 3]) -> Self {
         let [x, y, z] = self.frame();
         let translation = x * right + y * up + z * ahead;
         self.shifted(translation, self.pivot_distance(translation.length().max(1e-3)))
     }
 
-    /// Rotates the view about the eye, `right` degrees to the right and `up` degrees upwards. A target
-    /// moves around the eye.
+    /// Rotates the view about the eye, `right` degrees to the right and `up` degrees upwards. A
+    /// target is moved on a circle around the eye.
     pub fn look(&self, right: f64, up: f64) -> Self {
         let distance = self.pivot_distance(1.0);
         match self.turned(right, up) {
@@ -113,7 +116,8 @@ impl Camera {
             let half = (0.5 * degrees).to_radians().tan() * factor;
             let [narrow, wide] = ZOOM_ANGLES;
             let new = round_significant(2.0 * half.atan().to_degrees(), 4).clamp(narrow, wide);
-            // An angle outside of the limits keeps its value instead of moving against the zoom.
+            // An angle outside of the limits keeps its value: clamping would move it against the
+            // zoom.
             if (new < degrees) == (factor < 1.0) { new } else { degrees }
         };
         let view_angle = match self.view_angle {
@@ -123,8 +127,9 @@ impl Camera {
         self.valid_or_self(Self { view_angle, ..self.clone() })
     }
 
-    /// Frames the ball of `radius` around `center`, seen from the same side, with a margin of 10 %. `aspect`
-    /// is the picture's width divided by its height. A target becomes the centre.
+    /// Moves the eye so that the sphere of `radius` around `center` fills the picture with a margin
+    /// of 10 %; the view direction stays. `center` and `radius` are in scene units. `aspect` is the
+    /// picture's width divided by its height. A camera with a target gets `center` as its target.
     pub fn framed(&self, center: [f64; 3], radius: f64, aspect: f64) -> Self {
         let forward = self.frame()[2];
         let half = self.half_size(aspect).into_iter().fold(f64::INFINITY, f64::min).atan();
@@ -140,22 +145,23 @@ impl Camera {
         self.valid_or_self(aimed.moved_to(center - forward * distance, forward, distance, false))
     }
 
-    /// Returns the distance to the target, or `distance` without a target; 1 if that is invalid.
+    /// Returns the distance to the target, or `distance` if the camera has no target. Returns 1 if
+    /// this distance is not positive and finite.
     fn pivot_distance(&self, distance: f64) -> f64 {
         let to_target = self.target.map(|t| DVec3::from_array(t) - DVec3::from_array(self.eye));
         let distance = to_target.map_or(distance, DVec3::length);
         if distance > 0.0 && distance.is_finite() { distance } else { 1.0 }
     }
 
-    /// Returns the view direction rotated to the right and upwards, in degrees; `None` if an angle is not
-    /// finite.
+    /// Returns the view direction rotated by `right` degrees to the right and `up` degrees upwards.
+    /// Returns `None` if an angle is not finite.
     fn turned(&self, right: f64, up: f64) -> Option<DVec3> {
         if !(right.is_finite() && up.is_finite()) {
             return None;
         }
         let axis = unit(self.up).unwrap_or(DVec3::Y);
         let [side, _, forward] = self.frame();
-        // Forward direction in the plane across `up`.
+        // Forward direction in the plane perpendicular to `up`.
         let ahead = axis.cross(side);
         let pitch = forward.dot(axis).clamp(-1.0, 1.0).asin().to_degrees();
         let pitch = (pitch + up).clamp(-MAX_PITCH, MAX_PITCH).to_radians();
@@ -164,14 +170,16 @@ impl Camera {
         Some((level * pitch.cos() + axis * pitch.sin()).normalize())
     }
 
-    /// Returns the camera at `eye` with the view direction `forward` and the target, if it has one,
-    /// `distance` ahead. An unchanged eye keeps its digits; an invalid result gives the old camera.
+    /// Returns the camera at `eye` with the view direction `forward`. A target is put `distance`
+    /// ahead. An unchanged eye keeps its digits. If the result would be invalid, returns this
+    /// camera.
     fn placed(&self, eye: DVec3, forward: DVec3, distance: f64) -> Self {
         let eye_stays = DVec3::from_array(self.eye) == eye;
         self.valid_or_self(self.moved_to(eye, forward, distance, eye_stays))
     }
 
-    /// [`Camera::placed`] without validation.
+    /// Does the work of [`Camera::placed`] without validation. If `eye_stays`, the eye keeps its
+    /// digits and the target moves; otherwise the eye moves and the target stays.
     fn moved_to(&self, eye: DVec3, forward: DVec3, distance: f64, eye_stays: bool) -> Self {
         let mut next = self.clone();
         let round = |v: DVec3| v.map(|x| rounded(x, distance)).to_array();
@@ -200,7 +208,7 @@ impl Camera {
         self.valid_or_self(Self { eye: moved(self.eye), target, ..self.clone() })
     }
 
-    /// Returns `next` if it has no faults, otherwise this camera.
+    /// Returns `next` if it is valid, otherwise this camera.
     fn valid_or_self(&self, next: Self) -> Self {
         if next.faults().is_empty() { next } else { self.clone() }
     }

@@ -10,11 +10,12 @@ use glam::DVec3;
 #[derive(Clone, Copy, Debug)]
 pub struct PinholeCamera {
     eye: DVec3,
-    /// Right, up and forward, orthonormal.
+    /// `u`, `v` and `w`: orthonormal vectors to the right, up and forward.
     u: DVec3,
     v: DVec3,
     w: DVec3,
-    /// Steps to the next pixel to the right and downward, on the picture plane at unit distance.
+    /// `dx_axis` and `dy_axis`: vectors from a pixel to the next one to the right and to the next
+    /// one downward, on the picture plane at unit distance.
     dx_axis: DVec3,
     dy_axis: DVec3,
     /// Vector from the eye to the picture plane's corner at pixel (0, 0).
@@ -23,10 +24,11 @@ pub struct PinholeCamera {
 }
 
 impl PinholeCamera {
-    /// Compiles `camera` for a film of `width` x `height` pixels, in a scene translated by -`origin`.
+    /// Compiles `camera` for a film of `width` x `height` pixels, in a scene translated by
+    /// -`origin`.
     ///
-    /// If `up` is parallel to the view direction, which scene files cannot describe, the coordinate axis
-    /// least parallel to the view direction replaces it.
+    /// A coordinate axis replaces an `up` that is parallel to the view direction: the axis least
+    /// parallel to the view direction. Scene files cannot describe such a camera.
     pub fn new(camera: &Camera, [width, height]: [u32; 2], origin: DVec3) -> Self {
         let eye = DVec3::from(camera.eye);
         let forward = match (camera.direction, camera.target) {
@@ -74,21 +76,21 @@ impl PinholeCamera {
         }
     }
 
-    /// Returns the eye.
+    /// Returns the position of the eye in the translated scene.
     pub fn eye(&self) -> DVec3 {
         self.eye
     }
 
-    /// Returns orthonormal vectors to the right, up and forward.
+    /// Returns orthonormal vectors to the right, up in the picture, and forward.
     pub fn frame(&self) -> [DVec3; 3] {
         [self.u, self.v, self.w]
     }
 
-    /// Returns the smallest angle between rays through the centres of neighbouring pixels \[radians\]. It
-    /// occurs at the picture's corners.
+    /// Returns the smallest angle between rays through the centres of neighbouring pixels
+    /// \[radians\]. The angle is smallest at the picture's corners.
     pub fn pixel_angle(&self) -> f64 {
-        // At the distance d along the ray, a step p across the ray rotates it by about p / d, an oblique
-        // step by at least p / d^2.
+        // At the distance d from the eye, a step p across the ray rotates the ray by about p / d,
+        // and an oblique step by at least p / d^2.
         self.pixel() / self.raster_corner.length_squared()
     }
 
@@ -120,9 +122,9 @@ impl PinholeCamera {
         corner.to_array().map(S::from_f64)
     }
 
-    /// Returns origins, on the near plane, and unit directions of rays through points of pixels. `base` is
-    /// the result of [`PinholeCamera::pixel_corner_direction`]; `(dx, dy)` is the offset from the corner to
-    /// the right and downward \[pixels\].
+    /// Returns origins and unit directions of rays through points of pixels. The origins are on the
+    /// near plane. `base` is the result of [`PinholeCamera::pixel_corner_direction`]; `(dx, dy)` is
+    /// the offset from the corner to the right and downward \[pixels\].
     #[inline(always)]
     pub fn rays<L: SimdFloat>(&self, base: Vec3<L>, (dx, dy): (L, L)) -> (Vec3<L>, Vec3<L>) {
         let dx_axis = Vec3::of(self.dx_axis.to_array());

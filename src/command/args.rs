@@ -241,7 +241,7 @@ pub enum SamplerArg {
 }
 
 impl ComputeArgs {
-    /// Number of tracing threads: one per processor unless given.
+    /// Returns the number of tracing threads: one per processor unless `--threads` is given.
     pub fn threads(&self) -> usize {
         let all = || std::thread::available_parallelism().map_or(1, usize::from);
         self.threads.map_or_else(all, usize::from)
@@ -249,7 +249,7 @@ impl ComputeArgs {
 }
 
 impl PrecisionArgs {
-    /// Precision for the world's options.
+    /// Returns the precision for the options of scene compilation.
     pub fn get(&self) -> Precision {
         match self.precision {
             PrecisionArg::Single => Precision::Single,
@@ -260,15 +260,15 @@ impl PrecisionArgs {
 }
 
 impl PictureArgs {
-    /// Exposure and tone curve.
+    /// Returns the exposure and tone curve of the displayed picture.
     pub fn display(&self) -> Display {
         Display { exposure_ev: self.exposure, tone: self.tone }
     }
 
-    /// Replaces the size of `scene` by the given one, if there is one.
+    /// Sets the size of `scene` to that of `--size`, if this option is given.
     ///
     /// # Errors
-    /// Returns the first fault of the scene of that size.
+    /// Returns the first fault of the scene with the new size.
     pub fn resize(&self, scene: &mut Scene) -> Result<(), String> {
         let Some(size) = self.size else { return Ok(()) };
         scene.film.size = size;
@@ -280,7 +280,7 @@ impl PictureArgs {
 }
 
 impl SamplerArg {
-    /// Kind for the sampler's settings.
+    /// Returns the kind of sampler for the render options.
     pub fn kind(self) -> SamplerKind {
         match self {
             Self::Sobol => SamplerKind::Sobol,
@@ -298,7 +298,7 @@ fn tone() -> impl TypedValueParser<Value = Tone> {
     })
 }
 
-/// Parses the name of an acceleration.
+/// Parses the name of an acceleration structure.
 fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
     let names = Acceleration::ALL
         .map(|structure| PossibleValue::new(structure.name()).aliases(structure.former_name()));
@@ -306,7 +306,7 @@ fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
         .map(|given| Acceleration::from_name(&given).unwrap_or_default())
 }
 
-/// Parses `640x480`. The scene checks the range.
+/// Parses a size such as `640x480`. Its range is checked later, by the scene.
 fn size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_string())

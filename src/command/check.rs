@@ -29,7 +29,9 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Memory of a whole film, in bytes: a 64-bit sum for each replicate, pixel, group and channel.
+/// Returns the memory of a film in bytes. For each pixel the film holds a 64-bit sum for each of
+/// two replicates (halves of the samples), each of `groups` light groups, and each of three
+/// channels.
 fn film_bytes(size: [u32; 2], groups: usize) -> u64 {
     let [columns, rows] = size.map(|n| u64::from(n).div_ceil(TILE as u64));
     columns * rows * (2 * TILE_PIXELS * groups * 3 * size_of::<i64>()) as u64
@@ -41,7 +43,7 @@ mod tests {
 
     #[test]
     fn film_memory_counts_whole_tiles() {
-        // Whole tiles: 40 x 30 of them.
+        // The film has 40 x 30 complete tiles.
         assert_eq!(film_bytes([640, 480], 1), 640 * 480 * 48);
         assert_eq!(film_bytes([1, 1], 3), 256 * 48 * 3);
     }

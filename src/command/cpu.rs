@@ -1,15 +1,17 @@
-//! Check of the processor for the features that the program was compiled for.
+//! Test of the processor for the features for which the program was compiled.
 //!
-//! The build names a processor (see `.cargo/config.toml`), and the compiler uses all of its features
-//! everywhere; an older processor would stop with an illegal instruction at any moment.
-//! `is_x86_feature_detected!` returns `true` without a test for features that the build assumes.
-//! Therefore plain code reads CPUID directly.
+//! The build names a processor (see `.cargo/config.toml`), and the compiler may use all of its
+//! features anywhere. On an older processor the program would stop with an illegal instruction at
+//! any moment. `is_x86_feature_detected!` returns `true`, without a test, for features that the
+//! build assumes. This module therefore reads CPUID directly.
 //!
-//! This holds for builds for a named processor, such as x86-64-v3, and was tested under an emulator of older
-//! ones. An optimised build for `native` compiles the standard library again, including the code before `main`, and
-//! that code may contain the illegal instruction.
+//! The test works in builds for a named processor, such as x86-64-v3, and was tested under an
+//! emulator of older processors. It may fail in an optimised build for `native`: such a build also
+//! compiles the standard library for this processor, including code that runs before `main`, and
+//! that code may already contain the illegal instruction.
 
-/// Ends the program at the first listed feature that the build assumes and whose CPUID bit is 0.
+/// Ends the program if the build assumes a listed feature whose CPUID bit is 0. Each item is the
+/// name of the feature, the register and the bit.
 #[cfg(target_arch = "x86_64")]
 macro_rules! need {
     ($($name:literal $register:ident $bit:literal)*) => {
@@ -19,37 +21,40 @@ macro_rules! need {
     };
 }
 
-/// Ends the program with exit status 1 and a line on stderr if this processor lacks a feature that the
-/// program was compiled for. `main` calls it first.
+/// Ends the program with exit status 1 and a message on stderr if this processor lacks a feature
+/// for which the program was compiled. `main` calls it first.
 #[cfg(target_arch = "x86_64")]
 #[inline(never)]
 pub fn require() {
     use std::arch::x86_64::{__cpuid, __cpuid_count, CpuidResult};
-    // Bits: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 2A, CPUID; AMD64
-    // Architecture Programmer's Manual, volume 3, appendix E (those of leaf 8000_0001).
+    // Sources of the bits: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 2A,
+    // CPUID; for leaf 8000_0001, AMD64 Architecture Programmer's Manual, volume 3, appendix E.
     let none = CpuidResult { eax: 0, ebx: 0, ecx: 0, edx: 0 };
-    // Bit 27 (OSXSAVE): the operating system saves the extended registers. AVX needs it.
-    let basic = __cpuid(1).ecx;
-    let basic = if basic >> 27 & 1 == 1 { basic } else { basic & !(1 << 28) };
-    let seven = if __cpuid(0).eax >= 7 { __cpuid_count(7, 0) } else { none };
-    let (more, newer, newest) = (seven.ebx, seven.ecx, seven.edx);
-    let last = if seven.eax >= 1 { __cpuid_count(7, 1).eax } else { 0 };
+    // Bit 27 (OSXSAVE) is set if the operating system saves the extended registers, which AVX (bit
+    // 28) requires.
+    let leaf1_ecx = __cpuid(1).ecx;
+    let leaf1_ecx = if leaf1_ecx >> 27 & 1 == 1 { leaf1_ecx } else { leaf1_ecx & !(1 << 28) };
+    let leaf7 = if __cpuid(0).eax >= 7 { __cpuid_count(7, 0) } else { none };
+    let (leaf7_ebx, leaf7_ecx, leaf7_edx) = (leaf7.ebx, leaf7.ecx, leaf7.edx);
+    let leaf7_1_eax = if leaf7.eax >= 1 { __cpuid_count(7, 1).eax } else { 0 };
     let has_extended = __cpuid(0x8000_0000).eax >= 0x8000_0001;
-    let extended = if has_extended { __cpuid(0x8000_0001).ecx } else { 0 };
+    let extended_ecx = if has_extended { __cpuid(0x8000_0001).ecx } else { 0 };
     need! {
-        "avx" basic 28 "avx2" more 5 "fma" basic 12
-        "avx512f" more 16 "avx512dq" more 17 "avx512cd" more 28 "avx512bw" more 30 "avx512vl" more 31
-        "avx512ifma" more 21 "avx512vbmi" newer 1 "avx512vbmi2" newer 6 "avx512vnni" newer 11
-        "avx512bitalg" newer 12 "avx512vpopcntdq" newer 14 "avx512fp16" newest 23 "avx512bf16" last 5
-        "avxvnni" last 4 "gfni" newer 8 "vaes" newer 9 "vpclmulqdq" newer 10
-        "bmi1" more 3 "bmi2" more 8 "lzcnt" extended 5 "movbe" basic 22 "f16c" basic 29
-        "sse3" basic 0 "pclmulqdq" basic 1 "ssse3" basic 9 "sse4.1" basic 19 "sse4.2" basic 20
-        "popcnt" basic 23 "aes" basic 25 "rdrand" basic 30 "rdseed" more 18 "adx" more 19 "sha" more 29
-        "sse4a" extended 6 "tbm" extended 21
+        "avx" leaf1_ecx 28 "avx2" leaf7_ebx 5 "fma" leaf1_ecx 12 "avx512f" leaf7_ebx 16
+        "avx512dq" leaf7_ebx 17 "avx512cd" leaf7_ebx 28 "avx512bw" leaf7_ebx 30
+        "avx512vl" leaf7_ebx 31 "avx512ifma" leaf7_ebx 21 "avx512vbmi" leaf7_ecx 1
+        "avx512vbmi2" leaf7_ecx 6 "avx512vnni" leaf7_ecx 11 "avx512bitalg" leaf7_ecx 12
+        "avx512vpopcntdq" leaf7_ecx 14 "avx512fp16" leaf7_edx 23 "avx512bf16" leaf7_1_eax 5
+        "avxvnni" leaf7_1_eax 4 "gfni" leaf7_ecx 8 "vaes" leaf7_ecx 9 "vpclmulqdq" leaf7_ecx 10
+        "bmi1" leaf7_ebx 3 "bmi2" leaf7_ebx 8 "lzcnt" extended_ecx 5 "movbe" leaf1_ecx 22
+        "f16c" leaf1_ecx 29 "sse3" leaf1_ecx 0 "pclmulqdq" leaf1_ecx 1 "ssse3" leaf1_ecx 9
+        "sse4.1" leaf1_ecx 19 "sse4.2" leaf1_ecx 20 "popcnt" leaf1_ecx 23 "aes" leaf1_ecx 25
+        "rdrand" leaf1_ecx 30 "rdseed" leaf7_ebx 18 "adx" leaf7_ebx 19 "sha" leaf7_ebx 29
+        "sse4a" extended_ecx 6 "tbm" extended_ecx 21
     }
 }
 
-/// Other architectures are compiled for their baseline.
+/// Does nothing: for other architectures the program is compiled for their baseline.
 #[cfg(not(target_arch = "x86_64"))]
 pub fn require() {}
 
@@ -59,7 +64,7 @@ pub fn require() {}
 fn refuse(lacking: &str) -> ! {
     use std::io::Write;
     let mut err = std::io::stderr();
-    // With a closed stderr the exit status is the only message.
+    // Errors are ignored: if stderr is closed, the exit status is the only message.
     let _ = err.write_all(b"zerkalo was built for a processor with ");
     let _ = err.write_all(lacking.as_bytes());
     let _ = err.write_all(

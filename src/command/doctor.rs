@@ -1,5 +1,5 @@
-//! `zerkalo doctor`: report on the terminal and the connection, their use by the dashboard, and hints for
-//! improvements.
+//! `zerkalo doctor`: reports the abilities of the terminal and the connection and how the dashboard
+//! uses them, and gives hints for improvements.
 
 use crate::command::args::DoctorArgs;
 use crate::command::{Failure, print_line};
@@ -15,9 +15,9 @@ use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Width of the report, in columns.
+/// Width of the report, in columns of the terminal.
 const COLUMNS: usize = 80;
-/// Width of the names in the report, in columns.
+/// Width of the column of names in the report, in columns of the terminal.
 const NAME: usize = 17;
 
 pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
@@ -56,10 +56,10 @@ struct DoctorReport {
     /// Replies of the terminal, or the reason why it was not queried.
     diagnosis: Result<TerminalReport, &'static str>,
     rate_requested: bool,
-    /// Variable that names the character encoding, and its value.
+    /// Environment variable that names the character encoding, and its value.
     locale: Option<(&'static str, String)>,
     state: Option<PathBuf>,
-    /// Files of unsaved edits in `state`.
+    /// Files with unsaved edits in the folder `state`.
     unsaved_files: Vec<PathBuf>,
 }
 
@@ -94,12 +94,12 @@ impl DoctorReport {
         lines.join("\n")
     }
 
-    /// Capabilities of the terminal, if it was queried.
+    /// Returns the capabilities of the terminal. Returns `None` if the terminal was not queried.
     fn capabilities(&self) -> Option<&Capabilities> {
         self.diagnosis.as_ref().ok().map(|diagnosis| &diagnosis.terminal)
     }
 
-    /// Number of colours that the dashboard uses.
+    /// Returns the colours that the dashboard uses.
     fn level(&self) -> Colors {
         self.capabilities().map_or(self.environment.colors(), |terminal| terminal.colors)
     }
@@ -140,14 +140,15 @@ impl DoctorReport {
         }
     }
 
-    /// Number of colours and its source: NO_COLOR, COLORTERM, TERM or the terminal's reply.
+    /// Describes the number of colours and its source: NO_COLOR, COLORTERM, TERM or the terminal's
+    /// reply.
     fn colors(&self) -> String {
         let Environment { term, color_term, no_color, .. } = &self.environment;
         let level = self.level();
-        let promised = self.environment.colors();
+        let environment_colors = self.environment.colors();
         let source = if *no_color {
             "NO_COLOR is set".to_string()
-        } else if level != promised {
+        } else if level != environment_colors {
             "the terminal confirmed a 24-bit colour".to_string()
         } else if ["truecolor", "24bit"].contains(&color_term.as_str()) {
             format!("COLORTERM={color_term}")
@@ -236,7 +237,8 @@ impl DoctorReport {
     }
 }
 
-/// Wraps `value` to lines of at most `COLUMNS` behind `name`.
+/// Returns `name` followed by `value`. `value` is wrapped, with hanging indent, so that no line is
+/// longer than `COLUMNS`.
 fn indented(name: &str, value: &str) -> String {
     let lines = wrapped(value, (COLUMNS - name.len()) as u16);
     name.to_string() + &lines.join(&format!("\n{:1$}", "", name.len()))
@@ -246,7 +248,7 @@ fn background(terminal: &Capabilities) -> String {
     match terminal.background {
         None => "unknown".to_string(),
         Some([r, g, b]) => {
-            // Rec. 601 luma, sufficient to distinguish dark from light.
+            // Rec. 601 luma of the sRGB levels suffices to distinguish dark from light.
             let luma = 0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b);
             let shade = if luma < 128.0 { "dark" } else { "light" };
             format!("#{r:02x}{g:02x}{b:02x}, {shade}")

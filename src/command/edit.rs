@@ -56,7 +56,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         settings: Settings {
             adaptive: true,
             criterion: Criterion::Codes,
-            // Replaced by the scene's.
+            // The dashboard replaces this value by that of the scene.
             rays_per_pixel: 0,
             stop: DEFAULT_STOP,
         },
@@ -80,8 +80,8 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     ended.signalled.map_or(Ok(()), |status| Err(Failure::Signalled(status)))
 }
 
-/// Opens the scene file. The dashboard shows the errors of a readable file without a valid scene, whose
-/// user may correct it meanwhile.
+/// Opens the scene file. The inner error means that the file is readable but not a valid scene: the
+/// dashboard shows its errors, and the user may correct the file meanwhile.
 ///
 /// # Errors
 /// Fails if the file cannot be read.
@@ -107,7 +107,8 @@ fn open(
     }
 }
 
-/// Hint at unsaved edits of a scene whose file is gone; empty without any.
+/// Returns a hint at unsaved edits of a scene whose file is gone. Returns an empty string if there
+/// are none.
 fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     let found = Recovery::new(Some(path), "", state).find();
     let hint = |path: &Path| {
@@ -117,7 +118,8 @@ fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     found.orphans.first().map_or(String::new(), |lost| hint(lost.path()))
 }
 
-/// `mirror-room-1.png  640x480  212 spp  noise 0.50 8-bit levels`
+/// Formats a line about an exported picture:
+/// `mirror-room-1.png  640x480  212 spp  noise 0.50 8-bit levels`.
 fn summary(exported: &Exported) -> String {
     let [width, height] = exported.size;
     let noise = match exported.noise_codes {
@@ -128,7 +130,7 @@ fn summary(exported: &Exported) -> String {
     format!("{path}  {width}x{height}  {:.0} spp  noise {noise}", exported.spp)
 }
 
-/// Colours of the terminal given by `--color`; `None` for `auto`.
+/// Converts the value of `--color`. Returns `None` for `auto`.
 fn colors(requested: ColorArg) -> Option<Colors> {
     match requested {
         ColorArg::True => Some(Colors::True),

@@ -1,4 +1,4 @@
-//! Progress messages while the files that a scene names are read.
+//! Progress messages while meshes and images of a scene are loaded.
 
 use crate::asset::{Assets, LoadProgress};
 use crate::command::warn;
@@ -6,18 +6,19 @@ use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Least size in bytes of a file, and number of triangles of a BVH, that is reported.
+/// Thresholds of a message: size of a file that is read, in bytes (8 MiB), and number of triangles
+/// of a BVH that is built. Smaller files and BVHs are not reported.
 const LARGE: (u64, usize) = (8 << 20, 200_000);
 
-/// Asset cache that reports large files on stderr if that is a terminal.
+/// Asset cache with progress messages for large files on stderr, if stderr is a terminal.
 pub struct LoadReporter {
-    /// The cache, shared by all readers of scenes.
+    /// The cache, shared between all readers of scenes.
     pub assets: Arc<Assets>,
     enabled: Arc<AtomicBool>,
 }
 
 impl LoadReporter {
-    /// Creates a reporter, enabled if stderr is a terminal.
+    /// Creates a reporter. Its messages are enabled if stderr is a terminal.
     pub fn new() -> Self {
         let enabled = Arc::new(AtomicBool::new(std::io::stderr().is_terminal()));
         let is_enabled = enabled.clone();
@@ -33,7 +34,7 @@ impl LoadReporter {
         Self { assets: Arc::new(Assets::new(report)), enabled }
     }
 
-    /// Disables the messages: the dashboard owns the terminal from now on.
+    /// Disables the messages. The dashboard calls this before it takes over the terminal.
     pub fn mute(&self) {
         self.enabled.store(false, Ordering::Relaxed);
     }

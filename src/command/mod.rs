@@ -24,16 +24,17 @@ use std::io::Write;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Exit status of a command line that cannot be understood; clap uses the same.
+/// Exit status for a wrong command line. clap uses the same status.
 const WRONG_USAGE: u8 = 2;
 
-/// Unsuccessful end of a command.
+/// Reason for an exit status other than 0.
 enum Failure {
     /// Exit status 1, with the message.
     Failed(String),
     /// Exit status 2, with the message.
     Usage(String),
-    /// Ended by a signal after saving the picture or edits so far: exit status 129, 130 or 143.
+    /// The command was ended by a signal, after it saved the picture or the edits so far. The value
+    /// is the exit status: 129, 130 or 143.
     Signalled(u8),
 }
 
@@ -60,10 +61,11 @@ pub fn main() -> ExitCode {
     ExitCode::from(status)
 }
 
-/// Parses the command line; ends the program with exit status 2 if it is wrong.
+/// Parses the command line. Ends the program with exit status 2 if the command line is wrong.
 fn parse_command_line() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
-        // Of `zerkalo rendr a.toml` clap takes the first word for a scene and refuses the second.
+        // In `zerkalo rendr a.toml` clap takes `rendr` for a scene and reports `a.toml` as the
+        // error. The unknown command is reported instead.
         let first = std::env::args_os().nth(1).unwrap_or_default();
         let first = first.to_string_lossy();
         let unknown = !first.starts_with('-') && Cli::command().find_subcommand(&*first).is_none();
@@ -77,9 +79,10 @@ fn parse_command_line() -> Cli {
     })
 }
 
-/// Prints a usage error, help or the version, and ends the program.
+/// Prints a usage error, the help or the version, and ends the program.
 fn end(error: &clap::Error) -> ! {
-    // Arguments, which a shell's pattern may have found, must not control the terminal.
+    // Control characters in arguments, such as file names matched by a shell pattern, must not
+    // reach the terminal.
     let has_control_characters = |argument: OsString| {
         let argument = argument.to_string_lossy();
         sanitized(&argument) != argument
@@ -91,17 +94,17 @@ fn end(error: &clap::Error) -> ! {
     error.exit()
 }
 
-/// Prints a line on stderr. A closed stderr is no failure.
+/// Prints a line on stderr. Errors are ignored, so that a closed stderr is no failure.
 fn warn(message: &str) {
     let _ = writeln!(std::io::stderr(), "{}", sanitized_lines(message));
 }
 
-/// Prints a line on stdout. A closed stdout is no failure.
+/// Prints a line on stdout. Errors are ignored, so that a closed stdout is no failure.
 fn print_line(message: &str) {
     let _ = writeln!(std::io::stdout(), "{}", sanitized_lines(message));
 }
 
-/// Removes control characters from the lines of `message`, which may hold file names.
+/// Escapes control characters in the lines of `message`, which may contain file names.
 fn sanitized_lines(message: &str) -> String {
     message.split('\n').map(sanitized).collect::<Vec<_>>().join("\n")
 }

@@ -8,7 +8,7 @@ use std::io::{ErrorKind, Write};
 
 pub fn run(args: &NewArgs) -> Result<(), Failure> {
     let shown = args.file.display();
-    // `create_new` fails atomically if the file exists.
+    // `create_new` checks for an existing file and creates the file in one atomic step.
     let created = OpenOptions::new().write(true).create_new(true).open(&args.file);
     created.and_then(|mut file| file.write_all(starter().as_bytes())).map_err(|error| {
         Failure::Failed(match error.kind() {

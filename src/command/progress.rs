@@ -1,29 +1,32 @@
-//! Progress of a render on stderr: a bar in a terminal, lines in a log.
+//! Progress of a render on stderr: a bar if stderr is a terminal, otherwise lines for a log.
 
 use crate::render::session::Report;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
 
-/// Seconds before the first output: a shorter render needs no bar.
+/// Seconds before the first output. Shorter renders show no progress.
 const QUIET_SECONDS: f64 = 0.25;
-/// Seconds before the first line in a log; each interval is twice the one before, up to the longest.
+/// Seconds before the first line in a log. Each following interval is twice the previous one, up to
+/// [`LONGEST_INTERVAL_SECONDS`].
 const FIRST_LINE_SECONDS: f64 = 1.0;
+/// Longest interval between lines in a log, in seconds.
 const LONGEST_INTERVAL_SECONDS: f64 = 60.0;
 
-/// The steps of the bar.
+/// Number of steps of the bar.
 const STEPS: u64 = 1000;
 
 /// Progress display.
 pub enum Progress {
     /// A bar in a terminal, created at the first output.
     Bar(Option<ProgressBar>),
-    /// Lines in a log, with the seconds of rendering after which the next one is due.
+    /// Lines in a log. The value is the time at which the next line is due, in seconds of
+    /// rendering.
     Lines(f64),
 }
 
 impl Progress {
-    /// Creates the display that fits stderr.
+    /// Creates a bar if stderr is a terminal, otherwise lines.
     pub fn on_stderr() -> Self {
         if std::io::stderr().is_terminal() {
             Self::Bar(None)
@@ -32,7 +35,7 @@ impl Progress {
         }
     }
 
-    /// Shows `report` if output is due.
+    /// Shows `report` if a new output is due.
     pub fn show(&mut self, report: &Report) {
         if report.seconds < QUIET_SECONDS {
             return;
@@ -64,14 +67,14 @@ impl Progress {
 }
 
 fn new_bar() -> ProgressBar {
-    // Short enough for the time left to fit in 80 columns.
+    // The bar has 10 columns, so that the message with the remaining time fits into 80 columns.
     let style = ProgressStyle::with_template("{bar:10} {percent:>3} %  {wide_msg}")
         .expect("the template is well-formed");
     let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
     bar.with_style(style)
 }
 
-/// Formats a report: `33 spp (32-210)  41.2 Msamples/s  noise 0.81  3-5 s left`. The noise is in 8-bit
+/// Formats a report: `33 spp (32-210)  41.2 Msamples/s  noise 0.81  3-5 s left`. Noise is in 8-bit
 /// levels.
 fn status(report: &Report) -> String {
     let spp = &report.spp;
@@ -90,20 +93,20 @@ fn status(report: &Report) -> String {
     text
 }
 
-/// Formats a range of times.
+/// Formats a range of times in seconds.
 fn span(low: f64, high: f64) -> String {
     let [low_text, high_text] = [low, high].map(duration);
     if low_text == high_text {
         return low_text;
     }
-    // `3-5 s` rather than `3 s-5 s`.
+    // A common unit is written once: `3-5 s`.
     match (low_text.split_once(' '), high_text.split_once(' ')) {
         (Some((a, unit)), Some((b, same))) if unit == same => format!("{a}-{b} {unit}"),
         _ => format!("{low_text} - {high_text}"),
     }
 }
 
-/// Formats a time: `0.4 s`, `12 s`, `5 min`, `3.4 h`, `2.1 d`
+/// Formats a time, such as `0.4 s`, `12 s`, `5 min`, `3.4 h` or `2.1 d`.
 fn duration(seconds: f64) -> String {
     const MINUTE: f64 = 60.0;
     const HOUR: f64 = 60.0 * MINUTE;

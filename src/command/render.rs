@@ -18,7 +18,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Noise target of a render without stop options, in 8-bit levels: half a step of an 8-bit file.
+/// Noise target of a render without stop options, in 8-bit levels: half a quantisation step of an
+/// 8-bit file.
 const DEFAULT_NOISE_CODES: f64 = 0.5;
 
 /// Interval at which signals are polled.
@@ -30,7 +31,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let document = Document::read_with(&args.scene, LoadReporter::new().assets)
         .map_err(|e| Failure::Failed(e.to_string()))?;
     let scene = sized(document.scene(), args)?;
-    // An output that cannot be written is reported before the work.
+    // An output file that cannot be written is reported before the render starts.
     output.check_writable().map_err(failed_write)?;
     if let Some(path) = &args.stats {
         check_stats_path(path, &args.output)?;
@@ -106,16 +107,16 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
 }
 
-/// End of a render.
+/// Reason for the end of a render.
 #[derive(Clone, Copy)]
 enum End {
     /// A stop criterion was reached.
     Done(StoppedBy),
-    /// A signal ended it, with this exit status.
+    /// A signal ended the render. The value is the exit status.
     Signal(u8),
 }
 
-/// Shows progress until the work is done or a signal ends it.
+/// Shows progress until the render is done or a signal ends it.
 fn watch(session: &Session, signals: &Signals) -> Result<End, Failure> {
     let mut progress = Progress::on_stderr();
     let end = loop {
@@ -135,7 +136,7 @@ fn watch(session: &Session, signals: &Signals) -> Result<End, Failure> {
 
 type Written = (Report, &'static str, Result<(), WriteError>);
 
-/// Writes the picture on the rendering thread; `None` without a film.
+/// Writes the picture on the rendering thread. Returns `None` if there is no film yet.
 fn write(
     session: &Session,
     args: &RenderArgs,
@@ -160,7 +161,7 @@ fn failed_write(error: WriteError) -> Failure {
     Failure::Failed(error.to_string())
 }
 
-/// Applies the acceleration structure and the size of the command line to `scene`.
+/// Returns `scene` with the acceleration structure and the size that are given on the command line.
 fn sized(scene: &Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     let mut scene = scene.clone();
     if let Some(acceleration) = args.acceleration {
@@ -203,13 +204,14 @@ fn schedule_settings(args: &RenderArgs) -> Settings {
     Settings {
         adaptive: !args.uniform,
         criterion: if linear { Criterion::Linear } else { Criterion::Codes },
-        // Replaced by the scene's.
+        // The renderer replaces this value by that of the scene.
         rays_per_pixel: 0,
         stop: Stop { spp: args.spp, noise_codes, rmse_linear: args.rmse, seconds: args.time },
     }
 }
 
-/// `room.png  640x480  212 spp (32-900)  noise 0.500 8-bit levels  1.31 s`
+/// Formats the result of a render:
+/// `room.png  640x480  212 spp (32-900)  noise 0.500 8-bit levels  1.31 s`.
 fn summary(path: &Path, size: [u32; 2], report: &Report, end: End) -> String {
     let spp = &report.spp;
     let counts = if spp.min == spp.max {

@@ -1,4 +1,5 @@
-//! SIGINT and SIGTERM: the first signal saves the picture so far, the second ends the program at once.
+//! Handling of SIGINT and SIGTERM. After the first signal the program saves the picture so far and
+//! ends. A second signal ends the program at once.
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -6,10 +7,10 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Offset from a signal's number to the exit status, as in shells.
+/// Number that is added to the number of a signal to form the exit status, as in shells.
 const SIGNALLED: i32 = 128;
 
-/// Number of the latest caught signal; 0 before the first.
+/// Number of the last signal caught, 0 before the first one.
 pub struct Signals(Arc<AtomicUsize>);
 
 impl Signals {
@@ -18,7 +19,8 @@ impl Signals {
         let caught = Arc::new(AtomicUsize::new(0));
         let armed = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
-            // In this order a signal sees the state that earlier signals left.
+            // Handlers run in the order of registration. The shutdown is registered before `armed`
+            // is set by the second handler, so that the first signal does not end the program.
             flag::register_conditional_shutdown(signal, SIGNALLED + signal, Arc::clone(&armed))?;
             flag::register(signal, Arc::clone(&armed))?;
             flag::register_usize(signal, Arc::clone(&caught), signal as usize)?;
@@ -26,7 +28,8 @@ impl Signals {
         Ok(Self(caught))
     }
 
-    /// Exit status of a caught signal: 130 or 143.
+    /// Returns the exit status for the last signal caught: 130 or 143. Returns `None` if no signal
+    /// was caught.
     pub fn caught(&self) -> Option<u8> {
         let signal = self.0.load(Ordering::Relaxed);
         (signal != 0).then(|| (SIGNALLED as usize + signal) as u8)

@@ -1,17 +1,17 @@
-//! `--stats`: statistics of a run as JSON.
+//! Statistics of a render as JSON, written for `--stats`.
 
 use serde::Serialize;
 use std::fs;
 use std::path::Path;
 
-/// Contents of the file of `--stats`. Scripts rely on the keys: they stay.
+/// Contents of the JSON file. The keys must not change, because scripts rely on them.
 #[derive(Debug, Serialize)]
 pub struct Stats {
-    /// The scene file as named on the command line.
+    /// Path of the scene file as given on the command line.
     pub scene: String,
-    /// Hash of its contents, as in the picture's metadata.
+    /// Hash of the scene file, as in the metadata of the picture.
     pub scene_hash: String,
-    /// The picture file.
+    /// Path of the picture file.
     pub output: String,
     /// Version of the program.
     pub version: &'static str,
@@ -19,48 +19,49 @@ pub struct Stats {
     pub size: [u32; 2],
     pub seed: u64,
     pub sampler: &'static str,
-    /// The precision used: `single` or `double`.
+    /// Precision of the geometry: `single` or `double`.
     pub precision: &'static str,
-    /// Lane type, such as `f32x8`.
+    /// Number type and width of SIMD lanes, such as `f32x8`.
     pub lanes: &'static str,
     pub threads: usize,
     pub adaptive: bool,
-    /// Over all pixels.
+    /// Number of samples over all pixels.
     pub samples: u64,
     pub spp_min: u32,
     pub spp_mean: f64,
     pub spp_max: u32,
-    /// Camera, shadow and reflected rays.
+    /// Number of camera, shadow and reflected rays.
     pub rays: u64,
-    /// Rendering alone, by a monotonic clock.
+    /// Seconds of rendering alone, by a monotonic clock.
     pub seconds: f64,
     pub compile_seconds: f64,
-    /// Encoding, writing and syncing the picture.
+    /// Seconds of encoding, writing and syncing the picture.
     pub write_seconds: f64,
-    /// From the start of the program to the end of writing.
+    /// Seconds from the start of the program to the end of writing.
     pub total_seconds: f64,
     pub samples_per_second: f64,
-    /// From the start of the program to one sample in every pixel.
+    /// Seconds from the start of the program until every pixel has a sample.
     pub first_picture_seconds: Option<f64>,
-    /// Estimated RMSE as displayed, in 8-bit levels; null if A and B never had equal counts.
+    /// Estimated RMSE of the displayed picture, in 8-bit levels. Null if the replicates A and B,
+    /// from whose difference it is estimated, never had equal numbers of samples.
     pub noise_codes: Option<f64>,
-    /// 95th percentile of the tiles' RMSE, in 8-bit levels.
+    /// 95th percentile of the estimated RMSE of tiles, in 8-bit levels.
     pub noise_codes_p95: Option<f64>,
     pub rmse_linear: Option<f64>,
-    /// Samples left out because they were NaN or negative.
+    /// Number of samples left out because they were NaN or negative.
     pub bad_samples: u64,
-    /// Samples brighter than the film can hold; stored with its largest value.
+    /// Number of samples brighter than the largest value of the film, as which they were stored.
     pub saturated_samples: u64,
-    /// Pixels with a sum that has reached its limit.
+    /// Number of pixels with a sum that reached the largest value of the film.
     pub saturated_pixels: u64,
-    /// Peak resident memory; null where the system does not report it.
+    /// Peak resident memory in bytes. Null on systems that do not report it.
     pub peak_rss_bytes: Option<u64>,
-    /// `spp`, `noise`, `rmse`, `time`, `rays_per_pixel`, `full` or `signal`.
+    /// Reason for the end: `spp`, `noise`, `rmse`, `time`, `rays_per_pixel`, `full` or `signal`.
     pub stopped_by: &'static str,
 }
 
 impl Stats {
-    /// Writes the file.
+    /// Writes the JSON file at `path`.
     pub fn write(&self, path: &Path) -> Result<(), String> {
         let json = serde_json::to_string_pretty(self).expect("plain numbers and strings");
         let shown = path.display();
@@ -68,7 +69,8 @@ impl Stats {
     }
 }
 
-/// Peak resident memory of the process in bytes, from Linux's `/proc`.
+/// Returns the peak resident memory of the process in bytes. Returns `None` on systems without
+/// Linux's `/proc/self/status`.
 pub fn peak_rss_bytes() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;

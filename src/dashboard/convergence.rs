@@ -2,18 +2,18 @@
 
 use crate::render::session::Report;
 
-/// One report about the render.
+/// A report about the render at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Seconds of tracing.
+    /// Seconds of tracing until the report.
     pub seconds: f64,
     /// Mean samples per pixel.
     pub spp: f64,
-    /// Estimated RMSE as displayed, in 8-bit levels; greater than 0.
+    /// Estimated RMSE of the displayed picture in 8-bit levels, greater than 0.
     pub noise_codes: f64,
 }
 
-/// Reports about one picture in order, thinned to a bounded number.
+/// Reports about one picture in order of time. Older reports are thinned out to bound their number.
 #[derive(Clone, Debug, Default)]
 pub struct Convergence {
     points: Vec<Point>,
@@ -21,17 +21,18 @@ pub struct Convergence {
     samples: u64,
 }
 
-/// Maximum number of points, more than a plot has columns.
+/// Maximum number of points. It exceeds the number of columns of a plot.
 const MOST: usize = 400;
 
 impl Convergence {
-    /// Points by increasing time.
+    /// Returns the points in order of increasing time.
     pub fn points(&self) -> &[Point] {
         &self.points
     }
 
-    /// Returns the seconds of tracing at which the noise fell to `codes` 8-bit levels, interpolated
-    /// by a power law. `None` if it has not, or if the first report was below.
+    /// Returns the seconds of tracing at which the noise fell to `codes` 8-bit levels. The time is
+    /// interpolated between two reports by a power law. Returns `None` if the noise has not fallen
+    /// to `codes`, or if it was that low in the first report already.
     pub fn seconds_at(&self, codes: f64) -> Option<f64> {
         // The last crossing counts: lights may have been switched on since an earlier one.
         let after = self.points.iter().rposition(|p| p.noise_codes > codes)? + 1;
@@ -41,7 +42,7 @@ impl Convergence {
         Some(before.seconds * (after.seconds / before.seconds).powf(part))
     }
 
-    /// Adds a report. A restarted picture clears the history.
+    /// Adds a report. The report of a new or restarted picture clears the history first.
     pub fn add(&mut self, report: &Report) {
         if report.generation != self.generation || report.samples < self.samples {
             self.points.clear();
@@ -53,10 +54,10 @@ impl Convergence {
         };
         let point = Point { seconds: report.seconds, spp: report.spp.mean, noise_codes };
         match self.points.last_mut() {
-            // The estimate has not been updated.
+            // The error estimate has not been updated since the last report.
             Some(last) if last.noise_codes == point.noise_codes => {}
-            // Without new samples (a light was dimmed, or the render has finished) only the error
-            // changes.
+            // Without new samples only the error changes, when a light is dimmed or the render
+            // finishes.
             Some(last) if last.seconds >= point.seconds => *last = point,
             _ => self.points.push(point),
         }
@@ -65,8 +66,8 @@ impl Convergence {
         }
     }
 
-    /// Removes every second point of the later three quarters, which are densest on a logarithmic
-    /// axis. The newest point stays.
+    /// Removes every second of the later three quarters of the points, which are the densest on a
+    /// logarithmic axis. Keeps the newest point.
     fn thin(&mut self) {
         let (early, newest) = (MOST / 4, self.points.len() - 1);
         let mut index = 0;

@@ -1,16 +1,16 @@
-//! A line of text being typed.
+//! Text editor for one line.
 
 use crate::terminal::event::{Code, Key};
 use tui_input::{Input, InputRequest};
 
-/// Maximum length in characters: enough for a path, few enough to stay fast.
+/// Maximum length of the text in characters. It suffices for a path and keeps editing fast.
 const MOST: usize = 400;
 
-/// A line of text with a cursor and the problem of its last validation.
+/// A line of text with a cursor, and the reason if the text has been refused.
 #[derive(Clone, Debug, Default)]
 pub struct Editor {
     input: Input,
-    /// Reason for refusal, in a sentence or two; shown until the text changes.
+    /// Reason why the text was refused, in a sentence or two. It is shown until the text changes.
     pub problem: Option<String>,
 }
 
@@ -20,23 +20,24 @@ impl Editor {
         Self { input: Input::new(text.into()), problem: None }
     }
 
-    /// The text.
+    /// Returns the text.
     pub fn text(&self) -> &str {
         self.input.value()
     }
 
-    /// Column of the cursor from the beginning of the text.
+    /// Returns the distance in columns between the start of the text and the cursor.
     pub fn cursor_columns(&self) -> usize {
         self.input.visual_cursor()
     }
 
-    /// Columns to skip on the left so that the cursor is visible in `width` columns.
+    /// Returns the number of columns to skip at the start of the text so that the cursor is visible
+    /// in `width` columns.
     pub fn scroll_columns(&self, width: usize) -> usize {
         self.input.visual_scroll(width)
     }
 
-    /// Applies a key to the text. Returns `true` if it is an editing key; keys that end editing
-    /// (Enter, Esc, Tab, Up, Down) are not.
+    /// Applies a key to the text. Returns `true` if it is an editing key. Returns `false` for other
+    /// keys, such as those that end editing: Enter, Esc, Tab, Up and Down.
     pub fn key(&mut self, key: Key) -> bool {
         let request = match (key.code, key.ctrl, key.alt) {
             (Code::Char(c), false, false) => return self.insert(c),

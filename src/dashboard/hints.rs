@@ -1,4 +1,4 @@
-//! Texts made from the command table: hint line, help and docs/keys.md.
+//! Texts derived from the command table: hint line, help and docs/keys.md.
 
 use crate::dashboard::key_context::KeyContext;
 use crate::dashboard::model::Model;
@@ -10,11 +10,12 @@ use crate::dashboard::update::commands::{COMMANDS, Chapter, Command, Hint, HintL
 pub enum HelpLine {
     /// The heading of a chapter.
     Heading(&'static str),
-    /// Keys with their contexts, and the label of the command.
+    /// Keys of a command with the contexts of the keys, and the label of the command.
     Keys(String, &'static str),
 }
 
-/// The hint line of the model's state; `None` while an exported image covers the screen.
+/// Returns the state that selects the hints. Returns `None` while an exported image covers the
+/// screen.
 fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
         Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => HintLine::Reading,
@@ -41,7 +42,7 @@ fn hint_line(model: &Model) -> Option<HintLine> {
     })
 }
 
-/// Hints of a hint line, in their order.
+/// Returns the hints for a state, sorted by position.
 fn hints_of(line: HintLine) -> Vec<&'static Hint> {
     let mut hints: Vec<_> = COMMANDS
         .iter()
@@ -52,12 +53,12 @@ fn hints_of(line: HintLine) -> Vec<&'static Hint> {
     hints
 }
 
-/// Hints for the model's state, in their order.
+/// Returns the hints for the model's state, sorted by position.
 pub fn hints(model: &Model) -> Vec<&'static Hint> {
     hint_line(model).map_or_else(Vec::new, hints_of)
 }
 
-/// Lines of the help: every command of the table.
+/// Returns the lines of the help, with every command of the table.
 pub fn help() -> Vec<HelpLine> {
     let line = |command: &Command| {
         let keys = command.all_keys(str::to_string);
@@ -69,7 +70,7 @@ pub fn help() -> Vec<HelpLine> {
     lines.collect()
 }
 
-/// The text of docs/keys.md.
+/// Returns the text of docs/keys.md.
 pub fn reference() -> String {
     let mut page = "# Keys\n\n\
         Generated from the command table. Every action is also found by typing a part of its name \

@@ -1,10 +1,10 @@
 //! Contexts in which keys are looked up.
 
-/// Part or mode of the dashboard in which a key has a meaning.
+/// Panel or mode of the dashboard in which a key runs a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum KeyContext {
-    /// Every panel and mode that gives the key no meaning of its own. Text fields, lists, forms and
-    /// questions do not fall back to it.
+    /// Every panel and mode in which no other command has the key. Overlays and text editors are
+    /// excluded.
     Anywhere,
     /// The picture has the focus.
     Picture,
@@ -20,12 +20,13 @@ pub enum KeyContext {
     Outline,
     /// The inspector has the focus.
     Inspector,
-    /// A list, a form, help or a question covers the panels.
+    /// An overlay is open, such as a list, a form, the help or a question.
     Overlay,
 }
 
 impl KeyContext {
-    /// The context as a phrase: `in the outline`. Empty for [`KeyContext::Anywhere`].
+    /// Returns the context as a phrase, such as `in the outline`. The phrase is empty for
+    /// [`KeyContext::Anywhere`].
     pub fn place(self) -> &'static str {
         match self {
             Self::Anywhere => "",
@@ -40,7 +41,8 @@ impl KeyContext {
         }
     }
 
-    /// Contexts in which a key pressed here is looked up; the first that knows the key wins.
+    /// Returns the contexts in which a key is looked up while this one is active. The first context
+    /// with a command for the key determines the command.
     pub fn chain(self) -> &'static [Self] {
         match self {
             Self::Anywhere => &[Self::Anywhere],

@@ -1,15 +1,15 @@
-//! Layout of the screen: a pure function, shared by drawing and mouse handling.
+//! Layout of the screen, a pure function that drawing and mouse handling share.
 
 use crate::terminal::Area;
 
-/// Panel with the focus.
+/// Panel that can have the focus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Focus {
     /// The picture.
     Picture,
-    /// List of everything in the scene.
+    /// The outline, a list of everything in the scene that can be selected and edited.
     Outline,
-    /// Fields of the selection.
+    /// The inspector, with the fields of the selection.
     Inspector,
 }
 
@@ -31,32 +31,34 @@ pub struct Request {
 pub struct Layout {
     /// Panel of the picture.
     pub picture: Area,
-    /// Cells inside the panel that show the picture, centred.
+    /// Cells that show the picture, centred inside the panel.
     pub image: Area,
-    /// Columns and rows of half cells of the picture. Half cells count as square. An odd last row
-    /// is the upper half of a row of cells.
+    /// Columns and rows of the picture in half cells. A half cell is the upper or lower half of a
+    /// cell and counts as square. If the number of rows is odd, the last row of half cells is the
+    /// upper half of a row of cells.
     pub raster: [usize; 2],
-    /// Outline.
+    /// Panel of the outline.
     pub outline: Option<Area>,
-    /// Inspector.
+    /// Panel of the inspector.
     pub inspector: Option<Area>,
-    /// Convergence plot.
+    /// Panel of the convergence plot.
     pub plot: Option<Area>,
-    /// Status line.
+    /// Row of the status line.
     pub status: Area,
-    /// Line of hints and notices.
+    /// Row of hints and notices.
     pub hints: Area,
 }
 
-/// Smallest supported terminal: columns and rows.
+/// Columns and rows of the smallest supported terminal.
 pub const SMALLEST: [u16; 2] = [40, 12];
 
 /// Minimum height of the plot in rows.
 const PLOT_ROWS: u16 = 8;
-/// Terminal width in columns from which the side column is visible with any focus.
+/// Terminal width in columns from which the side panels are visible even if the picture has the
+/// focus.
 const SIDE_FROM: u16 = 72;
 
-/// Returns the layout; `None` if the terminal is smaller than [`SMALLEST`].
+/// Returns the layout of the screen. Returns `None` if the terminal is smaller than [`SMALLEST`].
 pub fn layout(request: &Request) -> Option<Layout> {
     let [width, height] = request.screen;
     if width < SMALLEST[0] || height < SMALLEST[1] {
@@ -83,12 +85,13 @@ pub fn layout(request: &Request) -> Option<Layout> {
     Some(Layout { picture, image, raster, outline, inspector, plot, status, hints })
 }
 
-/// Stacks outline, inspector and plot in the side column.
+/// Divides the side column into outline, inspector and plot, from top to bottom. Panels without
+/// room are folded.
 fn column(side: Area, focus: Focus) -> [Option<Area>; 3] {
     let rows = side.height;
     let part = |y: u16, height: u16| Some(Area { y: side.y + y, height, ..side });
     if rows < 16 {
-        // Room for one panel only.
+        // There is room for one panel only.
         return match focus {
             Focus::Outline => [part(0, rows), None, None],
             _ => [None, part(0, rows), None],
@@ -96,7 +99,7 @@ fn column(side: Area, focus: Focus) -> [Option<Area>; 3] {
     }
     let plot = if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 };
     let left = rows - plot;
-    // With little room the panel in use gets the larger part.
+    // With little room the focused panel gets the larger part.
     let outline = match focus {
         _ if rows >= 40 => left * 2 / 5,
         Focus::Outline => left * 3 / 5,
@@ -106,7 +109,8 @@ fn column(side: Area, focus: Focus) -> [Option<Area>; 3] {
     [part(0, outline), part(outline, left - outline), plot]
 }
 
-/// Returns the largest centred area of the film's aspect ratio, and its raster of half cells.
+/// Returns the largest centred area with the film's aspect ratio inside `inside`, and its columns
+/// and rows of half cells.
 fn fitted(inside: Area, [film_width, film_height]: [u32; 2]) -> (Area, [usize; 2]) {
     let (columns, halves) = (f64::from(inside.width), 2.0 * f64::from(inside.height));
     let (film_width, film_height) = (f64::from(film_width.max(1)), f64::from(film_height.max(1)));
@@ -124,7 +128,8 @@ fn fitted(inside: Area, [film_width, film_height]: [u32; 2]) -> (Area, [usize; 2
 }
 
 impl Layout {
-    /// Returns the film pixel (column, row) at the centre of a cell; `None` outside the picture.
+    /// Returns the film pixel (column, row) at the centre of a cell. Returns `None` if the cell is
+    /// outside the picture.
     pub fn film_pixel(&self, film: [u32; 2], column: u16, row: u16) -> Option<[usize; 2]> {
         if !self.image.contains(column, row) {
             return None;
@@ -150,8 +155,8 @@ mod tests {
 
     const FOCI: [Focus; 3] = [Focus::Picture, Focus::Outline, Focus::Inspector];
 
-    /// At every size panels do not overlap, stay on the screen, use all cells of unfolded columns,
-    /// and include the one with the focus.
+    /// Checks at every size that panels stay on the screen and together fill it without overlap,
+    /// and that the panel with the focus is not folded.
     #[test]
     fn panels_tile_the_screen() {
         for width in 40..220 {
@@ -182,8 +187,8 @@ mod tests {
         assert!(at(80, 24, Focus::Picture).unwrap().inspector.is_some());
     }
 
-    /// The picture has the film's aspect ratio to within half a half cell, is as large as fits, and
-    /// each of its cells shows a film pixel.
+    /// Checks that the picture is as large as possible, that it has the film's aspect ratio to
+    /// within half of a half cell, and that each of its cells shows a film pixel.
     #[test]
     fn picture_keeps_aspect_ratio_of_film() {
         for film in [[640, 480], [480, 640], [1920, 800], [1, 1], [8192, 1], [1, 8192]] {

@@ -1,4 +1,4 @@
-//! Messages that `update` takes and effects that it returns.
+//! Messages that `update` receives, and effects that it returns.
 
 use crate::film::{Display, LinearImage};
 use crate::render::schedule::Stop;
@@ -11,30 +11,30 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// An event that `update` takes.
+/// An event that `update` receives.
 #[derive(Debug)]
 pub enum Message {
     /// A key was pressed.
     Key(Key),
-    /// Mouse event. Of several pending drags only the newest is required.
+    /// Mouse event. Several pending drags may be joined to the newest one.
     Mouse(Mouse),
-    /// Pasted text; never interpreted as keys.
+    /// Pasted text, which is never interpreted as keys.
     Paste(String),
     /// New size of the terminal in columns and rows.
     Resize([u16; 2]),
     /// Latest snapshot of the renderer.
     Snapshot(Box<Snapshot>),
-    /// Picture requested by [`Effect::Pin`], and its mean samples per pixel.
+    /// Result of [`Effect::Pin`]: the picture and its mean samples per pixel.
     Pinned(Arc<LinearImage>, f64),
     /// Result of [`Effect::Save`] for this scene.
     Saved(Arc<Scene>, Result<PathBuf, SaveError>),
     /// Result of [`Effect::Load`].
     Loaded(Box<Result<Arc<Scene>, SceneErrors>>),
-    /// Another program has written the file since it was last read or written.
+    /// Another program has changed the scene file since this program last read or wrote it.
     ChangedOnDisk,
-    /// Unsaved edits of this scene, left by a crashed session.
+    /// Unsaved edits of this scene from a crashed session.
     OrphanedEdits(OrphanedEdits),
-    /// Warning about unsaved edits.
+    /// Warning, to be shown until the next key.
     Warning(String),
     /// Result of an export.
     Exported(Result<Exported, String>),
@@ -42,12 +42,11 @@ pub enum Message {
     ExportProgress(f64),
     /// Result of [`Effect::ViewImage`] for this path.
     ViewerImage(PathBuf, Result<Arc<ViewerImage>, String>),
-    /// Transferred share of the image in the viewer, 0..=1.
+    /// Transferred fraction of the image in the viewer, 0..=1.
     ImageSent(f64),
-    /// Status of the connection to a remote terminal.
+    /// Status of the connection to a remote terminal; `None` for a local terminal.
     LinkStatus(Option<LinkStatus>),
-    /// A moment that the model waits for has come
-    /// ([`Model::next_timeout`](crate::dashboard::model::Model::next_timeout)).
+    /// The time of [`Model::next_timeout`](crate::dashboard::model::Model::next_timeout) has come.
     Tick,
 }
 
@@ -56,9 +55,9 @@ pub enum Message {
 pub struct OrphanedEdits {
     /// Scene with the edits.
     pub scene: Arc<Scene>,
-    /// Time since the last autosave.
+    /// Time since the edits were last written to the recovery file.
     pub age: Duration,
-    /// The scene file has changed since then.
+    /// The scene file has changed since the edits were written.
     pub changed: bool,
 }
 
@@ -71,9 +70,9 @@ pub struct Exported {
     pub size: [usize; 2],
     /// Mean samples per pixel.
     pub spp: f64,
-    /// Estimated RMSE as displayed, in 8-bit levels, if there is an estimate.
+    /// Estimated RMSE of the displayed picture in 8-bit levels; `None` without an estimate.
     pub noise_codes: Option<f64>,
-    /// `user@host:path` for scp.
+    /// Argument of scp that copies the file, such as `user@host:path`.
     pub scp: String,
 }
 
@@ -96,20 +95,20 @@ impl Format {
     }
 }
 
-/// Channel that the picture shows.
+/// Channel of the render that the picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DisplayChannel {
     /// Rendered picture.
     Beauty,
-    /// Estimated error of tiles, false colour.
+    /// Estimated error of each tile, in false colour.
     Noise,
-    /// Samples per pixel of tiles, false colour.
+    /// Samples per pixel of each tile, in false colour.
     Samples,
-    /// Object ids of the first hits.
+    /// Object ids of the camera rays' first hits, in one colour per object.
     Objects,
-    /// Surface normals of the first hits.
+    /// Surface normals of the camera rays' first hits.
     Normals,
-    /// Distance of the first hits from the eye, false colour.
+    /// Distance of the camera rays' first hits from the eye, in false colour.
     Depth,
 }
 
@@ -118,7 +117,7 @@ impl DisplayChannel {
     pub const ALL: [Self; 6] =
         [Self::Beauty, Self::Noise, Self::Samples, Self::Objects, Self::Normals, Self::Depth];
 
-    /// Name of the channel.
+    /// Returns the name of the channel.
     pub fn name(self) -> &'static str {
         match self {
             Self::Beauty => "beauty",
@@ -131,32 +130,33 @@ impl DisplayChannel {
     }
 }
 
-/// A request of `update` to the event loop. Of several requests of one kind in a row only the last
-/// matters, except for saving and exporting.
+/// A request from `update` to the event loop. If several effects of one kind are pending, only the
+/// last one matters, except for saves and exports.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
-    /// Render this scene. Samples are kept where only light has changed (intensity, colour, on and
-    /// off, ambient, background).
+    /// Render this scene. Existing samples are kept if only lighting has changed: intensity or
+    /// colour of a light, a light switched on or off, ambient light, background.
     Show(Arc<Scene>),
-    /// Display transform that noise is measured through.
+    /// Use this display transform to measure noise and to write images.
     Display(Display),
-    /// Stop criteria.
+    /// Use these stop criteria.
     Stop(Stop),
-    /// Columns and rows of half cells that snapshots are resampled to.
+    /// Resample snapshots to these columns and rows of half cells.
     Raster([usize; 2]),
     /// Pause (`true`) or resume (`false`) tracing.
     Pause(bool),
-    /// Restart the picture.
+    /// Discard all samples and restart rendering.
     Restart,
-    /// Number of tracing threads, at least 1.
+    /// Use this number of tracing threads, at least 1.
     Threads(usize),
-    /// Low (`true`) or normal priority of the tracing threads.
+    /// Give the tracing threads low (`true`) or normal (`false`) priority.
     LowPriority(bool),
-    /// Pixel of the film (column, row) whose values snapshots report.
+    /// Report the values of this film pixel (column, row) in snapshots; `None` if no pixel is
+    /// probed.
     Probe(Option<[usize; 2]>),
-    /// Return the current picture, for comparison.
+    /// Return the current picture as [`Message::Pinned`], for comparison.
     Pin,
-    /// Write the scene to its file, or to `path`, which becomes its file.
+    /// Write the scene to its file, or to `path`, which becomes the scene's file.
     Save {
         /// Scene to write.
         scene: Arc<Scene>,
@@ -167,10 +167,10 @@ pub enum Effect {
     },
     /// Read the scene file.
     Load,
-    /// Write the current picture under the next free name derived from the scene's.
+    /// Write the current picture to the next free file name derived from the scene's name.
     Export(Format),
-    /// Render the scene at another size until `stop`, beside the main render, and write it under
-    /// the next free name.
+    /// Render the scene at another size until `stop`, while the main render continues, and write
+    /// the picture to the next free file name.
     ExportSized {
         /// Scene whose film has the requested size.
         scene: Arc<Scene>,
@@ -181,18 +181,18 @@ pub enum Effect {
         /// Stop criteria.
         stop: Stop,
     },
-    /// Cancel the render of `ExportSized`; nothing is written.
+    /// Cancel the render of [`Effect::ExportSized`], so that it writes nothing.
     CancelExport,
-    /// Write these unsaved edits to the recovery file, which the next start offers; `None` removes
-    /// it.
+    /// Write the scene with unsaved edits to the recovery file, from which the next start offers to
+    /// recover them. `None` removes the file.
     Autosave(Option<Arc<Scene>>),
-    /// The orphaned edits become the unsaved edits of this session.
+    /// Adopt the orphaned edits as the unsaved edits of this session.
     Recover,
     /// Discard the orphaned edits.
     Discard,
-    /// Prepare an exported image for the viewer.
+    /// Read and encode an exported image for the viewer.
     ViewImage {
-        /// Path of a PNG or EXR.
+        /// Path of a PNG or EXR file.
         path: PathBuf,
         /// Display transform for linear images.
         display: Display,

@@ -1,4 +1,4 @@
-//! The dashboard: editing a scene and watching it converge.
+//! Dashboard: the user interface in the terminal, for editing a scene while it is rendered.
 //!
 //! `update` is a pure function: it turns a [`Message`](message::Message) into a changed
 //! [`Model`](model::Model) and a list of [`Effect`](message::Effect)s, without access to clock,

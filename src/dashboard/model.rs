@@ -1,4 +1,4 @@
-//! The model: everything that the screen depends on.
+//! Model: the complete state that the screen is drawn from.
 
 use crate::dashboard::convergence::Convergence;
 use crate::dashboard::editor::Editor;
@@ -20,57 +20,57 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Object of the keys while the picture has the focus.
+/// Meaning of the arrow keys and of drags while the picture has the focus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mode {
-    /// The camera.
+    /// Default mode: orbit the camera.
     Orbit,
-    /// The selection, moved.
+    /// Move the selection.
     Move,
-    /// The selection, rotated about the vertical.
+    /// Rotate the selection about the vertical axis.
     Rotate,
-    /// The camera, flown by letters.
+    /// Fly: arrow keys and drags turn the camera, letter keys move it.
     Fly,
-    /// The probe.
+    /// Move the probe, which shows the values of a pixel.
     Probe,
 }
 
-/// The scene file.
+/// State of the scene file.
 #[derive(Clone, Debug)]
 pub struct File {
     /// Path; `None` for a scene that has no file yet.
     pub path: Option<PathBuf>,
-    /// Last component of the path, printable, for titles.
+    /// Last component of the path for titles, with control characters escaped.
     pub name: String,
-    /// Scene as last read or written; without a file, the scene at the start.
+    /// Scene as last read from or written to the file; without a file, the scene at the start.
     pub saved: Arc<Scene>,
-    /// Errors of the current file contents.
+    /// Errors in the current contents of the file; `None` if they are valid.
     pub broken: Option<SceneErrors>,
-    /// The file has never been readable: only `broken` can be shown.
+    /// The file has never been readable, so there is no scene and only `broken` can be shown.
     pub unreadable: bool,
 }
 
-/// State of the inspector. `panel_lines::inspector` makes its lines.
+/// State of the inspector, whose lines `panel_lines::inspector` returns.
 #[derive(Clone, Debug, Default)]
 pub struct Inspector {
-    /// Line of the cursor, always a field.
+    /// Index of the line under the cursor, which is always a field.
     pub cursor: usize,
-    /// First visible line.
+    /// Index of the first visible line.
     pub scroll: usize,
-    /// Editor of the field under the cursor, while a value is typed.
+    /// Text editor of the field under the cursor, while a value is typed.
     pub editor: Option<Editor>,
 }
 
-/// Comparison of the live picture with a pinned one (A/B).
+/// Comparison of the live picture with a pinned one, an earlier picture that the user has kept.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
     /// The pinned picture and its mean samples per pixel.
     pub pinned: Option<(Arc<LinearImage>, f64)>,
-    /// Visible side.
+    /// Visible view of the comparison.
     pub shown: CompareView,
 }
 
-/// Visible side of a comparison.
+/// Visible view of a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CompareView {
     /// The live picture.
@@ -78,11 +78,11 @@ pub enum CompareView {
     Live,
     /// The pinned picture.
     Pinned,
-    /// Live minus pinned.
+    /// The difference, live minus pinned.
     Difference,
 }
 
-/// Tone of a notice.
+/// Kind of a notice, which determines its mark and colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
     /// Success.
@@ -96,15 +96,15 @@ pub enum Tone {
 /// A message that replaces the hint line for a while.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Notice {
-    /// Text, printable.
+    /// Text, with control characters escaped.
     pub text: String,
-    /// Tone.
+    /// Kind of the notice.
     pub tone: Tone,
-    /// Time at which it disappears; `None` until the next key.
+    /// Time at which the notice disappears; `None` if it stays until the next key.
     pub until: Option<Duration>,
 }
 
-/// A render at another size that is under way.
+/// A running export, which renders at another size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunningExport {
     /// Width and height in pixels.
@@ -115,18 +115,18 @@ pub struct RunningExport {
     pub progress: f64,
 }
 
-/// A mouse button that is held down.
+/// State of a mouse button that is held down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drag {
-    /// Button.
+    /// Button that is held down.
     pub button: Button,
-    /// Control or Alt was down at the press.
+    /// Control or Alt was held when the button was pressed.
     pub modified: bool,
-    /// Last known column and row.
+    /// Last known column and row of the mouse.
     pub last: [u16; 2],
-    /// The mouse has moved since the press; otherwise the release is a click.
+    /// The mouse has moved since the press. Otherwise the release is a click.
     pub moved: bool,
-    /// The press was inside the picture.
+    /// The button was pressed inside the picture.
     pub in_picture: bool,
 }
 
@@ -141,19 +141,19 @@ pub struct Model {
     pub file: File,
     /// Scene with its undo history.
     pub history: History,
-    /// Selection; always exists in the scene.
+    /// Selected part of the scene, such as the camera or an object. It always exists.
     pub selection: Target,
     /// Panel with the focus.
     pub focus: Focus,
-    /// Object of the keys in the picture.
+    /// Meaning of the arrow keys while the picture has the focus.
     pub mode: Mode,
     /// Only the picture is visible.
     pub fullscreen: bool,
     /// First visible line of the outline.
     pub outline_scroll: usize,
-    /// Inspector.
+    /// State of the inspector.
     pub inspector: Inspector,
-    /// Overlay over the panels, which takes the keys.
+    /// Open overlay, which covers panels and receives the keys.
     pub overlay: Option<Overlay>,
     /// Exposure and tone curve.
     pub display: Display,
@@ -161,46 +161,46 @@ pub struct Model {
     pub channel: DisplayChannel,
     /// Comparison with a pinned picture.
     pub comparison: Comparison,
-    /// The probed pixel of the film (column, row).
+    /// Film pixel (column, row) whose values the probe shows.
     pub probe: Option<[usize; 2]>,
     /// Latest snapshot of the renderer.
     pub snapshot: Option<Box<Snapshot>>,
-    /// History of the error.
+    /// History of the estimated error.
     pub convergence: Convergence,
     /// Stop criteria of the render.
     pub stop: Stop,
     /// The user has paused the render.
     pub paused: bool,
-    /// Tracing threads.
+    /// Number of tracing threads.
     pub threads: usize,
-    /// Upper limit of tracing threads.
+    /// Maximum number of tracing threads.
     pub max_threads: usize,
     /// The tracing threads have low priority.
     pub low_priority: bool,
-    /// Status of the connection to a remote terminal.
+    /// Status of the connection to a remote terminal; `None` for a local terminal.
     pub link: Option<LinkStatus>,
     /// Notice that replaces the hints.
     pub notice: Option<Notice>,
-    /// A render at another size.
+    /// The running export at another size.
     pub export: Option<RunningExport>,
     /// Path of the last exported image.
     pub last_export: Option<PathBuf>,
-    /// No key has been pressed yet: the hints are those for beginners.
+    /// No key has been pressed yet, so the hint line shows the hints for beginners.
     pub first_time: bool,
     /// A mouse button that is held down.
     pub drag: Option<Drag>,
-    /// Time of the last edit that the next one may be coalesced with.
+    /// Time of the last edit, if the next one may be merged with it into one undo step.
     pub last_edit: Option<Duration>,
     /// The program quits after the pending save.
     pub quit_when_saved: bool,
-    /// Edits of a crashed session that wait for the user's decision.
+    /// Unsaved edits of a crashed session that the user has neither recovered nor discarded.
     pub orphaned_edits: Option<OrphanedEdits>,
-    /// Unsaved edits that were last passed to
+    /// Scene that was last passed to
     /// [`Effect::Autosave`](crate::dashboard::message::Effect::Autosave).
     pub autosaved: Option<Arc<Scene>>,
-    /// Raster that was last requested for snapshots.
+    /// Columns and rows of half cells that were last requested for snapshots.
     pub raster: Option<[usize; 2]>,
-    /// Version of the picture's cells; increases when they may have changed.
+    /// Counter that increases whenever the picture's cells may have changed.
     pub picture_version: u64,
 }
 
@@ -219,21 +219,21 @@ pub struct Start {
     pub colors: Colors,
     /// Stop criteria of the render.
     pub stop: Stop,
-    /// Tracing threads.
+    /// Number of tracing threads.
     pub threads: usize,
-    /// Upper limit of tracing threads.
+    /// Maximum number of tracing threads.
     pub max_threads: usize,
 }
 
-/// Returns the last component of a path, printable.
+/// Returns the last component of a path, with control characters escaped.
 pub fn short_name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     sanitized(&name.to_string_lossy())
 }
 
 impl Model {
-    /// Creates the model of a program that starts. The event loop renders [`Model::scene`] unless
-    /// [`File::unreadable`].
+    /// Creates the model at the start of the program. The event loop then renders [`Model::scene`],
+    /// unless [`File::unreadable`] is `true`.
     pub fn new(start: Start) -> Self {
         let (scene, broken) = match start.scene {
             Ok(scene) => (scene, None),
@@ -280,7 +280,7 @@ impl Model {
         }
     }
 
-    /// Scene to render: the preview of an open form, otherwise the edited scene.
+    /// Returns the scene to render: the preview of an open form, otherwise the edited scene.
     pub fn scene(&self) -> &Arc<Scene> {
         match &self.overlay {
             Some(Overlay::Form(form)) => &form.scene,
@@ -288,12 +288,12 @@ impl Model {
         }
     }
 
-    /// Returns `true` if the scene has edits that its file lacks.
+    /// Returns `true` if the scene has edits that are not in its file.
     pub fn is_unsaved(&self) -> bool {
         !self.history.is_saved()
     }
 
-    /// Layout of the screen; `None` if the terminal is too small.
+    /// Returns the layout of the screen. Returns `None` if the terminal is too small.
     pub fn layout(&self) -> Option<Layout> {
         layout(&Request {
             screen: self.screen,
@@ -303,7 +303,7 @@ impl Model {
         })
     }
 
-    /// Context in which keys are looked up.
+    /// Returns the context in which keys are looked up.
     pub fn context(&self) -> KeyContext {
         match (&self.overlay, self.focus, self.mode) {
             (Some(_), ..) => KeyContext::Overlay,
@@ -319,7 +319,7 @@ impl Model {
         }
     }
 
-    /// Text editor that takes the keys, if one is open.
+    /// Returns the text editor that receives the keys. Returns `None` if none is open.
     pub fn editor(&self) -> Option<&Editor> {
         match &self.overlay {
             Some(Overlay::Palette(palette)) => Some(&palette.editor),
@@ -335,13 +335,14 @@ impl Model {
         self.overlay.is_some() || self.editor().is_some()
     }
 
-    /// Values of the probed pixel, if the snapshot has them.
+    /// Returns the values of the probed pixel. Returns `None` if the snapshot does not contain
+    /// them.
     pub fn probed(&self) -> Option<&Probe> {
         let probe = self.snapshot.as_ref()?.probe.as_ref()?;
         (Some(probe.pixel) == self.probe).then_some(probe)
     }
 
-    /// Inventory of the compiled scene, wrapped to `width` columns.
+    /// Returns the lines of the compiled scene's inventory, wrapped to `width` columns.
     pub fn inventory(&self, width: u16) -> Vec<String> {
         match &self.snapshot {
             Some(snapshot) if !snapshot.report.inventory.is_empty() => {
@@ -351,7 +352,8 @@ impl Model {
         }
     }
 
-    /// Time of the next [`Tick`](crate::dashboard::message::Message::Tick) that the model needs.
+    /// Returns the time at which the model needs the next
+    /// [`Tick`](crate::dashboard::message::Message::Tick). Returns `None` if no timeout is pending.
     pub fn next_timeout(&self) -> Option<Duration> {
         self.notice.as_ref().and_then(|notice| notice.until)
     }

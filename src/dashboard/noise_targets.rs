@@ -1,10 +1,10 @@
-//! Noise targets for the current scene and the time to reach each.
+//! List of noise targets that the user can select, with the time to reach each of them.
 
 use crate::dashboard::convergence::Convergence;
 use crate::dashboard::model::Model;
 use crate::render::session::{QUALITIES, Report};
 
-/// Visual effect of each noise target.
+/// Visual quality at each noise target.
 const LOOKS: [&str; QUALITIES.len()] = [
     "a draft: grain is plain to see",
     "grain in dark and even parts",
@@ -17,14 +17,16 @@ const LOOKS: [&str; QUALITIES.len()] = [
 /// Note below the list of targets.
 pub const ABOUT: &str = "Halving the noise takes two to four times as long. Enter: stop there.";
 
-/// Time to a noise target.
+/// Time to reach a noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cost {
-    /// Reached, after this many seconds of tracing if that was observed.
+    /// The target has been reached after this number of seconds of tracing. `None` if the noise was
+    /// that low in the first report already.
     Reached(Option<f64>),
-    /// Lower and upper estimate of the remaining seconds of tracing.
+    /// The target has not been reached. The numbers are the lower and upper estimate of the
+    /// remaining seconds of tracing.
     Left(f64, f64),
-    /// No error estimate yet.
+    /// There is no error estimate yet.
     Unknown,
 }
 
@@ -33,16 +35,16 @@ pub enum Cost {
 pub struct NoiseTarget {
     /// Noise in 8-bit levels.
     pub noise_codes: f64,
-    /// Visual effect, in a few words.
+    /// Visual quality at this noise, in a few words.
     pub looks: &'static str,
-    /// Time to reach it.
+    /// Time to reach the target.
     pub cost: Cost,
-    /// The render stops at this target.
+    /// The target is the current stop criterion.
     pub is_target: bool,
 }
 
 impl Model {
-    /// Noise targets, the fastest first.
+    /// Returns the noise targets, the fastest to reach first.
     pub fn noise_targets(&self) -> [NoiseTarget; QUALITIES.len()] {
         let report = self.snapshot.as_ref().map(|snapshot| &snapshot.report);
         std::array::from_fn(|i| NoiseTarget {
@@ -54,6 +56,7 @@ impl Model {
     }
 }
 
+/// Returns the time to reach the noise target with index `at`.
 fn cost(report: &Report, convergence: &Convergence, at: usize) -> Cost {
     let reached = report.noise.is_some_and(|noise| noise.rmse_codes <= QUALITIES[at]);
     match report.quality_seconds[at] {
@@ -82,8 +85,8 @@ mod tests {
             assert_eq!(cost(&now, &convergence, at), Cost::Reached(None), "by the first look");
         }
         for (at, seconds) in [(2, 0.02), (3, 0.04)] {
-            let Cost::Reached(Some(told)) = cost(&now, &convergence, at) else { panic!("{at}") };
-            assert!((told - seconds).abs() < 1e-9, "{at}: {told}");
+            let Cost::Reached(Some(time)) = cost(&now, &convergence, at) else { panic!("{at}") };
+            assert!((time - seconds).abs() < 1e-9, "{at}: {time}");
         }
         assert_eq!(cost(&now, &convergence, 4), Cost::Left(0.2, 0.3));
         assert_eq!(cost(&now, &convergence, 5), Cost::Unknown);

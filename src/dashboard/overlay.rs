@@ -1,4 +1,5 @@
-//! Overlays over the panels, which take the keys: help, lists, forms, prompts, questions.
+//! Overlays: help, lists, forms, prompts and questions. An overlay covers panels and receives the
+//! keys.
 
 use crate::dashboard::editor::Editor;
 use crate::render::session::QUALITIES;
@@ -8,21 +9,21 @@ use crate::terminal::image::ViewerImage;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// An overlay.
+/// An overlay, which covers panels and receives the keys.
 #[derive(Clone, Debug)]
 pub enum Overlay {
-    /// All keys: [`help`](crate::dashboard::hints::help).
+    /// List of all keys: [`help`](crate::dashboard::hints::help).
     Help {
         /// First visible line.
         scroll: usize,
     },
-    /// Inventory of the compiled scene:
+    /// Inventory of the compiled scene, a text about its contents:
     /// [`Model::inventory`](crate::dashboard::model::Model::inventory).
     Inventory {
         /// First visible line.
         scroll: usize,
     },
-    /// Noise targets and the time to each:
+    /// List of noise targets with the time to reach each of them:
     /// [`Model::noise_targets`](crate::dashboard::model::Model::noise_targets).
     NoiseTargets {
         /// Index of the target under the cursor.
@@ -43,7 +44,8 @@ pub enum Overlay {
 }
 
 impl Overlay {
-    /// Cursor, first visible line and length of a list; `None` for other overlays.
+    /// Returns the cursor, the first visible line and the length of a list. A list that never
+    /// scrolls has no first visible line. Returns `None` for overlays without cursor.
     pub fn list(&mut self) -> Option<(&mut usize, Option<&mut usize>, usize)> {
         match self {
             Self::NoiseTargets { cursor } => Some((cursor, None, QUALITIES.len())),
@@ -64,18 +66,18 @@ impl Overlay {
 pub struct ViewedImage {
     /// Path of the file.
     pub path: PathBuf,
-    /// The image; `None` while it is read.
+    /// The image; `None` while the file is being read.
     pub image: Option<Arc<ViewerImage>>,
-    /// Transferred share, 0..=1.
+    /// Transferred fraction of the image, 0..=1.
     pub sent: f64,
 }
 
-/// Command palette: finds commands by fuzzy search.
+/// Command palette, which finds commands by fuzzy search.
 #[derive(Clone, Debug)]
 pub struct Palette {
     /// Text being typed.
     pub editor: Editor,
-    /// Matching commands, best first: positions in the command table.
+    /// Indices of the matching commands in the command table, best match first.
     pub found: Vec<usize>,
     /// Index in `found`.
     pub cursor: usize,
@@ -86,11 +88,11 @@ pub struct Palette {
 /// A choice from a list.
 #[derive(Clone, Debug)]
 pub struct Pick {
-    /// Purpose.
+    /// Use of the chosen entry.
     pub purpose: PickFor,
     /// Title.
     pub title: String,
-    /// Names and descriptions (may be empty).
+    /// Name and description of each entry. The description may be empty.
     pub entries: Vec<(String, String)>,
     /// Index of the entry under the cursor.
     pub cursor: usize,
@@ -105,41 +107,41 @@ pub enum PickFor {
     Object,
     /// Kind of a new light.
     Light,
-    /// Value of a key of a target.
+    /// Value of a key. The fields are the part of the scene with the key, and the key.
     Word(Target, String),
 }
 
-/// A new object or light. The picture previews it while the form is open.
+/// A form for a new object or light, which the picture previews while the form is open.
 #[derive(Clone, Debug)]
 pub struct Form {
-    /// Title: `new sphere`.
+    /// Title, such as `new sphere`.
     pub title: String,
     /// Valid scene that includes the new object or light.
     pub scene: Arc<Scene>,
     /// The new object or light in `scene`.
     pub subject: Target,
-    /// Label of its undo step.
+    /// Label of the undo step that adds the object or light.
     pub label: String,
-    /// Previous selection.
+    /// Selection before the form was opened.
     pub before: Target,
-    /// Line of the cursor (`panel_lines::form`).
+    /// Index of the line under the cursor in the result of `panel_lines::form`.
     pub cursor: usize,
     /// First visible line.
     pub scroll: usize,
-    /// Editor of the field under the cursor.
+    /// Text editor of the field under the cursor, if one is open.
     pub editor: Option<Editor>,
-    /// Reason why the last step was refused.
+    /// Reason why the last change of a field was refused.
     pub problem: Option<String>,
 }
 
 /// A prompt for a line of text.
 #[derive(Clone, Debug)]
 pub struct Prompt {
-    /// Purpose.
+    /// Use of the typed text.
     pub purpose: PromptFor,
-    /// Title: `save as`.
+    /// Title, such as `save as`.
     pub title: String,
-    /// One-line description of valid input.
+    /// Description of valid input.
     pub help: String,
     /// Text being typed.
     pub editor: Editor,
@@ -150,13 +152,13 @@ pub struct Prompt {
 pub enum PromptFor {
     /// Path to save to.
     SaveAs,
-    /// New name.
+    /// New name of this target.
     Rename(Target),
-    /// Name of a viewpoint.
+    /// Name of a new viewpoint.
     StoreView,
     /// Stop criteria.
     StopAt,
-    /// Size and format of an export.
+    /// Size and format of an export at another size.
     ExportSized,
 }
 
@@ -165,7 +167,7 @@ pub enum PromptFor {
 pub struct Question {
     /// Question, in a sentence or two.
     pub text: String,
-    /// Letter, text and effect of each answer. The cursor starts on the first.
+    /// Letter, text and effect of each answer. The cursor starts on the first answer.
     pub answers: Vec<(char, String, Answer)>,
     /// Index of the answer under the cursor.
     pub cursor: usize,
@@ -174,7 +176,7 @@ pub struct Question {
 /// Effect of an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// None.
+    /// No effect except closing the question.
     Nothing,
     /// Save, then quit.
     SaveAndQuit,
@@ -182,7 +184,7 @@ pub enum Answer {
     Quit,
     /// Read the file; unsaved edits are lost.
     Load,
-    /// Overwrite the scene file (`None`) or another one.
+    /// Overwrite the scene file (`None`) or the file at this path.
     Overwrite(Option<PathBuf>),
     /// Prompt for another path.
     SaveAs,

@@ -1,4 +1,4 @@
-//! Layout of overlays and panel rows: pure, shared by drawing and mouse handling.
+//! Layout of overlays and of rows in panels, shared by drawing and mouse handling.
 
 use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::ABOUT;
@@ -6,26 +6,27 @@ use crate::dashboard::overlay::Overlay;
 use crate::render::session::QUALITIES;
 use crate::terminal::Area;
 
-/// Areas of an overlay. Unused parts are empty.
+/// Areas of an overlay. Areas that an overlay does not use are empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OverlayLayout {
-    /// Box with its border.
+    /// Whole overlay with its border.
     pub frame: Area,
-    /// Text input: one row.
+    /// Row of the text input.
     pub input: Area,
-    /// Rows of a list, form or text.
+    /// Area of a list, of a form's fields or of a text.
     pub list: Area,
-    /// Rows for help, a problem or a question.
+    /// Area of help, a problem or the text of a question.
     pub help: Area,
 }
 
 impl Model {
-    /// Layout of the overlay; `None` without an overlay or if the terminal is too small.
+    /// Returns the layout of the overlay. Returns `None` if no overlay is open or the terminal is
+    /// too small.
     pub fn overlay_layout(&self) -> Option<OverlayLayout> {
         let layout = self.layout()?;
         let [width, height] = self.screen;
         let centred = |columns: u16, rows: u16| {
-            // Status line and hint line stay visible.
+            // The last two rows, status line and hint line, stay visible.
             let (columns, rows) = (columns.min(width - 2), rows.min(height - 2));
             let [x, y] = [(width - columns) / 2, (height - 2 - rows) / 2];
             Area { x, y, width: columns, height: rows }
@@ -69,7 +70,8 @@ impl Model {
                 whole(centred(76, (pick.entries.len() as u16).saturating_add(2)))
             }
             Overlay::Form(form) => {
-                // Beside the picture, which previews the form.
+                // The form replaces the side panels. It must not cover the picture, which previews
+                // the new object or light.
                 let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
                 let columns = side.min(width);
                 let x = width - columns;
@@ -81,8 +83,8 @@ impl Model {
             }
             Overlay::Prompt(prompt) => {
                 let columns = 64.min(width - 2);
-                let said = prompt.editor.problem.as_ref().unwrap_or(&prompt.help);
-                let rows = wrapped_rows(said, columns - 2);
+                let text = prompt.editor.problem.as_ref().unwrap_or(&prompt.help);
+                let rows = wrapped_rows(text, columns - 2);
                 let frame = low(columns, rows + 3);
                 let inner = frame.inner();
                 let input = Area { height: 1, ..inner };
@@ -92,7 +94,7 @@ impl Model {
             Overlay::Question(question) => {
                 let columns = 64.min(width - 2);
                 let answers = question.answers.len() as u16;
-                // One free column on both sides.
+                // The text has a margin of one column on both sides.
                 let rows = wrapped_rows(&question.text, columns - 4);
                 let frame = low(columns, rows + answers + 2);
                 let inner = frame.inner();
@@ -105,25 +107,26 @@ impl Model {
         })
     }
 
-    /// Rows of the outline's lines; `None` if it is folded.
+    /// Returns the area of the outline's lines. Returns `None` if the panel is folded.
     pub fn outline_rows(&self) -> Option<Area> {
         self.layout()?.outline.map(|area| area.inner())
     }
 
-    /// Rows of the inspector's lines, and rows for help on the field under the cursor; `None` if it
-    /// is folded.
+    /// Returns the area of the inspector's lines, and the area for help on the field under the
+    /// cursor. Returns `None` if the panel is folded.
     pub fn inspector_rows(&self) -> Option<(Area, Area)> {
         let problem = self.inspector.editor.as_ref().is_some_and(|e| e.problem.is_some());
         self.layout()?.inspector.map(|area| split(area.inner(), problem))
     }
 }
 
-/// A box that consists of list rows.
+/// Returns the layout of an overlay whose list fills the whole frame.
 fn whole(frame: Area) -> OverlayLayout {
     OverlayLayout { frame, list: frame.inner(), ..OverlayLayout::default() }
 }
 
-/// Splits a panel into rows for lines and rows for help below; a problem gets more of them.
+/// Splits the inside of a panel into an area for lines and an area for help below. The help area is
+/// larger if it shows a problem.
 fn split(inner: Area, problem: bool) -> (Area, Area) {
     let rows = match (inner.height, problem) {
         (0..4, _) => 0,
@@ -141,8 +144,8 @@ pub fn wrapped_rows(text: &str, width: u16) -> u16 {
     wrapped(text, width).len() as u16
 }
 
-/// Wraps `text` between words to `width` columns; longer words are broken. Columns are counted as
-/// characters.
+/// Wraps `text` between words to lines of `width` columns. Words longer than a line are broken.
+/// Each character counts as one column.
 pub fn wrapped(text: &str, width: u16) -> Vec<String> {
     let width = usize::from(width.max(1));
     let mut lines = Vec::new();

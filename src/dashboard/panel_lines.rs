@@ -1,4 +1,5 @@
-//! Lines of outline, inspector and form as data: `view` draws them, `update` moves over them.
+//! Lines of outline, inspector and form as data, which `view` draws and `update` moves the cursor
+//! over.
 
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::{Form, Overlay};
@@ -13,11 +14,12 @@ pub enum OutlineLine {
     Heading(&'static str),
     /// A selectable entry.
     Entry {
-        /// Target of the entry.
+        /// Part of the scene that the entry selects.
         subject: Target,
-        /// Name, printable.
+        /// Name, with control characters escaped.
         label: String,
-        /// Material of an object, `off` for a light, key of a view; may be empty.
+        /// Material of an object, `off` for a light that is off, key that recalls a viewpoint;
+        /// otherwise empty.
         note: String,
     },
 }
@@ -34,11 +36,11 @@ pub enum PanelLine {
 /// A field with its value and description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldLine {
-    /// Target that the field belongs to.
+    /// Part of the scene that the field belongs to.
     pub subject: Target,
-    /// Dotted key.
+    /// Key of the scene file, with dots between its parts.
     pub key: String,
-    /// Index of the number, if the key has several.
+    /// Index of the field's number, if the value of the key is a list of numbers.
     pub component: Option<usize>,
     /// Label before the value.
     pub label: String,
@@ -46,13 +48,14 @@ pub struct FieldLine {
     pub depth: usize,
     /// Kind of input widget.
     pub entry: Widget,
-    /// Value in the syntax of the editor, printable; empty if the key is absent.
+    /// Value in the syntax of the text editor, with control characters escaped; empty if the scene
+    /// does not have the key.
     pub value: String,
-    /// Linear colour of which this is the first line.
+    /// Linear colour to show a sample of, in the first line of a colour.
     pub swatch: Option<[f64; 3]>,
-    /// Unit; may be empty.
+    /// Unit of the value; may be empty.
     pub unit: &'static str,
-    /// The value is the default.
+    /// The value equals the default.
     pub is_default: bool,
     /// Default value; `None` for a required key.
     pub default: Option<String>,
@@ -63,7 +66,7 @@ pub struct FieldLine {
 }
 
 impl PanelLine {
-    /// Returns the field, if the line is one.
+    /// Returns the field of the line. Returns `None` for a heading.
     pub fn field(&self) -> Option<&FieldLine> {
         match self {
             Self::Field(field) => Some(field),
@@ -96,14 +99,15 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
     lines
 }
 
-/// Returns the line of `subject` in the outline.
+/// Returns the index of the line of `subject` in the outline. Returns `None` if there is none.
 pub fn outline_position(lines: &[OutlineLine], subject: &Target) -> Option<usize> {
     lines
         .iter()
         .position(|line| matches!(line, OutlineLine::Entry { subject: s, .. } if s == subject))
 }
 
-/// Returns the fields of `subject`, and of its material if it is an object.
+/// Returns the lines of the inspector: the fields of `subject`, and those of its material if it is
+/// an object.
 pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     let mut lines = fields(scene, subject);
     let material = subject.material(scene).filter(|material| material != subject);
@@ -116,8 +120,8 @@ pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     lines
 }
 
-/// Returns the fields of a form: those of the new object or light, and of its material if that is
-/// new as well. `base` is the scene without both.
+/// Returns the lines of a form: the fields of the new object or light, and those of its material if
+/// the material is new as well. `base` is the scene before the form was opened.
 pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
     let has_new_material = match form.subject.material(&form.scene) {
         Some(Target::Material(name)) => !base.materials.contains_key(&name),
@@ -138,7 +142,7 @@ fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
         .collect()
 }
 
-/// Returns one line for each number of a list, otherwise one line.
+/// Returns the lines of a property: one for each number of a list, otherwise a single line.
 fn lines_of(subject: &Target, row: &Property) -> Vec<FieldLine> {
     let line = |component: Option<usize>, label: String, value: String| FieldLine {
         subject: subject.clone(),
@@ -171,7 +175,7 @@ fn lines_of(subject: &Target, row: &Property) -> Vec<FieldLine> {
 }
 
 impl Model {
-    /// Lines of the open form, or else of the inspector.
+    /// Returns the lines of the form if one is open, otherwise those of the inspector.
     pub fn field_lines(&self) -> Vec<PanelLine> {
         match &self.overlay {
             Some(Overlay::Form(open)) => form(open, self.history.scene()),
@@ -180,7 +184,8 @@ impl Model {
     }
 }
 
-/// Returns the index of the first field at or below `wanted`, or else of the last field.
+/// Returns the index of the first field in `lines` from index `wanted` on. If there is none,
+/// returns the index of the last field before; without any field, 0.
 pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
     let field = |i: &usize| lines[*i].field().is_some();
     (wanted..lines.len())
@@ -189,8 +194,8 @@ pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
         .unwrap_or(0)
 }
 
-/// Returns the index of the field `steps` below (negative: above) the one at `cursor`, clamped to
-/// the ends.
+/// Returns the index of the line that is `steps` fields below the field at `cursor`, clamped to the
+/// ends. Negative steps go upwards. Headings do not count.
 pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].field().is_some()).collect();
     let position =
@@ -199,8 +204,8 @@ pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     fields.get(to).copied().unwrap_or(0)
 }
 
-/// Returns the first visible line such that line `cursor` of `len` is visible in `rows` rows with
-/// the line above it, as close to `scroll` as possible.
+/// Returns the first visible line of a list of `len` lines in `rows` rows, as close to `scroll` as
+/// possible. Line `cursor` is visible, and the line above it if there are more than two rows.
 pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize {
     let lowest = (cursor + 1).saturating_sub(rows);
     let highest = if rows > 2 { cursor.saturating_sub(1) } else { cursor };

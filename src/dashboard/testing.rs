@@ -4,7 +4,8 @@ use crate::film::{Mse, Noise};
 use crate::render::schedule::Spp;
 use crate::render::session::{QUALITIES, Report, State};
 
-/// Creates a report about scene `generation` after `spp` samples in each of ten thousand pixels.
+/// Creates a report about the scene with number `generation`, after `spp` samples in each of ten
+/// thousand pixels.
 pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
     Report {
         generation,

@@ -1,14 +1,15 @@
-//! Box filter: area-weighted means of pixels over larger or smaller cells, and hole filling.
+//! Box filter: means of pixels over larger or smaller cells, weighted by covered area. Also fills
+//! cells without samples.
 
-/// Pixels that a cell covers in one direction.
+/// Pixels that a cell covers, fully or in part, along one axis.
 pub(super) struct Coverage {
-    /// First pixel.
+    /// Index of the first covered pixel.
     pub first: usize,
-    /// Covered part of each pixel, from `first` on; 0..=1.
+    /// Covered part of each pixel from `first` on; 0..=1.
     pub parts: Vec<f64>,
 }
 
-/// Divides `pixels` into `cells` of equal width.
+/// Divides `pixels` pixels into `cells` cells of equal width.
 pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     let edge = |cell: usize| cell as f64 * pixels as f64 / cells as f64;
     let cover = |cell: usize| {
@@ -21,9 +22,10 @@ pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     (0..cells).map(cover).collect()
 }
 
-/// Means over `cells` (columns, rows) that together cover an image of `size` (columns, rows) pixels,
-/// `[row][column]`, weighted by the covered area of each pixel. The argument of `pixel` counts
-/// `[row][column]`.
+/// Returns the mean of an image over each cell, `[row][column]`, weighted by the covered area of
+/// each pixel. The image has `size` (columns, rows) pixels. The `cells` (columns, rows) have equal
+/// sizes and together cover the image. `pixel` returns the value of the pixel with an index in
+/// `[row][column]` order.
 pub fn box_means(
     size: [usize; 2],
     cells: [usize; 2],
@@ -54,8 +56,9 @@ pub fn box_means(
     means
 }
 
-/// Fills holes: a cell without samples gets the means of the nearest known cell of its row, a row
-/// without samples those of the nearest row. `stride` is the number of means of a cell.
+/// Fills cells without samples. Such a cell gets the means of the nearest known cell of its row. A
+/// row without samples gets the means of the nearest row with samples. `stride` is the number of
+/// means of a cell.
 pub(super) fn fill_gaps(
     means: &mut [f32],
     known: &mut [bool],
@@ -78,7 +81,8 @@ pub(super) fn fill_gaps(
     }
 }
 
-/// Index of the nearest known element for each element: the lower of two, or itself if none is known.
+/// Returns, for each element, the index of the nearest known element; the lower one if two are
+/// equally near. Without any known element it is the element's own index.
 fn nearest(known: &[bool]) -> Vec<usize> {
     let mut below: Vec<Option<usize>> = Vec::with_capacity(known.len());
     for (i, k) in known.iter().enumerate() {

@@ -1,12 +1,13 @@
-//! Canonical serialisation of the film: equal samples give equal bytes, in any order of addition. Unit
-//! and integration tests compare films by it.
+//! Canonical serialisation of the film. Films with equal samples have equal bytes, in whatever
+//! order the samples were added. Unit and integration tests use the bytes to compare films.
 //!
-//! Little-endian. Header: width, height, number of groups (u32 each), a scale per group (f64), seed
-//! (u64), the length of the precision's name (u32) and the name. Invalid samples: their count (u64), the
-//! number of those remembered (u32), and of each index, x, y (u32) and replicate (u8). Then the tiles
-//! in order: counts of A and B (u32), lattice (u8), and if there is any sample the sums of the pixels
-//! inside the picture, `[replicate][row][column][group][channel]` (i64). At the end, if there are saturated
-//! samples, their count (u64).
+//! All numbers are little-endian. The header contains width, height and number of groups (u32
+//! each), a scale for each group (f64), the seed (u64), and the length (u32) and text of the
+//! precision's name. Then follow the number of invalid samples (u64), the number of remembered ones
+//! (u32), and for each of these index, x, y (u32 each) and replicate (u8). Then follow the tiles in
+//! order: counts of A and B (u32), lattice (u8), and, if the tile has samples, the sums of the
+//! pixels inside the picture, `[replicate][row][column][group][channel]` (i64). If there are
+//! saturated samples, their number (u64) is at the end.
 
 use crate::film::TILE;
 use crate::film::store::Film;
@@ -14,17 +15,17 @@ use crate::film::tile::Tile;
 use std::io::{self, Write};
 
 impl Film {
-    /// Returns the film as bytes; equal for equal samples.
+    /// Returns the film as bytes, which are equal for equal samples.
     pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         self.write_bytes(&mut bytes).expect("writing to memory does not fail");
         bytes
     }
 
-    /// Writes the bytes of [`Film::bytes`] piece by piece.
+    /// Writes the bytes of [`Film::bytes`] to `out`, part by part.
     ///
     /// # Errors
-    /// Returns the error of `out`.
+    /// Returns the error of writing to `out`.
     pub fn write_bytes(&self, out: &mut impl Write) -> io::Result<()> {
         let u32_bytes = |n: usize| u32::try_from(n).map_err(io::Error::other).map(u32::to_le_bytes);
         let header = self.header();

@@ -5,19 +5,20 @@ use crate::value::srgb_from_linear;
 use std::fmt;
 use std::str::FromStr;
 
-/// Tone curve: treatment of light brighter than the display's white.
+/// Tone curve: maps radiance to the range of the display, whose white is 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tone {
     /// Clips each channel at 1.
     #[default]
     Clip,
-    /// The Khronos PBR Neutral tone mapper (KHR specification of 2024): keeps hues, compresses the
-    /// brightest fifth of the range and keeps the others up to a small constant in the dark.
+    /// The Khronos PBR Neutral tone mapper (KHR specification of 2024). It keeps hues, compresses
+    /// the brightest fifth of the range, and shifts the rest by at most a small constant in the
+    /// dark.
     Neutral,
 }
 
 impl Tone {
-    /// Every tone curve and its name.
+    /// All tone curves with their names.
     pub const NAMED: [(&'static str, Self); 2] = [("clip", Self::Clip), ("neutral", Self::Neutral)];
 }
 
@@ -40,12 +41,12 @@ impl FromStr for Tone {
     }
 }
 
-/// Display transform.
+/// Display transform: exposure, then tone curve, then sRGB encoding.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Display {
-    /// Radiance is multiplied by 2 to the power of this.
+    /// Exposure in stops: radiance is multiplied by 2 to the power of this value.
     pub exposure_ev: f64,
-    /// Tone curve, applied after the exposure.
+    /// Tone curve that is applied after the exposure.
     pub tone: Tone,
 }
 
@@ -55,18 +56,19 @@ impl Display {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Converts radiance to 8-bit sRGB: equal to rounding [`Display::codes`], but several times as fast.
+    /// Converts radiance to 8-bit sRGB. The result equals rounding of [`Display::codes`], but is
+    /// several times as fast.
     pub fn codes_8(&self, radiance: [f64; 3]) -> [u8; 3] {
         self.to_8()(radiance)
     }
 
-    /// Returns [`Display::codes_8`] as a function, for many pixels.
+    /// Returns [`Display::codes_8`] as a function, which is faster for many pixels.
     pub fn to_8(&self) -> impl Fn([f64; 3]) -> [u8; 3] + use<> {
         let (tone, factor, curve) = (self.tone, self.exposure_factor(), SrgbTable::shared());
         move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.code_8(c))
     }
 
-    /// Converts radiance to linear light of the display, 0..=1.
+    /// Converts radiance to linear light of the display, 0..=1, without sRGB encoding.
     pub fn shown(&self, radiance: [f64; 3]) -> [f64; 3] {
         toned(self.tone, radiance.map(|c| c * self.exposure_factor()))
     }
@@ -77,7 +79,7 @@ impl Display {
     }
 }
 
-/// Applies a tone curve; the result lies in 0..=1.
+/// Applies a tone curve. The result is in 0..=1.
 #[inline(always)]
 pub(super) fn toned(tone: Tone, color: [f64; 3]) -> [f64; 3] {
     match tone {
@@ -86,7 +88,7 @@ pub(super) fn toned(tone: Tone, color: [f64; 3]) -> [f64; 3] {
     }
 }
 
-/// Khronos PBR Neutral, as published.
+/// Applies the Khronos PBR Neutral tone mapper, in the form of its publication.
 #[inline(always)]
 fn neutral(color: [f64; 3]) -> [f64; 3] {
     const F90: f64 = 0.04;
@@ -105,7 +107,7 @@ fn neutral(color: [f64; 3]) -> [f64; 3] {
     color.map(|c| c * (new_peak / peak)).map(|c| c + (new_peak - c) * to_white)
 }
 
-/// Rounds a value 0..=255 to 16 bits, 65535 for 255.
+/// Rounds a value from 0 to 255 to 16 bits; 255 becomes 65535.
 pub fn quantised_16(code: f64) -> u16 {
     (code * (65535.0 / 255.0)).round() as u16
 }
@@ -118,7 +120,7 @@ mod tests {
 
     #[test]
     fn srgb_encoding_follows_the_standard() {
-        // The two pieces are continuous, and every 8-bit value round-trips.
+        // The two pieces of the curve join continuously, and every 8-bit value round-trips.
         let [below, above] = [0.003_130_79, 0.003_130_81].map(srgb_from_linear);
         assert!((above - below).abs() < 1e-6 && above > below);
         for code in 0..=255u8 {
@@ -148,11 +150,11 @@ mod tests {
         assert_eq!(bright.codes([0.01, 0.1, 2.0]), plain.codes([0.08, 0.8, 1.0]));
     }
 
-    /// From the published shader, evaluated by hand in double precision.
+    /// The expected values come from the published shader, evaluated by hand in double precision.
     #[test]
     fn neutral_follows_its_publication() {
         let neutral = Display { exposure_ev: 0.0, tone: Tone::Neutral };
-        // Below the toe's end a grey g becomes 6.25 g^2, above it g - 0.04.
+        // Below the end of the toe a grey g becomes 6.25 g^2, above it g - 0.04.
         let near = |got: [f64; 3], expected: [f64; 3]| {
             (0..3).for_each(|c| assert!((got[c] - expected[c]).abs() < 1e-12, "{got:?}"));
         };

@@ -1,5 +1,5 @@
-//! Incremental downsampling of the film to the cells of a display: only tiles that have changed since
-//! the previous picture are read again.
+//! Incremental downsampling of the film to the cells of a display. Only tiles that have changed
+//! since the previous picture are read again.
 
 use crate::film::TILE;
 use crate::film::box_filter::{Coverage, coverage, fill_gaps};
@@ -7,36 +7,37 @@ use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::store::Film;
 use crate::film::tile::Tile;
 
-/// Means of the film over the cells of a raster, one per light group, so that light weights can
-/// change without the film.
+/// Mean of each light group over the cells of a raster. The light weights are applied later, so
+/// that they can change without the film.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Thumbnail {
-    /// Cells in a row.
+    /// Number of cells in a row.
     pub cols: usize,
-    /// Rows of cells.
+    /// Number of rows.
     pub rows: usize,
-    /// `[row][column][group][channel]`, radiance of unit light.
+    /// Mean radiance of unit light: `[row][column][group][channel]`.
     means: Vec<f32>,
     groups: usize,
 }
 
 impl Thumbnail {
-    /// Averages `film` over `cols` x `rows` cells that together cover it: each cell holds the mean of
-    /// its sampled pixels, weighted by the area that it covers of them. A cell without samples gets
-    /// the means of the nearest one of its row that has some, a row without samples those of the
-    /// nearest row; a film without samples is black.
+    /// Averages `film` over `cols` x `rows` cells of equal size that together cover the film. Each
+    /// cell holds the mean of its sampled pixels, weighted by their areas inside of the cell. A
+    /// cell without samples gets the means of the nearest cell of its row that has samples. A row
+    /// without samples gets the means of the nearest row with samples. A film without samples is
+    /// black.
     pub fn of_film(film: &Film, cols: usize, rows: usize) -> Self {
         let mut downsample = IncrementalDownsample::new(film, cols, rows);
         downsample.stale(film).into_iter().for_each(DirtyTile::refresh);
         downsample.thumbnail()
     }
 
-    /// Number of light groups, which [`LightWeights`] for it must have.
+    /// Number of light groups. [`LightWeights`] for this thumbnail must have as many.
     pub fn groups(&self) -> usize {
         self.groups
     }
 
-    /// Radiance under `weights`, `[row][column]`.
+    /// Returns the radiance of each cell under `weights`, `[row][column]`.
     pub fn mixed(&self, weights: &LightWeights) -> Vec<[f32; 3]> {
         assert_eq!(weights.weights.len(), self.groups, "weights for the groups of the film");
         let weights: Vec<_> = weights.weights.iter().map(|w| w.map(|w| w as f32)).collect();
@@ -51,46 +52,49 @@ impl Thumbnail {
     }
 }
 
-/// Cached contributions of a film's tiles to a raster of cells; see [`Thumbnail::of_film`].
+/// Contributions of a film's tiles to the cells of a raster, cached between pictures; see
+/// [`Thumbnail::of_film`].
 pub struct IncrementalDownsample {
     layout: Layout,
-    /// In the order of the film's tiles.
+    /// Contribution of each tile, in the order of the film's tiles.
     parts: Vec<TilePart>,
 }
 
-/// Geometry of a raster of cells over the film's tiles.
+/// Positions of a raster's cells relative to the film's tiles.
 struct Layout {
     cols: usize,
     rows: usize,
     size: [usize; 2],
     groups: usize,
-    /// Cells under each column of tiles.
+    /// Cells that overlap each column of tiles.
     across: Vec<Span>,
-    /// Cells under each row of tiles.
+    /// Cells that overlap each row of tiles.
     down: Vec<Span>,
 }
 
-/// Cells under one column (row) of tiles.
+/// Cells that overlap one column (or row) of tiles.
 struct Span {
-    /// The first cell.
+    /// Index of the first cell.
     first: usize,
     /// Number of cells.
     len: usize,
-    /// The cells of each pixel, counted from `first`, and the part of the pixel that each covers,
-    /// 0..=1.
+    /// Cells that overlap each pixel: the index of each, counted from `first`, and the part of the
+    /// pixel that it covers, 0..=1.
     pixels: Vec<Vec<(usize, f64)>>,
 }
 
-/// Contribution of a tile to the cells under it.
+/// Contribution of a tile to the cells that overlap it.
 #[derive(Default)]
 struct TilePart {
-    /// Epoch, counts and lattice of the tile at its latest refresh; equal ones mean equal contents.
+    /// Epoch, counts and lattice of the tile at its latest refresh. If they are unchanged, so are
+    /// the contents.
     version: Option<(u64, [u32; 2], usize)>,
-    /// `[row][column][area, group 0 red, ...]`: sums of area times mean; empty without samples.
+    /// Sums of area, and of area times mean: `[row][column][area, group 0 red, ...]`. Empty without
+    /// samples.
     sums: Vec<f64>,
 }
 
-/// A tile that has changed, to be read by [`DirtyTile::refresh`] on any thread.
+/// A tile that has changed. [`DirtyTile::refresh`] reads it, on any thread.
 pub struct DirtyTile<'a> {
     layout: &'a Layout,
     part: &'a mut TilePart,
@@ -99,7 +103,8 @@ pub struct DirtyTile<'a> {
 }
 
 impl IncrementalDownsample {
-    /// Creates a raster for films of the size and groups of `film`, without any samples.
+    /// Creates the contributions of a film without samples to `cols` x `rows` cells. `film` gives
+    /// the size and the number of groups.
     pub fn new(film: &Film, cols: usize, rows: usize) -> Self {
         let size = [film.width(), film.height()];
         let spans = |pixels: usize, cells: usize| {
@@ -118,7 +123,8 @@ impl IncrementalDownsample {
         Self { layout, parts }
     }
 
-    /// Returns `true` for a raster of `cols` x `rows` cells for films of the size and groups of `film`.
+    /// Returns `true` if the raster has `cols` x `rows` cells and `film` has the size and the
+    /// number of groups for which it was created.
     pub fn is_for(&self, film: &Film, cols: usize, rows: usize) -> bool {
         let Layout { size, groups, .. } = self.layout;
         [self.layout.cols, self.layout.rows] == [cols, rows]
@@ -126,8 +132,8 @@ impl IncrementalDownsample {
             && groups == film.groups()
     }
 
-    /// Returns the tiles that have changed since their latest refresh. `film` is always the same one,
-    /// which may have been restarted.
+    /// Returns the tiles that have changed since their latest refresh. Every call must have the
+    /// same `film`; it may have been restarted in between.
     pub fn stale<'a>(&'a mut self, film: &'a Film) -> Vec<DirtyTile<'a>> {
         let layout = &self.layout;
         let stale = |(index, part): (usize, &'a mut TilePart)| {
@@ -139,7 +145,7 @@ impl IncrementalDownsample {
         self.parts.iter_mut().enumerate().filter_map(stale).collect()
     }
 
-    /// Means over the cells, with holes filled.
+    /// Returns the means over the cells. Cells without samples are filled.
     pub fn thumbnail(&self) -> Thumbnail {
         let Layout { cols, rows, groups, .. } = self.layout;
         let stride = 3 * groups;
@@ -169,7 +175,7 @@ impl IncrementalDownsample {
 }
 
 impl Span {
-    /// Cells under the tile that starts at pixel `start` of `pixels`.
+    /// Finds the cells that overlap the tile that starts at pixel `start` of `pixels` pixels.
     fn new(start: usize, pixels: usize, coverage: &[Coverage]) -> Self {
         let end = (start + TILE).min(pixels);
         let touched =
@@ -189,7 +195,7 @@ impl Span {
 }
 
 impl DirtyTile<'_> {
-    /// Reads the current samples of the tile.
+    /// Reads the current samples of the tile into its cached contribution.
     pub fn refresh(self) {
         let Self { layout, part, film, index } = self;
         let columns = film.tile_columns();
@@ -201,7 +207,7 @@ impl DirtyTile<'_> {
         part.sums.resize(down.len * width, 0.0);
         let per_unit: Vec<f64> = film.scales().iter().flat_map(|s| [1.0 / s; 3]).collect();
         let mut line = vec![0.0; width];
-        // A tile in its first pass has samples on the lattice only.
+        // During the first pass a tile has samples only in the pixels of its lattice.
         let step = if tile.counts() == [0; 2] { tile.lattice_px() } else { 1 };
         for (y, rows) in down.pixels.iter().enumerate().step_by(step) {
             line.fill(0.0);
@@ -214,7 +220,8 @@ impl DirtyTile<'_> {
     }
 }
 
-/// Adds every `step`-th pixel of row `y` of a tile to a row of cells of height 1.
+/// Adds every `step`-th pixel of row `y` of a tile to one row of cells, as if the cells had height
+/// 1.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {
@@ -275,7 +282,7 @@ mod tests {
         assert_eq!(raster.thumbnail().mixed(&white(2)).len(), 63);
     }
 
-    /// Brute-force reference: every pixel against every cell.
+    /// Brute-force reference: computes the overlap of every pixel with every cell.
     fn brute_force(film: &Film, cols: usize, rows: usize, mix: &LightWeights) -> Vec<[f64; 3]> {
         let overlap = |cell: usize, cells: usize, pixel: usize, pixels: usize| {
             let edge = |c: usize| c as f64 * pixels as f64 / cells as f64;
@@ -322,7 +329,7 @@ mod tests {
         }
     }
 
-    /// Adds one sample of value x + 100 y in every lattice pixel.
+    /// Adds one sample of value x + 100 y to every pixel of a lattice.
     fn first_samples(film: &mut Film, before_px: usize, step_px: usize) {
         each_tile(film, |tile, [x0, y0]| {
             let [width, height] = tile.extent();
@@ -345,12 +352,13 @@ mod tests {
         assert_eq!(value(&film, 8, 6, 7, 5), 0.0);
         first_samples(&mut film, 0, 8);
         assert_eq!(film.samples(), 12);
-        // Cells of 4x4 pixels: every second one has a sample, the others take that of a neighbour.
+        // With cells of 4x4 pixels, every second cell has a sample. The others take the value of a
+        // neighbour.
         for (col, row) in (0..6).flat_map(|row| (0..8).map(move |col| (col, row))) {
             let expected = (col / 2 * 8 + 100 * (row / 2 * 8)) as f32;
             assert_eq!(value(&film, 8, 6, col, row), expected, "{col} {row}");
         }
-        // One cell for all: the mean of the samples at hand.
+        // A single cell holds the mean of all samples.
         assert_eq!(value(&film, 1, 1, 0, 0), 12.0 + 800.0);
         first_samples(&mut film, 8, 2);
         assert_eq!(value(&film, 8, 6, 1, 1), 5.0 + 500.0);
@@ -361,7 +369,7 @@ mod tests {
 
     #[test]
     fn rows_without_samples_take_the_nearest_row() {
-        // The upper half of the film has samples, the lower none: they get the last row.
+        // The upper half of the film has samples. The lower half has none and gets the last row.
         let mut film = film(32, 32, &[1.0]);
         for slot in film.slots(&[1, 0]) {
             let value = slot.index as i64 + 3;

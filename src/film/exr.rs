@@ -1,9 +1,10 @@
-//! OpenEXR: linear radiance in 32-bit floats, with the replicates, the light groups and the sample
-//! count beside the picture.
+//! OpenEXR writer. Pictures are linear radiance in 32-bit floats, with additional channels for
+//! replicates, light groups and sample count.
 //!
-//! Channels of one part, layers by name prefix: `R G B` is the picture; `A.R ..` and `B.R ..` are the two
-//! replicates, whose half difference estimates the picture's error; `light_NAME.R ..` are the contributions
-//! of the light groups, which sum up to the picture; `count` is the number of samples of a pixel.
+//! All channels are in one part; prefixes of their names form layers. `R G B` is the picture.
+//! `A.R ..` and `B.R ..` are the two replicates; half of their difference is an estimate of the
+//! picture's error. `light_NAME.R ..` are the contributions of the light groups; their sum is the
+//! picture. `count` is the number of samples of a pixel.
 
 use crate::film::exr_header::Ordered;
 use crate::film::image_data::{ImageData, WriteSeek};
@@ -27,14 +28,14 @@ pub(super) fn encode(picture: &ImageData, sink: &mut dyn WriteSeek) -> io::Resul
     })
 }
 
-/// Contents of a channel.
+/// Source of a channel's values.
 #[derive(Clone, Copy)]
 enum Source {
-    /// Radiance of colour channel `.1` in the replicates `.0`, all groups together.
+    /// Radiance over all light groups: colour channel `.1` of the replicates `.0`.
     Mixed(Replicates, usize),
-    /// Contribution of group `.0` to colour channel `.1`.
+    /// Contribution of light group `.0` to colour channel `.1`.
     Group(usize, usize),
-    /// Number of samples of both replicates.
+    /// Number of samples of a pixel in both replicates.
     Count,
 }
 
@@ -61,7 +62,8 @@ fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), Error>
         })
         .collect();
     let header = Header::new(text("picture"), size, descriptions)
-        // Noise hardly compresses: of 108 MB at 1920x1080 this leaves 100 in 0.55 s, ZIP 71 in 3.4 s.
+        // Noise hardly compresses. A file of 108 MB at 1920x1080 becomes 100 MB in 0.55 s with RLE,
+        // and 71 MB in 3.4 s with ZIP.
         .with_encoding(Compression::RLE, BlockDescription::ScanLines, LineOrder::Increasing)
         .with_shared_attributes(image)
         .with_attributes(layer);
@@ -86,7 +88,7 @@ fn text(text: &str) -> Text {
     Text::new_or_none(text).unwrap_or_else(|| Text::from_bytes_unchecked(text.bytes().collect()))
 }
 
-/// Returns all channels, sorted by name as the format demands.
+/// Returns all channels with their names, sorted by name as the format requires.
 fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
     let mut channels = vec![("count".to_string(), Source::Count)];
     for (c, color) in ["R", "G", "B"].into_iter().enumerate() {
@@ -101,7 +103,8 @@ fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
     channels
 }
 
-/// Returns a unique layer name for each group: ASCII letters, digits, `_` and `-`.
+/// Returns a unique layer name for each light group. Names consist of ASCII letters, digits, `_`
+/// and `-`.
 fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
     let mut layers: Vec<String> = Vec::new();
@@ -118,7 +121,7 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     layers
 }
 
-/// Reader of single film rows as the bytes of each channel.
+/// Reader of film rows. It returns a row as the bytes of each channel.
 struct Rows<'a> {
     picture: &'a ImageData<'a>,
     sources: Vec<Source>,
@@ -168,7 +171,8 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Contribution of one group to one colour channel; `i` counts `[group][channel]`.
+/// Returns the contribution of one light group to one colour channel. `i` is the index in
+/// `[group][channel]` order.
 fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
     match sums.count(Replicates::Both) {
         0 => 0.0,

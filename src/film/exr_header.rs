@@ -1,20 +1,20 @@
-//! Sorts the attributes of an OpenEXR header, so that equal pictures are equal files.
+//! Sorts the attributes of an OpenEXR header, so that equal pictures have equal files.
 //!
-//! The format leaves the order of attributes free, and the library writes them in the order of a hash map,
-//! which differs between runs. OpenEXR File Layout: a header is a list of attributes and ends in a zero
-//! byte; an attribute has a name and a type (both end in a zero byte), a size (i32, little-endian) and as
-//! many bytes.
+//! The format allows any order of attributes. The library writes them in the order of a hash map,
+//! which differs between runs. OpenEXR File Layout: a header is a list of attributes that ends with
+//! a zero byte. An attribute consists of a name and a type (each ends with a zero byte), a size
+//! (i32, little-endian), and `size` bytes of data.
 
 use std::io::{self, Seek, SeekFrom, Write};
 
-/// Bytes before the first attribute: magic number and version.
+/// Number of bytes before the first attribute: magic number and version.
 const PREAMBLE: usize = 8;
 
-/// Writer that buffers the header until it is complete, and passes it on with the attributes sorted by
-/// name.
+/// Writer that buffers the header until it is complete. It then sorts the attributes by name and
+/// writes them to the sink, followed by all further bytes.
 pub(super) struct Ordered<W: Write + Seek> {
     sink: W,
-    /// The buffered bytes; `None` after the header.
+    /// Buffered bytes. `None` after the header has been written.
     buffer: Option<Vec<u8>>,
 }
 
@@ -38,7 +38,7 @@ impl<W: Write + Seek> Write for Ordered<W> {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        // The header is passed on as a whole.
+        // A flush does nothing until the header is complete.
         if self.buffer.is_none() { self.sink.flush() } else { Ok(()) }
     }
 }
@@ -52,7 +52,8 @@ impl<W: Write + Seek> Seek for Ordered<W> {
     }
 }
 
-/// Splits a header into its attributes and the bytes behind them; `None` while it is incomplete.
+/// Splits a header into its attributes and the bytes after the header. Returns `None` if the header
+/// is incomplete.
 fn attributes(mut bytes: &[u8]) -> Option<(Vec<&[u8]>, &[u8])> {
     let mut found = Vec::new();
     while *bytes.first()? != 0 {

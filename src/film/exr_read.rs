@@ -7,19 +7,20 @@ use std::path::Path;
 pub struct ReadPicture {
     /// Width and height in pixels.
     pub size: [usize; 2],
-    /// `[row][column]`.
+    /// Pixels in linear radiance, `[row][column]`.
     pub pixels: Vec<[f64; 3]>,
-    /// Replicates A and B of a picture of this program, `[row][column]`.
+    /// Replicates A and B, `[row][column]`. `None` if the file was not written by this program.
     pub replicates: Option<[Vec<[f64; 3]>; 2]>,
 }
 
-/// Largest number of pixels that is read: the limit of scenes.
+/// Largest number of pixels that is read. Scenes have the same limit.
 const MAX_PIXELS: usize = 1 << 26;
 
-/// Reads the channels `R G B` of an OpenEXR file, and `A.R ..` and `B.R ..` if they exist.
+/// Reads the channels `R G B` of an OpenEXR file, and the replicates `A.R ..` and `B.R ..` if they
+/// exist.
 ///
 /// # Errors
-/// Fails if the file cannot be read, is too large, or lacks the channels.
+/// Fails if the file cannot be read, is too large, or lacks `R G B`.
 pub fn read_exr(path: &Path) -> std::result::Result<ReadPicture, String> {
     let meta = MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
     let largest = meta.headers.iter().map(|h| h.layer_size.area()).max().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! Input of the picture encoders.
+//! Input of the picture encoders (PNG and OpenEXR).
 
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
@@ -8,18 +8,19 @@ use std::io::{Seek, Write};
 /// Contents of a picture file.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageData<'a> {
-    /// The samples.
+    /// Film that holds the samples.
     pub film: &'a Film,
-    /// Colour and strength of the light groups.
+    /// Weight of each light group: colour times intensity.
     pub mix: &'a LightWeights,
-    /// Name of each light group, for formats with layers.
+    /// Name of each light group, used by formats with layers.
     pub group_names: &'a [String],
-    /// Exposure and tone curve, for formats that hold display values.
+    /// Exposure and tone curve, used by formats that hold display values.
     pub display: Display,
-    /// Bits per channel, for formats that hold display values.
+    /// Bits per channel, used by formats that hold display values.
     pub depth: Depth,
-    /// Metadata keys and values. A key has 1 to 79 printable ASCII characters without leading, trailing
-    /// or double spaces and starts with a capital (OpenEXR's own keys start small).
+    /// Metadata keys and values. A key has 1 to 79 printable ASCII characters, without leading,
+    /// trailing or double spaces. It starts with a capital letter, because OpenEXR's own keys start
+    /// with a small one.
     pub metadata: &'a [(String, String)],
 }
 
@@ -33,6 +34,6 @@ pub enum Depth {
     Sixteen,
 }
 
-/// Destination of an encoder.
+/// Output that an encoder can write to and seek in.
 pub(super) trait WriteSeek: Write + Seek {}
 impl<T: Write + Seek> WriteSeek for T {}

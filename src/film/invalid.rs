@@ -1,14 +1,14 @@
-//! Invalid samples: NaN or negative.
+//! Invalid samples: samples that are NaN or negative.
 
-/// Number of invalid samples that are remembered one by one; further ones are counted.
+/// Number of invalid samples whose positions are stored. Further ones are only counted.
 pub const INVALID_REMEMBERED: usize = 16;
 
-/// Position of a sample, sufficient to trace it again.
+/// Position of a sample. It is sufficient to trace the sample again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct InvalidSample {
-    /// Index in the replicate's sequence.
+    /// Index in the sample sequence of the replicate.
     pub index: u32,
-    /// 0: A, 1: B.
+    /// Replicate; 0: A, 1: B.
     pub replicate: u8,
     /// Row, from the top, in pixels.
     pub y: u32,
@@ -16,13 +16,13 @@ pub struct InvalidSample {
     pub x: u32,
 }
 
-/// Number of invalid samples, and the first of them in the order of [`InvalidSample`]'s fields, which does
-/// not depend on threads.
+/// Number of invalid samples, and the positions of the first ones. They are sorted by the fields of
+/// [`InvalidSample`], so that the result does not depend on threads.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InvalidSamples {
     /// Number of invalid samples.
     pub count: u64,
-    /// The first [`INVALID_REMEMBERED`], ascending.
+    /// Positions of the first [`INVALID_REMEMBERED`] invalid samples, in ascending order.
     pub first: Vec<InvalidSample>,
 }
 

@@ -1,28 +1,29 @@
-//! Light group weights: conversion of the film's sums to radiance.
+//! Light weights: conversion of the film's integer sums to radiance.
 
 use crate::film::tile::Tile;
 
-/// Colour times intensity of each light group; the film holds sums for unit light.
+/// Weight of each light group: colour times intensity. The film's sums are for unit light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightWeights {
-    /// Red, green, blue of each light group, at least 0.
+    /// Red, green and blue weight of each light group; at least 0.
     pub weights: Vec<[f64; 3]>,
 }
 
 impl LightWeights {
-    /// Weights that select one group of a film of `groups` groups, in unit light.
+    /// Creates weights that show only one light group, in unit light. The film has `groups` groups.
     pub fn only(group: usize, groups: usize) -> Self {
         Self { weights: (0..groups).map(|g| [f64::from(u8::from(g == group)); 3]).collect() }
     }
 
-    /// Factors from sums to radiance times count, `[group][channel]`; `scales` are those of the film.
+    /// Returns the factors that convert sums to radiance times sample count, `[group][channel]`.
+    /// `scales` are the scales of the film.
     pub(super) fn radiance_per_step(&self, scales: &[f64]) -> Vec<f64> {
         assert_eq!(self.weights.len(), scales.len(), "weights for the groups of the film");
         self.weights.iter().zip(scales).flat_map(|(w, scale)| w.map(|w| w / scale)).collect()
     }
 }
 
-/// Choice of replicates.
+/// Replicates that a mean is taken over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Replicates {
     /// Both replicates: the picture.
@@ -33,17 +34,17 @@ pub enum Replicates {
     B,
 }
 
-/// Sums and counts of one pixel.
+/// Integer sums and sample counts of one pixel.
 #[derive(Clone, Copy)]
 pub(super) struct Sums<'a> {
-    /// `[group][channel]`, replicates A and B.
+    /// Sums of the replicates A and B, each `[group][channel]`.
     pub values: [&'a [i64]; 2],
-    /// Number of samples of A and B.
+    /// Number of samples of the replicates A and B.
     pub counts: [u32; 2],
 }
 
 impl Sums<'_> {
-    /// Number of samples of `replicates`.
+    /// Returns the number of samples in `replicates`.
     pub fn count(&self, replicates: Replicates) -> u32 {
         match replicates {
             Replicates::Both => self.counts[0].saturating_add(self.counts[1]),
@@ -52,7 +53,7 @@ impl Sums<'_> {
         }
     }
 
-    /// Sum `i` of `[group][channel]` over `replicates`.
+    /// Returns sum `i`, in `[group][channel]` order, over `replicates`.
     #[inline(always)]
     pub fn value(&self, replicates: Replicates, i: usize) -> f64 {
         match replicates {
@@ -62,7 +63,8 @@ impl Sums<'_> {
         }
     }
 
-    /// Radiance, or black without samples; `per_unit` is from [`LightWeights::radiance_per_step`].
+    /// Returns the radiance of the pixel, or black without samples. `per_unit` is the result of
+    /// [`LightWeights::radiance_per_step`].
     #[inline(always)]
     pub fn mean(&self, replicates: Replicates, per_unit: &[f64]) -> [f64; 3] {
         let count = self.count(replicates);

@@ -1,4 +1,4 @@
-//! Linear float image of the film's size, independent of the film.
+//! Linear float image of the film's size. It does not change when the film does.
 
 use crate::film::box_filter::{box_means, fill_gaps};
 use crate::film::light_weights::{LightWeights, Replicates};
@@ -9,13 +9,14 @@ use crate::film::store::Film;
 pub struct LinearImage {
     width: usize,
     height: usize,
-    /// `[row][column]`.
+    /// Pixels in linear radiance, `[row][column]`.
     pixels: Vec<[f32; 3]>,
 }
 
 impl LinearImage {
-    /// Image of `film` under `weights`. A pixel without samples gets the value of the nearest one of
-    /// its row that has some, a row without samples that of the nearest row.
+    /// Creates the image of `film` under `weights`. A pixel without samples gets the value of the
+    /// nearest pixel of its row that has samples. A row without samples gets the values of the
+    /// nearest row with samples.
     pub fn of_film(film: &Film, weights: &LightWeights) -> Self {
         let (width, height) = (film.width(), film.height());
         let per_unit = weights.radiance_per_step(film.scales());
@@ -34,22 +35,22 @@ impl LinearImage {
         Self { width, height, pixels }
     }
 
-    /// Columns and rows.
+    /// Number of columns and rows.
     pub fn size(&self) -> [usize; 2] {
         [self.width, self.height]
     }
 
-    /// Radiance of the pixel in column `x`, row `y`.
+    /// Returns the radiance of the pixel in column `x` and row `y`.
     ///
     /// # Panics
-    /// If there is no such pixel.
+    /// Panics if there is no such pixel.
     pub fn pixel(&self, x: usize, y: usize) -> [f32; 3] {
         assert!(x < self.width, "column {x} of {}", self.width);
         self.pixels[y * self.width + x]
     }
 
-    /// Means over `cols` x `rows` cells that together cover the picture, `[row][column]`, weighted by
-    /// area.
+    /// Returns the means over `cols` x `rows` cells of equal size that together cover the picture,
+    /// `[row][column]`, weighted by area.
     pub fn resampled(&self, cols: usize, rows: usize) -> Vec<[f32; 3]> {
         let means = box_means(self.size(), [cols, rows], |pixel| self.pixels[pixel].map(f64::from));
         means.into_iter().map(|mean| mean.map(|c| c as f32)).collect()

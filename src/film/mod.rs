@@ -1,9 +1,9 @@
-//! The film: integer sums of samples, and the pictures and noise estimates made of them.
+//! Film: integer sums of samples, and the pictures and noise estimates computed from them.
 //!
-//! Two independent replicates of the picture, A and B, are kept apart: their mean is the picture,
-//! their difference measures the remaining error. Sums are integers, so that the order of addition
-//! changes no bit. Each light group has its own sums, for white light of unit strength;
-//! [`LightWeights`] give it colour and strength afterwards.
+//! The film stores two independent replicates of the picture, A and B. Their mean is the picture;
+//! their difference is a measure of the remaining error. Sums are integers, so that the order of
+//! addition changes no bit. Each light group has its own sums, for white light of unit intensity.
+//! [`LightWeights`] multiply each group by colour and intensity afterwards.
 
 mod box_filter;
 mod canonical_bytes;
@@ -46,5 +46,5 @@ pub use srgb_table::quantised_8;
 pub use store::{Film, Header, Mismatch, TileHandle};
 pub use tile::{MAX_FILM_GROUPS, TILE_PIXELS, Tile, lattice_pixels};
 
-/// Side of a tile, in pixels.
+/// Side of a tile in pixels.
 pub const TILE: usize = 16;

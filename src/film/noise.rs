@@ -1,27 +1,35 @@
-//! Noise estimates from the difference of the two replicates.
+//! Noise estimates: the error of tiles and pictures, estimated from the difference of the two
+//! replicates.
 //!
-//! A and B are independent and equally distributed when their counts are equal. So their half
-//! difference d = (A - B) / 2 has the variance of the picture M = (A + B) / 2, and in linear light the
-//! mean of d^2 is the picture's mean square error, unbiased for any sampler. As displayed, the error
-//! is code(M) - code(truth), where code is the display transform. Its estimates are
-//! code(M) - code(M + d) and code(M) - code(M - d): the distances of the picture from A and B (which are
-//! M + d and M - d) as displayed, squared and averaged. They displace the picture by its own error, so a
-//! curved or clipped tone curve acts on both alike. In the hardest case, dark pixels that few of 16 + 16
-//! samples find lit, true over estimated RMSE is 1.13; it is 1.20 with half the displayed difference of A and B,
-//! and 1.52 with d times the slope at M (a test compares the three).
+//! The replicates A and B are independent, and equally distributed if their sample counts are
+//! equal. The half difference d = (A - B) / 2 then has the variance of the picture M = (A + B) / 2.
+//! In linear light the mean of d^2 is therefore the mean square error of the picture, unbiased for
+//! any sampler.
 //!
-//! One pixel has a single degree of freedom and no meaningful estimate; a tile's is good to some 7 %
-//! if its pixels are alike, and a whole picture's to well under that.
+//! The displayed error is code(M) - code(truth), where code is the display transform to 8-bit
+//! levels. It is estimated by code(M) - code(M + d) and code(M) - code(M - d), squared and
+//! averaged; M + d is A and M - d is B. These differences displace the picture by its own error, so
+//! that a curved or clipped tone curve acts on estimate and error alike. The hardest case are dark
+//! pixels that few of 16 + 16 samples find lit. There the ratio of true to estimated RMSE is 1.13.
+//! It is 1.20 with half the displayed difference of A and B, and 1.52 with d times the slope of the
+//! curve at M (a test compares the three).
 //!
-//! Adaptive sampling prefers the tiles with the largest estimates and neglects those whose estimates are low
-//! by chance. An estimate of the picture from the same numbers is too low: by 2 % of the RMSE after 32
-//! samples per pixel, by 5 % after 8. Therefore a tile is estimated twice, from the two colours of a
-//! chessboard of pixels: black ones decide the allocation, white ones give the reported error. Their samples
-//! are independent. They are half as many, and for a small picture the estimate from all pixels may be
-//! better: the larger of the two is reported.
+//! The estimate of a single pixel has one degree of freedom and is meaningless. The estimate of a
+//! tile has an uncertainty of about 7 % if its pixels are alike; that of a whole picture is far
+//! smaller.
 //!
-//! The error of a sparse picture (stars, hairlines) is concentrated in few pixels. With k effective pixels the
-//! relative uncertainty of the estimated RMSE is 1 / sqrt(2 k), and so is that of the true error.
+//! Adaptive sampling prefers the tiles with the largest estimates, and neglects tiles whose
+//! estimates are low by chance. An estimate of the picture's error from the same numbers would be
+//! too low: by 2 % of the RMSE after 32 samples per pixel, by 5 % after 8. Each tile therefore has
+//! two estimates, from the black and the white squares of a chessboard of pixels, whose samples are
+//! independent. The black pixels give the *allocation estimate*, which adaptive sampling uses. The
+//! white pixels give the *validation estimate*, which is reported. Half of the pixels may give a
+//! worse estimate of a small picture than all pixels do; the larger of the two estimates is
+//! reported.
+//!
+//! The error of a sparse picture (stars, hairlines) is concentrated in few pixels. With k effective
+//! pixels the relative uncertainty of the estimated RMSE is 1 / sqrt(2 k); the true error of a
+//! picture varies by the same ratio.
 
 use crate::film::TILE;
 use crate::film::display::{Display, Tone, toned};
@@ -29,17 +37,17 @@ use crate::film::light_weights::LightWeights;
 use crate::film::srgb_table::SrgbTable;
 use crate::film::tile::Tile;
 
-/// Mean square error over pixels and channels.
+/// Mean square error over all pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mse {
-    /// Error in linear radiance, squared.
+    /// Mean square error of linear radiance.
     pub linear: f64,
-    /// Displayed error, in squared 8-bit levels.
+    /// Mean square error of the displayed picture, in squared 8-bit levels.
     pub codes: f64,
 }
 
 impl Mse {
-    /// Squares ([`TileNoise::squares`]) of an error that is spread over any number of pixels.
+    /// Value of [`TileNoise::squares`] for an error that is spread over many pixels.
     #[cfg(test)]
     pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
 
@@ -52,20 +60,20 @@ impl Mse {
 /// Estimated error of one tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileNoise {
-    /// Validation estimate, reported to the user; no decision depends on it.
+    /// Validation estimate, from the white pixels. It is reported to the user.
     pub reported: Mse,
-    /// Allocation estimate from other pixels, used for decisions.
+    /// Allocation estimate, from the black pixels. It selects tiles for further samples.
     pub allocation: Mse,
-    /// Sum over the pixels of the squares of their squared errors (summed over channels). It determines the number
-    /// of effective pixels.
+    /// Sum over all pixels of the fourth power of the error: for each pixel the squared errors are
+    /// summed over channels, then squared. It determines the number of effective pixels.
     pub squares: Mse,
-    /// Number of pixels of the tile inside the picture.
+    /// Number of pixels of the tile that are inside the picture.
     pub pixels: u32,
 }
 
-/// Estimator of tile errors under given light weights and display transform.
+/// Estimator of tile errors under the given light weights and display transform.
 pub struct Estimator {
-    /// `[group][channel]`.
+    /// Factors from sums to radiance times count, `[group][channel]`.
     per_unit: Vec<f64>,
     exposure: f64,
     tone: Tone,
@@ -73,7 +81,8 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// Creates an estimator for tiles of films with these `scales` (see [`Film::scales`](crate::film::Film::scales)).
+    /// Creates an estimator for the tiles of a film. `scales` are those of the film (see
+    /// [`Film::scales`](crate::film::Film::scales)).
     pub fn new(scales: &[f64], mix: &LightWeights, display: &Display) -> Self {
         Self {
             per_unit: mix.radiance_per_step(scales),
@@ -83,18 +92,21 @@ impl Estimator {
         }
     }
 
-    /// Estimates the error of a tile; `None` while A and B have different numbers of samples, or none.
+    /// Estimates the error of a tile. Returns `None` if A and B have different numbers of samples,
+    /// or none.
     pub fn tile(&self, tile: &Tile) -> Option<TileNoise> {
         let [count, count_b] = tile.counts();
         if count == count_b { self.tile_so_far(tile) } else { None }
     }
 
-    /// Estimates the error of a tile, also while B has fewer samples than A; `None` while either has none.
+    /// Estimates the error of a tile, even if B has fewer samples than A. Returns `None` if A or B
+    /// has no samples.
     ///
-    /// With n and m samples of variance v each, (A - B)^2 has the mean v (n + m) / nm and the picture,
-    /// (nA + mB) / (n + m), has the variance v / (n + m). Hence d = (A - B) sqrt(nm) / (n + m) replaces
-    /// the half difference. This holds for independent samples; where errors fall faster the estimate is
-    /// too high, by at most a quarter while B has at least half of the samples of A.
+    /// With n and m samples of variance v each, (A - B)^2 has the mean v (n + m) / nm. The picture
+    /// (nA + mB) / (n + m) has the variance v / (n + m). Hence d = (A - B) sqrt(nm) / (n + m)
+    /// replaces the half difference. This is exact for independent samples. For samplers whose
+    /// errors fall faster the estimate is too high, by at most a quarter if B has at least half as
+    /// many samples as A.
     pub fn tile_so_far(&self, tile: &Tile) -> Option<TileNoise> {
         let counts = tile.counts();
         if counts.contains(&0) || tile.lattice_px() != 0 {
@@ -141,7 +153,7 @@ impl Estimator {
             let values = (3 * pixels) as f64;
             Mse { linear: sums.linear / values, codes: sums.codes / values }
         };
-        // A single pixel serves both estimates.
+        // A tile with a single pixel uses it for both estimates.
         let black = mean_over(halves[0], pixels.div_ceil(2));
         let white = if pixels > 1 { mean_over(halves[1], pixels / 2) } else { black };
         Some(TileNoise { reported: white, allocation: black, squares, pixels: pixels as u32 })
@@ -165,7 +177,7 @@ fn weighted(sums: &[i64], per_sum: &[f64]) -> [f64; 3] {
 }
 
 impl TileNoise {
-    /// Estimate from all pixels.
+    /// Estimate from all pixels, black and white.
     pub fn of_all(&self) -> Mse {
         let [black, white] = [self.pixels.div_ceil(2), self.pixels / 2].map(f64::from);
         let mean = |black_mse: f64, white_mse: f64| {
@@ -178,24 +190,25 @@ impl TileNoise {
     }
 }
 
-/// Estimated error of a whole picture.
+/// Estimated error of a whole picture. `rmse` is the root mean square error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Root mean square error in linear radiance.
     pub rmse_linear: f64,
     /// Root mean square error as displayed, in 8-bit levels.
     pub rmse_codes: f64,
-    /// 95th percentile of the tiles' RMSE, in 8-bit levels.
+    /// 95th percentile of the RMSE of the tiles, in 8-bit levels.
     pub p95_codes: f64,
     /// Largest RMSE of a tile, in 8-bit levels.
     pub worst_codes: f64,
-    /// Number of effective pixels (Kish's effective sample size): the squared sum of the pixels' squared errors over the
-    /// sum of their squares. 0 without any error.
+    /// Number of effective pixels (Kish's effective sample size): with e the squared error of a
+    /// pixel, it is (sum of e)^2 / (sum of e^2). It is 0 if there is no error.
     pub effective_pixels: Mse,
 }
 
 impl Noise {
-    /// Combines the estimates of all tiles; `None` without tiles or if one is missing.
+    /// Combines the estimates of all tiles. Returns `None` if there are no tiles or an estimate is
+    /// missing.
     pub fn of_tiles(tiles: impl IntoIterator<Item = Option<TileNoise>>) -> Option<Self> {
         let (mut reported, mut all, mut pixels) = (Mse::default(), Mse::default(), 0.0);
         let mut squares = Mse::default();
@@ -209,12 +222,12 @@ impl Noise {
             pixels += weight;
             tile_errors.push(tile.of_all().codes);
         }
-        // The smallest value that at least 95 % of the tiles do not exceed.
+        // Smallest value that at least 95 % of the tiles do not exceed.
         let rank = (tile_errors.len() * 19).div_ceil(20).checked_sub(1)?;
         let (_, p95, _) = tile_errors.select_nth_unstable_by(rank, f64::total_cmp);
         let p95_codes = p95.sqrt();
         let worst = tile_errors.iter().copied().fold(0.0, f64::max);
-        // The sums hold means over the three channels, the squares hold sums over them.
+        // The sums contain means over the three channels, the squares contain sums over channels.
         let effective = |sum: f64, squares: f64| {
             let sum = 3.0 * sum;
             if squares > 0.0 { sum * sum / squares } else { 0.0 }

@@ -1,12 +1,12 @@
-//! Noise estimates against known errors.
+//! Noise estimates compared with known errors.
 
 use crate::film::noise::*;
 use crate::film::testing::{Rng, each_tile, fill, film, white};
 use crate::film::*;
 use crate::film::{Replicates, quantised_8};
 
-/// Pixel of known mean. Its samples are `dark + LIGHT` with probability `chance` and `dark` otherwise, or
-/// normally distributed around the mean.
+/// Pixel of known mean. Its samples are `dark + LIGHT` with probability `chance` and `dark`
+/// otherwise. If `normal` is set, they are normally distributed around the mean.
 #[derive(Clone, Copy)]
 struct Pixel {
     chance: f64,
@@ -22,7 +22,8 @@ impl Pixel {
         [0, 1, 2].map(|c| self.dark[c] + self.chance * LIGHT[c])
     }
 
-    /// Sum of `n` samples; stratified ones use one number in each n-th of the unit interval.
+    /// Returns the sum of `n` samples. Stratified samples use one random number in each n-th of the
+    /// unit interval.
     fn sum(self, n: u32, stratified: bool, rng: &mut Rng) -> [f64; 3] {
         let count = f64::from(n);
         let hits = if self.normal {
@@ -38,7 +39,8 @@ impl Pixel {
     }
 }
 
-/// Pixels of a picture of 64x48; the light is visible from them with probabilities from 0 to 1.
+/// Returns the pixels of a picture of 64x48. The light is visible from them with probabilities from
+/// 0 to 1.
 fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
     (0..64 * 48).map(|_| Pixel { chance: rng.unit(), normal, dark }).collect()
 }
@@ -46,11 +48,11 @@ fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
 struct Outcome {
     linear: Vec<f64>,
     codes: Vec<f64>,
-    /// Relative standard deviation of a tile's estimated RMSE over the seeds, in the mean over tiles.
+    /// Relative standard deviation of a tile's estimated RMSE over the seeds; mean over all tiles.
     tile_spread: f64,
 }
 
-/// Ratio of true to estimated RMSE for each of 20 seeds.
+/// Returns the ratio of true to estimated RMSE for each of 20 seeds.
 fn ratios(n: u32, normal: bool, stratified: bool, dark: [f64; 3]) -> Outcome {
     let pixels = scene(normal, dark, &mut Rng(11));
     let (mix, display) = (white(1), Display::default());
@@ -117,8 +119,8 @@ fn estimates_equal_true_errors_in_the_mean() {
     }
 }
 
-/// Comparison with the two simpler estimates for dark pixels that few samples find lit, where the tone
-/// curve is steep and bent.
+/// Compares the estimate with the two simpler ones for dark pixels that few samples find lit. There
+/// the tone curve is steep and bent.
 #[test]
 fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
     let (n, mut rng) = (16u32, Rng(5));
@@ -151,7 +153,7 @@ fn estimate_of_one_pixel_matches_the_formula() {
     let mix = LightWeights { weights: vec![[1.0; 3], [0.0, 0.0, 0.25]] };
     let display = Display { exposure_ev: 1.0, tone: Tone::Clip };
     let tile = Estimator::new(film.scales(), &mix, &display).tile(film.tile(0).unwrap()).unwrap();
-    // Red 0.125 and 0.25, blue 0.25 + 0.25 and 0.25.
+    // The half differences are those of red (0.125 and 0.25) and blue (0.25 + 0.25 and 0.25).
     let expected = (0.0625f64.powi(2) + 0.125f64.powi(2)) / 3.0;
     assert!((tile.reported.linear - expected).abs() < 1e-15, "{tile:?}");
     let code = |x: f64| display.codes([x; 3])[0];
@@ -175,7 +177,7 @@ fn both_tone_curves_are_estimated_as_displayed() {
         let display = Display { exposure_ev: -0.5, tone };
         let (mut film, mut rng) = (film(16, 16, &[2f64.powi(20)]), Rng(3));
         fill(&mut film, 1, |_, _, _| (0..3).map(|_| 2.0 * rng.unit()).collect());
-        // The white squares of the chessboard give the reported error.
+        // The reported error comes from the white squares of the chessboard.
         let mut mse = 0.0;
         for y in 0..16 {
             let [m, a, b] = [Replicates::Both, Replicates::A, Replicates::B].map(|replicates| {
@@ -218,7 +220,7 @@ fn unequal_counts_have_no_noise() {
     assert_eq!(noise(&film), None);
 }
 
-/// The mean estimate between two waves, over many tiles, equals the variance of the picture.
+/// The mean over many tiles of the estimate between two waves equals the variance of the picture.
 #[test]
 fn replicate_with_fewer_samples_still_has_an_estimate() {
     let display = Display { exposure_ev: -2.0, tone: Tone::Clip };
@@ -263,7 +265,7 @@ fn noise_combines_the_tiles() {
     assert!((noise.rmse_linear - 0.1).abs() < 1e-15);
     assert!((noise.rmse_codes - 143.5f64.sqrt()).abs() < 1e-12);
     assert_eq!((noise.p95_codes, noise.worst_codes), (19.0, 20.0));
-    // The larger of the estimates from half the pixels and from all pixels counts.
+    // The larger of the estimates from half of the pixels and from all pixels is reported.
     let rmse = |reported: f64, allocation: f64| {
         let mse = |x: f64| Mse { linear: x, codes: x };
         let tile = TileNoise {

@@ -1,4 +1,5 @@
-//! Picture files: format by extension, and atomic replacement that keeps the old file on failure.
+//! Picture files: chooses the format by extension, and replaces files atomically, so that a failure
+//! leaves the old file unchanged.
 
 use crate::film::image_data::{ImageData, WriteSeek};
 use crate::film::{exr, png};
@@ -15,29 +16,29 @@ struct Format {
     encode: fn(&ImageData, &mut dyn WriteSeek) -> io::Result<()>,
 }
 
-/// Formats that can be written.
+/// All formats that can be written.
 static FORMATS: [Format; 2] = [
     Format { extension: "png", encode: png::encode },
     Format { extension: "exr", encode: exr::encode },
 ];
 
-/// A picture file to be written: a path whose extension names a known format.
+/// Picture file to be written: a path with the extension of a known format.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImageOutput {
     path: PathBuf,
     format: usize,
-    /// Fails if the file exists.
+    /// `true` if writing fails when the file exists.
     create_new: bool,
 }
 
-/// Reason why a picture cannot be written.
+/// Reason for which a picture cannot be written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WriteError {
     /// The requested file.
     pub path: PathBuf,
-    /// The problem, as a clause.
+    /// Problem, as a clause of a sentence.
     pub what: String,
-    /// The remedy, as a clause.
+    /// Advice to the user, as a clause of a sentence.
     pub remedy: String,
 }
 
@@ -50,7 +51,7 @@ impl fmt::Display for WriteError {
 impl std::error::Error for WriteError {}
 
 impl ImageOutput {
-    /// Chooses the format by the path's extension, in upper or lower case. Touches no file.
+    /// Chooses the format by the extension of `path`, in upper or lower case. Accesses no file.
     ///
     /// # Errors
     /// Fails if the extension is missing or unknown.
@@ -78,7 +79,8 @@ impl ImageOutput {
         }
     }
 
-    /// Output that fails to write if the file exists, or is created before this one is complete.
+    /// Returns an output that fails to write if the file exists, or if another program creates it
+    /// in the meantime.
     pub fn create_new(self) -> Self {
         Self { create_new: true, ..self }
     }
@@ -88,16 +90,16 @@ impl ImageOutput {
         &self.path
     }
 
-    /// Checks before the work that the file can be written, without changing it.
+    /// Checks that the file can be written, without changing it. Called before a long render.
     ///
     /// # Errors
-    /// Returns the error that writing would give now.
+    /// Returns the error that writing would return now.
     pub fn check_writable(&self) -> Result<(), WriteError> {
         self.prepare().map(drop)
     }
 
-    /// Writes the picture to a temporary file in the same directory and renames it when it is complete
-    /// and on the disk.
+    /// Writes the picture to a temporary file in the same directory. Renames the file when it is
+    /// complete and stored on the disk.
     ///
     /// # Errors
     /// Fails if the file cannot be written; an existing file is then unchanged.
@@ -120,8 +122,8 @@ impl ImageOutput {
             false => temporary.persist(&file),
         };
         renamed.map_err(|e| explain(e.error))?;
-        // Makes the new name durable. Not every system lets a directory be opened or synced; the
-        // picture is complete either way.
+        // Stores the new name on the disk. Some systems do not let a directory be opened or
+        // synchronised; the picture is complete in any case.
         if let Ok(directory) = File::open(&directory) {
             let _ = directory.sync_all();
         }
@@ -129,7 +131,7 @@ impl ImageOutput {
     }
 
     fn prepare(&self) -> Result<PendingFile, WriteError> {
-        // A symbolic link stays; its destination is replaced.
+        // A symbolic link is kept, and the file to which it points is replaced.
         let is_link = self.path.symlink_metadata().is_ok_and(|m| m.file_type().is_symlink());
         let file = match is_link.then(|| fs::canonicalize(&self.path)) {
             Some(Ok(real)) => real,
@@ -153,14 +155,16 @@ impl ImageOutput {
                 return Err(self.error("the existing file is read-only", remedy));
             }
         }
-        // An existing file keeps its permissions; a new one gets those that the user's umask leaves.
+        // An existing file keeps its permissions. A new file gets those that the user's umask
+        // allows.
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
             builder.permissions(fs::Permissions::from_mode(0o666));
         }
         let created = builder.tempfile_in(&directory).and_then(|temporary| {
-            // The lock marks a file in use; where files cannot be locked, leftovers are not removed.
+            // The lock shows that the file is in use. On file systems without locks, leftover files
+            // are not removed.
             let _ = temporary.as_file().try_lock();
             if let Some(existing) = &existing {
                 temporary.as_file().set_permissions(existing.permissions())?;
@@ -205,7 +209,7 @@ impl ImageOutput {
     }
 }
 
-/// Temporary file and its destination.
+/// Temporary file, and the path that it gets when it is complete.
 struct PendingFile {
     file: PathBuf,
     directory: PathBuf,
@@ -317,7 +321,7 @@ mod tests {
         assert!(link.symlink_metadata().unwrap().file_type().is_symlink());
         assert_eq!(fs::read(&real).unwrap(), b"new");
         assert_eq!(fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o640);
-        // A new file is readable as any other that the user creates.
+        // A new file has the permissions of any other file that the user creates.
         let (new, plain) = (dir.path().join("new.png"), dir.path().join("plain"));
         ImageOutput::from_path(&new).unwrap().replace(|sink| sink.write_all(b"new")).unwrap();
         fs::write(&plain, "").unwrap();

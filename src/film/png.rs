@@ -28,7 +28,8 @@ fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), Encodi
         Depth::Sixteen => BitDepth::Sixteen,
     });
     encoder.set_compression(Compression::Fast);
-    // The values that the PNG specification gives for sRGB, for readers that do not know its chunk.
+    // Gamma and chromaticities that the PNG specification gives for sRGB, for readers that ignore
+    // the sRGB chunk.
     encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
     encoder.set_source_gamma(ScaledFloat::from_scaled(45_455));
     let xy = |x, y| (ScaledFloat::from_scaled(x), ScaledFloat::from_scaled(y));
@@ -39,7 +40,7 @@ fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), Encodi
         blue: xy(15_000, 6_000),
     });
     for (key, value) in picture.metadata {
-        // The older chunk is more widely read, but holds Latin-1 only.
+        // More programs read the older text chunk, but it can hold only Latin-1.
         if value.is_ascii() {
             encoder.add_text_chunk(key.clone(), value.clone())?;
         } else {
@@ -54,7 +55,7 @@ fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), Encodi
 /// Encodes rows of red, green, blue, 8 bits each, sRGB, as PNG.
 ///
 /// # Errors
-/// Fails if the number of bytes differs from the size.
+/// Fails if `rgb` has not 3 bytes for each pixel.
 pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, width, height);
@@ -67,7 +68,8 @@ pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> 
     Ok(bytes)
 }
 
-/// Bytes of the picture: rows of red, green, blue; 16-bit values are big-endian, as in PNG.
+/// Returns the bytes of the picture: rows of red, green, blue. 16-bit values are big-endian, as PNG
+/// requires.
 fn pixels(picture: &ImageData) -> Vec<u8> {
     let (film, mut row) = (picture.film, Vec::new());
     let bytes_per_channel = match picture.depth {

@@ -5,10 +5,11 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-/// Largest number of pixels that is read: the limit of scenes.
+/// Largest number of pixels that is read. Scenes have the same limit.
 const MAX_PIXELS: u64 = 1 << 26;
 
-/// Returns width and height of a PNG and its 8-bit sRGB pixels, `[row][column]`, without transparency.
+/// Reads a PNG file. Returns width and height, and the pixels in 8-bit sRGB, `[row][column]`,
+/// without transparency.
 ///
 /// # Errors
 /// Fails if the file cannot be read or is too large.
@@ -33,7 +34,7 @@ pub fn read_png(path: &Path) -> Result<([usize; 2], Vec<[u8; 3]>), String> {
         ColorType::GrayscaleAlpha => {
             codes.as_chunks::<2>().0.iter().map(|[y, _]| [*y; 3]).collect()
         }
-        // Palettes are expanded.
+        // The decoder has expanded palettes already.
         ColorType::Grayscale | ColorType::Indexed => codes.iter().map(|y| [*y; 3]).collect(),
     };
     Ok(([width as usize, height as usize], pixels))
@@ -52,7 +53,7 @@ mod tests {
         std::fs::write(&path, png_of_rgb([5, 3], &codes).unwrap()).unwrap();
         let (size, pixels) = read_png(&path).unwrap();
         assert_eq!((size, pixels.as_flattened()), ([5, 3], &codes[..]));
-        // Truncated at any length, it gives an error or the picture.
+        // A truncated file gives an error or the complete picture.
         let whole = std::fs::read(&path).unwrap();
         for length in 0..whole.len() {
             std::fs::write(&path, &whole[..length]).unwrap();

@@ -1,4 +1,4 @@
-//! Probe of one pixel.
+//! Probe: samples, value and error of one pixel, for display in the viewer.
 
 use crate::film::TILE;
 use crate::film::display::Display;
@@ -9,25 +9,28 @@ use crate::film::store::Film;
 /// Samples, value and error of one pixel under given light weights and display transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probe {
-    /// Column and row of the film.
+    /// Column and row of the pixel in the film.
     pub pixel: [usize; 2],
-    /// Number of samples of replicates A and B.
+    /// Number of samples in the replicates A and B.
     pub samples: [u32; 2],
-    /// Linear radiance; black without samples.
+    /// Linear radiance of the pixel; black without samples.
     pub radiance: [f64; 3],
-    /// Displayed value in 8-bit levels, 0..=255, unrounded.
+    /// Value of the pixel on the display in 8-bit levels, 0..=255, not rounded.
     pub codes: [f64; 3],
-    /// Half the difference of A and B, in radiance: an estimate of the pixel's error with one degree of
-    /// freedom, good to a factor of two or three. `None` without samples of both.
+    /// Half the difference of A and B, in radiance. It is an estimate of the pixel's error with one
+    /// degree of freedom, correct within a factor of two or three. `None` if A or B has no samples.
     pub difference: Option<[f64; 3]>,
-    /// Estimated RMSE of the pixels of its tile in linear radiance; `None` without samples of both.
+    /// Estimated RMSE of the tile that contains the pixel, in linear radiance. `None` if A or B has
+    /// no samples.
     pub tile_rmse_linear: Option<f64>,
-    /// Estimated RMSE of the pixels of its tile as displayed, in 8-bit levels.
+    /// Estimated RMSE of the tile that contains the pixel, on the display in 8-bit levels. `None`
+    /// if A or B has no samples.
     pub tile_rmse_codes: Option<f64>,
 }
 
 impl Probe {
-    /// Probes the pixel in column `x`, row `y` of `film`; `None` if it lies outside.
+    /// Probes the pixel in column `x` and row `y` of `film`. Returns `None` if the pixel is outside
+    /// of the film.
     pub fn of_film(
         film: &Film,
         [x, y]: [usize; 2],
@@ -92,7 +95,7 @@ mod tests {
         assert_eq!(full.radiance, [2.0, 4.0, 6.0]);
         assert_eq!(full.codes, display.codes([2.0, 4.0, 6.0]));
         assert_eq!(full.difference, Some([1.0, 2.0, 0.0]));
-        // The tile in the corner has 4 x 2 pixels; one is wrong by 1 in red, 2 in green.
+        // The corner tile has 4 x 2 pixels. One of them has an error of 1 in red and 2 in green.
         let rmse = full.tile_rmse_linear.unwrap();
         assert!((rmse - (5.0f64 / 24.0).sqrt()).abs() < 1e-12, "{rmse}");
         assert!(full.tile_rmse_codes.is_some_and(|codes| codes > 0.0));

@@ -1,23 +1,25 @@
-//! Lookup table of the sRGB encoding, many times faster than the power function.
+//! Lookup table of the sRGB encoding, which is many times faster than the power function.
 
 use crate::value::srgb_from_linear;
 use std::sync::LazyLock;
 
-/// Segments per octave (power of two).
+/// Base-2 logarithm of the number of table entries per octave (factor 2 of linear light).
 const SEGMENTS_LOG2: u32 = 7;
-/// Exponent of the power of two below which the encoding is linear (it is up to 0.0031308).
+/// Exponent of the power of two below which a single entry is exact: the encoding is linear up to
+/// 0.0031308.
 const FIRST_OCTAVE: i32 = -9;
 const SHIFT: u32 = 52 - SEGMENTS_LOG2;
-/// Upper bits of 2^FIRST_OCTAVE, less one: entry 0 is the linear part.
+/// Upper bits of 2^FIRST_OCTAVE as a double, minus one. Entry 0 holds the linear part.
 const BASE: u64 = (((1023 + FIRST_OCTAVE) as u64) << SEGMENTS_LOG2) - 1;
 const ENTRIES: usize = ((-FIRST_OCTAVE as usize) << SEGMENTS_LOG2) + 2;
 
-/// Largest difference from the exact encoding, in 8-bit levels.
+/// Largest difference from the exact encoding in 8-bit levels.
 const MAX_ERROR_CODES: f64 = 5.5e-4;
 
-/// Piecewise linear sRGB encoding through exact points, 128 to an octave of linear light.
+/// Piecewise linear approximation of the sRGB encoding, exact at 128 points per octave of linear
+/// light.
 pub(super) struct SrgbTable {
-    /// `[value at 0, slope]` of each chord, in 8-bit levels.
+    /// Value at 0 and slope of each linear piece, in 8-bit levels.
     chords: [[f64; 2]; ENTRIES],
 }
 
@@ -41,7 +43,8 @@ impl SrgbTable {
         Self { chords }
     }
 
-    /// Unrounded sRGB value, 0..=255, of linear light 0..=1; within 5.5e-4 of the exact one.
+    /// Encodes linear light 0..=1 as an sRGB value 0..=255, not rounded; within 5.5e-4 of the exact
+    /// value.
     #[inline(always)]
     pub fn code(&self, linear: f64) -> f64 {
         let entry = (linear.to_bits() >> SHIFT).saturating_sub(BASE) as usize;
@@ -49,7 +52,7 @@ impl SrgbTable {
         at_zero + slope * linear
     }
 
-    /// 8-bit sRGB value of linear light 0..=1, as rounded from the exact encoding.
+    /// Encodes linear light 0..=1 as an 8-bit sRGB value. It equals the rounded exact encoding.
     #[inline]
     pub fn code_8(&self, linear: f64) -> u8 {
         let above = self.code(linear) + 0.5;
@@ -61,7 +64,7 @@ impl SrgbTable {
     }
 }
 
-/// Rounds a value 0..=255 to 8 bits.
+/// Rounds a value from 0 to 255 to 8 bits.
 pub fn quantised_8(code: f64) -> u8 {
     code.round() as u8
 }
@@ -92,7 +95,7 @@ mod tests {
             let linear = f64::from(i) * 5e-6;
             assert_eq!(SrgbTable::shared().code_8(linear), exact(linear), "{linear}");
         }
-        // Around every border between two 8-bit values.
+        // All values close to a border between two 8-bit values.
         for border in (0..255).map(|code| (f64::from(code) + 0.5) / 255.0) {
             let linear = linear_from_srgb(border);
             for step in -2000..=2000 {

@@ -1,4 +1,5 @@
-//! The film: tiles of integer sums, cleared lazily, added exactly.
+//! Film: tiles of integer sums. Tiles are cleared when they are next written, and added without
+//! rounding.
 
 use crate::film::TILE;
 use crate::film::display::Display;
@@ -8,24 +9,25 @@ use crate::film::noise::{Estimator, Noise};
 use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::fmt;
 
-/// Properties that films must share to be added.
+/// Properties of a film. Two films can be added only if their headers are equal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
-    /// Columns, in pixels, at least 1.
+    /// Width in pixels, at least 1.
     pub width: usize,
-    /// Rows, in pixels, at least 1.
+    /// Height in pixels, at least 1.
     pub height: usize,
-    /// Factor of each light group by which a sample is multiplied before it is rounded to an integer; a
-    /// power of two, so that the product is exact.
+    /// Scale of each light group: samples are multiplied by it before they are rounded to integers.
+    /// It is a power of two, so that the product is exact.
     pub scales: Vec<f64>,
     /// Random seed of all samples.
     pub seed: u64,
-    /// Precision of the samples, `single` or `double`. The number of lanes changes no bit.
+    /// Precision of the samples, `single` or `double`. The number of lanes does not change the
+    /// samples.
     pub precision: String,
 }
 
-/// Integer sums of samples for every pixel, light group, channel and replicate: the order of addition
-/// changes no bit. The sums of a pixel divided by `scale * count` are radiance.
+/// Integer sums of samples for every pixel, light group, channel and replicate. The order of
+/// addition changes no bit. Radiance is the sum of a pixel divided by `scale * count`.
 #[derive(Debug)]
 pub struct Film {
     header: Header,
@@ -33,31 +35,32 @@ pub struct Film {
     tiles: Vec<Tile>,
 }
 
-/// Exclusive access to a tile for one worker, which allocates or clears it by [`TileHandle::prepare`].
+/// Exclusive access to a tile for one thread. [`TileHandle::prepare`] allocates or clears the tile.
 #[derive(Debug)]
 pub struct TileHandle<'a> {
-    /// Number of the tile.
+    /// Number of the tile; tiles are numbered row by row.
     pub index: usize,
-    /// Column and row of its upper left pixel.
+    /// Column and row of the tile's upper left pixel.
     pub origin: [usize; 2],
     tile: &'a mut Tile,
     epoch: u64,
 }
 
 impl<'a> TileHandle<'a> {
-    /// Allocates or clears the tile if necessary and returns it.
+    /// Returns the tile. Before that it is allocated or cleared if necessary.
     pub fn prepare(self) -> &'a mut Tile {
         self.tile.clear_if_stale(self.epoch);
         self.tile
     }
 }
 
-/// Reason why two films cannot be added.
+/// Reason for which two films cannot be added.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mismatch {
-    /// Name of the property in which they differ, and the value of each.
+    /// The headers of the two films differ. The fields are the name of the property, its value in
+    /// the first film, and its value in the second film.
     Header(&'static str, String, String),
-    /// Both hold parts of the first sample of the tile with this number.
+    /// Both films hold parts of the first sample of the tile with this number.
     Overlap(usize),
 }
 
@@ -84,8 +87,8 @@ impl Film {
     /// Creates a film without samples.
     ///
     /// # Panics
-    /// If width, height or the number of groups is 0, there are more than [`MAX_FILM_GROUPS`], or a
-    /// scale is not a power of two.
+    /// Panics if width, height or the number of groups is 0, if there are more than
+    /// [`MAX_FILM_GROUPS`] groups, or if a scale is not a power of two.
     pub fn new(header: Header) -> Self {
         let Header { width, height, scales, .. } = &header;
         assert!(*width > 0 && *height > 0, "a film of {width} x {height} pixels");
@@ -104,7 +107,8 @@ impl Film {
         Self { epoch: 1, tiles, header }
     }
 
-    /// Creates a film without samples in the memory of this one, which may have another header.
+    /// Creates a film without samples. It uses the memory of this film, which may have another
+    /// header.
     ///
     /// # Panics
     /// Panics in the same cases as [`Film::new`].
@@ -114,7 +118,7 @@ impl Film {
             return self;
         }
         let mut film = Self::new(header);
-        // Later than every epoch of the old tiles.
+        // Larger than every epoch of the old tiles.
         film.epoch = self.epoch + 1;
         let memory = self.tiles.into_iter().map(Tile::into_memory);
         film.tiles = film
@@ -126,12 +130,12 @@ impl Film {
         film
     }
 
-    /// Columns, in pixels.
+    /// Width in pixels.
     pub fn width(&self) -> usize {
         self.header.width
     }
 
-    /// Rows, in pixels.
+    /// Height in pixels.
     pub fn height(&self) -> usize {
         self.header.height
     }
@@ -141,7 +145,8 @@ impl Film {
         self.header.scales.len()
     }
 
-    /// Factors of the light groups by which samples are multiplied before rounding; powers of two.
+    /// Scale of each light group: samples are multiplied by it before rounding. It is a power of
+    /// two.
     pub fn scales(&self) -> &[f64] {
         &self.header.scales
     }
@@ -151,22 +156,22 @@ impl Film {
         &self.header
     }
 
-    /// Number of restarts. Within one epoch, equal counts of a tile mean equal contents.
+    /// Number of restarts. While it is unchanged, equal counts of a tile mean equal contents.
     pub(super) fn epoch(&self) -> u64 {
         self.epoch
     }
 
-    /// Discards all samples. Pixels are cleared when they are next written.
+    /// Discards all samples. The sums of a pixel are cleared when it is next written.
     pub fn restart(&mut self) {
         self.epoch += 1;
     }
 
-    /// Number of tiles; they are numbered row by row.
+    /// Number of tiles. Tiles are numbered row by row.
     pub fn tile_count(&self) -> usize {
         self.tiles.len()
     }
 
-    /// Tiles in a row of tiles.
+    /// Number of tiles in a row.
     pub fn tile_columns(&self) -> usize {
         self.header.width.div_ceil(TILE)
     }
@@ -177,20 +182,21 @@ impl Film {
         [index % columns * TILE, index / columns * TILE]
     }
 
-    /// Returns a tile if it has been touched since the last restart.
+    /// Returns a tile. Returns `None` if it has not been prepared since the last restart.
     pub fn tile(&self, index: usize) -> Option<&Tile> {
         Some(&self.tiles[index]).filter(|tile| tile.is_of(self.epoch))
     }
 
-    /// Touched tiles with their numbers.
+    /// Iterates over the tiles that have been prepared since the last restart, with their numbers.
     pub fn touched(&self) -> impl Iterator<Item = (usize, &Tile)> {
         self.tiles.iter().enumerate().filter(|(_, tile)| tile.is_of(self.epoch))
     }
 
-    /// Handles of tiles, in the order of `indices`, each to be prepared by the thread that works on it.
+    /// Returns handles of tiles, in the order of `indices`. The thread that works on a tile
+    /// prepares it.
     ///
     /// # Panics
-    /// If an index occurs twice or is not below [`Film::tile_count`].
+    /// Panics if an index occurs twice or is not below [`Film::tile_count`].
     pub fn slots(&mut self, indices: &[usize]) -> Vec<TileHandle<'_>> {
         let mut order: Vec<usize> = (0..indices.len()).collect();
         order.sort_unstable_by_key(|i| indices[*i]);
@@ -210,7 +216,7 @@ impl Film {
         handles.into_iter().flatten().collect()
     }
 
-    /// Number of samples of all pixels and both replicates.
+    /// Number of samples, over all pixels and both replicates.
     pub fn samples(&self) -> u64 {
         let samples_of_tile = |tile: &Tile| {
             let [width, height] = tile.extent();
@@ -224,11 +230,11 @@ impl Film {
         self.touched().map(|(_, tile)| samples_of_tile(tile)).sum()
     }
 
-    /// Radiance of the pixel in column `x`, row `y`: the mean over all its samples of both
-    /// replicates; black without samples.
+    /// Returns the radiance of the pixel in column `x` and row `y`: the mean over its samples in
+    /// both replicates, or black without samples.
     ///
     /// # Panics
-    /// If there is no such pixel.
+    /// Panics if there is no such pixel.
     pub fn pixel(&self, x: usize, y: usize, weights: &LightWeights) -> [f64; 3] {
         assert!(x < self.width() && y < self.height(), "pixel ({x}, {y}) of the film");
         let index = y / TILE * self.tile_columns() + x / TILE;
@@ -237,7 +243,7 @@ impl Film {
         self.tile(index).map_or([0.0; 3], |tile| tile.sums(pixel).mean(Replicates::Both, &per_unit))
     }
 
-    /// Writes the radiance of row `y` to `row`, which is resized to the film's width.
+    /// Writes the radiance of the pixels in row `y` to `row`, which is resized to the film's width.
     pub fn row(
         &self,
         y: usize,
@@ -251,7 +257,8 @@ impl Film {
         self.visit_row(y, |x, sums| row[x] = sums.mean(replicates, &per_unit));
     }
 
-    /// Calls `f` with the column and the sums of each pixel of row `y` in touched tiles.
+    /// Calls `f` with the column and the sums of each pixel of row `y`. Tiles without samples are
+    /// skipped.
     pub(super) fn visit_row(&self, y: usize, mut f: impl FnMut(usize, Sums)) {
         let columns = self.tile_columns();
         for column in 0..columns {
@@ -262,40 +269,43 @@ impl Film {
         }
     }
 
-    /// Estimated error of the picture; `None` while a tile has unequal numbers of samples in A and B.
+    /// Estimated error of the picture. Returns `None` if a tile has unequal numbers of samples in A
+    /// and B, or none.
     pub fn noise(&self, weights: &LightWeights, display: &Display) -> Option<Noise> {
         let estimator = Estimator::new(self.scales(), weights, display);
         let noise_of_tile = |index| self.tile(index).and_then(|tile| estimator.tile(tile));
         Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }
 
-    /// Invalid samples since the last restart.
+    /// Samples since the last restart that were NaN or negative.
     pub fn bad_samples(&self) -> InvalidSamples {
         let mut all = InvalidSamples::default();
         self.touched().for_each(|(_, tile)| all.merge(tile.bad()));
         all
     }
 
-    /// Number of samples since the last restart that were brighter than the film can hold.
+    /// Number of samples since the last restart that were above the film's limit.
     pub fn saturated_samples(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_samples()).sum()
     }
 
-    /// Number of channel sums that have reached their limit.
+    /// Number of sums (of one pixel, group, channel and replicate) that have reached their limit.
     pub fn saturated(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated()).sum()
     }
 
-    /// Number of pixels with such a sum: further samples make them too dark.
+    /// Number of pixels with a sum that has reached its limit. Further samples make these pixels
+    /// too dark.
     pub fn saturated_pixels(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
     }
 
-    /// Adds the samples of another film. Films of disjoint sample ranges, added in any order, equal the film
-    /// of the whole range.
+    /// Adds the samples of another film. If films of disjoint sample ranges are added, in any
+    /// order, the result equals the film of the whole range.
     ///
     /// # Errors
-    /// Fails, without a change, if the headers differ or both films hold parts of the same first sample.
+    /// Fails if the headers differ, or if both films hold parts of the first sample of a tile. The
+    /// film is then unchanged.
     pub fn add(&mut self, other: &Self) -> Result<(), Mismatch> {
         self.check_addable(other)?;
         for (index, theirs) in other.touched() {
@@ -349,7 +359,7 @@ mod tests {
         let slots = film.slots(&[4, 0, 5, 2]);
         let order: Vec<_> = slots.iter().map(|slot| (slot.index, slot.origin)).collect();
         assert_eq!(order, [(4, [16, 16]), (0, [0, 0]), (5, [32, 16]), (2, [32, 0])]);
-        // Only prepared tiles are touched.
+        // Only the prepared tile counts as touched.
         slots.into_iter().nth(2).unwrap().prepare().advance(0, 3);
         let touched: Vec<_> = film.touched().map(|(i, tile)| (i, tile.counts())).collect();
         assert_eq!(touched, [(5, [3, 0])]);
@@ -384,7 +394,7 @@ mod tests {
             fill(&mut fresh, 1, |x, _, _| value(x).repeat(groups));
             (header, fresh.bytes())
         };
-        // Fewer, more and equally many tiles; more and fewer groups.
+        // New films with fewer, more and equally many tiles, and with more and fewer groups.
         for (width, height, groups) in [(20, 20, 1), (70, 30, 3), (70, 30, 2), (40, 40, 1)] {
             let (header, bytes) = expected(width, height, groups);
             old = old.reuse_for(header);

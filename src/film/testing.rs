@@ -32,7 +32,7 @@ pub fn film(width: usize, height: usize, scales: &[f64]) -> Film {
     Film::new(Header { width, height, scales, seed: 1, precision: "single".to_string() })
 }
 
-/// Unit weights.
+/// Returns light weights of 1 for each of `groups` groups.
 pub fn white(groups: usize) -> LightWeights {
     LightWeights { weights: vec![[1.0; 3]; groups] }
 }
@@ -46,8 +46,8 @@ pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
     }
 }
 
-/// Adds `count` samples per pixel to both replicates. Their sums, `[group][channel]`, are
-/// `sums(x, y, replicate)` times the group's scale, rounded.
+/// Adds `count` samples per pixel to both replicates. The sum of the samples of a pixel,
+/// `[group][channel]`, is `sums(x, y, replicate)` times the scale of the group, rounded.
 pub fn fill(film: &mut Film, count: u32, mut sums: impl FnMut(usize, usize, usize) -> Vec<f64>) {
     let scales = film.scales().to_vec();
     each_tile(film, |tile, [x0, y0]| {

@@ -1,4 +1,4 @@
-//! Tile of 16x16 pixels: integer sums for both replicates.
+//! Tile of 16x16 pixels: integer sums of the samples of both replicates.
 
 use crate::film::invalid::InvalidSamples;
 use crate::film::{InvalidSample, TILE};
@@ -10,35 +10,36 @@ pub const TILE_PIXELS: usize = TILE * TILE;
 /// Largest number of light groups of a film.
 pub const MAX_FILM_GROUPS: usize = 16;
 
-/// Number of sums in a cache line.
+/// Number of sums that fit in a cache line.
 const CACHE_LINE: usize = 8;
 
-/// Sums of a pixel without samples.
+/// Sums that are returned for pixels without samples.
 static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 
-/// Sums of 16x16 pixels. Pixels are numbered `y * 16 + x` inside the tile. The tiles at the right and lower
-/// edge have pixels outside the picture (see [`Tile::extent`]), which stay zero.
+/// Sums of 16x16 pixels. A pixel has the number `y * 16 + x` in its tile. In tiles at the right and
+/// lower edge of the picture, pixels outside of the picture stay zero (see [`Tile::extent`]).
 ///
-/// Every pixel has the same number of samples, one number per replicate. The exception is the first sample
-/// of replicate A, taken in interleaved order: [`Tile::lattice_px`] determines the pixels that have it.
+/// All pixels have the same number of samples; it may differ between the replicates. The exception
+/// is the first pass, which adds the first sample of replicate A in stages. [`Tile::lattice_px`]
+/// determines the pixels that already have this sample.
 #[derive(Debug)]
 pub struct Tile {
-    /// Epoch of the film to which the contents belong; 0 before the first.
+    /// Epoch of the film in which the contents were written; 0 for a new tile.
     epoch: u64,
-    /// `groups * 3`.
+    /// Number of sums of a pixel: `groups * 3`.
     stride: usize,
     extent: [usize; 2],
     counts: [u32; 2],
     lattice_px: u8,
-    /// A sum has reached its limit.
+    /// `true` if a sum has reached its limit.
     full: bool,
     saturated_samples: u64,
     bad: InvalidSamples,
-    /// `[replicate][pixel][group][channel]`; empty until the first touch.
+    /// Sums, `[replicate][pixel][group][channel]`. Empty until the tile is first written.
     sums: Vec<i64>,
-    /// Bit `p % 64` of `[replicate][p / 64]` is set if the sums of pixel p belong to this epoch. Those of
-    /// other pixels count as zero, whatever is stored: a restart costs nothing per pixel, and the first
-    /// samples of a large film touch few of its memory pages.
+    /// Bit `p % 64` of `[replicate][p / 64]` is set if pixel p has been written in this epoch. The
+    /// sums of other pixels count as zero, whatever the memory contains. A restart therefore writes
+    /// nothing per pixel, and the first samples of a large film access few of its memory pages.
     written: [[u64; TILE_PIXELS / 64]; 2],
 }
 
@@ -58,17 +59,18 @@ impl Tile {
         }
     }
 
-    /// Releases the tile's memory for another film.
+    /// Returns the tile's memory for use by another film.
     pub(super) fn into_memory(self) -> Vec<i64> {
         self.sums
     }
 
-    /// Gives an untouched tile memory for reuse.
+    /// Gives memory to a tile that has not been written.
     pub(super) fn with_memory(self, sums: Vec<i64>) -> Self {
         Self { sums, ..self }
     }
 
-    /// Moves the tile to `epoch`: allocates or clears it if it belongs to another one.
+    /// Starts a new epoch of the tile: allocates or clears it if its contents belong to another
+    /// epoch.
     pub(super) fn clear_if_stale(&mut self, epoch: u64) {
         if self.epoch == epoch {
             return;
@@ -77,7 +79,7 @@ impl Tile {
         if self.sums.capacity() >= len {
             self.sums.resize(len, 0);
         } else {
-            // A new allocation: growth would copy stale contents.
+            // The memory is allocated anew, because growth would copy old contents.
             self.sums = vec![0; len];
         }
         self.written = Default::default();
@@ -93,49 +95,51 @@ impl Tile {
         self.epoch == epoch
     }
 
-    /// Width and height of the part inside the picture, in pixels, 1..=16 each.
+    /// Width and height in pixels of the part that is inside the picture, 1..=16 each.
     pub fn extent(&self) -> [usize; 2] {
         self.extent
     }
 
-    /// Number of samples of every pixel, for replicates A and B.
+    /// Number of samples that every pixel has in the replicates A and B.
     pub fn counts(&self) -> [u32; 2] {
         self.counts
     }
 
-    /// Step of the lattice during the interleaved first pass: pixels whose x and y are both multiples of it
-    /// have the first sample of replicate A, in addition to [`Tile::counts`]. 0 outside of that pass.
+    /// Step of the lattice in pixels during the first pass. Pixels whose x and y are both multiples
+    /// of it have the first sample of replicate A, in addition to [`Tile::counts`]. 0 if the first
+    /// pass has not started or is complete.
     pub fn lattice_px(&self) -> usize {
         usize::from(self.lattice_px)
     }
 
-    /// Number of samples of one pixel, for replicates A and B.
+    /// Number of samples of one pixel in the replicates A and B.
     #[inline]
     pub fn counts_of(&self, pixel: usize) -> [u32; 2] {
         let extra = self.lattice_px != 0 && on_lattice(pixel, usize::from(self.lattice_px));
         [self.counts[0] + u32::from(extra), self.counts[1]]
     }
 
-    /// Returns `true` if the pixel has a sample.
+    /// Returns `true` if the pixel has at least one sample.
     pub fn sampled(&self, pixel: usize) -> bool {
         self.counts_of(pixel) != [0; 2]
     }
 
-    /// Returns `true` if any pixel has a sample.
+    /// Returns `true` if at least one pixel has a sample.
     pub fn any_sampled(&self) -> bool {
         self.counts != [0; 2] || self.lattice_px != 0
     }
 
-    /// Records `samples` further samples of `replicate` (0: A, 1: B) in every pixel.
+    /// Increases the sample count of all pixels in `replicate` (0: A, 1: B) by `samples`.
     pub fn advance(&mut self, replicate: usize, samples: u32) {
         self.counts[replicate] = self.counts[replicate].saturating_add(samples);
     }
 
-    /// Records the first sample of replicate A in the pixels whose x and y are multiples of `step_px` (1, 2,
-    /// 4, 8 or 16). With 1 that is every pixel, and the count grows by one.
+    /// Records that the pixels whose x and y are multiples of `step_px` (1, 2, 4, 8 or 16) have the
+    /// first sample of replicate A. With 1 these are all pixels; the sample count grows by one and
+    /// the lattice ends.
     ///
     /// # Panics
-    /// If `step_px` is none of these, or coarser than the current lattice.
+    /// Panics if `step_px` is another number, or larger than the step of the current lattice.
     pub fn set_lattice(&mut self, step_px: usize) {
         assert!(
             matches!(step_px, 1 | 2 | 4 | 8 | 16)
@@ -151,8 +155,9 @@ impl Tile {
         }
     }
 
-    /// Sums of one pixel and replicate (0: A, 1: B): `[group][channel]`, length `groups * 3`.
-    /// Adding to them directly is for sums that cannot overflow; else use [`Tile::add`].
+    /// Returns the sums of one pixel in one replicate (0: A, 1: B) for writing: `[group][channel]`,
+    /// length `groups * 3`. Direct addition is only allowed if the sums cannot overflow; otherwise
+    /// use [`Tile::add`].
     #[inline(always)]
     pub fn pixel_mut(&mut self, replicate: usize, pixel: usize) -> &mut [i64] {
         let start = (replicate * TILE_PIXELS + pixel) * self.stride;
@@ -160,7 +165,7 @@ impl Tile {
         let (word, bit) = (&mut self.written[replicate][pixel / 64], 1 << (pixel % 64));
         if *word & bit == 0 {
             *word |= bit;
-            // Three stores for one group; a call for that few takes longer.
+            // One group needs only three stores; a call would take longer.
             match &mut *sums {
                 [r, g, b] => (*r, *g, *b) = (0, 0, 0),
                 several => several.fill(0),
@@ -169,7 +174,7 @@ impl Tile {
         sums
     }
 
-    /// Sums of one pixel and replicate: `[group][channel]`.
+    /// Returns the sums of one pixel in one replicate: `[group][channel]`.
     #[inline(always)]
     pub fn pixel(&self, replicate: usize, pixel: usize) -> &[i64] {
         if self.written[replicate][pixel / 64] >> (pixel % 64) & 1 == 0 {
@@ -179,22 +184,22 @@ impl Tile {
         &self.sums[start..start + self.stride]
     }
 
-    /// Prefetches the sums of a replicate into the cache.
+    /// Prefetches the sums of a replicate into the processor's cache.
     pub fn prefetch(&self, replicate: usize) {
         let start = replicate * TILE_PIXELS * self.stride;
         let sums = &self.sums[start..start + TILE_PIXELS * self.stride];
         sums.chunks(CACHE_LINE).for_each(|line| prefetch(&line[0]));
     }
 
-    /// Replicates and pixels whose sums belong to this epoch.
+    /// Iterates over the pairs of replicate and pixel that have been written in this epoch.
     fn written(&self) -> impl Iterator<Item = (usize, usize)> {
         let all = (0..2).flat_map(|r| (0..TILE_PIXELS).map(move |p| (r, p)));
         all.filter(|(r, p)| self.written[*r][p / 64] >> (p % 64) & 1 != 0)
     }
 
-    /// Adds non-negative `values` (`[group][channel]`, length `groups * 3`) to a pixel. A sum that would
-    /// exceed `i64::MAX` stays there and counts as saturated. The values are not negative, so the order of
-    /// addition does not matter even then.
+    /// Adds non-negative `values` (`[group][channel]`, length `groups * 3`) to the sums of a pixel.
+    /// A sum that would exceed `i64::MAX` becomes `i64::MAX` and counts as saturated. No value is
+    /// negative, so that the order of addition has no influence even then.
     #[inline(always)]
     pub fn add(&mut self, replicate: usize, pixel: usize, values: &[i64]) {
         for (group, values) in values.chunks_exact(3).enumerate() {
@@ -202,18 +207,18 @@ impl Tile {
         }
     }
 
-    /// Adds the non-negative `values` of one group to a pixel; see [`Tile::add`].
+    /// Adds non-negative `values` to the sums of one pixel and group; see [`Tile::add`].
     #[inline(always)]
     pub fn add_group(&mut self, replicate: usize, pixel: usize, group: usize, values: [i64; 3]) {
         let sums = &mut self.pixel_mut(replicate, pixel)[3 * group..][..3];
-        // A sum of non-negative numbers that overflows is negative.
+        // A sum of non-negative numbers is negative if it has overflowed.
         let new = [0, 1, 2].map(|c| sums[c].wrapping_add(values[c]));
         let fit = new[0] | new[1] | new[2] >= 0;
         sums.copy_from_slice(&if fit { new } else { new.map(saturated_sum) });
         self.full |= !fit;
     }
 
-    /// Number of channel sums that have reached their limit.
+    /// Number of sums (of one pixel, group, channel and replicate) that have reached their limit.
     pub fn saturated(&self) -> u64 {
         if !self.full {
             return 0;
@@ -222,7 +227,7 @@ impl Tile {
         self.written().map(full).sum()
     }
 
-    /// Number of pixels with such a sum.
+    /// Number of pixels with a sum that has reached its limit.
     pub fn saturated_pixels(&self) -> u64 {
         if !self.full {
             return 0;
@@ -231,18 +236,18 @@ impl Tile {
         (0..TILE_PIXELS).filter(full).count() as u64
     }
 
-    /// Records samples that were brighter than the film can hold and have its largest value.
+    /// Counts samples that were above the film's limit and were stored with the limit.
     #[cold]
     pub fn record_saturated(&mut self, samples: u64) {
         self.saturated_samples += samples;
     }
 
-    /// Number of samples that were brighter than the film can hold.
+    /// Number of samples that were above the film's limit.
     pub fn saturated_samples(&self) -> u64 {
         self.saturated_samples
     }
 
-    /// Records an invalid sample. It counts as a sample of value 0.
+    /// Records an invalid sample. It counts as a sample with the value 0.
     #[cold]
     pub fn record_bad(&mut self, sample: InvalidSample) {
         self.bad.record(sample);
@@ -252,10 +257,10 @@ impl Tile {
         &self.bad
     }
 
-    /// Adds the same tile of another film.
+    /// Adds the samples of the tile at the same position of another film.
     ///
     /// # Errors
-    /// Fails if both hold parts of the same first sample.
+    /// Fails if both tiles hold parts of the first sample.
     pub(super) fn add_tile(&mut self, other: &Self) -> Result<(), ()> {
         if self.lattice_px != 0 && other.lattice_px != 0 {
             return Err(());
@@ -274,7 +279,7 @@ impl Tile {
     }
 }
 
-/// Replaces a sum that has wrapped around by the limit.
+/// Returns the limit if `sum` has overflowed, and `sum` otherwise.
 #[cold]
 fn saturated_sum(sum: i64) -> i64 {
     if sum < 0 { i64::MAX } else { sum }
@@ -282,12 +287,12 @@ fn saturated_sum(sum: i64) -> i64 {
 
 #[inline(always)]
 fn on_lattice(pixel: usize, step_px: usize) -> bool {
-    // Steps are powers of two: x and y of lattice pixels have no bit below the step.
+    // Steps are powers of two, so that x and y of lattice pixels have no bits below the step.
     ((pixel % TILE) | (pixel / TILE)) & (step_px - 1) == 0
 }
 
-/// Pixels of the lattice of `step_px` that are missing in the lattice of `before_px` (0: none), in row order.
-/// `step_px` divides 16.
+/// Iterates over the pixels of the lattice with step `step_px` that are not in the lattice with
+/// step `before_px` (0: no earlier lattice), row by row. `step_px` divides 16.
 pub fn lattice_pixels(before_px: usize, step_px: usize) -> impl Iterator<Item = usize> {
     let lines = move || (0..TILE).step_by(step_px);
     lines()
@@ -364,7 +369,7 @@ mod tests {
         tile.clear_if_stale(2);
         assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (0, [0, 0]));
         assert_eq!(tile.saturated_samples(), 0);
-        // A write is the first access, in memory of the same and of another stride.
+        // The write is the first access, in memory with the same and with another number of groups.
         tile.add(0, 0, &[2; 6]);
         assert_eq!((tile.pixel(0, 0), tile.pixel(1, 0)), (&[2; 6][..], &[0; 6][..]));
         for groups in [1, 3] {

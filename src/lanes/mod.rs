@@ -1,7 +1,7 @@
-//! SIMD lanes: floats, masks and integers in which kernels are written.
+//! SIMD lanes: the types of floats, masks and integers in which kernels are written.
 //!
-//! A kernel (intersection, shading, sampling) is written once, generic over [`SimdFloat`]: a vector
-//! of `WIDTH` floats. Instances:
+//! A kernel (intersection, shading, sampling) is written once, generic over the trait
+//! [`SimdFloat`]: a vector of `WIDTH` floats. The trait has these instances:
 //!
 //! | type | precision | width | use |
 //! |---|---|---|---|
@@ -10,10 +10,10 @@
 //! | `wide::f32x16`, `wide::f64x8` | both | 16, 8 | production when built for AVX-512 |
 //! | `f32`, `f64` | both | 1 | tests, benches, and primitives without packet kernels |
 //!
-//! All operations up to `sqrt` are IEEE operations: every instance of one precision returns
+//! All operations up to `sqrt` are IEEE operations, so that all instances of one precision return
 //! identical bits. [`SimdFloat::mul_add`] is fused on all instances or on none. Only `sin_cos`,
-//! `atan2`, `ln` and `exp` may differ between the vector instances and those of width 1, by a few
-//! ulps.
+//! `atan2`, `ln` and `exp` may differ by a few ulps between the vector instances and those of width
+//! 1.
 
 mod scalar;
 mod vec3;
@@ -26,23 +26,23 @@ use std::ops::{
     Add, AddAssign, BitAnd, BitOr, BitXor, Div, Mul, MulAssign, Neg, Not, Shl, Shr, Sub, SubAssign,
 };
 
-/// Single-precision instance of production.
+/// Single-precision vector that the renderer uses.
 #[cfg(not(target_feature = "avx512f"))]
 pub type Single = wide::f32x8;
-/// Double-precision instance of production.
+/// Double-precision vector that the renderer uses.
 #[cfg(not(target_feature = "avx512f"))]
 pub type Double = wide::f64x4;
-/// Single-precision instance of production.
+/// Single-precision vector that the renderer uses.
 #[cfg(target_feature = "avx512f")]
 pub type Single = wide::f32x16;
-/// Double-precision instance of production.
+/// Double-precision vector that the renderer uses.
 #[cfg(target_feature = "avx512f")]
 pub type Double = wide::f64x8;
 
-/// Width of the widest instance, and length of arrays indexed by lane.
+/// Width of the widest instance. Arrays that are indexed by lane have this length.
 pub const MAX_WIDTH: usize = if cfg!(target_feature = "avx512f") { 16 } else { 8 };
 
-/// One lane: `f32` or `f64`.
+/// Type of one lane: `f32` or `f64`.
 pub trait Float: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
     /// Distance from 1 to the next larger number of this precision.
     const EPSILON: f64;
@@ -76,7 +76,7 @@ impl Float for f64 {
     }
 }
 
-/// Mask: result of a comparison, one truth value per lane.
+/// Result of a lane-wise comparison: one truth value for each lane.
 pub trait Mask:
     Copy
     + Debug
@@ -91,7 +91,7 @@ pub trait Mask:
     fn any(self) -> bool;
     /// Returns `true` if every lane is true.
     fn all(self) -> bool;
-    /// Lanes as bits: bit `i` is lane `i`.
+    /// Returns the lanes as bits; bit `i` is lane `i`.
     fn bits(self) -> u32;
     /// Value of lane `i`.
     #[inline(always)]
@@ -103,7 +103,7 @@ pub trait Mask:
     fn none(self) -> bool {
         !self.any()
     }
-    /// Lanes of `self` that are not in `other`.
+    /// Returns the lanes that are true in `self` and false in `other`.
     #[inline(always)]
     fn and_not(self, other: Self) -> Self {
         self & !other
@@ -125,9 +125,9 @@ pub trait SimdU32:
     + Shr<u32, Output = Self>
     + 'static
 {
-    /// The value `x` in every lane.
+    /// Returns `x` in every lane.
     fn splat(x: u32) -> Self;
-    /// Vector whose lane `i` is `f(i)`.
+    /// Returns the vector whose lane `i` is `f(i)`.
     fn from_fn(f: impl FnMut(usize) -> u32) -> Self;
     /// Value of lane `i`.
     fn lane(self, i: usize) -> u32;
@@ -135,7 +135,7 @@ pub trait SimdU32:
     fn reverse(self) -> Self;
 }
 
-/// Vector of `WIDTH` floats, see the [module](self).
+/// Vector of `WIDTH` floats; see the [module](self).
 pub trait SimdFloat:
     Copy
     + Debug
@@ -153,7 +153,7 @@ pub trait SimdFloat:
 {
     /// Number of lanes.
     const WIDTH: usize;
-    /// Name for statistics, such as `f32x8`.
+    /// Name for statistics and reports, such as `f32x8`.
     const NAME: &'static str;
     /// Distance from 1 to the next larger number of this precision.
     const EPSILON: f64 = Self::Scalar::EPSILON;
@@ -166,13 +166,13 @@ pub trait SimdFloat:
     /// Integers of the same width.
     type SimdU32: SimdU32;
 
-    /// The value `x` in every lane.
+    /// Returns `x` in every lane.
     fn splat(x: Self::Scalar) -> Self;
-    /// Vector whose lane `i` is `f(i)`.
+    /// Returns the vector whose lane `i` is `f(i)`.
     fn from_fn(f: impl FnMut(usize) -> Self::Scalar) -> Self;
     /// Value of lane `i`.
     fn lane(self, i: usize) -> Self::Scalar;
-    /// The value `x`, rounded to this precision, in every lane.
+    /// Returns `x`, rounded to this precision, in every lane.
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         Self::splat(Self::Scalar::from_f64(x))
@@ -190,18 +190,20 @@ pub trait SimdFloat:
 
     /// Computes `self * a + b`, rounded once if the target has fused multiply-add, else twice.
     fn mul_add(self, a: Self, b: Self) -> Self;
-    /// Lane-wise minimum. If `self` is NaN, `other`; unspecified (but no panic) if `other` is NaN.
+    /// Lane-wise minimum. Lanes where `self` is NaN become `other`. Lanes where `other` is NaN are
+    /// unspecified, but never panic.
     fn min(self, other: Self) -> Self;
-    /// Lane-wise maximum. If `self` is NaN, `other`; unspecified (but no panic) if `other` is NaN.
+    /// Lane-wise maximum. Lanes where `self` is NaN become `other`. Lanes where `other` is NaN are
+    /// unspecified, but never panic.
     fn max(self, other: Self) -> Self;
-    /// Horizontal minimum and maximum. NaN lanes are ignored; if all lanes are NaN, the results are
-    /// [`SimdFloat::MAX`] and its negative.
+    /// Returns the minimum and the maximum over all lanes. NaN lanes are ignored. If all lanes are
+    /// NaN, the results are [`SimdFloat::MAX`] and its negative.
     fn min_max(self) -> (Self::Scalar, Self::Scalar);
     /// Absolute value.
     fn abs(self) -> Self;
-    /// Square root; NaN below zero.
+    /// Square root; NaN for negative numbers.
     fn sqrt(self) -> Self;
-    /// Sine and cosine of radians.
+    /// Sine and cosine of an angle in radians.
     fn sin_cos(self) -> (Self, Self);
     /// Angle of the point (`x`, `self`) from the x axis, in radians from -pi to pi.
     fn atan2(self, x: Self) -> Self;
@@ -226,39 +228,40 @@ pub trait SimdFloat:
     fn ge(self, other: Self) -> Self::Mask {
         other.le(self)
     }
-    /// The truth value `value` in every lane.
+    /// Returns a mask with `value` in every lane.
     fn mask(value: bool) -> Self::Mask;
-    /// `yes` where `mask` is true, `no` elsewhere.
+    /// Returns `yes` in lanes where `mask` is true, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
-    /// `self` where `mask` is true, zero elsewhere.
+    /// Returns `self` in lanes where `mask` is true, zero elsewhere.
     #[inline(always)]
     fn masked(self, mask: Self::Mask) -> Self {
         Self::select(mask, self, Self::zero())
     }
 
-    /// Bit-casts a 32-bit id into every lane. Ids are selected by [`SimdFloat::select`], without
-    /// arithmetic. Ids below 2^31 - 2^23 are ordered by [`SimdFloat::lt`] and [`SimdFloat::le`]
-    /// like integers, as the bits of all positive floats are.
+    /// Stores the bits of a 32-bit id in every lane, reinterpreted as a float. Ids can be selected
+    /// by [`SimdFloat::select`], but arithmetic on them is meaningless. [`SimdFloat::lt`] and
+    /// [`SimdFloat::le`] order ids below 2^31 - 2^23 like integers, because positive floats have
+    /// the order of their bits.
     fn from_id(id: u32) -> Self;
-    /// Id in lane `i`.
+    /// Returns the id in lane `i`.
     fn id_lane(self, i: usize) -> u32;
     /// Mask of lanes whose id is `id`.
     fn id_eq(self, id: u32) -> Self::Mask;
 
-    /// Maps 32 random bits to [0, 1): 24 of them in single precision, all in double precision
-    /// (there to the middle of a step).
+    /// Maps 32 random bits to [0, 1). Single precision uses 24 of the bits. Double precision uses
+    /// all bits, and returns the middle of a step.
     fn to_unit(bits: Self::SimdU32) -> Self;
 
-    /// Sum over all lanes of `round(lane * scale)`. Each lane is rounded separately, so that the
-    /// sum is exact in any grouping. `|lane * scale|` is at most 2^49.
+    /// Returns the sum of `round(lane * scale)` over all lanes. Each lane is rounded separately, so
+    /// that the sum does not depend on the grouping of lanes. `|lane * scale|` is at most 2^49.
     fn fixed_sum(self, scale: f64) -> i64;
-    /// Returns `round(lane * scale)` of every lane, and zeros after the last. `|lane * scale|` is
-    /// at most 2^49.
+    /// Returns `round(lane * scale)` for each lane, and zeros beyond the last lane.
+    /// `|lane * scale|` is at most 2^49.
     fn fixed(self, scale: f64) -> [i64; MAX_WIDTH];
 }
 
-/// Id of the first lane of `mask`, and the lanes of `mask` that have this id; `None` if `mask` is
-/// empty.
+/// Returns the id in the first lane of `mask`, and all lanes of `mask` that have this id. Returns
+/// `None` if `mask` is empty.
 #[inline(always)]
 pub(crate) fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
     let bits = mask.bits();
@@ -269,18 +272,18 @@ pub(crate) fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32,
     Some((id, mask & ids.id_eq(id)))
 }
 
-/// Rounding constant, 1.5 x 2^52. The sum of it and a double below 2^51 in magnitude has no
-/// fraction bits: the double is rounded to the nearest integer, which is the difference of the
-/// bits.
+/// Rounding constant, 1.5 x 2^52. The sum of the constant and a double `x` below 2^51 in magnitude
+/// has no fraction bits, so that the addition rounds `x` to the nearest integer. This integer is
+/// the difference between the bits of the sum and the bits of the constant.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
-/// Rounds to the nearest integer, ties to even, for `|x| < 2^51`.
+/// Rounds `x` to the nearest integer, ties to even. `|x|` is below 2^51.
 #[inline(always)]
 fn round_i64(x: f64) -> i64 {
     ((x + ROUNDER).to_bits() as i64).wrapping_sub(ROUNDER.to_bits() as i64)
 }
 
-/// Prefetches the first cache line of `value` on processors that support it.
+/// Prefetches the first cache line of `value`; does nothing on processors without prefetch.
 #[inline(always)]
 pub fn prefetch<T>(value: &T) {
     #[cfg(target_arch = "x86_64")]

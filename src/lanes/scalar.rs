@@ -1,4 +1,5 @@
-//! Instances of width 1: `f32` and `f64`, with the operations of the vectors in the same order.
+//! Instances of width 1: `f32` and `f64`. Their operations have the same order as those of the
+//! vector instances.
 
 use crate::lanes::{MAX_WIDTH, Mask, SimdFloat, SimdU32, round_i64};
 
@@ -17,7 +18,7 @@ impl Mask for bool {
     }
 }
 
-/// One `u32` with wrapping arithmetic.
+/// Vector of one `u32` with wrapping arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct One(u32);
 
@@ -101,8 +102,8 @@ macro_rules! scalar_lanes {
             }
             #[inline(always)]
             fn mul_add(self, a: Self, b: Self) -> Self {
-                // The vectors fuse on these targets only. A fused call elsewhere would be slow and
-                // would return other bits.
+                // The vector instances use fused operations on these targets only. On other targets
+                // a fused call would be slow and would return other bits.
                 if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
                     <$float>::mul_add(self, a, b)
                 } else {

@@ -3,7 +3,7 @@
 use crate::lanes::{Float, SimdFloat};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-/// Three coordinates or colour channels per lane.
+/// Three coordinates, or three colour channels, in each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Vec3<L> {
     /// First coordinate or red.
@@ -20,17 +20,17 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn new(x: L, y: L, z: L) -> Self {
         Self { x, y, z }
     }
-    /// The vector `v` in every lane.
+    /// Returns `v` in every lane.
     #[inline(always)]
     pub fn splat(v: [L::Scalar; 3]) -> Self {
         Self::new(L::splat(v[0]), L::splat(v[1]), L::splat(v[2]))
     }
-    /// The vector `v`, rounded to this precision, in every lane.
+    /// Returns `v`, rounded to this precision, in every lane.
     #[inline(always)]
     pub fn of(v: [f64; 3]) -> Self {
         Self::splat(v.map(L::Scalar::from_f64))
     }
-    /// Vectors whose lane `i` is `f(i)`.
+    /// Returns the vectors whose lane `i` is `f(i)`.
     #[inline(always)]
     pub fn from_fn(mut f: impl FnMut(usize) -> [L::Scalar; 3]) -> Self {
         Self::new(L::from_fn(|i| f(i)[0]), L::from_fn(|i| f(i)[1]), L::from_fn(|i| f(i)[2]))
@@ -40,7 +40,7 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn zero() -> Self {
         Self::new(L::zero(), L::zero(), L::zero())
     }
-    /// Vector of lane `i`.
+    /// Returns the vector in lane `i`.
     #[inline(always)]
     pub fn lane(self, i: usize) -> [L::Scalar; 3] {
         [self.x.lane(i), self.y.lane(i), self.z.lane(i)]
@@ -69,8 +69,8 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn normalize(self) -> Self {
         self * (L::one() / self.length_squared().sqrt())
     }
-    /// Normalises a vector whose length is 1 up to a few roundings, by one step of Newton's method
-    /// instead of a square root.
+    /// Normalises a vector whose length differs from 1 by a few rounding errors. One step of
+    /// Newton's method replaces the square root.
     #[inline(always)]
     pub fn renormalize(self) -> Self {
         self * self.length_squared().mul_add(L::from_f64(-0.5), L::from_f64(1.5))
@@ -90,12 +90,12 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn max_element(self) -> L {
         self.x.max(self.y).max(self.z)
     }
-    /// Largest magnitude of a coordinate.
+    /// Largest absolute value of a coordinate.
     #[inline(always)]
     pub fn max_abs(self) -> L {
         self.x.abs().max(self.y.abs()).max(self.z.abs())
     }
-    /// `yes` where `mask` is true, `no` elsewhere.
+    /// Returns `yes` in lanes where `mask` is true, `no` elsewhere.
     #[inline(always)]
     pub fn select(mask: L::Mask, yes: Self, no: Self) -> Self {
         Self::new(
@@ -104,7 +104,7 @@ impl<L: SimdFloat> Vec3<L> {
             L::select(mask, yes.z, no.z),
         )
     }
-    /// `self` where `mask` is true, zero elsewhere.
+    /// Returns `self` in lanes where `mask` is true, zero elsewhere.
     #[inline(always)]
     pub fn masked(self, mask: L::Mask) -> Self {
         Self::new(self.x.masked(mask), self.y.masked(mask), self.z.masked(mask))

@@ -1,4 +1,4 @@
-//! Vector instances, over the types of the `wide` crate.
+//! Vector instances, based on the types of the `wide` crate.
 
 use crate::lanes::{MAX_WIDTH, Mask, ROUNDER, SimdFloat, SimdU32};
 use wide::bytemuck::cast;
@@ -42,7 +42,7 @@ fn reverse_by_shifts<B: SimdU32>(x: B) -> B {
     (x >> 16) | (x << 16)
 }
 
-/// Table of the reversed bits of each nibble, shifted up by `SHIFT`.
+/// Returns a table of the reversed bits of each nibble, shifted left by `SHIFT`.
 const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     let mut table = [0i8; 16];
     let mut n = 0;
@@ -53,8 +53,8 @@ const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     table
 }
 
-/// Reverses the bits of each 32-bit lane by byte shuffles: a table lookup per nibble, then a
-/// reversal of the bytes of each word.
+/// Reverses the bits of each 32-bit lane by byte shuffles. A table lookup reverses each nibble;
+/// then the bytes of each word are reversed.
 #[inline(always)]
 fn reverse8(x: u32x8) -> u32x8 {
     use wide::i8x32;
@@ -77,7 +77,7 @@ fn reverse8(x: u32x8) -> u32x8 {
     cast(i8x32::swizzle_half_relaxed(cast(bytes), i8x32::new(ORDER)))
 }
 
-/// [`reverse8`] for four lanes.
+/// Does the same as [`reverse8`] for four lanes.
 #[inline(always)]
 fn reverse4(x: u32x4) -> u32x4 {
     use wide::i8x16;
@@ -145,7 +145,7 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn min_max(self) -> ($scalar, $scalar) {
-                // Both halves are combined first, then the remaining lanes one by one.
+                // The two halves are combined first, then the remaining lanes one by one.
                 let max = $vector::splat($scalar::MAX);
                 let [a, b]: [$half; 2] = cast(SimdFloat::min(self, max));
                 let [c, d]: [$half; 2] = cast(SimdFloat::max(self, -max));
@@ -225,7 +225,8 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed_sum(self, scale: f64) -> i64 {
-                // The difference of the bits of `x + ROUNDER` and `ROUNDER` is the rounded integer.
+                // The rounded integer is the difference between the bits of `x + ROUNDER` and those
+                // of `ROUNDER`.
                 let (scale, rounder) = (f64x4::splat(scale), f64x4::splat(ROUNDER));
                 let mut sum = i64x4::splat(0);
                 for four in self.as_array().chunks_exact(4) {
@@ -238,7 +239,8 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {
-                // Groups of four: for single numbers the compiler emits scattered stores.
+                // Lanes are converted in groups of four. For single numbers the compiler emits
+                // scattered stores.
                 let (scale, rounder) = (f64x4::splat(scale), f64x4::splat(ROUNDER));
                 let mut each = [0; MAX_WIDTH];
                 let fours = self.as_array().chunks_exact(4);

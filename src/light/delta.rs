@@ -1,5 +1,5 @@
-//! Compiled lights, white and of unit strength. Colour and intensity are applied to the accumulated
-//! sums, so that changing them needs no new samples.
+//! Compiled lights, white and of unit strength. Colour and intensity of a light are applied to the
+//! accumulated sums, so that new colours and intensities need no new samples.
 
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::light::{Falloff, Light};
@@ -15,19 +15,19 @@ pub enum DeltaLight<S> {
         /// Position of the light.
         position: [S; 3],
     },
-    /// Point light with the normal irradiance pi at every distance.
+    /// Point light with the irradiance pi, at normal incidence, at every distance.
     Constant {
         /// Position of the light.
         position: [S; 3],
     },
-    /// Directional light with the normal irradiance pi.
+    /// Directional light with the irradiance pi at normal incidence.
     Directional {
         /// Unit vector towards the light.
         wi: [S; 3],
     },
 }
 
-/// Light incident at points, of unit strength.
+/// Light incident at surface points from a light of unit strength.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSample<L> {
     /// Unit vector towards the light.
@@ -39,7 +39,8 @@ pub struct LightSample<L> {
 }
 
 impl<S: Float> DeltaLight<S> {
-    /// Compiles `light` for a scene translated by -`origin`. `None` if it has no kind or no direction.
+    /// Compiles `light` for a scene translated by -`origin`. Returns `None` if `light` has neither
+    /// `point` nor `directional`, or if its direction is zero.
     pub fn new(light: &Light, origin: DVec3) -> Option<Self> {
         if let Some(point) = &light.point {
             let position = (DVec3::from(point.position) - origin).to_array().map(S::from_f64);
@@ -66,7 +67,7 @@ impl<S: Float> DeltaLight<S> {
                 let distance = to_light.length_squared().sqrt();
                 let inverse = L::one() / distance;
                 let irradiance = match self {
-                    // Finite, because infinity times black would be NaN.
+                    // The irradiance is kept finite, because infinity times black would be NaN.
                     Self::InverseSquare { .. } => (inverse * inverse).min(L::from_f64(L::MAX)),
                     _ => L::from_f64(PI),
                 };
@@ -75,7 +76,8 @@ impl<S: Float> DeltaLight<S> {
         }
     }
 
-    /// Returns the normal irradiance at a typical point: the origin, at a distance of at least `radius`.
+    /// Returns the irradiance, at normal incidence, at a typical point: the origin of the
+    /// translated scene. A distance to the light that is less than `radius` counts as `radius`.
     pub fn typical_irradiance(&self, radius: f64) -> f64 {
         match self {
             Self::InverseSquare { position } => {

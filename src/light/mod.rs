@@ -57,7 +57,7 @@ choices! {
 pub const FIELDS: &[Field] = Light::FIELDS;
 
 impl Light {
-    /// Returns the errors of the light.
+    /// Returns the validation errors of the light.
     pub fn faults(&self) -> Vec<ValidationError> {
         let kinds = match (&self.point, &self.directional) {
             (Some(_), None) => None,

@@ -11,7 +11,7 @@ use std::f64::consts::FRAC_1_PI;
 /// the power is the exponent times about 1.5e-7.
 pub const SHARP_EXPONENT: f64 = 1024.0;
 
-/// Formula of a light's highlight.
+/// Formula for the highlights of lights.
 #[derive(Clone, Copy, Debug)]
 pub enum SpecularModel<S> {
     /// No highlight.
@@ -22,14 +22,14 @@ pub enum SpecularModel<S> {
         strength: S,
         /// alpha.
         exponent: S,
-        /// alpha exceeds `SHARP_EXPONENT`.
+        /// `true` if alpha exceeds `SHARP_EXPONENT`.
         sharp: bool,
     },
     /// k_s D G F / (4 N.L N.V).
     MicrofacetDistribution {
         /// k_s.
         strength: S,
-        /// D and G.
+        /// Microfacets, which define D and G.
         facets: MicrofacetDistribution<S>,
     },
 }
@@ -37,7 +37,7 @@ pub enum SpecularModel<S> {
 /// Distribution of reflected rays.
 #[derive(Clone, Copy, Debug)]
 pub enum ReflectionLobe<S> {
-    /// All in the mirror direction.
+    /// All rays in the mirror direction.
     Mirror,
     /// Uniform in a cone.
     Cone {
@@ -58,7 +58,7 @@ pub enum ReflectionLobe<S> {
 pub struct Transmission<S> {
     /// k_t.
     pub strength: S,
-    /// Index of refraction of the inside.
+    /// Index of refraction inside of the surface.
     pub index: S,
     /// `true` if Fresnel's equations split the light between reflection and transmission; otherwise k_r
     /// and k_t are used unchanged.
@@ -80,12 +80,12 @@ pub struct Bsdf<S> {
     pub transmission: Option<Transmission<S>>,
     /// Fresnel reflectance of the highlight.
     pub highlight_fresnel: Reflectance<S>,
-    /// Fresnel reflectance of the reflection, except the part that depends on the medium on the other
-    /// side.
+    /// Fresnel reflectance of reflected rays. It is 1 for a transparent dielectric, whose
+    /// reflectance depends on the medium on the other side and is computed at each intersection.
     pub reflection_fresnel: Reflectance<S>,
-    /// `true` if lights contribute to its colour.
+    /// `true` if lights contribute directly to the colour of the surface.
     pub has_direct: bool,
-    /// `true` if its back is like its front.
+    /// `true` if the back of a surface has the same material as its front.
     pub two_sided: bool,
 }
 
@@ -162,8 +162,8 @@ pub struct BsdfSample<L> {
     pub weight: Vec3<L>,
 }
 
-/// Returns the component of `h` along the unit vector `n`, and the squared tangent of the angle between
-/// them; `h` has any length.
+/// Returns the component of `h` along the unit vector `n`, and the squared tangent of the angle
+/// between `h` and `n`. `h` may have any length.
 ///
 /// The tangent is computed from the part of `h` across `n`, so that small angles keep full precision, and
 /// bounded by 1e15, so that terms computed from it are finite.
@@ -176,8 +176,8 @@ fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
 
 /// Returns `cos`^alpha for a cosine computed from unit vectors; 0 from 90 degrees.
 ///
-/// The cosine is clamped to 1: that of two rounded vectors may exceed 1 by a few roundings, and
-/// 1.000001^1e6 is 2.7.
+/// The cosine is clamped to 1: the cosine of two rounded vectors may exceed 1 by a few roundings,
+/// and 1.000001^1e6 is 2.7.
 #[inline(always)]
 fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
     let power = (cos.max(L::from_f64(1e-30)).min(L::one()).ln() * alpha).exp();
@@ -203,16 +203,18 @@ fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Returns `true` if lights have highlights on it.
+    /// Returns `true` if the surface has highlights of lights.
     #[inline(always)]
     pub fn has_highlight(&self) -> bool {
         !matches!(self.specular, SpecularModel::None)
     }
 
-    /// Returns the highlight of a light: radiance towards `view` per irradiance of a surface that faces
-    /// the light [1/sr]. It includes the cosine of the incident light where the formula has one.
+    /// Returns the highlight of a light, in units of 1/sr: the radiance towards `view` divided by
+    /// the irradiance of a surface that faces the light. The highlight includes the cosine of the
+    /// incident light where the formula has one.
     ///
-    /// `n`, `view` and `light` are unit vectors away from the surface, `nl` and `nv` their cosines.
+    /// `n`, `view` and `light` are unit vectors away from the surface. `nl` is the cosine between
+    /// `n` and `light`, `nv` that between `n` and `view`.
     #[inline(always)]
     pub fn highlight<L: SimdFloat<Scalar = S>>(
         &self,
@@ -236,8 +238,8 @@ impl<S: Float> Bsdf<S> {
                 Vec3::new(value, value, value)
             }
             SpecularModel::MicrofacetDistribution { strength, facets } => {
-                // The half vector without normalisation: its squared length is twice its product with
-                // either direction.
+                // The half vector is not normalised: its squared length is twice its dot product
+                // with `view` or with `light`.
                 let h = view + light;
                 let (nh, tan2) = along_tan2(h, n);
                 let h2 = h.length_squared();
@@ -252,9 +254,9 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Samples a reflected ray. `incident` is the unit direction towards the surface, `n` the normal on
-    /// the viewer's side, `u` and `v` are uniform in [0, 1). If `fold` is `true`, directions below the
-    /// surface are mirrored up, otherwise they get the weight 0.
+    /// Samples a reflected ray. `incident` is the unit direction towards the surface, `n` the
+    /// normal on the viewer's side; `u` and `v` are uniform in [0, 1). If `fold` is `true`,
+    /// directions below the surface are mirrored up; otherwise their weight is 0.
     #[inline(always)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
@@ -288,15 +290,15 @@ impl<S: Float> Bsdf<S> {
         } else {
             (direction, L::select(below, L::zero(), weight))
         };
-        // The normal of the facet that reflects this ray is half-way between view and reflected
-        // direction: its cosine with either is half the length of their sum, without cancellation at
-        // grazing angles.
+        // The normal of the microfacet that reflects this ray is half-way between the directions to
+        // the viewer and of the reflected ray. Its cosine with either direction is half the length
+        // of their sum, which has no cancellation at grazing angles.
         let cos =
             || ((direction - incident).length_squared().sqrt() * L::from_f64(0.5)).min(L::one());
         BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }
     }
 
-    /// Samples the reflection at a microfacet. Below the surface G, and with it the weight, is zero.
+    /// Samples the reflection at a microfacet. G is zero below the surface, and so is the weight.
     #[inline(always)]
     fn sample_microfacet<L: SimdFloat<Scalar = S>>(
         &self,
@@ -331,8 +333,9 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction` before folding; `None`
-    /// for a mirror. Scalar, in double precision, for tests.
+    /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction`, before directions
+    /// below the surface are mirrored up. Returns `None` for a mirror. Scalar, in double precision,
+    /// for tests.
     pub fn density(
         &self,
         lobe: &ReflectionLobe<S>,

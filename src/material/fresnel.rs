@@ -1,4 +1,4 @@
-//! Fresnel reflectance against angle, per channel.
+//! Fresnel reflectance as a function of the angle, per channel.
 
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::material::{Fresnel, Material};
@@ -35,7 +35,7 @@ impl<S: Float> Reflectance<S> {
         Self::new(&Material::default())
     }
 
-    /// Compiles the F0 (white if none is given) and the Fresnel mode of a material.
+    /// Compiles the Fresnel mode and the reflectance F0 of a material.
     pub fn new(material: &Material) -> Self {
         let f0 = material.f0().0;
         let mode = material.fresnel_mode();
@@ -54,8 +54,8 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// Returns `value` times the reflectance at the cosine `c()`, which is evaluated only if the mode
-    /// depends on the angle.
+    /// Returns `value` times the reflectance at the cosine `c()`. The closure is called only if the
+    /// mode depends on the angle.
     #[inline(always)]
     pub fn times<L: SimdFloat<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> Vec3<L> {
         match self.mode {
@@ -64,7 +64,8 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// Returns the reflectance at the cosine `c` (0..1) between light and facet normal.
+    /// Returns the reflectance at `c`, the cosine (0..1) between the directions of the light and
+    /// the microfacet normal.
     #[inline(always)]
     pub fn at<L: SimdFloat<Scalar = S>>(&self, c: L) -> Vec3<L> {
         let f0 = Vec3::splat(self.f0);
@@ -84,8 +85,9 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// Cook and Torrance's form of Fresnel's equations:
-    /// F = 1/2 ((g - c) / (g + c))^2 (1 + ((c (g + c) - 1) / (c (g - c) + 1))^2), g^2 = n^2 + c^2 - 1.
+    /// Returns the reflectance by Cook and Torrance's form of Fresnel's equations:
+    /// F = 1/2 ((g - c) / (g + c))^2 (1 + ((c (g + c) - 1) / (c (g - c) + 1))^2), g^2 = n^2 + c^2 -
+    /// 1.
     #[inline(always)]
     fn exact<L: SimdFloat<Scalar = S>>(&self, c: L, channel: usize) -> L {
         if self.total[channel] {
@@ -93,7 +95,8 @@ impl<S: Float> Reflectance<S> {
         }
         let g = c.mul_add(c, L::splat(self.index2_less_1[channel])).max(L::zero()).sqrt();
         let (plus, minus) = (g + c, g - c);
-        // At n = 1 and grazing incidence g = c = 0: there is no boundary, and the reflectance is 0.
+        // At n = 1 and grazing incidence, g = c = 0: there is no boundary, and the reflectance is
+        // 0.
         let ratio = minus / plus.max(L::from_f64(1e-30));
         let other = (c * plus - L::one()) / (c * minus + L::one());
         L::from_f64(0.5) * ratio * ratio * (L::one() + other * other)

@@ -18,20 +18,23 @@ pub enum Projection {
     Spherical,
     /// u is the angle around y in turns, 1/2 at the front; v the height divided by the shape's height.
     Cylindrical,
-    /// Each side of a box in planar projection, seen from outside.
+    /// Planar projection of each side of a box, seen from outside.
     Box,
     /// Texture coordinates of the shape.
     Uv,
 }
 
-/// Distance that v keeps from the ends of a cylindrical projection, as a fraction of the height: the ends
-/// show the colours of their rims in spite of rounding errors.
+/// Smallest distance of v from the ends of a cylindrical projection, as a fraction of the height.
+/// The flat ends show the colours of their rims, in spite of rounding errors that would otherwise
+/// wrap v to the opposite rim.
 const RIM: f64 = 1.0 / 16_384.0;
 
-/// Factor in favour of the later of two axes, so that rounding errors do not choose between equal ones.
+/// Factor in favour of the later of two axes in the choice of the side of a box. Rounding errors
+/// therefore do not choose between axes with which the normal has equal angles.
 const TIE: f64 = 1.001;
 
-/// Texture coordinates in repeats, and their gradients in texture space.
+/// Texture coordinates and their gradients in texture space. The unit of the coordinates is one
+/// repetition of the image.
 #[derive(Clone, Copy, Debug)]
 pub struct TexCoord<L> {
     /// Coordinate to the right.
@@ -52,8 +55,8 @@ pub struct TextureMapping<S> {
     texture_from_scene: [[S; 3]; 3],
     /// Columns of the inverse map.
     scene_from_texture: [[S; 3]; 3],
-    /// Centre of the part in the scene. Points are mapped relative to it, so that rounding errors scale
-    /// with the size of the part.
+    /// Centre of the part in the scene. Points are mapped relative to this centre: rounding errors
+    /// scale with the size of the part.
     center: [S; 3],
     /// Centre of the part in texture space, relative to the origin of the projection.
     texture_center: [S; 3],
@@ -63,7 +66,9 @@ pub struct TextureMapping<S> {
     offset: [S; 2],
 }
 
-/// Returns the axes in which a mapping along or around `axis` is one along z or around y.
+/// Returns the rotation from texture space to axes in which the projection is along z (planar) or
+/// around y (spherical and cylindrical). `axis` is the axis along or around which the mapping
+/// projects.
 fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     let rows = match (projection, axis) {
@@ -77,8 +82,9 @@ fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
 }
 
 impl<S: Float> TextureMapping<S> {
-    /// Compiles `placement` for one part of an object. `projection` is the projection that the mapping
-    /// means for the part; `low` and `high` are corners of its bounding box in texture space.
+    /// Compiles `placement` for one part of an object. `projection` is the projection that
+    /// `placement` selects for the part. `low` and `high` are opposite corners of the part's
+    /// bounding box, in texture space.
     pub fn new(
         placement: &Placement,
         projection: Projection,
@@ -102,7 +108,7 @@ impl<S: Float> TextureMapping<S> {
         let mut scale = placement.scale;
         let extent = high - low;
         if projection == Projection::Planar && placement.mapping == Mapping::Uv {
-            // One repeat from edge to edge of a flat shape.
+            // One repetition from edge to edge of a flat shape.
             scale = [scale[0] / extent.x, scale[1] / extent.y];
         }
         Self {
@@ -117,20 +123,22 @@ impl<S: Float> TextureMapping<S> {
         }
     }
 
-    /// Returns `true` if the mapping uses the shape's texture coordinates.
+    /// Returns `true` if the mapping uses the texture coordinates of the shape.
     pub fn wants_uv(&self) -> bool {
         self.projection == Projection::Uv
     }
 
-    /// Maps a normal of any length to the other space. `columns` are those of the map back.
+    /// Maps a normal of any length from one space to the other. `columns` are those of the linear
+    /// map in the opposite direction.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(columns: &[[S; 3]; 3], n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = columns.map(Vec3::splat);
         Vec3::new(x.dot(n), y.dot(n), z.dot(n))
     }
 
-    /// Returns the coordinates at `point`; `normal` is the outer normal there, both in the scene. Zero if
-    /// [`TextureMapping::wants_uv`] is `true`.
+    /// Returns the texture coordinates at `point`. `normal` is the outer normal at `point`; both
+    /// are in scene space. If [`TextureMapping::wants_uv`] is `true`, the coordinates are those of
+    /// u = v = 0.
     pub fn coordinates<L: SimdFloat<Scalar = S>>(
         &self,
         point: Vec3<L>,
@@ -155,7 +163,7 @@ impl<S: Float> TextureMapping<S> {
         self.placed(coordinates)
     }
 
-    /// Applies scale and offset to coordinates.
+    /// Applies scale and offset of the placement to texture coordinates.
     pub fn placed<L: SimdFloat<Scalar = S>>(&self, unplaced: TexCoord<L>) -> TexCoord<L> {
         let ([su, sv], [ou, ov]) = (self.scale.map(L::splat), self.offset.map(L::splat));
         TexCoord {
@@ -166,10 +174,11 @@ impl<S: Float> TextureMapping<S> {
         }
     }
 
-    /// Returns the unit normal perturbed by a bump map. `gradient` is the gradient of the height in texture
-    /// space; `outward` is 1 where `normal` is the outer normal, along which heights rise, else -1.
+    /// Returns the unit normal perturbed by a bump map. `gradient` is the gradient of the height in
+    /// texture space. Heights rise along the outer normal: `outward` is 1 where `normal` is the
+    /// outer normal, and -1 elsewhere.
     ///
-    /// Heights rise along the normal in texture space, so that bumps are transformed with their object.
+    /// The heights are added in texture space, so that bumps are transformed with their object.
     pub fn bumped<L: SimdFloat<Scalar = S>>(
         &self,
         normal: Vec3<L>,
@@ -183,7 +192,7 @@ impl<S: Float> TextureMapping<S> {
     }
 }
 
-/// Vector of the given length along a coordinate axis.
+/// Returns the vector of the given length along a coordinate axis.
 #[inline(always)]
 fn along_axis<L: SimdFloat>(axis: usize, length: L) -> Vec3<L> {
     let zero = L::zero();
@@ -202,7 +211,7 @@ fn planar<L: SimdFloat>(p: Vec3<L>) -> TexCoord<L> {
 #[inline(always)]
 fn around<L: SimdFloat>(p: Vec3<L>) -> (L, Vec3<L>, L) {
     let across2 = p.x.mul_add(p.x, p.z * p.z);
-    // Bounded, because angle and gradient are undefined on the axis.
+    // The squared distance has a lower bound, because angle and gradient are undefined on the axis.
     let across2 = across2.max(p.length_squared() * L::from_f64(1e-12)).max(L::from_f64(1e-30));
     let turns = p.x.atan2(p.z).mul_add(L::from_f64(1.0 / TAU), L::from_f64(0.5));
     let per = L::from_f64(1.0 / TAU) / across2;
@@ -232,7 +241,8 @@ fn cylindrical<L: SimdFloat>(p: Vec3<L>, height: L) -> TexCoord<L> {
     }
 }
 
-/// Planar projection of the side of a box that `normal` selects, from its lower corner.
+/// Returns the planar projection of one side of a box, measured from the lower left corner of that
+/// side. The side is that which faces in the direction of `normal`.
 fn sides<L: SimdFloat>(p: Vec3<L>, normal: Vec3<L>, extent: Vec3<L>) -> TexCoord<L> {
     let zero = L::zero();
     let [ax, ay, az] = [normal.x, normal.y, normal.z].map(L::abs);

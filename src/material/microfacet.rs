@@ -5,8 +5,8 @@ use crate::material::Masking;
 use crate::sampling::warp;
 use std::f64::consts::PI;
 
-/// Smallest microfacet alpha. Below it the reflection lobe is a mirror, and the highlights of lights use
-/// this value.
+/// Smallest alpha of a microfacet distribution. For a smaller alpha the reflection lobe is a
+/// mirror, and the highlights of lights use this value.
 pub const SMOOTH_ALPHA: f64 = 1e-3;
 
 /// A distribution of microfacets.
@@ -20,7 +20,7 @@ pub struct MicrofacetDistribution<S> {
     pub alpha2: S,
     /// Inverse square of `alpha`.
     pub inverse_alpha2: S,
-    /// Masking and shadowing between microfacets.
+    /// Model of masking and shadowing between microfacets.
     pub masking: Masking,
 }
 
@@ -35,17 +35,19 @@ impl<S: Float> MicrofacetDistribution<S> {
 
 /// Terms of a microfacet BSDF in SIMD lanes.
 pub trait MicrofacetEval<L: SimdFloat> {
-    /// Returns D [1/sr]; `tan2` is the squared tangent of the angle between facet normal and surface
-    /// normal.
+    /// Returns the density D of microfacet normals [1/sr]. `tan2` is the squared tangent of the
+    /// angle between microfacet normal and surface normal.
     fn density(&self, tan2: L) -> L;
-    /// Returns G, the fraction of facets with normal h visible from both directions, as numerator and
-    /// denominator. `nh`, `nv`, `nl`, `vh` are positive cosines; `nh` and `vh` may have a common factor.
+    /// Returns G as numerator and denominator. G is the fraction of the microfacets with normal h
+    /// that are visible from both directions. `nh`, `nv`, `nl`, `vh` are positive cosines; `nh` and
+    /// `vh` may have a common factor.
     fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L);
     /// Returns Smith's Lambda for a direction with the cosine `c` > 0 to the normal.
     fn lambda(&self, c: L) -> L;
 }
 
-/// Value of 1 / (alpha tan) from which Beckmann's Lambda is below 3e-10.
+/// Value of 1 / (alpha tan) from which masking is neglected: Beckmann's Lambda is below 3e-10
+/// there.
 const STEEP: f64 = 4.0;
 
 /// Returns Beckmann's Lambda (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)) for 0 < a < [`STEEP`] (Heitz
@@ -86,9 +88,9 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         }
     }
 
-    /// Torrance and Sparrow 1967 (V-cavities): min(1, 2 N.H min(N.V, N.L) / V.H); Heitz 2014,
-    /// *Understanding the Masking-Shadowing Function* (height-correlated Smith): 1 / (1 + Lambda(V) +
-    /// Lambda(L)).
+    /// Returns G of V-cavities, min(1, 2 N.H min(N.V, N.L) / V.H) (Torrance and Sparrow 1967), or
+    /// of height-correlated Smith masking, 1 / (1 + Lambda(V) + Lambda(L)) (Heitz 2014,
+    /// *Understanding the Masking-Shadowing Function*).
     #[inline(always)]
     fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L) {
         match self.masking {
@@ -97,7 +99,7 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         }
     }
 
-    /// Lambda as a function of a = 1 / (alpha tan).
+    /// Returns Lambda as a function of a = 1 / (alpha tan).
     #[inline(always)]
     fn lambda(&self, c: L) -> L {
         let alpha2 = L::splat(self.alpha2);
@@ -105,7 +107,7 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         if self.ggx {
             return ((alpha2 * sin2 / cos2 + L::one()).sqrt() - L::one()) * L::from_f64(0.5);
         }
-        // Most packets see the surface steeply in all lanes: nothing is masked.
+        // Most packets hit the surface steeply in all lanes: then nothing is masked.
         let grazing = cos2.lt(sin2 * alpha2 * L::from_f64(STEEP * STEEP));
         if grazing.none() {
             return L::zero();

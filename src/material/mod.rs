@@ -153,7 +153,9 @@ impl Metal {
 }
 
 impl Material {
-    /// Returns the reflectance at normal incidence: that of `metal`, `f0`, that of the dielectric, or white.
+    /// Returns the reflectance at normal incidence: that of `metal`, else `f0`. If neither is
+    /// given, it is that of the index of refraction for a dielectric, and white for any other
+    /// material.
     pub fn f0(&self) -> Color {
         let default = match self.fresnel_mode() {
             Fresnel::Dielectric => Color([f0_from_index(self.ior); 3]),
@@ -162,14 +164,14 @@ impl Material {
         self.metal.map(Metal::f0).or(self.f0).unwrap_or(default)
     }
 
-    /// Returns the dependence of the reflectance on the angle.
+    /// Returns the dependence of the reflectance on the angle: `fresnel`, or its default.
     pub fn fresnel_mode(&self) -> Fresnel {
         let default = if self.metal.is_some() { Fresnel::Exact } else { Fresnel::Constant };
         self.fresnel.unwrap_or(default)
     }
 
-    /// Returns the alpha of the microfacet distribution: `alpha`, or the one with the second moment of the
-    /// cone.
+    /// Returns the alpha of the microfacet distribution. Without the key `alpha`, it is the value
+    /// that gives the distribution the second moment of the reflection cone.
     pub fn microfacet_alpha(&self) -> f64 {
         self.alpha.unwrap_or(self.roughness / 8f64.sqrt())
     }
@@ -180,7 +182,7 @@ impl Material {
             || self.highlight == Highlight::CookTorrance && self.specular > 0.0
     }
 
-    /// Returns the errors of the material.
+    /// Returns the validation errors of the material.
     pub fn faults(&self) -> Vec<ValidationError> {
         let both = self.f0.is_some() && self.metal.is_some();
         let dielectric = self.fresnel == Some(Fresnel::Dielectric);

@@ -23,16 +23,17 @@ pub struct BsdfProperties {
 }
 
 impl BsdfProperties {
-    /// Properties of the diffuse part, Lambert's law f = albedo / pi, the only model without a name in
-    /// scene files.
+    /// Properties of the diffuse part, Lambert's law f = albedo / pi, which is the only model
+    /// without a name in scene files.
     pub const LAMBERT: Self = Self { reciprocal: true, energy: Energy::Conserving };
 }
 
 impl Lobe {
     /// Returns the properties of reflection by this lobe.
     ///
-    /// Cone and square are uniform about the mirror direction: the density is symmetric, so that
-    /// f = density / cos of the light is not.
+    /// The lobes `cone` and `square` are uniform about the mirror direction, so that their density
+    /// is symmetric in light and view. f is the density divided by the cosine of the light, and
+    /// therefore not symmetric.
     pub fn properties(self) -> BsdfProperties {
         match self {
             Self::Mirror => BsdfProperties { reciprocal: true, energy: Energy::Conserving },
@@ -57,11 +58,11 @@ impl Highlight {
 }
 
 impl Fresnel {
-    /// Returns the properties of reflection and transmission together, of a transparent surface.
+    /// Returns the properties of a transparent surface, for reflection and transmission together.
     pub fn transmission_properties(self) -> BsdfProperties {
         match self {
             Self::Dielectric => BsdfProperties { reciprocal: true, energy: Energy::Conserving },
-            // k_r and k_t are independent; inner sides do not reflect.
+            // k_r and k_t are independent, and the inner sides of surfaces do not reflect.
             _ => BsdfProperties { reciprocal: false, energy: Energy::Unbounded },
         }
     }

@@ -34,8 +34,9 @@ pub struct FresnelSplit<L> {
 }
 
 impl<L: SimdFloat> Interface<L> {
-    /// Refracts rays with the unit direction `incident` at a boundary with the unit normal `n` on their
-    /// side. `n_i` and `n_t` are the indices of refraction before and behind it.
+    /// Refracts rays with the unit direction `incident` at a boundary. `n` is the unit normal of
+    /// the boundary on the side of the rays. `n_i` and `n_t` are the indices of refraction on this
+    /// side and on the other one.
     ///
     /// sin t = (n_i / n_t) sin i is computed from the part of the direction along the boundary, so that
     /// grazing rays keep full precision. With equal indices the direction is unchanged.
@@ -64,7 +65,7 @@ impl<L: SimdFloat> Interface<L> {
     fn polarised(&self) -> (L, L) {
         let Self { cos_i, cos_t, n_i, n_t, .. } = *self;
         let reflectance = |a: L, b: L| {
-            // With equal indices and a grazing ray both are zero: there is no boundary.
+            // With equal indices and a grazing ray, a and b are zero: there is no boundary.
             let r = (a - b) / (a + b).max(L::from_f64(1e-30));
             r * r
         };
@@ -80,16 +81,17 @@ impl<L: SimdFloat> Interface<L> {
         (s + p) * L::from_f64(0.5)
     }
 
-    /// Returns the reflectance for unpolarised light of a thin pane, a slab with this boundary on both
-    /// sides, with all inner reflections: 2 F / (1 + F) for each polarisation.
+    /// Returns the reflectance of a thin pane for unpolarised light: 2 F / (1 + F) for each
+    /// polarisation. The pane is a slab with this boundary on both sides, and all inner reflections
+    /// are included.
     #[inline(always)]
     pub fn pane_reflectance(&self) -> L {
         let (s, p) = self.polarised();
         s / (L::one() + s) + p / (L::one() + p)
     }
 
-    /// Returns the weights of reflected and transmitted rays. `outer` selects lanes that come from outside
-    /// of a solid.
+    /// Returns the weights of reflected and transmitted rays. `outer` selects the lanes whose rays
+    /// come from outside of a solid.
     ///
     /// Without Fresnel's equations a solid reflects on its outer side only, which prevents endless
     /// reflections between its inner walls; beyond the critical angle all light is reflected.

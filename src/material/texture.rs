@@ -152,19 +152,19 @@ choices! {
 pub struct Placement {
     /// Source of the coordinates.
     pub mapping: Mapping,
-    /// Axis of the mapping; `None` for the shape's own.
+    /// Axis around or along which the mapping projects; `None` is the default axis of the mapping.
     pub axis: Option<Axis>,
-    /// Repeats per unit of u and v.
+    /// Repetitions of the image per unit of u and of v.
     pub scale: [f64; 2],
-    /// Added to the scaled coordinates, in repeats.
+    /// Offset that is added to the scaled coordinates. Its unit is one repetition of the image.
     pub offset: [f64; 2],
 }
 
-/// Content of a file, or the error of reading it; `None` until the file was searched.
+/// Content of a file, or the error of reading it; `None` until the file has been looked for.
 #[derive(Clone, Default)]
 struct Loaded(Option<Result<Arc<Image>, AssetError>>);
 
-/// Pixels are compared only if the images differ in address.
+/// Compares the pixels only if the images differ in address.
 impl PartialEq for Loaded {
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
@@ -200,7 +200,7 @@ impl Loaded {
 macro_rules! placed {
     ($($kind:ident),+) => {$(
         impl $kind {
-            /// Returns its placement on shapes.
+            /// Returns the placement of the texture on shapes.
             pub fn placement(&self) -> Placement {
                 let Self { mapping, axis, scale, offset, .. } = *self;
                 Placement { mapping, axis, scale, offset }
@@ -212,21 +212,22 @@ macro_rules! placed {
 placed!(ImageTexture, Checker, HeightImage);
 
 impl ImageTexture {
-    /// Returns the pixels; `None` without a readable file.
+    /// Returns the pixels; `None` if no readable file has been loaded.
     pub fn image(&self) -> Option<&Arc<Image>> {
         self.content.image()
     }
 }
 
 impl HeightImage {
-    /// Returns the pixels; `None` without a readable file.
+    /// Returns the pixels; `None` if no readable file has been loaded.
     pub fn image(&self) -> Option<&Arc<Image>> {
         self.content.image()
     }
 }
 
 impl Texture {
-    /// Creates the kind with this key and default parameters; `None` if no kind has it.
+    /// Creates a texture of the kind `key` with default parameters; `None` if there is no such
+    /// kind.
     pub fn new(key: &str) -> Option<Self> {
         match key {
             "image" => Some(Self::Image(ImageTexture::default())),
@@ -235,7 +236,7 @@ impl Texture {
         }
     }
 
-    /// Returns the key of its kind.
+    /// Returns the key of the texture's kind.
     pub fn key(&self) -> &'static str {
         match self {
             Self::Image(_) => "image",
@@ -243,7 +244,7 @@ impl Texture {
         }
     }
 
-    /// Returns its placement on shapes.
+    /// Returns the placement of the texture on shapes.
     pub fn placement(&self) -> Placement {
         match self {
             Self::Image(image) => image.placement(),
@@ -251,7 +252,8 @@ impl Texture {
         }
     }
 
-    /// Returns a texture of the kind `key` with the same placement.
+    /// Returns a texture of the kind `key` with the same placement; `None` if there is no such
+    /// kind.
     pub fn changed(&self, key: &str) -> Option<Self> {
         let Placement { mapping, axis, scale, offset } = self.placement();
         Some(match Self::new(key)? {
@@ -264,7 +266,7 @@ impl Texture {
         })
     }
 
-    /// Returns `false` for an image without a readable file.
+    /// Returns `true` unless the texture is an image without a readable file.
     pub fn has_effect(&self) -> bool {
         match self {
             Self::Image(image) => image.image().is_some(),
@@ -274,18 +276,20 @@ impl Texture {
 }
 
 impl Bump {
-    /// Creates the kind with this key and default parameters; `None` if no kind has it.
+    /// Creates a bump map of the kind `key` with default parameters; `None` if there is no such
+    /// kind.
     pub fn new(key: &str) -> Option<Self> {
         (key == "image").then(|| Self::Image(HeightImage::default()))
     }
 
-    /// Returns its placement on shapes.
+    /// Returns the placement of the bump map on shapes.
     pub fn placement(&self) -> Placement {
         let Self::Image(image) = self;
         image.placement()
     }
 
-    /// Returns `false` if no normal is perturbed: without a readable file, or with the height 0.
+    /// Returns `true` if the bump map perturbs normals. Returns `false` without a readable file, or
+    /// if the height is 0.
     pub fn has_effect(&self) -> bool {
         let Self::Image(image) = self;
         image.height != 0.0 && image.image().is_some()
@@ -335,7 +339,7 @@ impl FieldValue for Bump {
 }
 
 impl crate::material::Material {
-    /// Returns the names of its texture's and bump's files with their content.
+    /// Returns the names of the files of texture and bump map, each with its content.
     fn files_mut(&mut self) -> impl Iterator<Item = (&String, &mut Loaded)> {
         let texture = match &mut self.texture {
             Some(Texture::Image(image)) => Some((&image.file, &mut image.content)),
@@ -355,14 +359,15 @@ impl crate::material::Material {
         [texture, bump].into_iter().flatten().filter(|file| !file.is_empty())
     }
 
-    /// Loads the files that the material names with `load`, unless they have been searched already.
+    /// Loads the files that the material names with `load`, unless content or an error is there
+    /// already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Image>, AssetError>) {
         for (file, content) in self.files_mut() {
             content.0.get_or_insert_with(|| load(file));
         }
     }
 
-    /// Takes the content of files from `other` that both materials name.
+    /// Copies the content of the files that both materials name from `other`.
     pub fn resolve_as(&mut self, other: &Self) {
         let mut known = other.clone();
         let known: Vec<_> = known.files_mut().collect();

@@ -5,10 +5,10 @@ use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3};
 use crate::material::texture::{Bump, Texture, TextureFilter, Wrap};
 use std::sync::Arc;
 
-/// Compiled texture; its coordinates are in repeats.
+/// Compiled texture. The unit of its coordinates is one repetition of the image.
 #[derive(Clone, Debug)]
 pub enum CompiledTexture<S> {
-    /// Squares, two by two per repeat: colour of the first and of its neighbours.
+    /// Squares, two by two per repetition: colour of the first square, and that of its neighbours.
     Checker([[S; 3]; 2]),
     /// An image.
     Image {
@@ -21,7 +21,7 @@ pub enum CompiledTexture<S> {
     },
 }
 
-/// Compiled bump map; its coordinates are in repeats.
+/// Compiled bump map. The unit of its coordinates is one repetition of the image.
 #[derive(Clone, Debug)]
 pub struct BumpMap {
     image: Arc<Image>,
@@ -30,14 +30,14 @@ pub struct BumpMap {
     height: f64,
 }
 
-/// Returns the position of the coordinate `x`, in repeats, among `size` pixels: the index of the pixel
-/// whose centre is at or before it, which may be out of range, and the fraction from there to the next
-/// centre, from 0 to 1.
+/// Returns the position of the coordinate `x`, in repetitions, among `size` pixels. The index is
+/// that of the pixel whose centre is at or before `x`; it may be out of range. The fraction, from 0
+/// to 1, is the way from there to the next centre.
 #[inline(always)]
 fn pixel_position(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
     let size = f64::from(size);
     let x = match wrap {
-        // A triangle without area has no texture coordinates.
+        // The texture coordinates of a triangle without area are not finite.
         _ if !x.is_finite() => 0.0,
         Wrap::Repeat => x - x.floor(),
         Wrap::Clamp => x.clamp(-1.0, 2.0),
@@ -55,7 +55,8 @@ fn wrapped(i: i32, size: u32, wrap: Wrap) -> u32 {
     }
 }
 
-/// Returns linear light at (u, v); v points up, rows are stored downwards.
+/// Returns the colour, in linear light, at (u, v). v points up; rows of pixels are stored
+/// downwards.
 #[inline(always)]
 fn color_at(image: &Image, wrap: Wrap, filter: TextureFilter, u: f64, v: f64) -> [f64; 3] {
     let [width, height] = image.size();
@@ -74,7 +75,7 @@ fn color_at(image: &Image, wrap: Wrap, filter: TextureFilter, u: f64, v: f64) ->
     })
 }
 
-/// Gathers `f(lane)` for the lanes of `bits`; other lanes are zero.
+/// Gathers `f(lane)` for the lanes whose bits are set in `bits`; other lanes are zero.
 #[inline(always)]
 fn gathered<L: SimdFloat>(bits: u32, mut f: impl FnMut(usize) -> [f64; 3]) -> Vec3<L> {
     let mut all = [[0.0; 3]; MAX_WIDTH];
@@ -88,7 +89,7 @@ fn gathered<L: SimdFloat>(bits: u32, mut f: impl FnMut(usize) -> [f64; 3]) -> Ve
 }
 
 impl<S: Float> CompiledTexture<S> {
-    /// Compiles a texture; `None` if it has no effect.
+    /// Compiles a texture; returns `None` if it is an image without a readable file.
     pub fn new(texture: &Texture) -> Option<Self> {
         match texture {
             Texture::Checker(checker) => {
@@ -102,7 +103,7 @@ impl<S: Float> CompiledTexture<S> {
         }
     }
 
-    /// Returns the colours at (u, v) in the lanes of `bits`.
+    /// Returns the colours at (u, v) in the lanes whose bits are set in `bits`.
     pub fn eval<L: SimdFloat<Scalar = S>>(&self, (u, v): (L, L), bits: u32) -> Vec3<L> {
         let coordinates = |lane| (u.lane(lane).to_f64(), v.lane(lane).to_f64());
         match self {
@@ -120,14 +121,15 @@ impl<S: Float> CompiledTexture<S> {
 }
 
 impl BumpMap {
-    /// Compiles a bump map; `None` if it has no effect.
+    /// Compiles a bump map; returns `None` if it does not perturb normals.
     pub fn new(bump: &Bump) -> Option<Self> {
         let Bump::Image(source) = bump;
         bump.has_effect().then_some(())?;
         Some(Self { image: source.image()?.clone(), wrap: source.wrap, height: source.height })
     }
 
-    /// Returns the gradient of the height along u and v, in lengths per repeat, in the lanes of `bits`.
+    /// Returns the gradient of the height along u and v, in scene units per repetition, in the
+    /// lanes whose bits are set in `bits`.
     ///
     /// Central differences at the pixels are interpolated bilinearly. The gradient is continuous; that of
     /// bilinear heights would jump at pixel boundaries.
@@ -148,7 +150,8 @@ impl BumpMap {
         let rows: [u32; 4] = std::array::from_fn(|i| wrapped(y + i as i32 - 1, height, wrap));
         let height_at = |i: usize, j: usize| f64::from(self.image.height(columns[i], rows[j]));
         let lerp = |f: f64, a: f64, b: f64| a + f * (b - a);
-        // Twice the slope per pixel, to the right and down, at the four pixels around.
+        // Twice the slope per pixel, to the right and downward, at the four pixels around the
+        // point.
         let right = |i: usize, j: usize| height_at(i + 1, j) - height_at(i - 1, j);
         let down = |i: usize, j: usize| height_at(i, j + 1) - height_at(i, j - 1);
         let du = lerp(fy, lerp(fx, right(1, 1), right(2, 1)), lerp(fx, right(1, 2), right(2, 2)));

@@ -1,28 +1,29 @@
-//! Run-queue delay: the time for which this program's threads were ready and waited for a processor,
-//! because other programs disturbed a measurement. Linux reports it for each thread
-//! (`/proc/PID/task/TID/schedstat`); elsewhere it is unknown.
+//! Run-queue delay: the time for which threads of this program were ready to run and waited for a
+//! processor. It shows that other programs disturbed a measurement. Linux reports it for each
+//! thread (`/proc/PID/task/TID/schedstat`). On other systems it is unknown.
 
 use std::collections::HashMap;
 use std::fs;
 use std::time::Duration;
 
-/// Run-queue delay of each thread of this program since the thread's start.
+/// Run-queue delay of each thread of this program, since the start of the thread.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunQueueDelay(HashMap<String, Duration>);
 
 impl RunQueueDelay {
-    /// Delays until now; `None` where the system does not report them.
+    /// Reads the delays of all threads until now. Returns `None` on systems that do not report
+    /// them.
     pub fn now() -> Option<Self> {
         let mut all = HashMap::new();
         for task in fs::read_dir("/proc/self/task").ok()?.flatten() {
-            // A thread may end meanwhile.
+            // The read fails if the thread has ended meanwhile.
             let Ok(text) = fs::read_to_string(task.path().join("schedstat")) else { continue };
             all.insert(task.file_name().to_string_lossy().into_owned(), parse_delay(&text)?);
         }
         (!all.is_empty()).then_some(Self(all))
     }
 
-    /// Seconds that all threads together have waited since `before` was taken.
+    /// Returns the seconds that all threads together have waited since `before` was read.
     pub fn seconds_since(&self, before: &Self) -> f64 {
         let since = |(thread, now): (&String, &Duration)| {
             now.saturating_sub(before.0.get(thread).copied().unwrap_or_default())
@@ -31,7 +32,8 @@ impl RunQueueDelay {
     }
 }
 
-/// Parses the delay from a line of three numbers: nanoseconds run, nanoseconds waited, times scheduled.
+/// Parses the delay, the second of three numbers: nanoseconds run, nanoseconds waited, number of
+/// times scheduled.
 fn parse_delay(schedstat: &str) -> Option<Duration> {
     schedstat.split_whitespace().nth(1)?.parse().ok().map(Duration::from_nanos)
 }

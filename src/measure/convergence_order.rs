@@ -1,6 +1,6 @@
 //! Order of convergence: the slope of log error against log samples.
 
-/// Slope of a least-squares line, with its standard error.
+/// Slope of a least-squares line through points in log-log coordinates, with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
     /// d log(error) / d log(samples): -0.5 for independent random samples.
@@ -10,7 +10,9 @@ pub struct Slope {
 }
 
 impl Slope {
-    /// Fits points of (samples, error), both positive; `None` for fewer than three points.
+    /// Fits a line to points (samples, error). Points with a number that is not positive are
+    /// ignored. Returns `None` if fewer than three points remain or all have the same number of
+    /// samples.
     pub fn fit(points: &[(f64, f64)]) -> Option<Self> {
         let logs: Vec<(f64, f64)> = points
             .iter()
@@ -48,7 +50,8 @@ mod tests {
         assert_eq!(Slope::fit(&points[..2]), None);
     }
 
-    /// Residuals are (1, -2, 1) / 10 about a horizontal line: the slope's error is sqrt(0.06 / 1 / 2).
+    /// The residuals about a horizontal line are (1, -2, 1) / 10. The standard error of the slope
+    /// is therefore sqrt(0.06 / 1 / 2).
     #[test]
     fn scatter_determines_the_standard_error() {
         let e = std::f64::consts::E;

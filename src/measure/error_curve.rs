@@ -1,4 +1,4 @@
-//! Error curve of one variant, from the first samples to the target noise.
+//! Error curve of one variant of the settings, from the first samples to the target noise.
 
 use crate::measure::contention::RunQueueDelay;
 use crate::measure::experiment::Variant;
@@ -9,36 +9,39 @@ use std::io;
 /// Point of an error curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Number of preceding decisions of the schedule.
+    /// Number of steps of the render up to this point.
     pub step: usize,
-    /// Samples over all pixels.
+    /// Number of samples over all pixels.
     pub samples: u64,
     /// Samples per pixel, mean.
     pub spp: f64,
     /// Seconds of tracing, one entry for each repetition.
     pub seconds: Vec<f64>,
-    /// The program's own estimate of the error, in 8-bit levels.
+    /// Error that the render estimates from its own replicates, without a reference, in 8-bit
+    /// levels.
     pub estimated_codes: Option<f64>,
-    /// The error against the reference.
+    /// Errors against the reference.
     pub errors: Errors,
 }
 
-/// End of an error curve.
+/// Conditions at which an error curve ends.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
     /// Error at which the curve ends, in 8-bit levels.
     pub codes: f64,
-    /// Seconds of tracing after which it ends in any case.
+    /// Seconds of tracing after which the curve ends in any case.
     pub seconds: f64,
-    /// Compares the estimated error instead of the true one, for biased variants.
+    /// `true` if the estimated error is compared with `codes`, instead of the true one. Used for
+    /// biased variants, whose true error does not converge to 0.
     pub use_estimate: bool,
 }
 
-/// Factor by which the estimated error falls between two points of the curve.
+/// Factor by which the estimated error falls from one point of the curve to the next.
 const POINT_RATIO: f64 = 0.84;
 
-/// Share of the processors' time that other programs used while `threads` threads ran for `seconds`
-/// since `before`; `None` if it is unknown, or if these threads wait for each other.
+/// Returns the share of the processors' time that other programs used while `threads` threads ran
+/// for `seconds` since `before`. Returns `None` if the share is unknown, or if there are more
+/// threads than processors, so that these threads wait for each other.
 fn stolen_share(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) -> Option<f64> {
     if seconds <= 0.0 || threads > std::thread::available_parallelism().map_or(1, usize::from) {
         return None;
@@ -47,8 +50,8 @@ fn stolen_share(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) ->
     Some((waited / (threads as f64 * seconds)).min(1.0))
 }
 
-/// Renders `variant` until `end`. Returns the points, the share of the processors that other programs
-/// used meanwhile, and the render.
+/// Renders `variant` until `end`. Returns the points of the error curve, the share of the
+/// processors' time that other programs used meanwhile (`None` if unknown), and the render.
 ///
 /// # Errors
 /// Returns the error of the system that refuses to start a thread.
@@ -66,7 +69,7 @@ pub fn follow(
         let estimate = render.noise_codes();
         let timed_out = render.seconds() >= end.seconds;
         let changed = estimate.is_some_and(|t| t <= POINT_RATIO * last_estimate);
-        // A picture without noise is final at once.
+        // A picture without noise does not change any more.
         let noiseless = estimate == Some(0.0);
         if changed || done || timed_out {
             last_estimate = estimate.unwrap_or(last_estimate);
@@ -92,8 +95,8 @@ pub fn follow(
     Ok((points, stolen, render))
 }
 
-/// Renders `variant` again and adds the seconds to each point. Returns the share of the processors that
-/// other programs used meanwhile.
+/// Renders `variant` again and adds the seconds of this repetition to each point. Returns the share
+/// of the processors' time that other programs used meanwhile, or `None` if unknown.
 ///
 /// # Errors
 /// Returns the error of the system that refuses to start a thread.

@@ -1,4 +1,4 @@
-//! Experiments: the settings that trade speed for accuracy, varied one at a time.
+//! Experiments: settings that trade speed for accuracy are varied one at a time.
 
 use crate::film::Display;
 use crate::material::Lobe;
@@ -16,30 +16,30 @@ use std::sync::Arc;
 pub enum Experiment {
     /// Default settings.
     Default,
-    /// Adaptive or uniform sampling.
+    /// Adaptive sampling against uniform sampling.
     Adaptivity,
-    /// Single or double precision.
+    /// Single precision against double precision.
     Precision,
     /// Number of tracing threads.
     Threads,
-    /// Sobol points or independent random numbers.
+    /// Sobol points against independent random numbers.
     Sampler,
-    /// Cone lobe or its cheap approximation, the square lobe.
+    /// Cone lobe of glossy reflection against its cheap approximation, the square lobe.
     Lobe,
-    /// Ray types.
+    /// Fewer types of rays: only camera rays, or camera and shadow rays.
     Level,
     /// Largest number of reflections of a path.
     Depth,
-    /// Least weight of a path.
+    /// Throughput below which a path ends.
     MinWeight,
-    /// Cap on the samples of a glossy pixel.
+    /// Cap on the number of samples of a glossy pixel.
     RaysPerPixel,
     /// Acceleration structure.
     Acceleration,
 }
 
 impl Experiment {
-    /// Every setting, its name on the command line, and its title.
+    /// All settings, each with its name on the command line and its title.
     pub const ALL: &'static [(Self, &'static str, &'static str)] = &[
         (Self::Default, "default", "Default settings"),
         (Self::Adaptivity, "adaptivity", "Adaptive against uniform sampling"),
@@ -54,7 +54,7 @@ impl Experiment {
         (Self::Acceleration, "acceleration", "Acceleration structures"),
     ];
 
-    /// Name on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         Self::ALL
             .iter()
@@ -62,7 +62,7 @@ impl Experiment {
             .map_or("", |(_, name, _)| name)
     }
 
-    /// Title in tables and plots.
+    /// Returns the title in tables and plots.
     pub fn title(self) -> &'static str {
         Self::ALL
             .iter()
@@ -70,7 +70,9 @@ impl Experiment {
             .map_or("", |(.., title)| title)
     }
 
-    /// Name of the default among the variants: `adaptive, default`.
+    /// Returns the name of the default value in the list of variants, such as `adaptive, default`.
+    /// `single` is `true` if the default is single precision; `threads` is the default number of
+    /// threads.
     pub fn default_name(self, single: bool, threads: usize) -> String {
         let name = match self {
             Self::Adaptivity => "adaptive".to_string(),
@@ -83,7 +85,8 @@ impl Experiment {
         format!("{name}, default")
     }
 
-    /// Returns `true` if all variants have the same expectation and differ in noise only.
+    /// Returns `true` if the pictures of all variants have the same expectation and differ in noise
+    /// only.
     pub fn unbiased(self) -> bool {
         matches!(
             self,
@@ -101,7 +104,7 @@ impl FromStr for Experiment {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        // Names of earlier versions.
+        // The names of earlier versions are accepted.
         let text = match text {
             "level" => "ray-types",
             "depth" => "max-depth",
@@ -116,25 +119,26 @@ impl FromStr for Experiment {
     }
 }
 
-/// Settings of one render of the scene.
+/// Scene and settings of one render.
 #[derive(Clone)]
 pub struct Variant {
     /// The setting that differs from the default.
     pub experiment: Experiment,
-    /// Value of the setting: `uniform`, `depth 4`.
+    /// Name of the value of this setting, such as `uniform` or `depth 4`.
     pub name: String,
-    /// The scene, with the settings of its file.
+    /// The scene with this variant's settings.
     pub scene: Arc<Scene>,
-    /// Options of compilation and sampling.
+    /// Options of scene compilation and of sampling.
     pub options: Options,
-    /// Adaptive sampling.
+    /// `true` if sampling is adaptive.
     pub adaptive: bool,
     /// Number of tracing threads.
     pub threads: usize,
 }
 
 impl Variant {
-    /// Creates its render, which ends by itself only when every tile is full.
+    /// Creates a render of this variant. The render stops by itself only when every tile has
+    /// reached its largest number of samples.
     ///
     /// # Errors
     /// Returns the error of the system that refuses to start a thread.
@@ -162,14 +166,15 @@ pub struct Plan {
     pub seconds: f64,
     /// Number of threads, except in [`Experiment::Threads`].
     pub threads: usize,
-    /// Random seed. The reference has another one.
+    /// Random seed of all variants. The reference has another seed.
     pub seed: u64,
-    /// Exposure and tone curve of the displayed error.
+    /// Exposure and tone curve of the picture whose displayed error is measured.
     pub display: Display,
 }
 
 impl Plan {
-    /// The default, then the variants of each experiment that differ from it in this scene.
+    /// Returns the default variant, followed by the variants of each experiment that differ from
+    /// the default in this scene.
     pub fn variants(&self, scene: &Arc<Scene>) -> Vec<Variant> {
         let mut all = vec![self.default_of(scene)];
         for experiment in &self.experiments {
@@ -178,7 +183,7 @@ impl Plan {
         all
     }
 
-    /// The variant with default settings.
+    /// Returns the variant with default settings.
     pub fn default_of(&self, scene: &Arc<Scene>) -> Variant {
         Variant {
             experiment: Experiment::Default,
@@ -223,7 +228,7 @@ impl Plan {
                 vec![variant]
             }
             Experiment::Threads => {
-                // All threads are the default.
+                // The default, which uses all threads, is not repeated.
                 let counts = (0..).map(|k| 1 << k).take_while(|n| *n < self.threads);
                 let variant = |n: usize| {
                     let name = if n == 1 { "1 thread".to_string() } else { format!("{n} threads") };

@@ -1,9 +1,10 @@
-//! Measurement of speed against accuracy on one scene: errors against a reference, seconds to a given
-//! noise, cost and bias of each setting.
+//! Measurement of speed against accuracy on one scene: errors against a reference picture, seconds
+//! to a given noise, cost and bias of each setting.
 //!
-//! Errors are those of a seeded picture and repeat exactly. Seconds are medians of repetitions. Settings
-//! take turns, so that a slow moment of the machine affects all of them alike; repetitions in which
-//! other programs used the processors are left out.
+//! Errors are exactly reproducible, because the random seed is fixed. Seconds are medians of
+//! repetitions. The repetitions of all settings are interleaved, so that a slow moment of the
+//! machine affects all of them alike. Repetitions in which other programs used the processors are
+//! left out.
 
 mod contention;
 mod convergence_order;

@@ -1,4 +1,5 @@
-//! Plot of error against time: a log-log panel for each experiment, with the default and its variants.
+//! Plot of error against time. Each experiment has a panel with logarithmic axes, which shows the
+//! curves of the default and of the variants.
 
 use crate::measure::experiment::Experiment;
 use crate::measure::result::{Measured, Measurement, median};
@@ -10,14 +11,16 @@ use plotters::style::{FontStyle, register_font};
 use std::error::Error;
 use std::ops::Range;
 
-/// Width and height of a panel, and of the head above all panels, in pixels.
+/// Width and height of a panel, in pixels.
 const PANEL: (i32, i32) = (440, 374);
+/// Height of the head above all panels, in pixels.
 const HEAD: i32 = 64;
 
-/// Margins between a panel and its field, in pixels: left, right, top, bottom.
+/// Margins between the edges of a panel and its coordinate area, in pixels: left, right, top,
+/// bottom.
 const FRAME: [i32; 4] = [58, 22, 96, 50];
 
-/// Factor by which the axes extend beyond the data.
+/// Factor by which each axis extends beyond the smallest and the largest number.
 const MARGIN: f64 = 1.15;
 
 /// Colours that are distinguishable with any colour vision (Okabe and Ito 2008).
@@ -38,14 +41,14 @@ const TARGET: RGBColor = RGBColor(150, 150, 150);
 struct Line<'a> {
     name: &'a str,
     color: RGBColor,
-    /// (seconds, RMSE in 8-bit levels)
+    /// Points (seconds, RMSE in 8-bit levels).
     points: Vec<(f64, f64)>,
 }
 
 type Drawn = Result<(), Box<dyn Error>>;
 type Canvas<B> = DrawingArea<B, Shift>;
 
-/// Width and height of a measurement's drawing, in pixels.
+/// Returns the width and height of the plot of a measurement, in pixels.
 pub fn size(measurement: &Measurement) -> (u32, u32) {
     let (cols, rows) = grid(panels(measurement).len());
     ((cols * PANEL.0) as u32, (HEAD + rows * PANEL.1) as u32)
@@ -61,7 +64,8 @@ pub fn svg(measurement: &Measurement, title: &str) -> Result<String, Box<dyn Err
     Ok(text)
 }
 
-/// Draws the plot as rows of red, green, blue, 8 bits each, [`size`] pixels.
+/// Draws the plot as an RGB image of 8 bits per channel, row by row. Its width and height are those
+/// of [`size`].
 ///
 /// # Errors
 /// Returns the error of the drawing library.
@@ -72,7 +76,8 @@ pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn
     Ok(bytes)
 }
 
-/// Experiments with their variants. The default has a panel only if there is no other.
+/// Returns the panels: each experiment with its variants. The default has a panel of its own only
+/// if there are no experiments.
 fn panels(measurement: &Measurement) -> Vec<(Experiment, Vec<&Measured>)> {
     let mut panels: Vec<(Experiment, Vec<&Measured>)> = Vec::new();
     for measured in measurement.measured.iter().skip(1) {
@@ -89,7 +94,7 @@ fn panels(measurement: &Measurement) -> Vec<(Experiment, Vec<&Measured>)> {
     panels
 }
 
-/// Columns and rows of a grid of `panels` panels.
+/// Returns the number of columns and rows of the grid for this number of panels.
 fn grid(panels: usize) -> (i32, i32) {
     let cols = match panels {
         1 => 1,
@@ -99,14 +104,15 @@ fn grid(panels: usize) -> (i32, i32) {
     (cols as i32, panels.div_ceil(cols) as i32)
 }
 
-/// (seconds, RMSE in 8-bit levels) of the points where both are positive.
+/// Returns the points (seconds, RMSE in 8-bit levels) of an error curve at which both numbers are
+/// positive.
 fn points(measured: &Measured) -> Vec<(f64, f64)> {
     let coordinates =
         |p: &crate::measure::Point| (median(&measured.seconds(p)), p.errors.rmse_codes);
     measured.points.iter().map(coordinates).filter(|(s, e)| *s > 0.0 && *e > 0.0).collect()
 }
 
-/// Logarithmic map from numbers to pixels along one axis.
+/// Logarithmic mapping of numbers to pixel coordinates along one axis.
 struct Axis {
     numbers: Range<f64>,
     pixels: (i32, i32),
@@ -125,7 +131,8 @@ impl Axis {
         self.pixels.0 + (share * f64::from(self.pixels.1 - self.pixels.0)).round() as i32
     }
 
-    /// Round numbers in the range: 1, 2 and 5 times each power of ten, or the powers alone.
+    /// Returns the round numbers in the range, with their labels: 1, 2 and 5 times each power of
+    /// ten, or only the powers of ten if there would be more than nine.
     fn ticks(&self) -> Vec<(f64, String)> {
         let Range { start, end } = self.numbers;
         let powers = start.log10().floor() as i32..=end.log10().ceil() as i32;
@@ -153,7 +160,8 @@ fn draw<B: DrawingBackend>(backend: B, measurement: &Measurement, title: &str) -
 where
     B::ErrorType: 'static,
 {
-    // The same font on every machine; a font that is registered already stays.
+    // The font is embedded, so that plots are the same on every machine. An error means that it is
+    // registered already.
     let _ = register_font("sans-serif", FontStyle::Normal, UBUNTU_LIGHT);
     let root = backend.into_drawing_area();
     root.fill(&WHITE)?;
@@ -170,7 +178,7 @@ where
     Ok(())
 }
 
-/// Draws one experiment in the panel whose upper left corner is `corner`.
+/// Draws the panel of one experiment. `corner` is the upper left corner of the panel.
 fn panel<'a, B: DrawingBackend>(
     root: &Canvas<B>,
     corner: (i32, i32),
@@ -210,7 +218,8 @@ where
         root.draw(&path((x0, y), (x1, y), &GRID))?;
         root.draw_text(&label, &text(13, INK, HPos::Right, VPos::Center), (x0 - 8, y))?;
     }
-    // Curves fall from the upper left: labels fit below them.
+    // Curves fall from the upper left, so there is room below them for the labels of targets at the
+    // left edge.
     let small = text(12, TARGET, HPos::Left, VPos::Bottom);
     for target in measurement.targets.iter().filter(|t| codes.numbers.contains(t)) {
         let y = codes.at(*target);
@@ -238,7 +247,8 @@ where
     Ok(())
 }
 
-/// Draws the names of the curves in their colours, side by side from `corner`; rows end at `end`.
+/// Draws the legend: a line in the colour of each curve, followed by the name of the curve. The
+/// first row starts at `corner`. Rows are wrapped at the x coordinate `end`.
 fn legend<B: DrawingBackend>(
     root: &Canvas<B>,
     corner: (i32, i32),

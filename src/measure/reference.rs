@@ -1,25 +1,27 @@
-//! Errors of pictures against a reference.
+//! Errors of pictures against a reference picture.
 
 use crate::film::{Display, Film, LightWeights, Replicates};
 
-/// Radiance below which relative errors do not count as larger: relMSE = mean((x - r)^2 / (r^2 + 0.01)).
+/// Number that is added to the squared reference, so that relative errors of dark pixels stay
+/// bounded: relMSE = mean((x - r)^2 / (r^2 + 0.01)).
 const RELATIVE_FLOOR: f64 = 0.01;
 
-/// Reference picture and its own error.
+/// Reference picture, with an estimate of its own error.
 pub struct Reference {
     size: [usize; 2],
     pixels: Vec<[f64; 3]>,
     codes: Vec<[f64; 3]>,
-    /// Half the difference of the replicates in 8-bit levels: as large as its error, and independent of
-    /// it. Empty if the picture counts as exact.
+    /// Half the difference of the two replicates of each pixel, in 8-bit levels. It has the same
+    /// standard deviation as the error of the reference and is independent of this error. Empty if
+    /// the reference counts as exact.
     halves: Vec<[f64; 3]>,
     own: Squares,
-    /// Variance of the mean of all pixels and channels.
+    /// Variance of the mean over all pixels and channels of the reference.
     mean_variance: f64,
     display: Display,
 }
 
-/// Mean squares over pixels and channels.
+/// Mean squared errors over pixels and channels.
 #[derive(Clone, Copy, Debug, Default)]
 struct Squares {
     linear: f64,
@@ -27,41 +29,45 @@ struct Squares {
     relative: f64,
 }
 
-/// Errors of a picture.
+/// Errors of a picture against a reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
     /// Root mean square error in linear radiance.
     pub rmse_linear: f64,
-    /// Root mean square error as displayed, in unrounded 8-bit levels.
+    /// Root mean square error of the displayed picture, in unrounded 8-bit levels.
     pub rmse_codes: f64,
-    /// Mean of (x - r)^2 / (r^2 + 0.01).
+    /// Relative mean squared error: the mean of (x - r)^2 / (r^2 + 0.01) with pixel x and reference
+    /// r.
     pub rel_mse: f64,
-    /// Relative standard error of `rmse_codes` against another reference as noisy as this one, at most
-    /// 1: the uncertainty that remains after subtraction of the reference's own error.
+    /// Relative standard deviation of `rmse_codes` over different references as noisy as this one,
+    /// at most 1. It is the uncertainty that remains after the error of the reference itself was
+    /// subtracted.
     pub spread: f64,
 }
 
-/// Difference of a picture's expectation from the reference's.
+/// Difference between the expectation of a picture and that of the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bias {
-    /// Difference of the pictures' means in standard errors.
+    /// Difference between the mean brightness of picture and reference, in standard errors.
     pub z: f64,
-    /// Root mean square of the pixels' differences that noise does not explain, in 8-bit levels.
+    /// Root mean square of the differences of pixels, in 8-bit levels, after the part that noise
+    /// explains was subtracted.
     pub codes: f64,
-    /// The least `codes` that can be distinguished from noise, at two standard errors.
+    /// Least value of `codes` that can be distinguished from noise, at two standard errors.
     pub least_codes: f64,
 }
 
 impl Bias {
-    /// Returns `true` if there is more than noise explains.
+    /// Returns `true` if the difference is larger than noise explains.
     pub fn is_seen(&self) -> bool {
         self.codes > self.least_codes || self.z.abs() > 4.0
     }
 }
 
-/// Mean squared error of the mean of two replicates, and the variance of its mean over the picture. Linear
-/// errors are half the difference of the replicates; displayed errors are the distance of the mean's
-/// 8-bit levels from those of the replicates.
+/// Estimates the mean squared error of a picture that is the mean of two replicates, and the
+/// variance of the mean brightness of this picture. The linear error of a pixel is estimated as
+/// half the difference of its replicates. The displayed error is estimated from the distances, in
+/// 8-bit levels, between the displayed mean and each displayed replicate.
 fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64) {
     let mut squares = Squares::default();
     let mut mean_variance = 0.0;
@@ -87,7 +93,7 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64
     (own, mean_variance / (values * values))
 }
 
-/// Both replicates, row by row.
+/// Returns the pixels of both replicates, row by row.
 fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
     [Replicates::A, Replicates::B].map(|replicates| {
         let mut all = Vec::with_capacity(film.width() * film.height());
@@ -101,14 +107,15 @@ fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
 }
 
 impl Reference {
-    /// Reference from the picture of `film`, whose replicates hold equally many samples and determine its
-    /// own error.
+    /// Creates a reference from the picture of `film`. Its two replicates hold equal numbers of
+    /// samples, and its own error is estimated from their difference.
     pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
         let [a, b] = replicates(film, mix);
         Self::of_replicates([film.width(), film.height()], &a, &b, display)
     }
 
-    /// Reference from the mean of two independent pictures, `[row][column]`.
+    /// Creates a reference from the mean of two independent pictures `a` and `b`, whose pixels are
+    /// row by row.
     pub fn of_replicates(
         size: [usize; 2],
         a: &[[f64; 3]],
@@ -122,7 +129,7 @@ impl Reference {
         Self { halves, ..Self::new(size, pixels, own, mean_variance, *display) }
     }
 
-    /// Reference from a picture that counts as exact.
+    /// Creates a reference from a picture that counts as exact.
     pub fn of_pixels(size: [usize; 2], pixels: Vec<[f64; 3]>, display: &Display) -> Self {
         Self::new(size, pixels, Squares::default(), 0.0, *display)
     }
@@ -138,27 +145,28 @@ impl Reference {
         Self { size, pixels, codes, halves: Vec::new(), own, mean_variance, display }
     }
 
-    /// Width and height in pixels.
+    /// Returns the width and height in pixels.
     pub fn size(&self) -> [usize; 2] {
         self.size
     }
 
-    /// Root mean square error of the reference itself, in 8-bit levels.
+    /// Returns the root mean square error of the reference itself, in 8-bit levels.
     pub fn noise_codes(&self) -> f64 {
         self.own.codes.sqrt()
     }
 
-    /// Root mean square error of the reference itself, in linear radiance.
+    /// Returns the root mean square error of the reference itself, in linear radiance.
     pub fn noise_linear(&self) -> f64 {
         self.own.linear.sqrt()
     }
 
-    /// Errors of `film`: its distance from the reference, less the reference's own error.
+    /// Returns the errors of `film`: mean squared distances from the reference, minus the squared
+    /// error of the reference itself.
     pub fn errors(&self, film: &Film, mix: &LightWeights) -> Errors {
         self.errors_of(&mut |y, row| film.row(y, Replicates::Both, mix, row))
     }
 
-    /// Errors of the picture whose rows `fill` writes.
+    /// Returns the errors of a picture. `fill` writes row `y` of the picture.
     fn errors_of(&self, fill: &mut dyn FnMut(usize, &mut Vec<[f64; 3]>)) -> Errors {
         let mut sum = Squares::default();
         let mut crossed = 0.0;
@@ -167,20 +175,21 @@ impl Reference {
             fill(y, &mut row);
             for (x, i) in row.iter().zip(y * self.size[0]..) {
                 let (r, code_r, code_x) = (self.pixels[i], self.codes[i], self.display.codes(*x));
-                let apart: [f64; 3] = std::array::from_fn(|c| code_x[c] - code_r[c]);
+                let difference: [f64; 3] = std::array::from_fn(|c| code_x[c] - code_r[c]);
                 for c in 0..3 {
                     let d = x[c] - r[c];
                     sum.linear += d * d;
-                    sum.codes += apart[c] * apart[c];
+                    sum.codes += difference[c] * difference[c];
                     sum.relative += d * d / (r[c] * r[c] + RELATIVE_FLOOR);
                 }
-                crossed += self.halves.get(i).map_or(0.0, |half| dot(&apart, half).powi(2));
+                crossed += self.halves.get(i).map_or(0.0, |half| dot(&difference, half).powi(2));
             }
         }
         let values = (3 * self.pixels.len()) as f64;
         let remaining = |sum: f64, own: f64| (sum / values - own).max(0.0);
         let codes = remaining(sum.codes, self.own.codes);
-        // The error of the sum of squares is twice this; its root halves it.
+        // The standard error of the sum of squares is twice `crossed.sqrt()`. The root of the sum
+        // has half of its relative error.
         let spread = crossed.sqrt() / values;
         Errors {
             rmse_linear: remaining(sum.linear, self.own.linear).sqrt(),
@@ -190,7 +199,8 @@ impl Reference {
         }
     }
 
-    /// Bias of the expectation of `film` against the reference's.
+    /// Returns the bias of `film`: the difference between its expectation and that of the
+    /// reference.
     pub fn bias(&self, film: &Film, mix: &LightWeights) -> Bias {
         let [a, b] = replicates(film, mix);
         let (own, mean_variance) = own_error(&a, &b, &self.display);
@@ -199,16 +209,16 @@ impl Reference {
             let mean = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
             sum += (0..3).map(|c| mean[c] - self.pixels[i][c]).sum::<f64>();
             let code = self.display.codes(mean);
-            let apart = std::array::from_fn(|c| code[c] - self.codes[i][c]);
-            squares += dot(&apart, &apart);
-            crossed += dot(&apart, &half(a, b, &self.display)).powi(2);
-            crossed += self.halves.get(i).map_or(0.0, |half| dot(&apart, half).powi(2));
+            let difference = std::array::from_fn(|c| code[c] - self.codes[i][c]);
+            squares += dot(&difference, &difference);
+            crossed += dot(&difference, &half(a, b, &self.display)).powi(2);
+            crossed += self.halves.get(i).map_or(0.0, |half| dot(&difference, half).powi(2));
         }
         let values = (3 * self.pixels.len()) as f64;
         let mean = sum / values;
         let deviation = (mean_variance + self.mean_variance).sqrt();
         Bias {
-            // Without noise z is 0 or infinite.
+            // If both pictures are without noise, `z` is 0 or infinite.
             z: if mean == 0.0 { 0.0 } else { mean / deviation },
             codes: (squares / values - own.codes - self.own.codes).max(0.0).sqrt(),
             least_codes: (2.0 * 2.0 * crossed.sqrt() / values).sqrt(),
@@ -220,7 +230,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Half the difference of two replicates of a pixel as displayed, in 8-bit levels.
+/// Returns half the difference of two replicates of a pixel as displayed, in 8-bit levels.
 fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
     let [a, b] = [*a, *b].map(|x| display.codes(x));
     std::array::from_fn(|c| 0.5 * (a[c] - b[c]))
@@ -231,7 +241,8 @@ mod tests {
     use super::*;
     use crate::film::testing::Rng;
 
-    /// Grey pixels of standard deviation `s` about 0.5, plus a third of that in each channel.
+    /// Returns random pixels with mean 0.5. Grey noise has the standard deviation `s`; independent
+    /// noise of a third of that is added to each channel.
     fn noisy_pixels(rng: &mut Rng, count: usize, s: f64) -> Vec<[f64; 3]> {
         let pixel = |_| {
             let common = rng.normal();
@@ -240,7 +251,7 @@ mod tests {
         (0..count).map(pixel).collect()
     }
 
-    /// Replicates with noise of standard deviation s have a mean whose error is s / sqrt 2.
+    /// The mean of two replicates with noise of standard deviation s has an error of s / sqrt 2.
     #[test]
     fn own_error_is_that_of_the_mean() {
         let mut rng = Rng(1);
@@ -248,12 +259,13 @@ mod tests {
         let reference = Reference::of_replicates([100, 100], &a, &b, &Display::default());
         let expected = 0.01 * (1.0f64 + 1.0 / 9.0).sqrt() / 2f64.sqrt();
         assert!((reference.noise_linear() / expected - 1.0).abs() < 0.02);
-        // The sRGB curve's slope at 0.5 is 1.055 / 2.4 x 0.5^(1/2.4 - 1).
+        // The slope of the sRGB curve at 0.5 is 1.055 / 2.4 x 0.5^(1/2.4 - 1).
         let slope = 255.0 * 1.055 / 2.4 * 0.5f64.powf(1.0 / 2.4 - 1.0);
         assert!((reference.noise_codes() / (slope * expected) - 1.0).abs() < 0.02);
     }
 
-    /// Errors of one picture against many references of the same noise differ by the predicted spread.
+    /// Compares the predicted spread with the standard deviation of the errors of one picture
+    /// against many references of equal noise.
     #[test]
     fn spread_is_that_between_references() {
         let mut rng = Rng(2);

@@ -5,10 +5,10 @@ use crate::measure::error_curve::Point;
 use crate::measure::experiment::{Experiment, Variant};
 use crate::measure::reference::Bias;
 
-/// Time at which a render reached a given noise.
+/// Time at which a render reached a noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeToTarget {
-    /// The true error, in 8-bit levels.
+    /// The noise target, in 8-bit levels.
     pub codes: f64,
     /// Seconds of tracing, median of the repetitions.
     pub seconds: f64,
@@ -16,14 +16,15 @@ pub struct TimeToTarget {
     pub spread: f64,
     /// Samples per pixel, mean.
     pub spp: f64,
-    /// The first picture was better already; `seconds` is an upper bound.
+    /// `true` if the first point of the curve had reached the target already. `seconds` is then an
+    /// upper bound.
     pub at_most: bool,
 }
 
-/// Extrapolated time to a noise that the default did not reach.
+/// Extrapolated time to a noise target that the default settings did not reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
-    /// The noise, in 8-bit levels.
+    /// The noise target, in 8-bit levels.
     pub codes: f64,
     /// Lower and upper estimate of the seconds, extrapolated from the convergence so far.
     pub seconds: (f64, f64),
@@ -38,33 +39,36 @@ pub struct Measured {
     pub name: String,
     /// Number of tracing threads.
     pub threads: usize,
-    /// Error curve, first point to last.
+    /// Points of the error curve, in the order of samples.
     pub points: Vec<Point>,
-    /// Share of the processors' time that other programs used, for each repetition; `None` if unknown.
+    /// Share of the processors' time that other programs used, for each repetition. `None` if
+    /// unknown.
     pub stolen: Vec<Option<f64>>,
-    /// Bias against the reference at the end, for variants with another expectation.
+    /// Bias against the reference at the end of the curve. `None` for variants with the same
+    /// expectation as the default.
     pub bias: Option<Bias>,
 }
 
-/// Results for a scene.
+/// Results of all variants of a scene.
 pub struct Measurement {
     /// Film size in pixels.
     pub size: [u32; 2],
-    /// Samples per pixel of the reference; 0 if it was read from a file.
+    /// Samples per pixel of the reference. 0 if the reference was read from a file.
     pub reference_spp: f64,
     /// Error of the reference itself, in 8-bit levels.
     pub reference_codes: f64,
     /// Error of the reference itself, in linear radiance.
     pub reference_linear: f64,
-    /// Seconds of tracing of the reference.
+    /// Seconds of tracing that the reference took.
     pub reference_seconds: f64,
-    /// Noise at which settings are compared, in 8-bit levels: a target that the default reached.
+    /// Noise at which settings are compared, in 8-bit levels: a noise that the default settings
+    /// reached.
     pub compared_at: f64,
     /// Noise targets, descending.
     pub targets: Vec<f64>,
-    /// Targets that the default did not reach in its time.
+    /// Targets that the default settings did not reach in time, with extrapolated times.
     pub expected: Vec<Expected>,
-    /// Requested experiments without a variant in this scene.
+    /// Requested experiments without a variant that differs from the default in this scene.
     pub idle: Vec<Experiment>,
     /// Results of all variants, the default first.
     pub measured: Vec<Measured>,
@@ -73,35 +77,44 @@ pub struct Measurement {
 /// Reliability of a measurement's times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steadiness {
-    /// Least number of repetitions of which a time is the median.
+    /// Smallest number of repetitions over which a median was taken.
     pub repetitions: usize,
     /// Largest relative spread of the reported times.
     pub spread: f64,
-    /// Largest share of the processors that other programs used meanwhile; `None` if unknown.
+    /// Largest share of the processors' time that other programs used meanwhile. `None` if unknown.
     pub stolen: Option<f64>,
 }
 
-/// Largest share of the processors that other programs use in an undisturbed repetition.
+/// Largest share of the processors' time that other programs may use in a repetition that counts as
+/// undisturbed.
 const MAX_STOLEN: f64 = 0.05;
-/// Least number of repetitions that count, the least disturbed ones first.
+/// Least number of repetitions that count. If fewer are undisturbed, the least disturbed ones count
+/// as well.
 const MIN_COUNTED: usize = 5;
-/// Largest share by which another reference could change a reported error.
+/// Largest relative uncertainty of an error, caused by the error of the reference, for which the
+/// error counts.
 const MAX_SPREAD: f64 = 0.05;
 
-/// Number of standard deviations that contains a count of signs in about four of five cases, times the
-/// square root of two for the difference of two such counts.
+/// Parameter of the signs test: half the width of the confidence interval, in units of half the
+/// square root of the number of values, which is the standard deviation of the count of signs. The
+/// value 1.4 contains the count in about four of five cases. The factor of the square root of two
+/// is for the difference of two such counts.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
-/// Median; of an even number of values the mean of the two in the middle.
+/// Returns the median. For an even number of values it is the mean of the two in the middle.
+/// Returns NaN if there are no values.
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// Relative spread of a median: in about four of five cases the median of another measurement on the same
-/// machine is within this share of it. For fewer than five values it is their range. Otherwise it is half
-/// the width of the confidence interval of the median by the signs test (Conover, *Practical Nonparametric
-/// Statistics*, confidence interval for a quantile), at a level at which two such medians agree. 0 for
-/// fewer than two values.
+/// Returns the relative spread of the median of `values`. In about four of five cases the median of
+/// another measurement on the same machine differs from this median by at most this share.
+///
+/// For fewer than five values the spread is their range divided by the median. For more values it
+/// is half the width of the confidence interval of the median by the signs test (Conover,
+/// *Practical Nonparametric Statistics*, confidence interval for a quantile), divided by the
+/// median. The confidence level is chosen so that two such medians agree. For fewer than two values
+/// the spread is 0.
 pub fn spread(values: &[f64]) -> f64 {
     let middle = median(values);
     if values.len() < 2 || middle == 0.0 {
@@ -142,7 +155,8 @@ impl Measured {
         }
     }
 
-    /// The repetitions that count: the undisturbed ones; if they are too few, the least disturbed.
+    /// Returns the indices of the repetitions that count: all undisturbed ones. If fewer than
+    /// [`MIN_COUNTED`] are undisturbed, the [`MIN_COUNTED`] least disturbed ones count.
     fn counted(&self) -> Vec<usize> {
         let stolen = |i: &usize| self.stolen[*i].unwrap_or(0.0);
         let mut all: Vec<usize> = (0..self.stolen.len()).collect();
@@ -152,17 +166,20 @@ impl Measured {
         all
     }
 
-    /// Seconds at `point`, for each repetition that counts.
+    /// Returns the seconds at `point` of each repetition that counts.
     pub fn seconds(&self, point: &Point) -> Vec<f64> {
         self.counted().into_iter().filter_map(|i| point.seconds.get(i).copied()).collect()
     }
 
-    /// Largest share of the processors that other programs used in the repetitions that count.
+    /// Returns the largest share of the processors' time that other programs used in a repetition
+    /// that counts. Returns `None` if unknown.
     fn max_stolen(&self) -> Option<f64> {
         self.counted().into_iter().filter_map(|i| self.stolen[i]).reduce(f64::max)
     }
 
-    /// Time at which the true error fell to `codes`, interpolated log-log between points.
+    /// Returns the time at which the true error fell to `codes`, interpolated between points in
+    /// log-log coordinates. Returns `None` if the error stayed larger. Errors that are uncertain
+    /// because of the reference do not count.
     pub fn time_to(&self, codes: f64) -> Option<TimeToTarget> {
         self.interpolated_time(codes, |p| {
             let certain = p.errors.spread <= MAX_SPREAD;
@@ -170,12 +187,14 @@ impl Measured {
         })
     }
 
-    /// Time at which the program's own estimate of the error fell to `codes`, for biased variants.
+    /// Returns the time at which the error that the render estimates itself fell to `codes`. Used
+    /// for biased variants. Returns `None` if the estimate stayed larger.
     pub fn estimated_time_to(&self, codes: f64) -> Option<TimeToTarget> {
         self.interpolated_time(codes, |p| p.estimated_codes.unwrap_or(f64::INFINITY))
     }
 
-    /// [`Measured::estimated_time_to`] for biased variants, [`Measured::time_to`] for the others.
+    /// Returns [`Measured::estimated_time_to`] for biased variants and [`Measured::time_to`] for
+    /// unbiased ones.
     pub fn true_time_to(&self, codes: f64) -> Option<TimeToTarget> {
         if self.bias.is_some() { self.estimated_time_to(codes) } else { self.time_to(codes) }
     }
@@ -185,7 +204,8 @@ impl Measured {
         let to = &self.points[after];
         let from = after.checked_sub(1).map(|i| &self.points[i]);
         let (weight, from) = match from {
-            // An error of 0 has no logarithm.
+            // Points are interpolated only if the errors of both have a logarithm: an error of 0
+            // has none.
             Some(from) if error(to) > 0.0 && error(from).is_finite() => {
                 ((error(from) / codes).ln() / (error(from) / error(to)).ln(), from)
             }
@@ -204,15 +224,17 @@ impl Measured {
         })
     }
 
-    /// Samples per second over the whole render: median and spread of the repetitions.
+    /// Returns the median and the spread of the samples per second over the whole render. Returns
+    /// `None` if there are no points.
     pub fn samples_per_second(&self) -> Option<(f64, f64)> {
         let last = self.points.last()?;
         let speeds: Vec<f64> = self.seconds(last).iter().map(|s| last.samples as f64 / s).collect();
         Some((median(&speeds), spread(&speeds)))
     }
 
-    /// Order of convergence in linear radiance, without the first quarter of the points, which have too
-    /// few samples for a power law.
+    /// Returns the order of convergence of the linear error. The first quarter of the points is
+    /// left out, because these have too few samples for a power law. Returns `None` if too few
+    /// points remain.
     pub fn slope(&self) -> Option<Slope> {
         let from = self.points.len() / 4;
         let points: Vec<_> =
@@ -220,7 +242,8 @@ impl Measured {
         Slope::fit(&points)
     }
 
-    /// Efficiency at the end: 1 / (linear MSE x seconds).
+    /// Returns the efficiency at the end of the curve: 1 / (linear MSE x seconds). Returns `None`
+    /// if this is infinite or there are no points.
     pub fn efficiency(&self) -> Option<f64> {
         let last = self.points.last()?;
         let cost = last.errors.rmse_linear.powi(2) * median(&self.seconds(last));
@@ -229,7 +252,8 @@ impl Measured {
 }
 
 impl Measurement {
-    /// Reliability of the reported times: those to the targets, and those that settings are compared by.
+    /// Returns the reliability of the reported times: the times of the default to all targets, and
+    /// the times of all variants to the noise at which they are compared.
     pub fn steadiness(&self) -> Steadiness {
         let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0, stolen: None };
         for (i, measured) in self.measured.iter().enumerate() {
@@ -247,7 +271,8 @@ impl Measurement {
         all
     }
 
-    /// Largest share by which another reference could change the reported errors.
+    /// Returns the largest relative change of the reported errors that another reference could
+    /// cause.
     pub fn reference_uncertainty(&self) -> f64 {
         let points = self.measured.iter().flat_map(|m| &m.points);
         let reported = points.map(|p| p.errors.spread).filter(|spread| *spread <= MAX_SPREAD);
@@ -288,18 +313,18 @@ mod tests {
     #[test]
     fn times_are_interpolated_on_the_power_law() {
         // error = 8 / sqrt(spp)
-        let way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
-        let target = way.time_to(2f64.sqrt()).unwrap();
+        let curve = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
+        let target = curve.time_to(2f64.sqrt()).unwrap();
         assert!(
             (target.spp - 32.0).abs() < 1e-9 && (target.seconds - 0.064).abs() < 1e-12,
             "{target:?}"
         );
         assert!(!target.at_most && (target.spread - 1.0).abs() < 1e-12);
-        assert!(way.time_to(3.0).unwrap().at_most);
-        assert_eq!(way.time_to(0.4), None);
-        assert!((way.estimated_time_to(2.0).unwrap().spp - 64.0).abs() < 1e-9);
-        assert!((way.slope().unwrap().value + 0.5).abs() < 1e-12);
-        assert!((way.samples_per_second().unwrap().0 - 500.0).abs() < 1e-9);
+        assert!(curve.time_to(3.0).unwrap().at_most);
+        assert_eq!(curve.time_to(0.4), None);
+        assert!((curve.estimated_time_to(2.0).unwrap().spp - 64.0).abs() < 1e-9);
+        assert!((curve.slope().unwrap().value + 0.5).abs() < 1e-12);
+        assert!((curve.samples_per_second().unwrap().0 - 500.0).abs() < 1e-9);
     }
 
     #[test]
@@ -313,8 +338,8 @@ mod tests {
         assert!(median(&[]).is_nan());
     }
 
-    /// The median of a second measurement of normally distributed times is within the spread of the first
-    /// in about four of five cases.
+    /// The times are normally distributed. The median of a second measurement must be within the
+    /// spread of the first in about four of five cases.
     #[test]
     fn spread_predicts_the_median_of_another_measurement() {
         let mut rng = Rng(5);
@@ -329,17 +354,17 @@ mod tests {
         }
     }
 
-    /// Two disturbed repetitions of nine do not count. Of nine disturbed ones the five least disturbed do,
-    /// and their disturbance is reported.
+    /// If two of nine repetitions are disturbed, these two do not count. If all nine are disturbed,
+    /// the five least disturbed ones count, and their disturbance is reported.
     #[test]
     fn disturbed_repetitions_do_not_count() {
-        let mut way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
-        for point in &mut way.points {
+        let mut curve = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
+        for point in &mut curve.points {
             let first = point.spp * 1e-3;
             point.seconds = (0..9).map(|i| first * [1.0, 3.0, 1.0, 1.1][i % 4]).collect();
         }
-        way.stolen = [0.0, 0.4, 0.01, 0.0].into_iter().cycle().take(9).map(Some).collect();
-        let target = way.time_to(1.0).unwrap();
+        curve.stolen = [0.0, 0.4, 0.01, 0.0].into_iter().cycle().take(9).map(Some).collect();
+        let target = curve.time_to(1.0).unwrap();
         assert!(
             (target.seconds - 0.064).abs() < 1e-12 && (target.spread - 0.05).abs() < 1e-9,
             "{target:?}"
@@ -354,7 +379,7 @@ mod tests {
             targets: vec![1.0, 0.25],
             expected: Vec::new(),
             idle: Vec::new(),
-            measured: vec![way],
+            measured: vec![curve],
         };
         let steady = measurement.steadiness();
         assert_eq!((steady.repetitions, steady.stolen), (7, Some(0.01)));
@@ -365,12 +390,12 @@ mod tests {
         assert!((steady.spread - 1.0).abs() < 1e-9, "1, 3, 1, 1.1, 1: {steady:?}");
     }
 
-    /// An error that is uncertain because of the reference's own error does not count.
+    /// An error that is uncertain because of the error of the reference does not count.
     #[test]
     fn uncertain_error_reaches_no_target() {
-        let mut way = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
-        way.points[2].errors.spread = 0.3;
-        assert!(way.time_to(1.0).is_some());
-        assert_eq!(way.time_to(0.5), None);
+        let mut curve = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
+        curve.points[2].errors.spread = 0.3;
+        assert!(curve.time_to(1.0).is_some());
+        assert_eq!(curve.time_to(0.5), None);
     }
 }

@@ -1,4 +1,4 @@
-//! The measurement: reference, error curves, repetitions.
+//! Course of a measurement: reference, error curves, repetitions.
 
 use crate::measure::error_curve::{End, follow, repeat};
 use crate::measure::experiment::{Experiment, Plan, Variant};
@@ -20,28 +20,29 @@ pub struct Progress<'a> {
     pub total: usize,
 }
 
-/// Seconds of tracing before anything is measured: clocks and caches settle.
+/// Seconds of tracing before the measurement starts. In this time clock rates and caches become
+/// steady.
 const WARM_UP_SECONDS: f64 = 0.3;
-/// Target noise of the reference, as a part of the smallest target.
+/// Target noise of the reference, as a share of the smallest noise target.
 const REFERENCE_SHARE: f64 = 0.3;
-/// Largest part of the time for the reference.
+/// Largest share of the time of the measurement for the reference.
 const REFERENCE_TIME: f64 = 0.3;
-/// Largest part of the time for the first run of the default.
+/// Largest share of the time of the measurement for the first run of the default settings.
 const DEFAULT_TIME: f64 = 0.12;
-/// Noise at which settings are compared if time suffices, in 8-bit levels.
+/// Noise at which settings are compared if there is enough time, in 8-bit levels.
 const COMPARED_AT: f64 = 0.5;
-/// Longest duration of a variant, in multiples of the default's.
+/// Longest duration of a variant, in multiples of the duration of the default.
 const MAX_SLOWDOWN: f64 = 5.0;
-/// Largest relative spread of steady times.
+/// Largest relative spread of times that count as steady.
 const STEADY: f64 = 0.05;
-/// Largest number of repetitions of steady times.
+/// Largest number of repetitions if all times are steady.
 const MAX_STEADY_ROUNDS: usize = 7;
-/// Largest number of repetitions of unsteady times.
+/// Largest number of repetitions if some times are unsteady.
 const MAX_ROUNDS: usize = 31;
 
-/// Measures `scene`, which has no faults. `reference` is the picture to compare with; `None` renders one
-/// with another seed. `report` receives the progress; if it returns `false`, the measurement ends early
-/// with the results so far.
+/// Measures `scene`, which must be valid. `reference` is the reference picture. If it is `None`, a
+/// reference with another seed is rendered. `report` receives the progress. If `report` returns
+/// `false`, the measurement ends early with the results so far.
 ///
 /// # Errors
 /// Returns the error of the system that refuses to start a thread.
@@ -95,7 +96,8 @@ pub fn measure(
         measured.push(result);
     }
 
-    // Variants take turns: `plan.repetitions` times, then until times are steady or time is up.
+    // Repetitions of all variants are interleaved. There are at least `plan.repetitions` rounds,
+    // and further ones until times are steady or time is up.
     let mut round = 1;
     let mut round_seconds = 0.0;
     while keep_going {
@@ -132,14 +134,16 @@ pub fn measure(
     })
 }
 
-/// Extrapolated time at which the noise falls to `codes`.
+/// Returns the extrapolated time at which the noise falls to `codes`. Returns `None` if it cannot
+/// be extrapolated.
 fn extrapolate(render: &SyncRender, codes: f64) -> Option<Expected> {
     render.seconds_to_noise(codes).map(|seconds| Expected { codes, seconds })
 }
 
-/// Noise at which settings are compared, in 8-bit levels: the finest target of at least [`COMPARED_AT`], or
-/// power of two, that the default reached within `seconds`; else the coarsest that it reached; else its
-/// last noise.
+/// Returns the noise at which settings are compared, in 8-bit levels. Candidates are the targets
+/// and the powers of two from 0.5 to 8 that are at least [`COMPARED_AT`]. The result is the
+/// smallest candidate that the default reached within `seconds`; otherwise the largest candidate
+/// that it reached; otherwise the last noise of the default.
 fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     let mut levels: Vec<f64> = targets.iter().copied().chain([0.5, 1.0, 2.0, 4.0, 8.0]).collect();
     levels.retain(|codes| *codes >= COMPARED_AT);
@@ -151,7 +155,8 @@ fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     in_time.or_else(any).map_or_else(end, |c| c.codes)
 }
 
-/// Returns `true` if the time to `codes`, or to the end, needs no more repetitions.
+/// Returns `true` if the repetitions of the time to `codes` agree. If `codes` was not reached, the
+/// time to the end of the curve is examined.
 fn is_steady(measured: &Measured, codes: f64) -> bool {
     let end = || measured.points.last().map_or(0.0, |p| spread(&measured.seconds(p)));
     measured.true_time_to(codes).map_or_else(end, |c| c.spread) <= STEADY
@@ -163,7 +168,7 @@ fn warm_up(variant: &Variant) -> io::Result<()> {
     Ok(())
 }
 
-/// Reference with its cost.
+/// Reference with the cost of rendering it.
 struct RenderedReference {
     reference: Reference,
     spp: f64,
@@ -195,7 +200,7 @@ mod tests {
     use crate::measure::error_curve::Point;
     use crate::measure::reference::Errors;
 
-    /// Results with these seconds and errors.
+    /// Returns results whose points have these seconds and errors.
     fn results(points: &[(f64, f64)]) -> Measured {
         let point = |(seconds, codes): &(f64, f64)| Point {
             step: 1,

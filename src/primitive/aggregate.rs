@@ -1,4 +1,4 @@
-//! All primitives of a scene, compiled for rays: batches, and a tree over them where it pays.
+//! All primitives of a scene, compiled for rays: batches, and a BVH over them where it is faster.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -12,64 +12,67 @@ use crate::primitive::scene_bvh::SceneBvh;
 use std::fmt;
 use std::ops::Range;
 
-/// From this many bounded items there is a tree. With rays in a ball of spheres it is faster than a list
-/// from some 50 where packets stay together, and from some 300 where they do not; whole pictures, of which a
-/// list's tiles leave out what they do not see, gain by the list up to 95 (`benches/acceleration.rs`).
+/// Least number of bounded items for a BVH. With rays in a ball of spheres the BVH is faster than a
+/// list from about 50 items for coherent packets, and from about 300 for incoherent ones. Whole
+/// pictures, whose tiles skip the items of the list that they cannot see, are faster with the list
+/// up to 95 (`benches/acceleration.rs`).
 pub const BVH_MIN_PRIMITIVES: usize = 96;
 
 impl PrimitiveSet {
-    /// Returns `true` if there are none.
+    /// Returns `true` if the set is empty.
     pub fn is_empty(&self) -> bool {
         self.ranges.is_empty() && !self.tree
     }
 }
 
-/// One batch and where its items stand in the numbering of all items.
+/// One batch and the range of its items in the numbering of all items.
 struct BatchRange<L: SimdFloat> {
     batch: PrimitiveBatch<L>,
     base: u32,
     end: u32,
 }
 
-/// Primitives of a scene, compiled for one lane type.
+/// Primitives of a scene, compiled for item_hit lane type.
 pub struct Aggregate<L: SimdFloat> {
     parts: Vec<BatchRange<L>>,
     all: PrimitiveSet,
     tree: Option<SceneBvh>,
-    /// `(part, number in the part)` of the tree's items.
+    /// Items of the BVH, as `(part, number in the part)`.
     tree_items: Vec<(u32, u32)>,
-    /// For each item a box that is asked first, if it has one; empty: none has.
+    /// Box of each item, tested before the item; `None` for an infinite item. Empty if no boxes are
+    /// used.
     extents: Vec<Option<ItemBox<L::Scalar>>>,
-    /// `source[item]`: which form, in the order given to [`Aggregate::new`], and which part of it.
+    /// Form of each item, by position in the list given to [`Aggregate::new`], and its part.
     source: Vec<PrimitiveId>,
     counts: Vec<String>,
 }
 
-/// Some items of a geometry.
+/// Set of items of an [`Aggregate`].
 #[derive(Clone, Debug, Default)]
 pub struct PrimitiveSet {
-    /// Items that are no tree's, by part and number in the part.
+    /// Items outside the BVH, by part and number in the part.
     ranges: Vec<(u32, Range<u32>)>,
-    /// All items of the tree.
+    /// `true` if the set includes all items of the BVH.
     tree: bool,
 }
 
 impl<L: SimdFloat> Aggregate<L> {
-    /// Compiles `forms`, as a list or with a tree by their number.
+    /// Compiles `forms`, as a list or with a BVH depending on their number.
     pub fn new(forms: &[Form]) -> Self {
         Self::accelerated(forms, Acceleration::Auto)
     }
 
-    /// Compiles `forms` with or without a tree, whatever their number.
+    /// Compiles `forms` with or without a BVH, regardless of their number.
     pub fn with_tree(forms: &[Form], tree: bool) -> Self {
         Self::compiled(forms, if tree { Acceleration::Bvh } else { Acceleration::Auto }, tree)
     }
 
-    /// Compiles `forms` with what `acceleration` says.
+    /// Compiles `forms` with the acceleration structure `acceleration`.
     pub fn accelerated(forms: &[Form], acceleration: Acceleration) -> Self {
-        let many = || forms.iter().filter(|f| f.bounds().is_some()).count() >= BVH_MIN_PRIMITIVES;
+        let is_large =
+            || forms.iter().filter(|f| f.bounds().is_some()).count() >= BVH_MIN_PRIMITIVES;
         let tree = match acceleration {
-            Acceleration::Auto => many(),
+            Acceleration::Auto => is_large(),
             Acceleration::Bvh => true,
             _ => false,
         };
@@ -120,14 +123,15 @@ impl<L: SimdFloat> Aggregate<L> {
         out.tree = (!bounds.is_empty()).then(|| SceneBvh::new(&bounds));
         out.all.tree = out.tree.is_some();
         if matches!(acceleration, Acceleration::Obb | Acceleration::Aabb) {
-            let own = acceleration == Acceleration::Obb;
-            let of = |source: &PrimitiveId| ItemBox::new(&forms[source.form], own);
-            out.extents = out.source.iter().map(of).collect();
+            let oriented = acceleration == Acceleration::Obb;
+            let box_of = |source: &PrimitiveId| ItemBox::new(&forms[source.form], oriented);
+            out.extents = out.source.iter().map(box_of).collect();
         }
         out
     }
 
-    /// Those items for which `wanted` is true; all of those in a tree, which knows better.
+    /// Returns the items for which `wanted` is true, and all items of the BVH, which culls by
+    /// itself.
     pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
         let mut ranges: Vec<(u32, Range<u32>)> = Vec::new();
         for (part, range) in &self.all.ranges {
@@ -142,7 +146,7 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, tree: self.all.tree }
     }
 
-    /// Those `items` of a tree, and all that are in none.
+    /// Returns `items` of the BVH, and all items outside it.
     pub fn select_indices(&self, items: &[u32]) -> PrimitiveSet {
         let mut ranges = self.all.ranges.clone();
         for item in items {
@@ -154,67 +158,68 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, tree: false }
     }
 
-    /// The items that stand in a tree, in ascending order.
+    /// Returns the items in the BVH, in ascending order.
     pub fn in_tree(&self) -> Vec<u32> {
         let item = |(part, i): &(u32, u32)| self.parts[*part as usize].base + i;
         self.tree_items.iter().map(item).collect()
     }
 
-    /// Returns `true` if the bounded items stand in a tree.
+    /// Returns `true` if the bounded items are in a BVH.
     pub fn has_tree(&self) -> bool {
         self.tree.is_some()
     }
 
-    /// Returns `true` if there is neither a tree nor a box: nothing but lists.
+    /// Returns `true` if there are neither BVH nor boxes: only lists.
     pub fn has_no_tree(&self) -> bool {
         self.tree.is_none() && self.extents.is_empty()
     }
 
-    /// All items.
+    /// Returns the set of all items.
     pub fn all(&self) -> &PrimitiveSet {
         &self.all
     }
 
-    /// Number of items.
+    /// Returns the number of items.
     pub fn len(&self) -> usize {
         self.source.len()
     }
 
-    /// No items at all.
+    /// Returns `true` if there are no items.
     pub fn is_empty(&self) -> bool {
         self.source.is_empty()
     }
 
-    /// For each item, which form it came from, and which part of it.
+    /// Returns the form and part of each item.
     pub fn sources(&self) -> &[PrimitiveId] {
         &self.source
     }
 
-    /// The nearest of some items in front of each ray; of several at the same distance the one with
-    /// the lowest number, so that neither the order in the tree nor the other rays of the packet decide.
+    /// Returns the closest hit of each ray with the items of `set`. At equal distances the item
+    /// with the lowest number wins, so that the result depends neither on the order in the BVH nor
+    /// on the other rays of the packet.
     #[inline(always)]
-    pub fn closest(&self, ray: &Ray<L>, of: &PrimitiveSet) -> Hit<L> {
-        self.closest_masked(ray, of, L::mask(true))
+    pub fn closest(&self, ray: &Ray<L>, set: &PrimitiveSet) -> Hit<L> {
+        self.closest_masked(ray, set, L::mask(true))
     }
 
-    /// As [`Aggregate::closest`], in those lanes for which `wanted` is true; the others are meaningless.
+    /// [`Aggregate::closest`] for the lanes in `wanted`; other lanes are meaningless.
     #[inline(always)]
-    pub fn closest_masked(&self, ray: &Ray<L>, of: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
+    pub fn closest_masked(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         if !self.extents.is_empty() {
-            return self.closest_boxed(ray, of, nearest_wanted(wanted));
+            return self.closest_boxed(ray, set, nearest_wanted(wanted));
         }
-        let hit = self.closest_linear(ray, of, wanted);
+        let hit = self.closest_linear(ray, set, wanted);
         match &self.tree {
-            Some(tree) if of.tree => self.closest_bvh(tree, ray, hit),
+            Some(tree) if set.tree => self.closest_bvh(tree, ray, hit),
             _ => hit,
         }
     }
 
-    /// As [`Aggregate::closest_masked`], of those items that are in no tree; boxes are not asked.
+    /// [`Aggregate::closest_masked`] for items outside the BVH, without tests of boxes.
     #[inline(always)]
-    pub fn closest_linear(&self, ray: &Ray<L>, of: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
+    pub fn closest_linear(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         let mut hit = nearest_wanted(wanted);
-        for (part, range) in &of.ranges {
+        for (part, range) in &set.ranges {
             let part = &self.parts[*part as usize];
             part.batch.closest(indices(range), part.base, ray, &mut hit);
         }
@@ -226,32 +231,32 @@ impl<L: SimdFloat> Aggregate<L> {
         tree.traverse(ray, hit.t, |item, limit| {
             let (part, i) = self.tree_items[item];
             let part = &self.parts[part as usize];
-            // As near is near enough: of equal distances the lowest tag counts.
-            let mut one = Hit::with_t_max(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
-            part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut one);
-            // Lanes of no interest have met nothing.
-            one.t = L::select(one.t.gt(L::zero()), one.t, L::from_f64(L::MAX));
-            hit.merge(&one);
+            // The limit is widened by rounding: at equal distances the lowest tag wins.
+            let mut item_hit = Hit::with_t_max(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
+            part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut item_hit);
+            // Inactive lanes have no hit.
+            item_hit.t = L::select(item_hit.t.gt(L::zero()), item_hit.t, L::from_f64(L::MAX));
+            hit.merge(&item_hit);
             hit.t
         });
         hit
     }
 
-    /// The items of `of`, as a part and the number in it, with their boxes.
+    /// Returns the items of `set`, each as part, number in the part and box.
     #[inline(always)]
     fn boxed<'a>(
         &'a self,
-        of: &'a PrimitiveSet,
+        set: &'a PrimitiveSet,
     ) -> impl Iterator<Item = (&'a BatchRange<L>, u32, Option<&'a ItemBox<L::Scalar>>)> {
-        of.ranges.iter().flat_map(move |(part, range)| {
+        set.ranges.iter().flat_map(move |(part, range)| {
             let part = &self.parts[*part as usize];
             range.clone().map(move |i| (part, i, self.extents[(part.base + i) as usize].as_ref()))
         })
     }
 
     #[inline(never)]
-    fn closest_boxed(&self, ray: &Ray<L>, of: &PrimitiveSet, mut hit: Hit<L>) -> Hit<L> {
-        for (part, i, extent) in self.boxed(of) {
+    fn closest_boxed(&self, ray: &Ray<L>, set: &PrimitiveSet, mut hit: Hit<L>) -> Hit<L> {
+        for (part, i, extent) in self.boxed(set) {
             if extent.is_none_or(|extent| extent.meets(ray, hit.t).any()) {
                 part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut hit);
             }
@@ -265,10 +270,10 @@ impl<L: SimdFloat> Aggregate<L> {
         ray: &Ray<L>,
         limit: L,
         wanted: L::Mask,
-        by: &PrimitiveSet,
+        set: &PrimitiveSet,
     ) -> L::Mask {
         let mut occluded = L::mask(false);
-        for (part, i, extent) in self.boxed(by) {
+        for (part, i, extent) in self.boxed(set) {
             let open = wanted.and_not(occluded);
             let open = extent.map_or(open, |extent| open & extent.meets(ray, limit));
             if open.any() {
@@ -282,32 +287,32 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Lanes of `wanted` that hit any of some items at a distance in (0, limit).
+    /// Returns the lanes of `wanted` that hit any item of `set` at a distance in (0, limit).
     #[inline(always)]
-    pub fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, by: &PrimitiveSet) -> L::Mask {
+    pub fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, set: &PrimitiveSet) -> L::Mask {
         if !self.extents.is_empty() {
-            return self.blocked_in_boxes(ray, limit, wanted, by);
+            return self.blocked_in_boxes(ray, limit, wanted, set);
         }
-        let occluded = self.occluded_linear(ray, limit, wanted, by);
+        let occluded = self.occluded_linear(ray, limit, wanted, set);
         match &self.tree {
-            Some(tree) if by.tree && wanted.and_not(occluded).any() => {
+            Some(tree) if set.tree && wanted.and_not(occluded).any() => {
                 self.blocked_in(tree, ray, limit, wanted, occluded)
             }
             _ => occluded,
         }
     }
 
-    /// As [`Aggregate::occluded`], by those items that are in no tree; boxes are not asked.
+    /// [`Aggregate::occluded`] by items outside the BVH, without tests of boxes.
     #[inline(always)]
     pub fn occluded_linear(
         &self,
         ray: &Ray<L>,
         limit: L,
         wanted: L::Mask,
-        by: &PrimitiveSet,
+        set: &PrimitiveSet,
     ) -> L::Mask {
         let mut occluded = L::mask(false);
-        for (part, range) in &by.ranges {
+        for (part, range) in &set.ranges {
             let open = wanted.and_not(occluded);
             let batch = &self.parts[*part as usize].batch;
             occluded = occluded | batch.occluded(indices(range), ray, limit, open);
@@ -318,7 +323,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// As [`Aggregate::occluded`], by one item of the tree: `number` in [`Aggregate::in_tree`].
+    /// [`Aggregate::occluded`] by item_hit item of the BVH; `number` is its position in
+    /// [`Aggregate::in_tree`].
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (part, i) = self.tree_items[number as usize];
@@ -344,7 +350,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Hits of rays with `item`, a compound's first part for all of it, nearer than `limit`.
+    /// Returns hits nearer than `limit` with `item`; the first part of a compound represents all of
+    /// it.
     pub fn closest_to(&self, item: u32, ray: &Ray<L>, limit: L) -> Hit<L> {
         let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
         let (i, mut hit) = ((item - part.base) as usize, Hit::with_t_max(limit));
@@ -352,18 +359,18 @@ impl<L: SimdFloat> Aggregate<L> {
         hit
     }
 
-    /// The surface of `item` near `point`; `facet`: as the hit has it.
+    /// Returns the surface of `item` near `point`; `triangle_tag` is the triangle of the hit.
     #[inline(always)]
-    pub fn surface(&self, item: u32, facet: L, point: Vec3<L>) -> SurfacePoint<L> {
+    pub fn surface(&self, item: u32, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         for part in &self.parts {
             if item < part.end {
-                return part.batch.surface((item - part.base) as usize, facet, point);
+                return part.batch.surface((item - part.base) as usize, triangle_tag, point);
             }
         }
         unreachable!("every item belongs to a part")
     }
 
-    /// The meshes, and the number of the first; they are the last of all items.
+    /// Returns the meshes and the number of the first mesh item. Meshes are last in the numbering.
     fn meshes(&self) -> Option<(&Meshes<L::Scalar>, u32)> {
         match self.parts.last()? {
             BatchRange { batch: PrimitiveBatch::Meshes(meshes), base, .. } => Some((meshes, *base)),
@@ -371,7 +378,7 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns `true` if light sees other normals than the surfaces' own anywhere: [`Aggregate::shading_normal`].
+    /// Returns `true` if any surface has interpolated normals: [`Aggregate::shading_normal`].
     pub fn is_smooth(&self) -> bool {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_smooth())
     }
@@ -381,37 +388,38 @@ impl<L: SimdFloat> Aggregate<L> {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
     }
 
-    /// The normal that light is computed with where rays along `direction` meet `item` at `point`, whose
-    /// geometric normal on the viewer's side is `normal`: on the same side, and facing the viewer.
+    /// Returns the shading normal at `at`, the point of `item` that rays along `direction` hit and
+    /// its geometric normal on the viewer's side. The shading normal is on the same side and faces
+    /// the viewer.
     pub fn shading_normal(
         &self,
-        (item, facet): (u32, L),
+        (item, triangle_tag): (u32, L),
         at: (Vec3<L>, Vec3<L>),
         direction: Vec3<L>,
     ) -> Vec3<L> {
         match self.meshes() {
             Some((meshes, base)) if item >= base => {
-                meshes.shading_normal((item - base) as usize, facet, at, direction)
+                meshes.shading_normal((item - base) as usize, triangle_tag, at, direction)
             }
             _ => at.1,
         }
     }
 
-    /// The colour of its own that `item` has at `facet`, if it has one.
-    pub fn color(&self, item: u32, facet: L) -> Option<Vec3<L>> {
+    /// Returns the colour of `item` at the triangle `triangle_tag`; `None` if the item has none.
+    pub fn color(&self, item: u32, triangle_tag: L) -> Option<Vec3<L>> {
         let (meshes, base) = self.meshes()?;
-        (item >= base).then(|| meshes.color((item - base) as usize, facet))?
+        (item >= base).then(|| meshes.color((item - base) as usize, triangle_tag))?
     }
 
-    /// Texture coordinates that `item` has of its own at `point`, near its triangles tagged `facet`; `None`
-    /// if it has none.
-    pub fn uv(&self, item: u32, facet: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+    /// Returns the texture coordinates of `item` at `point`, near its triangle `triangle_tag`;
+    /// `None` if the item has none.
+    pub fn uv(&self, item: u32, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
         let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
-        part.batch.uv((item - part.base) as usize, facet, point)
+        part.batch.uv((item - part.base) as usize, triangle_tag, point)
     }
 }
 
-/// An empty hit; inactive lanes get a negative `t_max`.
+/// Returns an empty hit; inactive lanes get a negative `t_max`.
 #[inline(always)]
 fn nearest_wanted<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
     Hit::with_t_max(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))

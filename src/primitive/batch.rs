@@ -1,5 +1,5 @@
-//! Batches of compiled primitives: one per form, all items of a form side by side, so that a form that does
-//! not occur costs nothing.
+//! Batches of compiled primitives: one per form, all items of a form side by side, so that a form
+//! that does not occur costs nothing.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -18,7 +18,7 @@ use std::ops::Range;
 /// Surface at the point that a ray hits.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint<L> {
-    /// The point, put back on the surface as exactly as the precision allows.
+    /// Point projected onto the surface as exactly as the precision allows.
     pub point: Vec3<L>,
     /// Unit geometric normal: outward for solids, on the front for flat shapes.
     pub normal: Vec3<L>,
@@ -30,15 +30,15 @@ pub struct SurfacePoint<L> {
 /// Texture coordinates that a shape has of its own, at one point.
 #[derive(Clone, Copy, Debug)]
 pub struct UvGradients<L> {
-    /// u to the right, v up.
+    /// Coordinates: u to the right, v up.
     pub uv: [L; 2],
-    /// Their gradients along the surface, in the shape's own axes.
+    /// Gradients of u and v along the surface, in the space of the shape.
     pub gradients: [Vec3<L>; 2],
 }
 
 impl<L: SimdFloat> SurfacePoint<L> {
-    /// Distance from the point at which rays start that leave the surface: a few roundings of the largest number
-    /// involved.
+    /// Returns the distance above the surface at which rays that leave it start: a few roundings of
+    /// the largest number involved.
     #[inline(always)]
     pub fn ray_offset(&self) -> L {
         self.max_coordinate.max(self.point.max_abs()) * L::from_f64(8.0 * L::EPSILON)
@@ -47,15 +47,16 @@ impl<L: SimdFloat> SurfacePoint<L> {
 
 /// One primitive, compiled for the lane type.
 pub trait Primitive<L: SimdFloat> {
-    /// Distance at which each line through a ray meets the item first in front of the ray's origin, and
-    /// where it meets it; there, a distance that is not positive is no hit. `None`: it meets it nowhere.
+    /// Returns the first distance in front of the ray's origin at which each line hits the
+    /// primitive, and the mask of lines that hit it. A distance that is not positive is no hit.
+    /// `None` if no lane hits.
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;
 
-    /// The surface at `point` (near it, from `ray.at(t)`).
+    /// Returns the surface at `point`, which is near it, from `ray.at(t)`.
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L>;
 
-    /// Texture coordinates that the primitive has of its own at `point`. Forms whose default mapping is
-    /// [`DefaultMapping::Uv`](crate::primitive::DefaultMapping::Uv) return them.
+    /// Returns the primitive's own texture coordinates at `point`. Forms whose default mapping is
+    /// [`DefaultMapping::Uv`](crate::primitive::DefaultMapping::Uv) have them.
     fn uv(&self, _point: Vec3<L>) -> Option<UvGradients<L>> {
         None
     }
@@ -72,8 +73,8 @@ macro_rules! batches {
             Meshes(Meshes<L::Scalar>),
         }
 
-        /// Evaluates one expression for the primitives of any form but compounds and meshes, and one for
-        /// each of those.
+        /// Evaluates one expression for the primitives of any form but compounds and meshes, and
+        /// one for each of those.
         macro_rules! each {
             ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
                 $meshes:ident => $third:expr) => {
@@ -141,8 +142,8 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.closest(range, base, ray, hit));
     }
 
-    /// Lanes that hit an item in `range` at a distance in (0, limit) of the ray. May stop
-    /// early once all lanes of `wanted` are blocked.
+    /// Returns the lanes that hit an item in `range` at a distance in (0, limit) of the ray. The
+    /// search may stop once all lanes of `wanted` are blocked.
     #[inline(always)]
     pub fn occluded(
         &self,
@@ -157,21 +158,22 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.occluded(range, ray, limit, wanted))
     }
 
-    /// The surface of `item` at `point` (near it, from `ray.at(t)`); `facet`: tag of a mesh's triangle.
+    /// Returns the surface of `item` at `point`, which is near it, from `ray.at(t)`; `triangle_tag`
+    /// is the triangle of a mesh.
     #[inline(always)]
-    pub fn surface(&self, item: usize, facet: L, point: Vec3<L>) -> SurfacePoint<L> {
+    pub fn surface(&self, item: usize, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         each!(self,
             items => items[item].surface(point),
             compounds => compounds.surface(item, point),
-            meshes => meshes.surface(item, facet, point))
+            meshes => meshes.surface(item, triangle_tag, point))
     }
 
-    /// Texture coordinates that `item` has of its own at `point`; `None` if it has none.
-    pub fn uv(&self, item: usize, facet: L, point: Vec3<L>) -> Option<UvGradients<L>> {
+    /// Returns the texture coordinates of `item` at `point`; `None` if it has none.
+    pub fn uv(&self, item: usize, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
         each!(self,
             items => items[item].uv(point),
             compounds => compounds.uv(item, point),
-            meshes => meshes.uv(item, facet, point))
+            meshes => meshes.uv(item, triangle_tag, point))
     }
 }
 
@@ -208,22 +210,22 @@ fn occluded<L: SimdFloat>(
 pub struct PrimitiveId {
     /// Position in the list given to `compile`.
     pub form: usize,
-    /// Part of a compound; 0 for all other forms. Part 0 stands for the whole compound where
-    /// rays ask for items; its other parts never meet anything by themselves.
+    /// Part of a compound; 0 for all other forms. Part 0 represents the whole compound in the
+    /// numbering of items; the other parts are never intersected by themselves.
     pub part: usize,
 }
 
-/// A compiled batch and what its items came from.
+/// Compiled batch with the origins of its items.
 pub struct LabelledBatch<L: SimdFloat> {
-    /// The batch.
+    /// Compiled batch.
     pub batch: PrimitiveBatch<L>,
-    /// `sources[item]`: which form, which part of it.
+    /// Form and part of each item.
     pub sources: Vec<PrimitiveId>,
     /// Singular and plural by which the inventory counts the items.
     pub noun: (&'static str, &'static str),
-    /// Words of the inventory behind that.
+    /// Text of the inventory after the noun.
     pub detail: String,
-    /// Items without an end, which no tree can hold.
+    /// `true` if the items are infinite; a BVH cannot hold them.
     pub infinite: bool,
 }
 
@@ -241,7 +243,7 @@ impl<L: SimdFloat> LabelledBatch<L> {
     }
 }
 
-/// `69,451`
+/// Returns `n` with thousands separators: `69,451`.
 fn with_thousands_separators(n: usize) -> String {
     let digits = n.to_string();
     let mut out = String::new();

@@ -1,10 +1,12 @@
-//! Bounding volumes, enough to rule out that some rays hit a primitive. In double precision, and
-//! with room for the roundings of single: whatever a ray in lanes may meet is never ruled out.
+//! Bounding volumes that rule out hits of rays with a primitive. They are in double precision with
+//! room for the roundings of single precision: a primitive that a ray in lanes may hit is never
+//! ruled out.
 
 use crate::primitive::form::Form;
 use glam::DVec3;
 
-/// Rays in single precision stray by a few times 2^-24 of the largest coordinate; this is more.
+/// Relative error of rays in single precision, more than the few times 2^-24 of the largest
+/// coordinate that they stray by.
 pub const F32_RAY_ERROR: f64 = 1e-5;
 
 /// A ball.
@@ -19,27 +21,27 @@ pub struct BoundingSphere {
 /// Target of shadow rays.
 #[derive(Clone, Copy, Debug)]
 pub enum LightTarget {
-    /// To a point.
+    /// A point.
     Point(DVec3),
-    /// Far away in a direction of unit length.
+    /// A direction of unit length to a distant light.
     Direction(DVec3),
 }
 
-/// Straight lines that leave one point through a convex quadrilateral.
+/// Lines from one point through a convex quadrilateral.
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
-    /// The point.
+    /// Common point of the lines.
     pub apex: DVec3,
-    /// Forward, of unit length.
+    /// Forward direction, of unit length.
     pub forward: DVec3,
-    /// From the apex to the quadrilateral's corners, which lie at distance 1 along `forward`.
+    /// Vectors from the apex to the corners of the quadrilateral, at distance 1 along `forward`.
     pub corners: [DVec3; 4],
 }
 
 impl Frustum {
-    /// Returns `true` if a ball may reach between the lines: into the cone around them, if that is narrower than a half
-    /// space; otherwise, as no circular cone is convex then, to the inner side of the four planes through the
-    /// apex and neighbouring corners.
+    /// Returns `true` if a ball may reach between the lines. The test is against the cone around
+    /// the lines if it is narrower than a half-space; otherwise, as no wider cone is convex,
+    /// against the inner side of the four planes through the apex and neighbouring corners.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let Self { apex, forward, corners } = self;
         let axis = corners.iter().sum::<DVec3>().normalize();
@@ -65,7 +67,7 @@ pub struct BoundingVolume {
     ball: BoundingSphere,
     /// Unit normal and offset of the plane that a flat form lies in.
     plane: Option<(DVec3, f64)>,
-    /// It does not see itself from outside.
+    /// `true` if the outside of the form cannot see itself.
     convex: bool,
     /// Largest distance between the end of a ray and its nominal end.
     slack: f64,
@@ -83,7 +85,7 @@ impl BoundingSphere {
         self.center.distance(point) <= self.radius + ray_error(self.center) + ray_error(point)
     }
 
-    /// Its radius, with room for the roundings of rays from `apex`.
+    /// Returns the radius with room for the roundings of rays from `apex`.
     fn reach(&self, apex: DVec3) -> f64 {
         self.radius * (1.0 + F32_RAY_ERROR) + ray_error(self.center) + ray_error(apex)
     }
@@ -101,22 +103,23 @@ impl BoundingVolume {
         Self { ball, plane, convex, slack: 0.0 }
     }
 
-    /// A ball around it.
+    /// Returns a ball around the form.
     pub fn ball(&self) -> BoundingSphere {
         self.ball
     }
 
-    /// Returns `true` if it is flat: a ray that leaves it does not hit it again.
+    /// Returns `true` if the form is flat: a ray that leaves it does not hit it again.
     pub fn is_flat(&self) -> bool {
         self.plane.is_some()
     }
 
-    /// Returns `true` if it is convex: its outside does not see itself.
+    /// Returns `true` if the form is convex: its outside cannot see itself.
     pub fn is_convex(&self) -> bool {
         self.convex
     }
 
-    /// A ball around all of it that the pencil's lines meet in front of the apex; `None`: nothing.
+    /// Returns a ball around the part of the form that the pencil's lines can hit in front of the
+    /// apex; `None` if there is none.
     pub fn clip_to(&self, pencil: &Frustum) -> Option<BoundingSphere> {
         let Frustum { apex, forward, corners } = pencil;
         let ball = self.ball;
@@ -128,9 +131,9 @@ impl BoundingVolume {
         let middle = (ball.center - *apex).dot(*forward);
         let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
         if let Some((normal, offset)) = self.plane {
-            // Along lines that have the same length in depth, 1 / depth of a plane is linear: its
-            // extremes are at the corners, if the plane crosses all four in front. What rounding may do to
-            // the plane's height above the apex and to the slopes of the lines is allowed for.
+            // 1 / depth of a plane is linear along lines of equal length in depth: its extremes are
+            // at the corners if all four cross the plane in front. The slacks allow for rounding of
+            // the plane's height above the apex and of the slopes of the lines.
             let height = offset - normal.dot(*apex);
             let (height, toward) = (height.abs(), normal * height.signum());
             let slack = self.ray_error(*apex);
@@ -160,13 +163,14 @@ impl BoundingVolume {
         Some(if part.radius < ball.radius { part } else { ball })
     }
 
-    /// The same with room around it: for shadow rays that end so far from their lights.
+    /// Returns the volume grown by `by`, for shadow rays that end within `by` of their lights.
     pub fn grown(self, by: f64) -> Self {
         let ball = BoundingSphere { radius: self.ball.radius + by, ..self.ball };
         Self { ball, slack: self.slack + by, ..self }
     }
 
-    /// Distance from the plane of a flat form at which rays that lead to `point` may hit it.
+    /// Returns the distance from the plane of a flat form within which rays that lead to `point`
+    /// may hit it.
     fn ray_error(&self, point: DVec3) -> f64 {
         let BoundingSphere { center, radius } = self.ball;
         let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
@@ -174,7 +178,7 @@ impl BoundingVolume {
         self.slack + ray_error(point) + F32_RAY_ERROR * reach.max(offset)
     }
 
-    /// Returns `true` if it may stand between some point of `lit` and the light.
+    /// Returns `true` if the form may be between some point of `lit` and the light.
     pub fn may_occlude(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
         let slack = ray_error(lit.center) + F32_RAY_ERROR * lit.radius;
         let radius = lit.radius + slack;
@@ -187,7 +191,7 @@ impl BoundingVolume {
             };
             let sure =
                 height.abs() > lit.radius + self.ray_error(lit.center) && beyond.abs() > unsure;
-            // Both on the same side.
+            // Light and lit points are on the same side.
             if sure && height.abs() > radius && height * beyond > 0.0 {
                 return false;
             }
@@ -229,8 +233,8 @@ struct Cone {
 }
 
 impl Cone {
-    /// Returns `true` if a ball may reach into the cone: it is not all behind the apex, and its centre is no
-    /// farther from the cone's side than its radius.
+    /// Returns `true` if a ball may reach into the cone: some of it is in front of the apex, and
+    /// its centre is no farther from the cone's side than its radius.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let to = ball.center - self.apex;
         let along = to.dot(self.axis);
@@ -304,8 +308,8 @@ mod tests {
         }
     }
 
-    /// Lines in all directions that a picture of 175 degrees shows in its only tile; the eye is not in the
-    /// middle of the tile's corners, which lie more than 90 degrees from their mean.
+    /// Lines in all directions that a picture of 175 degrees shows in its only tile; the eye is not
+    /// in the middle of the tile's corners, which lie more than 90 degrees from their mean.
     #[test]
     fn a_wide_pencil_meets_what_its_lines_meet() {
         let apex = DVec3::new(1.0, -2.0, 5.0);

@@ -1,5 +1,5 @@
-//! Properties that every canonical form has. Each primitive implements all of them in its own file, so
-//! that a new one cannot inherit an answer by default.
+//! Properties that every canonical form has. Each primitive implements all of them in its own file,
+//! so that a new one cannot inherit an answer by default.
 
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::form::Form;
@@ -87,11 +87,12 @@ pub trait CanonicalShape {
     /// Sphere around the form; its radius is infinite if the form has no end.
     fn bounding_sphere(&self) -> BoundingSphere;
 
-    /// The map from the space in which the form was described, and its box there; `None` if the form has
-    /// no space of its own.
+    /// The map from the space in which the form was described, and its box there; `None` if the
+    /// form has no space of its own.
     fn oriented_box(&self) -> Option<(DAffine3, Bounds)>;
 
-    /// Plane that a flat form lies in, its front on the side of the normal; `None` if the form is not flat.
+    /// Plane that a flat form lies in, its front on the side of the normal; `None` if the form is
+    /// not flat.
     fn plane(&self) -> Option<HalfSpace>;
 
     /// Returns `true` if the outside of the form cannot see itself.
@@ -101,16 +102,16 @@ pub trait CanonicalShape {
     /// thinnest part: what is left between cuts is found as a gap.
     fn thickness(&self) -> f64;
 
-    /// Lower bound of the distance of `point` from the surface, exact close to it; outside of a box the box
-    /// may stand for the form. `None` if there is no surface.
+    /// Lower bound of the distance of `point` from the surface, exact close to it; outside of a box
+    /// the box may stand for the form. `None` if there is no surface.
     fn clearance(&self, point: DVec3) -> Option<f64>;
 
-    /// Unit normals of the surfaces that pass `point` within `slack`, a list for each solid that the form
-    /// is made of; empty if none does.
+    /// Unit normals of the surfaces that pass `point` within `slack`, a list for each solid that
+    /// the form is made of; empty if none does.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
-    /// Smallest t > 0 at which `origin + t direction` lies on the surface; `None` if there is none. The unit
-    /// of t is the length of `direction`.
+    /// Smallest t > 0 at which `origin + t direction` lies on the surface; `None` if there is none.
+    /// The unit of t is the length of `direction`.
     fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64>;
 
     /// Mapping of textures that leave it open.
@@ -119,8 +120,8 @@ pub trait CanonicalShape {
     /// Proxies for the search for narrow gaps; none for a form whose details are too many.
     fn proxies(&self) -> Vec<Proxy>;
 
-    /// Least and largest value of `axis . p` over the form, or bounds of them; `None` if it has no end in
-    /// that direction. `axis` is a unit vector.
+    /// Least and largest value of `axis . p` over the form, or bounds of them; `None` if it has no
+    /// end in that direction. `axis` is a unit vector.
     fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)>;
 
     /// Corners on which the form can stand.
@@ -162,8 +163,8 @@ pub fn extent_of_box(bounds: Option<Bounds>, axis: DVec3) -> Option<(f64, f64)> 
     Some((center - reach, center + reach))
 }
 
-/// Normals of those sides of one convex solid, given by height and normal, whose surfaces pass a point
-/// within `slack`: near the solid the height over the farthest side is the distance.
+/// Normals of those sides of one convex solid, given by height and normal, whose surfaces pass a
+/// point within `slack`: near the solid the height over the farthest side is the distance.
 pub fn normals_of_solid(sides: Vec<(f64, DVec3)>, slack: f64) -> Vec<Vec<DVec3>> {
     let near = sides.iter().all(|(height, _)| *height <= slack);
     let on = sides.into_iter().filter(|(height, _)| near && *height >= -slack);
@@ -190,8 +191,8 @@ pub fn half_space(point: DVec3, normal: DVec3) -> HalfSpace {
     HalfSpace { normal, offset: normal.dot(point) }
 }
 
-/// Factor by which a linear map scales every length; `None` if it depends on the direction by more than
-/// rounding.
+/// Factor by which a linear map scales every length; `None` if it depends on the direction by more
+/// than rounding.
 pub fn similarity(linear: &DMat3) -> Option<f64> {
     let gram = linear.transpose() * *linear;
     let square = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;

@@ -1,5 +1,5 @@
-//! Tapered cylinders: cylinders, cones and what lies between, under any affine map. The ray goes back
-//! to the canonical solid's space, with the origin in the middle of its axis:
+//! Tapered cylinders: cylinders, cones and what lies between, under any affine map. The ray goes
+//! back to the canonical solid's space, with the origin in the middle of its axis:
 //!   x^2 + y^2 <= (middle + slope z)^2, |z| <= 1/2
 
 use crate::bvh::Ray;
@@ -20,20 +20,20 @@ use std::f64::consts::TAU;
 /// 0 <= z <= 1. [`Form::conical_frustum`] makes one of any proportions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConicalFrustumForm {
-    /// From that solid's space to the scene's.
+    /// Map from the space of that solid to the scene.
     pub scene_from_unit: DAffine3,
     /// Radius at z = 1 over radius at z = 0: from 0, a cone, to 1, a cylinder.
     pub top_radius: f64,
 }
 
 impl Form {
-    /// The image under `scene_from_canonical` of the solid with x^2 + y^2 <= (1 + (s - 1) z)^2 and
-    /// 0 <= z <= 1, for any s >= 0.
+    /// Creates the image under `scene_from_canonical` of the solid with x^2 + y^2 <= (1 + (s - 1)
+    /// z)^2 and 0 <= z <= 1, for any s >= 0.
     pub fn conical_frustum(scene_from_canonical: DAffine3, s: f64) -> Self {
         let (scene_from_unit, top_radius) = if s <= 1.0 {
             (scene_from_canonical, s)
         } else {
-            // Upside down, with the wider end as the base.
+            // The frustum is turned upside down: the wider end is the base.
             let linear = DMat3::from_diagonal(DVec3::new(s, s, -1.0));
             let flip = DAffine3::from_mat3_translation(linear, DVec3::Z);
             (scene_from_canonical * flip, 1.0 / s)
@@ -42,7 +42,7 @@ impl Form {
     }
 }
 
-/// Number of normals that stand for the circle of them at the tip of a cone.
+/// Number of normals that sample the circle of normals at the tip of a cone.
 pub(crate) const AROUND_TIP: u32 = 64;
 
 impl CanonicalShape for ConicalFrustumForm {
@@ -87,7 +87,7 @@ impl CanonicalShape for ConicalFrustumForm {
     }
 
     fn thickness(&self) -> f64 {
-        // Between the faces of the box around the canonical solid: 2 by 2 by 1.
+        // Thickness between the faces of the box around the canonical solid, which is 2 by 2 by 1.
         let rows = self.scene_from_unit.matrix3.inverse().transpose();
         let across = rows.x_axis.length().max(rows.y_axis.length());
         (2.0 / across).min(rows.z_axis.length().recip())
@@ -153,8 +153,9 @@ impl CanonicalShape for ConicalFrustumForm {
     }
 }
 
-/// Distance of `point` from the image of a frustum. The surface is made of outlines of three segments, from
-/// the middle of the base over both rims to the middle of the cap, one for each angle.
+/// Returns the distance of `point` from the image of a frustum. The surface consists of outlines of
+/// three segments, from the middle of the base over both rims to the middle of the cap, one for
+/// each angle.
 fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
     const ANGLES: usize = 64;
     let place = |x, y, z| scene_from_unit.transform_point3(DVec3::new(x, y, z));
@@ -184,7 +185,7 @@ fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
     least
 }
 
-/// One solid. Matrices by rows.
+/// Compiled frustum. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct ConicalFrustum<S> {
     /// Image of the middle of the axis.
@@ -201,12 +202,12 @@ pub struct ConicalFrustum<S> {
     reach: S,
 }
 
-/// Squared radius of the ball about the middle of the axis that holds the canonical solid, and a
-/// little more: what is cut off by rounding must not be cut off for good.
+/// Squared radius of the ball around the middle of the axis that holds the canonical solid, with
+/// room for rounding.
 const AROUND2: f64 = 1.26;
 
 impl<S: Float> ConicalFrustum<S> {
-    /// `None`: the form is another.
+    /// Compiles a conical frustum; `None` if the form is another.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit: m, top_radius }) = form
         else {
@@ -227,19 +228,19 @@ impl<S: Float> ConicalFrustum<S> {
     }
 }
 
-/// Crossings of a line with a solid.
+/// Chord of a line in a frustum.
 struct Chord<L: SimdFloat> {
-    /// The point of the line nearest to the middle of the axis, and its direction, of unit length in
+    /// Point of the line nearest to the middle of the axis, and the direction, of unit length in
     /// the canonical space.
     point: Vec3<L>,
     direction: Vec3<L>,
-    /// The scene's distance of `point`, and of a step of length 1.
+    /// Distance of `point` in the scene, and length in the scene of a step of length 1.
     start: L,
     scale: L,
     /// Steps from `point` to both ends.
     enter: L,
     leave: L,
-    /// Lanes whose end lies on the side, not on a flat end.
+    /// Lanes with an end on the side rather than on a flat end.
     enters_side: L::Mask,
     leaves_side: L::Mask,
     meets: L::Mask,
@@ -252,20 +253,21 @@ impl<L: SimdFloat> Chord<L> {
     }
 }
 
-/// The line's steps are counted from its point nearest to the solid's middle, so that a distant origin
-/// costs no digits. With p the point, d the direction, r the radius at p and k the slope, the side is
-/// crossed where a t^2 + 2 b t + c = 0. Its discriminant is formed as |r d' - k d_z p'|^2 - (p' x d')^2
-/// (primes: without z), which for a cylinder compares the radius with the line's distance from the axis
-/// and does not cancel as b^2 - a c does; its roots as q / a and c / q, so that a = 0, a line parallel
-/// to a generator, leaves one of them finite.
+/// Returns the chord of a line. Steps are counted from the line's point nearest to the solid's
+/// middle, so that a distant origin costs no digits. With p the point, d the direction, r the
+/// radius at p and k the slope, the side is crossed where a t^2 + 2 b t + c = 0. Its discriminant
+/// is computed as |r d' - k d_z p'|^2 - (p' x d')^2 (primes: without z), which for a cylinder
+/// compares the radius with the line's distance from the axis and does not cancel as b^2 - a c
+/// does. Its roots are computed as q / a and c / q, so that a = 0, a line parallel to a generator,
+/// leaves one of them finite.
 #[inline(always)]
-fn interval<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
+fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let (zero, half) = (L::zero(), L::from_f64(0.5));
     let f = times(&s.unit_from_scene, ray.origin - Vec3::splat(s.center));
     let d = times(&s.unit_from_scene, ray.direction);
     let scale = L::one() / d.length_squared().sqrt();
     let d = d * scale;
-    // Twice: what the first step rounds off along the direction, the second takes away.
+    // The second step removes the rounding of the first step along the direction.
     let back = -f.dot(d);
     let p = d.mul_add(back, f);
     let again = -p.dot(d);
@@ -284,7 +286,7 @@ fn interval<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option
     let ey = r.mul_add(d.y, -(kd * p.y));
     let cross = p.x.mul_add(d.y, -(p.y * d.x));
     let discriminant = ex.mul_add(ex, ey.mul_add(ey, -(cross * cross)));
-    // Steeper than the side: the line crosses both nappes of the cone, for certain.
+    // Lines steeper than the side always cross both nappes of the cone.
     let steep = a.lt(zero);
     let root = discriminant.max(zero).sqrt();
     let q = -(b + root.copysign(b));
@@ -292,17 +294,17 @@ fn interval<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option
     let t0 = L::select(turns, q / a, zero);
     let t1 = L::select(turns, c / q, zero);
     let (low, high) = (t0.min(t1), t0.max(t1));
-    // A line along a generator or the axis that touches nothing: inside everywhere or nowhere.
+    // A line along a generator or the axis without a crossing is inside everywhere or nowhere.
     let level = L::mask(true).and_not(turns) & a.abs().le(zero);
     let (all, none) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
-    // Of the two nappes the one where the radius is positive, on which the line ends or begins.
+    // The nappe with a positive radius counts; the line ends or begins on it.
     let widens = kd.gt(zero);
     let enter_side = L::select(steep, L::select(widens, high, none), low);
     let leave_side = L::select(steep, L::select(widens, all, low), high);
     let enter_side = L::select(level, none, enter_side);
     let leave_side = L::select(level, all, leave_side);
     let crosses = (steep | discriminant.ge(zero)).and_not(level) | (level & c.le(zero));
-    // Between the planes of the ends; a parallel line is within or without by its height.
+    // Interval between the planes of the ends; a parallel line is inside or outside by its height.
     let tiny = L::from_f64(1e-30);
     let inverse = L::one() / d.z.abs().max(tiny).copysign(d.z);
     let (z0, z1) = ((-half - p.z) * inverse, (half - p.z) * inverse);
@@ -321,14 +323,15 @@ fn interval<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option
     })
 }
 
-/// The side's outward normal at the canonical point (x, y, z), in the scene's space, not normalised.
+/// Returns the outward normal of the side at the canonical point (x, y, z), in the space of the
+/// scene, not normalised.
 #[inline(always)]
 fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3<L>, L) {
     let rho = x.mul_add(x, y * y).sqrt();
-    // At the apex the axis stands for the normals that meet there.
+    // At the apex the axis represents all normals.
     let inverse = L::select(rho.gt(L::zero()), L::one() / rho, L::zero());
     let (nx, ny, nz) = (x * inverse, y * inverse, -L::splat(s.slope));
-    // The inverse transpose times the normal: columns of the inverse.
+    // Normals transform by the inverse transpose: columns of the inverse.
     let m = &s.unit_from_scene;
     (Vec3::splat(m[0]) * nx + Vec3::splat(m[1]) * ny + Vec3::splat(m[2]) * nz, rho)
 }
@@ -336,12 +339,13 @@ fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3
 impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
     #[inline(always)]
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
-        let interval = interval(self, ray)?;
-        let (enter, leave) = interval.distances();
-        Some((L::select(enter.gt(L::zero()), enter, leave), interval.meets))
+        let chord = chord(self, ray)?;
+        let (enter, leave) = chord.distances();
+        Some((L::select(enter.gt(L::zero()), enter, leave), chord.meets))
     }
 
-    /// Side, base or cap: the one that is nearest, outside by most or inside by least.
+    /// Returns the surface of the nearest of side, base and cap: the largest height outside, or the
+    /// least depth inside.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let s = self;
@@ -369,21 +373,21 @@ impl<L: SimdFloat> SolidPrimitive<L> for ConicalFrustum<L::Scalar> {
 
     fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let s = self;
-        let interval = interval(s, ray)?;
-        let (enter, leave) = interval.distances();
+        let chord = chord(s, ray)?;
+        let (enter, leave) = chord.distances();
         let cap = Vec3::splat(s.cap_normal).dot(ray.direction).abs();
         let cosine = |on_side: L::Mask, t: L| {
-            let at = interval.direction.mul_add(t, interval.point);
-            let (normal, _) = side_normal(s, at.x, at.y);
+            let end_point = chord.direction.mul_add(t, chord.point);
+            let (normal, _) = side_normal(s, end_point.x, end_point.y);
             let side = (normal.dot(ray.direction) / normal.length_squared().sqrt()).abs();
             L::select(on_side, side, cap)
         };
         Some(Span {
             enter,
             leave,
-            enter_cosine: cosine(interval.enters_side, interval.enter),
-            leave_cosine: cosine(interval.leaves_side, interval.leave),
-            meets: interval.meets,
+            enter_cosine: cosine(chord.enters_side, chord.enter),
+            leave_cosine: cosine(chord.leaves_side, chord.leave),
+            meets: chord.meets,
         })
     }
 }

@@ -118,20 +118,20 @@ impl CanonicalShape for ConvexPolyhedronForm {
     }
 }
 
-/// The points p with low <= normal . (p - center) <= high.
+/// Points p with low <= normal . (p - center) <= high.
 struct Slab<S> {
     normal: [S; 3],
     low: S,
     high: S,
 }
 
-/// The points p with normal . (p - center) <= high.
+/// Points p with normal . (p - center) <= high.
 struct Face<S> {
     normal: [S; 3],
     high: S,
 }
 
-/// One solid: its bounding sphere, slabs and single faces.
+/// Compiled polyhedron: its bounding sphere, slabs and single faces.
 pub struct ConvexPolyhedron<S> {
     center: [S; 3],
     radius2: S,
@@ -141,7 +141,7 @@ pub struct ConvexPolyhedron<S> {
 }
 
 impl<S: Float> ConvexPolyhedron<S> {
-    /// `None`: the form is another.
+    /// Compiles a convex polyhedron; `None` if the form is another.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners }) = form else {
             return None;
@@ -152,7 +152,7 @@ impl<S: Float> ConvexPolyhedron<S> {
         let radius2 = corners.iter().map(|c| c.distance_squared(center)).fold(0.0, f64::max);
         let mut out = Self {
             center: center.to_array().map(S::from_f64),
-            // Rounded up: the test may let a miss through, never lose a hit.
+            // Rounded up: the test may pass a miss, but never rejects a hit.
             radius2: S::from_f64(radius2 * (1.0 + 8.0 * S::EPSILON)),
             reach: S::from_f64(max_coordinate(form)),
             slabs: Vec::new(),
@@ -181,7 +181,7 @@ impl<S: Float> ConvexPolyhedron<S> {
 }
 
 impl<S: Float> ConvexPolyhedron<S> {
-    /// Distances at which the line enters and leaves, and where it meets the solid.
+    /// Returns the distances at which the line enters and leaves, and the lanes that hit the solid.
     #[inline(always)]
     fn chord<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
         let from_center = ray.origin - Vec3::splat(self.center);
@@ -193,9 +193,10 @@ impl<S: Float> ConvexPolyhedron<S> {
         }
         let mut enter = L::from_f64(-L::MAX);
         let mut leave = L::from_f64(L::MAX);
-        // A direction parallel to a face becomes one that is so nearly, on the side of its zero's
-        // sign: 0 / 0 cannot occur, a line inside the face is not cut by it, one beyond it has an
-        // empty chord, and one in the face's plane touches the solid or not by that sign.
+        // A direction parallel to a face is replaced by a nearly parallel one, on the side of its
+        // zero's sign. 0 / 0 cannot occur: a line inside the face is not cut by it, one outside has
+        // an empty chord, and one in the face's plane touches the solid or not depending on the
+        // sign.
         let tiny = L::from_f64(1e-30);
         let steep = |speed: L| speed.abs().max(tiny).copysign(speed);
         for slab in &self.slabs {
@@ -215,7 +216,8 @@ impl<S: Float> ConvexPolyhedron<S> {
             enter = L::select(entering, t.max(enter), enter);
             leave = L::select(entering, leave, t.min(leave));
         }
-        // Each lane by itself: company in the packet must not decide about a line past a corner.
+        // Each lane is decided by itself: other lanes of the packet do not affect a line past a
+        // corner.
         Some((enter, leave, near & enter.le(leave)))
     }
 }
@@ -227,7 +229,8 @@ impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), meets))
     }
 
-    /// The face is the one whose plane is nearest to the point: outside by most, or inside by least.
+    /// Returns the surface of the face with the plane nearest to the point: the largest height
+    /// outside, or the least depth inside.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let from_center = point - Vec3::splat(self.center);
@@ -265,8 +268,8 @@ impl<L: SimdFloat> SolidPrimitive<L> for ConvexPolyhedron<L::Scalar> {
     fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let (enter, leave, meets) = self.chord(ray)?;
         let from_center = ray.origin - Vec3::splat(self.center);
-        // The face at an end is the one that is nearest there, of those that the line crosses in
-        // the right sense.
+        // The face at an end is the nearest one there, among those that the line crosses in the
+        // right sense.
         let mut best = (L::from_f64(-L::MAX), L::from_f64(-L::MAX));
         let mut cosines = (L::one(), L::one());
         let mut face = |normal: Vec3<L>, offset: L| {

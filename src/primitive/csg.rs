@@ -1,14 +1,14 @@
 //! Compounds: unions, intersections and differences of convex solids, by intervals (Roth 1982, *Ray
 //! Casting for Modeling Solids*).
 //!
-//! Every part gives the span in which a line is inside it. The ends of all spans, sorted, cut the line
-//! into gaps; in each of them every part is either inside or outside, and so is the whole. Where that
-//! changes from one gap to the next there is a surface.
+//! Each part returns the span in which a line is inside it. The sorted ends of all spans cut the
+//! line into gaps. In each gap every part is either inside or outside, and so is the compound. A
+//! change from one gap to the next is a surface.
 //!
-//! Ends that are nearer to each other than [`TIE`] roundings across the surface have no gap between
-//! them: they happen at once. So a cut that is flush with a face leaves no skin, and parts that touch
-//! leave no crack, whichever of two equal faces rounding puts in front. What is thinner than that is
-//! nothing.
+//! Ends that are nearer to each other than [`TIE`] roundings across the surface coincide: there is
+//! no gap between them. A cut flush with a face therefore leaves no skin, and parts in contact
+//! leave no crack, regardless of the order that rounding gives to equal faces. Parts thinner than
+//! that are dropped.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -26,20 +26,20 @@ use crate::primitive::sphere::Sphere;
 use crate::primitive::torus::Torus;
 use std::ops::Range;
 
-/// Surfaces that are so many roundings of the largest coordinate apart lie on each other: two faces
-/// given four units of the last place apart, each met with a few roundings.
+/// Distance within which surfaces coincide, in roundings of the largest coordinate: two faces given
+/// four units of the last place apart, each hit with a few roundings.
 const TIE: f64 = 16.0;
 
-/// A step of the computation of "inside the whole" from "inside a part", on a stack.
+/// Operation on a stack that computes "inside the compound" from "inside a part".
 #[derive(Clone, Copy, Debug)]
 enum Op {
     /// Pushes a part.
     Part(u32),
-    /// Replaces two entries by the one that is in either.
+    /// Replaces two entries by their union.
     Or,
-    /// Replaces two entries by the one that is in both.
+    /// Replaces two entries by their intersection.
     And,
-    /// Replaces two entries by the one that is in the lower, but not in the upper.
+    /// Replaces two entries by the lower without the upper.
     Minus,
 }
 
@@ -83,16 +83,16 @@ leaves! {
     ConvexPolyhedron(1),
     ConicalFrustum(1),
     Torus(2),
-    // The half-space behind it.
+    // Half-space behind the plane.
     Plane(1),
 }
 
 /// A part of a compound.
 struct Part<S> {
     solid: CsgLeaf<S>,
-    /// The whole's outside is on the solid's inside.
+    /// `true` if the outside of the compound is on the inside of the solid.
     reversed: bool,
-    /// Places of its spans among those of the compound.
+    /// Range of its spans among those of the compound.
     spans: Range<usize>,
 }
 
@@ -105,22 +105,22 @@ struct SolidOperand<S> {
     ops: Range<usize>,
     /// Largest number of spans of all parts.
     spans: usize,
-    /// Entries on the stack at most.
+    /// Largest number of entries on the stack.
     depth: usize,
 }
 
-/// All compounds of a scene. Every part is an item of its own, so that a hit names the part; the
-/// first one of a compound stands for it where rays ask for items.
+/// All compounds of a scene. Every part is an item, so that a hit names the part; the first part of
+/// a compound represents it in the numbering of items.
 pub struct Compounds<S> {
     compounds: Vec<SolidOperand<S>>,
     parts: Vec<Part<S>>,
     ops: Vec<Op>,
-    /// For each part the compound that begins with it.
+    /// Compound of each part that is the first of one; `None` for other parts.
     first: Vec<Option<u32>>,
 }
 
 impl<S: Float> Compounds<S> {
-    /// Those of `forms` that are compounds, in order.
+    /// Compiles the compounds among `forms`, in order.
     pub fn new(forms: &[Form]) -> Self {
         let mut out =
             Self { compounds: Vec::new(), parts: Vec::new(), ops: Vec::new(), first: Vec::new() };
@@ -156,8 +156,8 @@ impl<S: Float> Compounds<S> {
         });
     }
 
-    /// Appends the operations of `tree` and returns how high the stack grows; `reversed`: its inside
-    /// is outside the whole.
+    /// Appends the operations of `tree` and returns the depth of the stack; `reversed` is `true` if
+    /// the inside of the tree is outside the compound.
     fn build(&mut self, tree: &CsgTree, first_part: usize, reversed: bool) -> usize {
         let (list, op) = match tree {
             CsgTree::Part(i) => {
@@ -181,30 +181,32 @@ impl<S: Float> Compounds<S> {
         depth
     }
 
-    /// Spans of part number `i` of a compound.
+    /// Returns the spans of part number `i` of a compound.
+    ///
+    /// `SINGLE` is `true` if every part of the compound has one span.
     #[inline(always)]
-    fn spans_of<'a, L>(
+    fn spans_of<'a, L, const SINGLE: bool>(
         &self,
-        one: &SolidOperand<S>,
+        compound: &SolidOperand<S>,
         spans: &'a [Interval<L>],
         i: u32,
     ) -> &'a [Interval<L>] {
-        &spans[self.parts[one.parts.start + i as usize].spans.clone()]
+        &spans[self.parts[compound.parts.start + i as usize].spans.clone()]
     }
 
-    /// Lanes whose point at distance `t` is inside the whole.
+    /// Returns the lanes whose point at distance `t` is inside the compound.
     #[inline(always)]
-    fn inside<L: SimdFloat<Scalar = S>>(
+    fn inside<L: SimdFloat<Scalar = S>, const SINGLE: bool>(
         &self,
-        one: &SolidOperand<S>,
+        compound: &SolidOperand<S>,
         spans: &[Interval<L>],
         t: L,
     ) -> L::Mask {
-        with_scratch(one.depth, L::mask(false), |stack| {
+        with_scratch(compound.depth, L::mask(false), |stack| {
             let mut top = 0;
-            for op in &self.ops[one.ops.clone()] {
+            for op in &self.ops[compound.ops.clone()] {
                 if let Op::Part(i) = op {
-                    stack[top] = inside_any(self.spans_of(one, spans, *i), t);
+                    stack[top] = inside_any(self.spans_of::<_, SINGLE>(compound, spans, *i), t);
                     top += 1;
                     continue;
                 }
@@ -220,10 +222,10 @@ impl<S: Float> Compounds<S> {
         })
     }
 
-    /// Visible change of the surface between the distances `before` and `after`.
-    fn change<L: SimdFloat<Scalar = S>>(
+    /// Returns the visible change of the surface between the distances `before` and `after`.
+    fn change<L: SimdFloat<Scalar = S>, const SINGLE: bool>(
         &self,
-        one: &SolidOperand<S>,
+        compound: &SolidOperand<S>,
         spans: &[Interval<L>],
         base: u32,
         before: L,
@@ -235,18 +237,18 @@ impl<S: Float> Compounds<S> {
             t: L::zero(),
             tag: L::from_id(0),
         };
-        with_scratch(one.depth, nothing, |stack| {
+        with_scratch(compound.depth, nothing, |stack| {
             let mut top = 0;
-            for op in &self.ops[one.ops.clone()] {
+            for op in &self.ops[compound.ops.clone()] {
                 if let Op::Part(i) = op {
-                    let spans = self.spans_of(one, spans, *i);
+                    let spans = self.spans_of::<_, SINGLE>(compound, spans, *i);
                     let (was, is) = (inside_any(spans, before), inside_any(spans, after));
                     let mut t = spans[0].leave;
                     for span in spans {
                         t = L::select(span.at(before).and_not(is), span.leave, t);
                         t = L::select(span.at(after), span.enter, t);
                     }
-                    let tag = L::from_id(base + one.parts.start as u32 + i);
+                    let tag = L::from_id(base + compound.parts.start as u32 + i);
                     stack[top] = Transition { before: was, after: is, t, tag };
                     top += 1;
                     continue;
@@ -266,30 +268,30 @@ impl<S: Float> Compounds<S> {
     /// Narrows `hit` by the lanes of `wanted`.
     fn intersect_item<L: SimdFloat<Scalar = S>>(
         &self,
-        one: &SolidOperand<S>,
+        compound: &SolidOperand<S>,
         base: u32,
         ray: &Ray<L>,
         wanted: L::Mask,
         hit: &mut Hit<L>,
     ) {
-        let from_center = ray.origin - Vec3::splat(one.center);
+        let from_center = ray.origin - Vec3::splat(compound.center);
         let along = from_center.dot(ray.direction);
         let across = ray.direction.mul_add(-along, from_center);
-        let radius2 = L::splat(one.radius2);
-        // Ahead, or around the origin.
+        let radius2 = L::splat(compound.radius2);
+        // The ball is ahead of the origin or around it.
         let ahead = along.le(L::zero()) | from_center.length_squared().le(radius2);
         let near = wanted & across.length_squared().le(radius2) & ahead;
         if near.none() {
             return;
         }
         let (never, always) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
-        let parts = &self.parts[one.parts.clone()];
+        let parts = &self.parts[compound.parts.clone()];
         let outside = Interval { enter: never, leave: always };
         let end = Event { t: never, tie: L::zero() };
-        with_scratch(one.spans, outside, |spans| {
-            with_scratch(2 * one.spans, end, |ends| {
-                let tie =
-                    ray.origin.max_abs().max(L::splat(one.reach)) * L::from_f64(TIE * L::EPSILON);
+        with_scratch(compound.spans, outside, |spans| {
+            with_scratch(2 * compound.spans, end, |ends| {
+                let tie = ray.origin.max_abs().max(L::splat(compound.reach))
+                    * L::from_f64(TIE * L::EPSILON);
                 let mut count = 0;
                 for part in parts {
                     let slots = &mut spans[part.spans.clone()];
@@ -304,19 +306,24 @@ impl<S: Float> Compounds<S> {
                         }
                     });
                 }
-                self.sweep_events(one, (&*spans, &ends[..count]), base, near, hit);
+                let found = (&*spans, &ends[..count]);
+                if compound.spans == parts.len() {
+                    self.sweep_events::<_, true>(compound, found, base, near, hit);
+                } else {
+                    self.sweep_events::<_, false>(compound, found, base, near, hit);
+                }
             });
         });
     }
 
-    /// Narrows `hit` by the first surface of the lanes in `open`: from gap to gap along the lines.
+    /// Narrows `hit` by the first surface of the lanes in `open`, from gap to gap along the lines.
     ///
-    /// Faces that lie on each other are met at the same angle, so both ends must be as near as their
-    /// ties: a face that is met flatly does not swallow others that are not.
+    /// Coincident faces have the same angle to the line, so ends coincide only within the ties of
+    /// both: the wide tie of a grazing face does not absorb other faces.
     #[inline(always)]
-    fn sweep_events<L: SimdFloat<Scalar = S>>(
+    fn sweep_events<L: SimdFloat<Scalar = S>, const SINGLE: bool>(
         &self,
-        one: &SolidOperand<S>,
+        compound: &SolidOperand<S>,
         (spans, ends): (&[Interval<L>], &[Event<L>]),
         base: u32,
         mut open: L::Mask,
@@ -332,17 +339,17 @@ impl<S: Float> Compounds<S> {
                 continue;
             }
             let middle = L::from_f64(0.5) * end.t + L::from_f64(0.5) * next.t;
-            let inside = self.inside(one, spans, middle);
+            let inside = self.inside::<_, SINGLE>(compound, spans, middle);
             let changed = gap & (inside.and_not(state) | state.and_not(inside));
             if changed.any() {
-                let seen = self.change(one, spans, base, before, middle);
+                let seen = self.change::<_, SINGLE>(compound, spans, base, before, middle);
                 let ahead = changed & seen.t.gt(L::zero());
                 let nearer = ahead & seen.t.lt(hit.t);
                 hit.t = L::select(nearer, seen.t, hit.t);
                 hit.item = L::select(nearer, seen.tag, hit.item);
                 open = open.and_not(ahead);
             }
-            // Everything behind this end is farther than what is known.
+            // All surfaces behind this end are farther than the hit.
             open = open.and_not(gap & next.t.gt(hit.t));
             if open.none() {
                 return;
@@ -368,8 +375,8 @@ impl<S: Float> Compounds<S> {
         }
     }
 
-    /// Lanes with a surface of the compounds that begin in `range` at a distance in (0, limit) of the
-    /// ray, of the lanes in `wanted`.
+    /// Returns the lanes of `wanted` that hit a compound beginning in `range` at a distance in (0,
+    /// limit) of the ray.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
@@ -391,7 +398,7 @@ impl<S: Float> Compounds<S> {
         occluded
     }
 
-    /// The surface of a part at `point`, outward of the whole.
+    /// Returns the surface of a part at `point`, outward of the compound.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -404,7 +411,7 @@ impl<S: Float> Compounds<S> {
         SurfacePoint { normal, ..surface }
     }
 
-    /// Texture coordinates that a part has of its own at `point`; `None` if it has none.
+    /// Returns the texture coordinates of a part at `point`; `None` if it has none.
     pub fn uv<L: SimdFloat<Scalar = S>>(
         &self,
         part: usize,
@@ -414,7 +421,7 @@ impl<S: Float> Compounds<S> {
     }
 }
 
-/// Lanes whose point at distance `t` lies in any of `spans`.
+/// Returns the lanes whose point at distance `t` is in any of `spans`.
 #[inline(always)]
 fn inside_any<L: SimdFloat>(spans: &[Interval<L>], t: L) -> L::Mask {
     let [first, others @ ..] = spans else { return L::mask(false) };

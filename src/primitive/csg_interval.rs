@@ -1,20 +1,20 @@
-//! Interval algebra of compounds: spans' ends in order, parts of lines inside, and what changes
-//! from one to the next.
+//! Interval algebra of compounds: sorted ends of spans, intervals inside, and transitions between
+//! them.
 
 use crate::lanes::SimdFloat;
 use crate::primitive::solid::Span;
 
-/// Least cosine that a tie is widened for: surfaces that a line hits flatter than that are not distinguished.
+/// Least cosine that widens a tie; flatter hits are not distinguished.
 const FLATTEST: f64 = 1e-9;
 
-/// The end of a span: its distance, and how near another end must be to happen at once.
+/// End of a span: its distance, and the distance within which another end coincides with it.
 #[derive(Clone, Copy)]
 pub struct Event<L> {
     pub t: L,
     pub tie: L,
 }
 
-/// The span of a part as far as "inside" needs it.
+/// Interval of a part without its cosines.
 #[derive(Clone, Copy)]
 pub struct Interval<L> {
     pub enter: L,
@@ -28,12 +28,12 @@ impl<L: SimdFloat> Interval<L> {
     }
 }
 
-/// Change of a part of the tree at a surface.
+/// Change of a subtree at a surface.
 #[derive(Clone, Copy)]
 pub struct Transition<L: SimdFloat> {
     pub before: L::Mask,
     pub after: L::Mask,
-    /// Distance and part that is visible there; meaningless if nothing changes.
+    /// Distance and tag of the visible part; meaningless without a change.
     pub t: L,
     pub tag: L,
 }
@@ -43,7 +43,7 @@ impl<L: SimdFloat> Transition<L> {
         Self { before: !self.before, after: !self.after, ..self }
     }
 
-    /// Both joined; of two that change in the right sense the first is to be seen.
+    /// Combines both transitions; the first one that changes in the right sense is visible.
     fn joined(self, other: Self, before: L::Mask, after: L::Mask) -> Self {
         let same = (self.after & after) | (!self.after & !after);
         let first = same & ((self.before & !self.after) | (!self.before & self.after));
@@ -64,14 +64,21 @@ impl<L: SimdFloat> Transition<L> {
     }
 }
 
-/// Room for `n` values while `use_it` runs: on the stack if they are few.
+/// Runs `use_it` with room for `n` values, on the stack if they are few.
 #[inline(always)]
 pub fn with_scratch<T: Copy, R>(n: usize, fill: T, use_it: impl FnOnce(&mut [T]) -> R) -> R {
     const FEW: usize = 8;
-    if n <= FEW { use_it(&mut [fill; FEW][..n]) } else { use_it(&mut vec![fill; n]) }
+    let (mut few, mut many) = ([fill; FEW], Vec::new());
+    // A single call, so that the compiler inlines `use_it`.
+    use_it(if n <= FEW {
+        &mut few[..n]
+    } else {
+        many.resize(n, fill);
+        &mut many
+    })
 }
 
-/// The ends of a span; those of lines that do not meet the solid stand behind all others.
+/// Returns the ends of a span; those of lines that miss the solid are behind all others.
 #[inline(always)]
 pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     let never = L::from_f64(L::MAX);
@@ -85,7 +92,7 @@ pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     [end(span.enter, span.enter_cosine), end(span.leave, span.leave_cosine)]
 }
 
-/// Puts `end` into the first `count` of `ends`, which are sorted in every lane.
+/// Inserts `end` into the first `count` of `ends`, which are sorted in every lane.
 #[inline(always)]
 pub fn insert<L: SimdFloat>(mut end: Event<L>, ends: &mut [Event<L>], count: usize) {
     for slot in &mut ends[..count] {

@@ -1,4 +1,4 @@
-//! Compound solids as what they are computed from: parts and how they are combined.
+//! Compound solids as parts and their combination.
 
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
@@ -10,18 +10,18 @@ use glam::{DAffine3, DVec3};
 /// Combination of parts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CsgTree {
-    /// A part, by its position in [`CsgSolid::parts`].
+    /// One part, by its position in [`CsgSolid::parts`].
     Part(usize),
-    /// The points that are in any of these.
+    /// Points in any of the operands.
     Union(Vec<CsgTree>),
-    /// The points that are in all of these.
+    /// Points in all of the operands.
     Intersection(Vec<CsgTree>),
-    /// The points of the first that are in none of the others.
+    /// Points of the first operand that are in none of the others.
     Difference(Vec<CsgTree>),
 }
 
 impl CsgTree {
-    /// The same tree over parts that stand `by` places later.
+    /// Returns the tree with the positions of its parts increased by `by`.
     pub(crate) fn shifted(self, by: usize) -> Self {
         let all = |list: Vec<Self>| list.into_iter().map(|t| t.shifted(by)).collect();
         match self {
@@ -33,13 +33,13 @@ impl CsgTree {
     }
 }
 
-/// A solid made of solids.
+/// Solid composed of solids.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CsgSolid {
-    /// Solids: `Sphere`, `Ellipsoid`, `ConvexPolyhedron`, `ConicalFrustum`, `Torus`, and `Plane` for the half-space
-    /// behind it.
+    /// Parts: `Sphere`, `Ellipsoid`, `ConvexPolyhedron`, `ConicalFrustum`, `Torus`, and `Plane` for
+    /// the half-space behind it.
     pub parts: Vec<Form>,
-    /// Every part occurs once, in order.
+    /// Combination, in which every part occurs once, in order.
     pub tree: CsgTree,
 }
 
@@ -95,7 +95,7 @@ impl CanonicalShape for CsgSolid {
         DefaultMapping::Box
     }
 
-    /// Those of the parts.
+    /// Returns the proxies of all parts.
     fn proxies(&self) -> Vec<Proxy> {
         self.parts.iter().flat_map(Form::proxies).collect()
     }
@@ -124,7 +124,7 @@ impl CsgSolid {
             CsgTree::Intersection(list) => {
                 let boxes = list.iter().filter_map(|t| self.bounds_of(t));
                 let (low, high) = boxes.reduce(|a, b| (a.0.max(b.0), a.1.min(b.1)))?;
-                // Boxes that do not overlap leave nothing: a box without extent.
+                // Disjoint boxes give a box without extent.
                 Some((low, high.max(low)))
             }
             CsgTree::Difference(list) => self.bounds_of(list.first()?),

@@ -1,4 +1,5 @@
-//! Images of the unit sphere under affine maps: the ray goes back to the unit sphere's space.
+//! Images of the unit sphere under affine maps. Rays are transformed into the space of the unit
+//! sphere.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
@@ -13,10 +14,10 @@ use crate::primitive::solid::{SolidPrimitive, Span};
 use crate::primitive::sphere::{cast_at_unit_sphere, intersections};
 use glam::{DAffine3, DMat3, DVec3};
 
-/// The image of the unit sphere at the origin under an invertible affine map.
+/// Image of the unit sphere at the origin under an invertible affine map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EllipsoidForm {
-    /// From the unit sphere's space to the scene's.
+    /// Map from the space of the unit sphere to the scene.
     pub scene_from_unit: DAffine3,
 }
 
@@ -32,7 +33,7 @@ impl CanonicalShape for EllipsoidForm {
     }
 
     fn bounds(&self) -> Option<Bounds> {
-        // Half-widths of the image of the unit sphere: the lengths of the matrix's rows.
+        // Half-widths of the image of the unit sphere are the lengths of the matrix's rows.
         let m = &self.scene_from_unit;
         let rows = m.matrix3.transpose();
         let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
@@ -106,14 +107,15 @@ impl CanonicalShape for EllipsoidForm {
     }
 }
 
-/// Distance of `point` from the image of the unit sphere. With Q = (M M^T)^-1 and p from the centre, the nearest point q of
-/// q^T Q q = 1 is (I + l Q)^-1 p for the only l at which it lies there and I + l Q is positive definite: q^T Q q
-/// falls with l. (Eberly 2013, *Distance from a Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid*.)
+/// Returns the distance of `point` from the image of the unit sphere. With Q = (M M^T)^-1 and p
+/// relative to the centre, the nearest point q of q^T Q q = 1 is (I + l Q)^-1 p for the only l at
+/// which q is on the surface and I + l Q is positive definite; q^T Q q decreases with l. (Eberly
+/// 2013, *Distance from a Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid*.)
 fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_unit.matrix3.inverse();
     let q = inverse.transpose() * inverse;
     let size = q.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
-    // In the middle several points are the nearest; a little aside one of them is.
+    // A point in the middle has several nearest points; the offset selects one of them.
     let aside = DVec3::new(0.6, 0.5, 0.7) * (1e-8 / size.sqrt());
     let p = point - scene_from_unit.translation + aside;
     // The smallest half-axis is at least 1 / sqrt(size) and at most 3^(1/4) times that.
@@ -136,7 +138,7 @@ fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     nearest.distance(p)
 }
 
-/// One ellipsoid. Matrices by rows.
+/// Compiled ellipsoid. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct Ellipsoid<S> {
     center: [S; 3],
@@ -145,19 +147,19 @@ pub struct Ellipsoid<S> {
     reach: S,
 }
 
-/// The rows of a matrix, rounded.
+/// Returns the rows of a matrix, rounded.
 pub(crate) fn rows<S: Float>(m: DMat3) -> [[S; 3]; 3] {
     m.transpose().to_cols_array_2d().map(|row| row.map(S::from_f64))
 }
 
-/// A matrix, given by rows, times a vector.
+/// Returns the product of a matrix, given by rows, and a vector.
 #[inline(always)]
 pub(crate) fn times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
     Vec3::new(Vec3::splat(m[0]).dot(v), Vec3::splat(m[1]).dot(v), Vec3::splat(m[2]).dot(v))
 }
 
 impl<S: Float> Ellipsoid<S> {
-    /// `None`: the form is another.
+    /// Compiles an ellipsoid; `None` if the form is another.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Ellipsoid(EllipsoidForm { scene_from_unit: m }) = form else { return None };
         Some(Self {
@@ -169,7 +171,7 @@ impl<S: Float> Ellipsoid<S> {
     }
 }
 
-/// Ends of the chord in the scene's distances, and where there is one.
+/// Returns the ends of the chord in the scene's distances, and the lanes that have one.
 #[inline(always)]
 fn chord<L: SimdFloat>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
     let f = times(&e.unit_from_scene, ray.origin - Vec3::splat(e.center));
@@ -190,7 +192,7 @@ impl<L: SimdFloat> Primitive<L> for Ellipsoid<L::Scalar> {
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let center = Vec3::splat(self.center);
         let on_unit = times(&self.unit_from_scene, point - center).normalize();
-        // The normal of the image is the inverse transpose times the normal: columns of the inverse.
+        // Normals transform by the inverse transpose: columns of the inverse.
         let m = &self.unit_from_scene;
         let normal = Vec3::splat(m[0]) * on_unit.x
             + Vec3::splat(m[1]) * on_unit.y

@@ -1,5 +1,5 @@
-//! Canonical forms: every kind of shape and every transform becomes one of them before it is compiled
-//! for a lane type.
+//! Canonical forms. Every shape and transform is reduced to one of them before it is compiled for a
+//! lane type.
 
 use crate::bvh::Ray;
 use crate::lanes::Vec3;
@@ -76,8 +76,8 @@ forms! {
 }
 
 impl Form {
-    /// Image under the invertible affine map `map`. Similarities keep a sphere a sphere; any other map makes
-    /// it an ellipsoid. The other forms keep their kind.
+    /// Image under the invertible affine map `map`. Similarities keep a sphere a sphere; any other
+    /// map makes it an ellipsoid. The other forms keep their kind.
     pub fn transformed(self, map: &DAffine3) -> Self {
         dispatch!(self, form => form.transformed(map))
     }
@@ -97,7 +97,8 @@ impl Form {
         dispatch!(self, form => form.bounding_sphere())
     }
 
-    /// The map from the space in which the form was described, and its box there, if it has such a space.
+    /// The map from the space in which the form was described, and its box there, if it has such a
+    /// space.
     pub(crate) fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
         dispatch!(self, form => form.oriented_box())
     }
@@ -132,14 +133,14 @@ impl Form {
         dispatch!(self, form => form.clearance(point))
     }
 
-    /// Unit normals of the surfaces that pass `point` within `slack`, a list for each solid that the form
-    /// is made of; empty if none does.
+    /// Unit normals of the surfaces that pass `point` within `slack`, a list for each solid that
+    /// the form is made of; empty if none does.
     pub fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
         dispatch!(self, form => form.normals_at(point, slack))
     }
 
-    /// Smallest t > 0 at which `origin + t direction` lies on the surface; `None` if there is none. The unit
-    /// of t is the length of `direction`.
+    /// Smallest t > 0 at which `origin + t direction` lies on the surface; `None` if there is none.
+    /// The unit of t is the length of `direction`.
     pub fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         dispatch!(self, form => form.cast(origin, direction))
     }
@@ -154,8 +155,8 @@ impl Form {
         dispatch!(self, form => form.proxies())
     }
 
-    /// Least and largest value of `axis . p` over the form, or bounds of them; `None` if it has no end in
-    /// that direction.
+    /// Least and largest value of `axis . p` over the form, or bounds of them; `None` if it has no
+    /// end in that direction.
     pub fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
         dispatch!(self, form => form.extent_along(axis))
     }
@@ -170,8 +171,8 @@ impl Form {
         dispatch!(self, form => form.triangles())
     }
 
-    /// Largest magnitude of a coordinate that the surface is computed from: of a plane its distance from
-    /// the origin.
+    /// Largest magnitude of a coordinate that the surface is computed from: of a plane its distance
+    /// from the origin.
     pub fn max_coordinate(&self) -> f64 {
         match self.bounds() {
             Some((low, high)) => low.abs().max(high.abs()).max_element(),

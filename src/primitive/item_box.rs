@@ -12,13 +12,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Acceleration {
-    /// The fastest by measurement: a tree for many primitives, else for each part of the picture
-    /// the primitives that its rays may hit.
+    /// The fastest by measurement: a BVH for many primitives, otherwise candidate lists for each
+    /// tile.
     #[default]
     Auto,
-    /// Every ray meets everything.
+    /// Every ray tests every primitive.
     None,
-    /// Camera rays test the primitives on their part of the screen: each has a rectangle there.
+    /// Screen rectangles: camera rays test only the primitives whose rectangle they pass.
     ScreenBounds,
     /// Each primitive has a box in its own space.
     Obb,
@@ -29,11 +29,11 @@ pub enum Acceleration {
 }
 
 impl Acceleration {
-    /// All of them, in the order of [`Acceleration::CHOICES`].
+    /// All structures, in the order of [`Acceleration::CHOICES`].
     pub const ALL: [Self; 6] =
         [Self::Auto, Self::None, Self::ScreenBounds, Self::Obb, Self::Aabb, Self::Bvh];
 
-    /// Their names and what they mean.
+    /// Names and meanings.
     pub const CHOICES: &'static [Choice] = &[
         Choice { name: "auto", doc: "the fastest, by measurement" },
         Choice { name: "none", doc: "every ray meets everything" },
@@ -46,13 +46,13 @@ impl Acceleration {
         Choice { name: "bvh", doc: "a tree of boxes" },
     ];
 
-    /// Its name.
+    /// Returns the name.
     pub fn name(self) -> &'static str {
         Self::CHOICES[self as usize].name
     }
 
-    /// Its name in earlier versions, which scene files and the command line still accept; `None` if
-    /// that is the same.
+    /// Returns the name in earlier versions, which scene files and the command line still accept;
+    /// `None` if it is the same.
     pub fn former_name(self) -> Option<&'static str> {
         match self {
             Self::Auto | Self::None => None,
@@ -63,7 +63,7 @@ impl Acceleration {
         }
     }
 
-    /// The structure with this name or former name.
+    /// Returns the structure with this name or former name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|s| s.name() == name || s.former_name() == Some(name))
     }
@@ -73,42 +73,43 @@ impl Acceleration {
 pub struct ItemBox<S> {
     low: [S; 3],
     high: [S; 3],
-    /// The box's space; `None`: the scene's.
+    /// Space of the box; `None` if it is the scene's.
     space: Option<BoxFrame<S>>,
 }
 
-/// A space of its own: p becomes `rows (p - center)`.
+/// Space of an oriented box: p becomes `rows (p - center)`.
 struct BoxFrame<S> {
     center: [S; 3],
     rows: [[S; 3]; 3],
-    /// For each row the sum of its magnitudes: coordinates grow by so much at most.
+    /// Sum of magnitudes of each row: the largest growth of a coordinate.
     growth: [S; 3],
     /// Largest magnitude of a coordinate of the primitive in the scene.
     reach: S,
 }
 
-/// Corners rounded outward by a few units in the last place, `epsilon`, of the largest coordinate, which
-/// is also what an item's own test may err by, in any direction.
+/// Returns the corners rounded outward by four `epsilon` of the largest coordinate, which also
+/// bounds the error of an item's own test, in any direction.
 pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
     let reach = low.abs().max(high.abs()).max_element();
     let pad = DVec3::splat(reach * 4.0 * epsilon);
     [low - pad, high + pad]
 }
 
-/// Difference between faces and corners of one solid at most, as a part of its extent: in a scene far from the
-/// origin of its file both were rounded to what double precision has there.
+/// Largest difference between faces and corners of one solid, as a fraction of its extent: in a
+/// scene far from the origin of its file both were rounded in double precision.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> ItemBox<S> {
-    /// Creates the box of a form, in its own space if `own` and if it has one; `None`: it has no end.
-    pub fn new(form: &Form, own: bool) -> Option<Self> {
+    /// Creates the box of a form, in its own space if `oriented` is set and the form has one;
+    /// `None` for an infinite form.
+    pub fn new(form: &Form, oriented: bool) -> Option<Self> {
         let bounds = form.bounds()?;
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
         let made = |bounds, space| {
             let [low, high] = padded(bounds, S::EPSILON.max(GIVEN)).map(vector);
             Self { low, high, space }
         };
-        let Some((scene_from_own, (low, high))) = form.oriented_box().filter(|_| own) else {
+        let Some((scene_from_own, (low, high))) = form.oriented_box().filter(|_| oriented) else {
             return Some(made(bounds, None));
         };
         let rows = scene_from_own.matrix3.inverse().transpose();
@@ -123,28 +124,29 @@ impl<S: Float> ItemBox<S> {
         Some(made((low - middle, high - middle), Some(space)))
     }
 
-    /// Rays that may hit the primitive no farther than `limit`.
+    /// Returns the rays that may hit the primitive within `limit`.
     #[inline(always)]
     pub fn meets<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L) -> L::Mask {
         let far = ray.origin.max_abs();
-        let beam = match &self.space {
+        let packet = match &self.space {
             None => {
                 let pad = far * L::from_f64(4.0 * L::EPSILON);
                 SlabPacket::new(ray, Vec3::new(pad, pad, pad))
             }
             Some(space) => {
-                // What origin, direction and centre lose on their way into the space, at most, by the
-                // time the ray has come to the primitive.
+                // Largest rounding error of origin, direction and centre in the space of the box,
+                // at the distance of the primitive.
                 let lost = (far + L::splat(space.reach)) * L::from_f64(64.0 * L::EPSILON);
                 let rows = space.rows.map(Vec3::splat);
-                let of = |v: Vec3<L>| Vec3::new(rows[0].dot(v), rows[1].dot(v), rows[2].dot(v));
+                let transform =
+                    |v: Vec3<L>| Vec3::new(rows[0].dot(v), rows[1].dot(v), rows[2].dot(v));
                 let inner = Ray {
-                    origin: of(ray.origin - Vec3::splat(space.center)),
-                    direction: of(ray.direction),
+                    origin: transform(ray.origin - Vec3::splat(space.center)),
+                    direction: transform(ray.direction),
                 };
                 SlabPacket::new(&inner, Vec3::splat(space.growth) * lost)
             }
         };
-        beam.enters(Vec3::splat(self.low), Vec3::splat(self.high), limit)
+        packet.enters(Vec3::splat(self.low), Vec3::splat(self.high), limit)
     }
 }

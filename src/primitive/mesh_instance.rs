@@ -1,6 +1,8 @@
-//! Meshes: a ray goes into the mesh's space, walks its tree there, and what it meets comes back.
+//! Triangle meshes. A ray is transformed into the space of the mesh and traverses the mesh's BVH
+//! there; hits are transformed back.
 //!
-//! Coordinates of a mesh are in single precision whatever the lanes; all computation is in the lanes'.
+//! Coordinates of a mesh are in single precision for every lane type; computation has the precision
+//! of the lanes.
 
 use crate::asset;
 use crate::bvh::{Hit, LEAF_FLAG, Ray};
@@ -19,7 +21,8 @@ use glam::{DAffine3, DVec3};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Ratio of the extent of a mesh to that of its details, as assumed for the choice of the precision.
+/// Ratio of the extent of a mesh to that of its details, as assumed for the choice of the
+/// precision.
 const EXTENT_PER_DETAIL: f64 = 64.0;
 
 /// The image of a mesh under an invertible affine map.
@@ -27,9 +30,9 @@ const EXTENT_PER_DETAIL: f64 = 64.0;
 pub struct MeshForm {
     /// The triangles.
     pub mesh: Arc<asset::Mesh>,
-    /// From the space of the mesh's coordinates to the scene's.
+    /// Map from the space of the mesh to the scene.
     pub scene_from_mesh: DAffine3,
-    /// Light sees normals interpolated between vertices, not the triangles' own.
+    /// `true` if shading normals are interpolated between vertices.
     pub smooth: bool,
 }
 
@@ -76,7 +79,7 @@ impl CanonicalShape for MeshForm {
         let stretched = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
         let size = ((high - low) * DVec3::from(stretched)).to_array();
         let longest = size.into_iter().fold(0.0, f64::max);
-        // Needles and thin sheets; what is flat altogether has no inside.
+        // Thickness of needles and thin sheets; a flat mesh has no inside.
         let thinnest = size.into_iter().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
         thinnest.min(longest / EXTENT_PER_DETAIL)
     }
@@ -120,7 +123,7 @@ impl CanonicalShape for MeshForm {
         }
     }
 
-    /// None: the faces are triangles, whose corners are in single precision.
+    /// `None`: the faces are triangles, whose corners are in single precision.
     fn proxies(&self) -> Vec<Proxy> {
         Vec::new()
     }
@@ -138,13 +141,13 @@ impl CanonicalShape for MeshForm {
     }
 }
 
-/// The unit normal of a triangle that passes `point` within `slack`.
+/// Returns the unit normal of a triangle that passes `point` within `slack`.
 fn normal_of_triangle([a, b, c]: [DVec3; 3], point: DVec3, slack: f64) -> Option<DVec3> {
     let normal = (b - a).cross(c - a).try_normalize()?;
     if normal.dot(point - a).abs() > slack {
         return None;
     }
-    // Beyond an edge by no more than the slack.
+    // The point is inside, or beyond an edge by at most the slack.
     let inside = [(a, b), (b, c), (c, a)].into_iter().all(|(from, to)| {
         let inward = normal.cross(to - from);
         inward.dot(point - from) >= -slack * inward.length()
@@ -166,21 +169,21 @@ fn triangle_distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Distance of `point` from the nearest triangle.
+/// Returns the distance of `point` from the nearest triangle.
 fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_mesh.inverse();
     let inside = inverse.transform_point3(point);
-    // Lengths in the scene are at least those in the mesh's space times this.
+    // Lower bound of a length in the scene over that in the mesh.
     let columns = inverse.matrix3.to_cols_array();
     let shrinks = columns.iter().map(|x| x * x).sum::<f64>().sqrt().recip();
     let mut least = f64::INFINITY;
-    let mut todo = vec![(0u32, 0.0)];
-    while let Some((branch, bound)) = todo.pop() {
+    let mut stack = vec![(0u32, 0.0)];
+    while let Some((branch, bound)) = stack.pop() {
         if bound >= least {
             continue;
         }
         let branch = &mesh.boxes().nodes()[branch as usize];
-        let first = todo.len();
+        let first = stack.len();
         for i in branch.children() {
             let corner =
                 |from: usize| DVec3::from([0, 1, 2].map(|a| f64::from(branch.bounds[a + from][i])));
@@ -190,7 +193,7 @@ fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3
                 continue;
             }
             if branch.child[i] & LEAF_FLAG == 0 {
-                todo.push((branch.child[i], bound));
+                stack.push((branch.child[i], bound));
                 continue;
             }
             let leaf = &mesh.leaves()[(branch.child[i] & !LEAF_FLAG) as usize];
@@ -199,24 +202,24 @@ fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3
                     scene_from_mesh
                         .transform_point3(DVec3::from(corner.map(|axis| f64::from(axis[place]))))
                 });
-                // Places without a triangle hold NaN.
+                // Empty places hold NaN, which `min` ignores.
                 least = least.min(triangle_distance(corners, point));
             }
         }
-        // The nearest box last, to be looked at first.
-        todo[first..].sort_by(|a, b| b.1.total_cmp(&a.1));
+        // The nearest box is last and popped first.
+        stack[first..].sort_by(|a, b| b.1.total_cmp(&a.1));
     }
     least
 }
 
-/// One mesh in its place.
+/// One mesh placed in the scene.
 struct MeshInstance<S> {
     mesh: Arc<asset::Mesh>,
-    /// A box around it in the scene: most rays need not be carried over.
+    /// Box in the scene; rays that miss it are not transformed.
     extent: ItemBox<S>,
     /// Columns of the linear part.
     mesh_from_scene: [[S; 3]; 3],
-    /// The middle of the mesh's box, in the scene and in the mesh: points are carried over relative to
+    /// Centre of the mesh's box in the scene and in the mesh. Points are transformed relative to
     /// it, so that their error is that of the mesh's size and distance.
     center: [S; 3],
     mesh_center: [S; 3],
@@ -224,12 +227,12 @@ struct MeshInstance<S> {
     smooth: bool,
 }
 
-/// All meshes of a scene. Each is one item; the triangle of a hit is its facet.
+/// All meshes of a scene. Each mesh is one item; a hit names its triangle by a tag.
 pub struct Meshes<S> {
     items: Vec<MeshInstance<S>>,
 }
 
-/// The corners of one triangle per lane, in the mesh's space.
+/// Corners of one triangle per lane, in the space of the mesh.
 struct Triangle<L> {
     corners: [Vec3<L>; 3],
 }
@@ -246,7 +249,7 @@ impl<S: Float> MeshInstance<S> {
             .into_iter()
             .map(DVec3::length)
             .fold(0.0, f64::max);
-        // Coordinates in the mesh's space are rounded as well, at most those of its corners.
+        // Rounding in the space of the mesh is at most that of its corners.
         let inner = low.abs().max(high.abs()).max_element() * scale;
         let outer = max_coordinate(form);
         Some(Self {
@@ -266,7 +269,8 @@ impl<S: Float> MeshInstance<S> {
         x * v.x + y * v.y + z * v.z
     }
 
-    /// A normal in the scene from one in the mesh, not normalised: by the inverse's transpose.
+    /// Returns the normal in the scene for one in the mesh, not normalised: by the inverse's
+    /// transpose.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(&self, n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = self.mesh_from_scene.map(Vec3::splat);
@@ -278,7 +282,7 @@ impl<S: Float> MeshInstance<S> {
         self.vector(p - Vec3::splat(self.center)) + Vec3::splat(self.mesh_center)
     }
 
-    /// The ray in the mesh's space, and how much longer its directions are there.
+    /// Returns the ray in the space of the mesh, and the length there of its directions.
     #[inline(always)]
     fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
         let direction = self.vector(ray.direction);
@@ -287,46 +291,57 @@ impl<S: Float> MeshInstance<S> {
         (Ray { origin: self.point(ray.origin), direction }, length)
     }
 
-    /// Per lane something of the vertices of the triangle tagged `facet`.
+    /// Returns for each lane the elements of `attributes` at the vertices of the triangle
+    /// `triangle_tag`.
     #[inline(always)]
-    fn vertices<L: SimdFloat<Scalar = S>>(&self, facet: L, of: &[[f32; 3]]) -> [Vec3<L>; 3] {
+    fn vertices<L: SimdFloat<Scalar = S>>(
+        &self,
+        triangle_tag: L,
+        attributes: &[[f32; 3]],
+    ) -> [Vec3<L>; 3] {
         let triangles = &self.mesh.mesh().triangles;
-        // Lanes that met something else may hold any tag.
-        let number = |lane| (facet.id_lane(lane) as usize).min(triangles.len() - 1);
+        // Lanes that hit another item may hold any tag.
+        let number = |lane| (triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1);
         std::array::from_fn(|k| {
             Vec3::from_fn(|lane| {
-                of[triangles[number(lane)][k] as usize].map(|x| S::from_f64(f64::from(x)))
+                attributes[triangles[number(lane)][k] as usize].map(|x| S::from_f64(f64::from(x)))
             })
         })
     }
 
-    /// Per lane the pairs of the vertices of the triangle tagged `facet`.
+    /// Returns for each lane the pairs of `attributes` at the vertices of the triangle
+    /// `triangle_tag`.
     #[inline(always)]
-    fn pairs<L: SimdFloat<Scalar = S>>(&self, facet: L, of: &[[f32; 2]]) -> [[L; 2]; 3] {
+    fn pairs<L: SimdFloat<Scalar = S>>(
+        &self,
+        triangle_tag: L,
+        attributes: &[[f32; 2]],
+    ) -> [[L; 2]; 3] {
         let triangles = &self.mesh.mesh().triangles;
-        let number = |lane| (facet.id_lane(lane) as usize).min(triangles.len() - 1);
-        let one = |vertex: usize, k: usize| {
-            let pair = |lane| of[triangles[number(lane)][vertex] as usize][k];
+        let number = |lane| (triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1);
+        let component = |vertex: usize, k: usize| {
+            let pair = |lane| attributes[triangles[number(lane)][vertex] as usize][k];
             L::from_fn(|lane| S::from_f64(f64::from(pair(lane))))
         };
-        std::array::from_fn(|vertex| [one(vertex, 0), one(vertex, 1)])
+        std::array::from_fn(|vertex| [component(vertex, 0), component(vertex, 1)])
     }
 
     #[inline(always)]
-    fn triangle<L: SimdFloat<Scalar = S>>(&self, facet: L) -> Triangle<L> {
-        Triangle { corners: self.vertices(facet, &self.mesh.mesh().positions) }
+    fn triangle<L: SimdFloat<Scalar = S>>(&self, triangle_tag: L) -> Triangle<L> {
+        Triangle { corners: self.vertices(triangle_tag, &self.mesh.mesh().positions) }
     }
 }
 
 impl<L: SimdFloat> Triangle<L> {
-    /// Twice the area, along the normal of the front.
+    /// Returns the normal on the front, with twice the area as its length.
     #[inline(always)]
     fn normal(&self) -> Vec3<L> {
         let [a, b, c] = self.corners;
         (b - a).cross(c - a)
     }
 
-    /// The gradients in the triangle's plane of the second and of the third corner's weight.
+    /// Returns the gradients, in the plane of the triangle, of the weights of the second and the
+    /// third corner.
     #[inline(always)]
     fn gradients(&self) -> [Vec3<L>; 2] {
         let [a, b, c] = self.corners;
@@ -336,7 +351,8 @@ impl<L: SimdFloat> Triangle<L> {
         [to_c.cross(normal) * inverse, normal.cross(to_b) * inverse]
     }
 
-    /// Weights of the corners at the point nearest to `p`, about: positive, with the sum 1.
+    /// Returns the weights of the corners at the point nearest to `p`, approximately: positive,
+    /// with the sum 1.
     #[inline(always)]
     fn weights(&self, p: Vec3<L>) -> [L; 3] {
         let normal = self.normal();
@@ -349,7 +365,7 @@ impl<L: SimdFloat> Triangle<L> {
 }
 
 impl<S: Float> Meshes<S> {
-    /// Those of `forms` that are meshes, in order.
+    /// Compiles the meshes among `forms`, in order.
     pub fn new(forms: &[Form]) -> Self {
         Self { items: forms.iter().filter_map(MeshInstance::new).collect() }
     }
@@ -369,19 +385,19 @@ impl<S: Float> Meshes<S> {
                 continue;
             }
             let (inner, length) = item.ray(ray);
-            // Beyond by what the way into the mesh's space and back rounds off: what is known decides only
-            // here below, in the scene's distances, so that the order of primitives does not matter.
+            // The limit is widened by the rounding of the transform. Only the comparison in the
+            // scene's distances below decides, so that the order of primitives does not matter.
             let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
             let limit = L::select(near, limit, L::from_f64(-1.0));
             let found = triangle_mesh::closest(&item.mesh, &inner, limit);
-            let met = found.t.lt(limit);
+            let hit_mask = found.t.lt(limit);
             let before = hit.t;
-            hit.keep_closer(met, found.t / length, tag);
+            hit.keep_closer(hit_mask, found.t / length, tag);
             hit.triangle = L::select(hit.t.lt(before), found.triangle, hit.triangle);
         }
     }
 
-    /// Lanes of `wanted` that hit one of the meshes in `range` at a distance in (0, limit).
+    /// Returns the lanes of `wanted` that hit a mesh in `range` at a distance in (0, limit).
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
@@ -407,17 +423,18 @@ impl<S: Float> Meshes<S> {
         occluded
     }
 
-    /// The surface of `item` at `point`, which lies near its triangles tagged `facet`.
+    /// Returns the surface of `item` at `point`, which is near its triangle `triangle_tag`.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,
         item: usize,
-        facet: L,
+        triangle_tag: L,
         point: Vec3<L>,
     ) -> SurfacePoint<L> {
         let item = &self.items[item];
-        let triangle = item.triangle(facet);
-        // Neither the largest nor the smallest triangle may lose its area to the range of numbers.
+        let triangle = item.triangle(triangle_tag);
+        // Normals are scaled, so that neither the largest nor the smallest triangle leaves the
+        // range of numbers.
         let flat = triangle.normal();
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());
@@ -430,14 +447,14 @@ impl<S: Float> Meshes<S> {
         SurfacePoint { point, normal, max_coordinate: L::splat(item.reach) }
     }
 
-    /// The normal that light is computed with where rays along `direction` meet the triangles tagged
-    /// `facet` of `item` at `point`; `normal` is their geometric one on the viewer's side. It stays on
-    /// that side, and where it would turn away from the viewer it is bent back to him.
+    /// Returns the shading normal where rays along `direction` hit the triangle `triangle_tag` of
+    /// `item` at `point`; `normal` is the geometric normal on the viewer's side. The shading normal
+    /// stays on that side; one that would turn away from the viewer is bent back.
     #[inline(never)]
     pub fn shading_normal<L: SimdFloat<Scalar = S>>(
         &self,
         item: usize,
-        facet: L,
+        triangle_tag: L,
         (point, normal): (Vec3<L>, Vec3<L>),
         direction: Vec3<L>,
     ) -> Vec3<L> {
@@ -445,26 +462,26 @@ impl<S: Float> Meshes<S> {
         if !item.smooth {
             return normal;
         }
-        let weights = item.triangle(facet).weights(item.point(point));
-        let [a, b, c] = item.vertices(facet, item.mesh.smooth_normals());
+        let weights = item.triangle(triangle_tag).weights(item.point(point));
+        let [a, b, c] = item.vertices(triangle_tag, item.mesh.smooth_normals());
         let smooth = item.normal(a * weights[0] + b * weights[1] + c * weights[2]);
         let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
-        // Normals that cancel, or a triangle without area, leave no number.
+        // Cancelling normals and triangles without area give NaN, which is replaced here.
         keep_visible(smooth, normal, direction)
     }
 
-    /// The texture coordinates of `item` at `point`, which lies near its triangles tagged `facet`;
-    /// `None`: its file has none.
+    /// Returns the texture coordinates of `item` at `point`, which is near its triangle
+    /// `triangle_tag`; `None` if its file has none.
     #[inline(never)]
     pub fn uv<L: SimdFloat<Scalar = S>>(
         &self,
         item: usize,
-        facet: L,
+        triangle_tag: L,
         point: Vec3<L>,
     ) -> Option<UvGradients<L>> {
         let item = &self.items[item];
-        let triangle = item.triangle(facet);
-        let corners = item.pairs(facet, item.mesh.mesh().uvs.as_deref()?);
+        let triangle = item.triangle(triangle_tag);
+        let corners = item.pairs(triangle_tag, item.mesh.mesh().uvs.as_deref()?);
         let weights = triangle.weights(item.point(point));
         let gradient = triangle.gradients();
         let along = |k: usize| {
@@ -476,24 +493,25 @@ impl<S: Float> Meshes<S> {
         Some(UvGradients { uv: [u, v], gradients: [du, dv] })
     }
 
-    /// Base colour of the triangles tagged `facet` of `item`; `None`: its file names none.
+    /// Returns the base colour of the triangle `triangle_tag` of `item`; `None` if its file has
+    /// none.
     #[inline(never)]
-    pub fn color<L: SimdFloat<Scalar = S>>(&self, item: usize, facet: L) -> Option<Vec3<L>> {
+    pub fn color<L: SimdFloat<Scalar = S>>(&self, item: usize, triangle_tag: L) -> Option<Vec3<L>> {
         let mesh = self.items[item].mesh.mesh();
         mesh.color(0)?;
-        let number = |lane| (facet.id_lane(lane) as usize).min(mesh.triangles.len() - 1);
+        let number = |lane| (triangle_tag.id_lane(lane) as usize).min(mesh.triangles.len() - 1);
         let white = [1.0; 3];
         Some(Vec3::from_fn(|lane| {
             mesh.color(number(lane)).unwrap_or(white).map(|x| S::from_f64(f64::from(x)))
         }))
     }
 
-    /// Returns `true` if light sees any normals but the triangles' own.
+    /// Returns `true` if any mesh has interpolated normals.
     pub fn is_smooth(&self) -> bool {
         self.items.iter().any(|item| item.smooth)
     }
 
-    /// Returns `true` if a file names colours.
+    /// Returns `true` if any mesh has colours.
     pub fn is_colored(&self) -> bool {
         self.items.iter().any(|item| item.mesh.mesh().color(0).is_some())
     }

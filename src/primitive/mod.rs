@@ -1,4 +1,5 @@
-//! Primitives that rays intersect. Each has one file with its canonical form, its compiled kernel and its tests.
+//! Primitives that rays intersect. Each has one file with its canonical form, its compiled kernel
+//! and its tests.
 
 mod aggregate;
 pub(crate) mod batch;

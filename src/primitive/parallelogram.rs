@@ -119,8 +119,8 @@ impl CanonicalShape for ParallelogramForm {
     }
 }
 
-/// One parallelogram. A point p of its plane has the coordinates (p - corner) . dual, both in 0..1
-/// inside.
+/// Compiled parallelogram. A point p of its plane has the coordinates (p - corner) . dual, both in
+/// 0..1 inside.
 #[derive(Clone, Copy)]
 pub struct Parallelogram<S> {
     corner: [S; 3],
@@ -131,17 +131,17 @@ pub struct Parallelogram<S> {
 }
 
 impl<S: Float> Parallelogram<S> {
-    /// `None`: the form is another.
+    /// Compiles a parallelogram; `None` if the form is another.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Parallelogram(ParallelogramForm { corner, u, v }) = form else { return None };
         let n = u.cross(*v);
         let area2 = n.length_squared();
-        let of = |v: DVec3| v.to_array().map(S::from_f64);
+        let rounded = |v: DVec3| v.to_array().map(S::from_f64);
         Some(Self {
-            corner: of(*corner),
-            normal: of(n.normalize()),
-            dual_u: of(v.cross(n) / area2),
-            dual_v: of(n.cross(*u) / area2),
+            corner: rounded(*corner),
+            normal: rounded(n.normalize()),
+            dual_u: rounded(v.cross(n) / area2),
+            dual_v: rounded(n.cross(*u) / area2),
             reach: S::from_f64(max_coordinate(form)),
         })
     }
@@ -154,9 +154,9 @@ impl<L: SimdFloat> Primitive<L> for Parallelogram<L::Scalar> {
         let from_corner = ray.origin - Vec3::splat(self.corner);
         // Parallel rays divide by zero: infinite or NaN distances fail every comparison.
         let t = -from_corner.dot(normal) / ray.direction.dot(normal);
-        let at = ray.direction.mul_add(t, from_corner);
-        let a = at.dot(Vec3::splat(self.dual_u));
-        let b = at.dot(Vec3::splat(self.dual_v));
+        let hit_point = ray.direction.mul_add(t, from_corner);
+        let a = hit_point.dot(Vec3::splat(self.dual_u));
+        let b = hit_point.dot(Vec3::splat(self.dual_v));
         let inside = a.ge(L::zero()) & a.le(L::one()) & b.ge(L::zero()) & b.le(L::one());
         Some((t, inside))
     }

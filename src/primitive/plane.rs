@@ -96,7 +96,7 @@ impl CanonicalShape for PlaneForm {
     }
 }
 
-/// One infinite plane.
+/// Compiled plane.
 #[derive(Clone, Copy)]
 pub struct Plane<S> {
     normal: [S; 3],
@@ -104,7 +104,7 @@ pub struct Plane<S> {
 }
 
 impl<S: Float> Plane<S> {
-    /// `None`: the form is another.
+    /// Compiles a plane; `None` if the form is another.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Plane(PlaneForm { normal, offset }) = form else { return None };
         Some(Self { normal: normal.to_array().map(S::from_f64), offset: S::from_f64(*offset) })
@@ -129,7 +129,7 @@ impl<L: SimdFloat> Primitive<L> for Plane<L::Scalar> {
     }
 }
 
-/// The half-spaces behind the planes.
+/// Half-spaces behind planes.
 impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
     type Spans = Option<Span<L>>;
 

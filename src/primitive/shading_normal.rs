@@ -1,13 +1,13 @@
-//! Normals that light is computed with, kept where they can be seen.
+//! Shading normals, bent so that they face the viewer.
 
 use crate::lanes::{SimdFloat, Vec3};
 
 /// Least cosine between a shading normal and the direction to the viewer.
 const LEAST_COSINE: f64 = 0.02;
 
-/// The unit normal `shading` on the side of the geometric normal `normal`, which faces the viewer who
-/// looks along `direction`; where it would turn away from the viewer it is bent back to him. Where it is
-/// no direction at all, `normal`.
+/// Returns the unit normal `shading` on the side of the geometric normal `normal`, which faces a
+/// viewer who looks along `direction`. A shading normal that would turn away from the viewer is
+/// bent back; `normal` replaces one that is not finite.
 #[inline(always)]
 pub fn keep_visible<L: SimdFloat>(
     shading: Vec3<L>,

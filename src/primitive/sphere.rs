@@ -104,7 +104,7 @@ impl CanonicalShape for SphereForm {
     }
 }
 
-/// Smallest t > 0 with |o + t d| = 1.
+/// Returns the smallest t > 0 with |o + t d| = 1.
 pub fn cast_at_unit_sphere(o: DVec3, d: DVec3) -> Option<f64> {
     let (a, b, c) = (d.length_squared(), o.dot(d), o.length_squared() - 1.0);
     let root = (b * b - a * c).sqrt();
@@ -122,7 +122,7 @@ pub struct Sphere<S> {
 }
 
 impl<S: Float> Sphere<S> {
-    /// `None`: the form is another.
+    /// Compiles a sphere; `None` if the form is another.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Sphere(SphereForm { center, radius }) = form else { return None };
         Some(Self {
@@ -134,12 +134,12 @@ impl<S: Float> Sphere<S> {
     }
 }
 
-/// Distances at which a line enters and leaves a sphere about the origin of `f`, and where it does.
+/// Returns the distances at which a line enters and leaves a sphere, and the lanes that hit it.
 ///
-/// `f` is the line's origin seen from the centre, `d` its unit direction. The discriminant is formed
-/// from the vector f - (f.d) d, whose length is the line's distance from the centre, and the root
-/// nearer to the origin from the product of both, so that neither cancels for small or distant
-/// spheres (Haines, Günther, Akenine-Möller 2019, *Precision Improvements for Ray/Sphere
+/// `f` is the line's origin relative to the centre, `d` its unit direction. The discriminant is
+/// computed from the vector f - (f.d) d, whose length is the line's distance from the centre, and
+/// the root nearer to the origin from the product of both, so that neither cancels for small or
+/// distant spheres (Haines, Günther, Akenine-Möller 2019, *Precision Improvements for Ray/Sphere
 /// Intersection*, Ray Tracing Gems, chapter 7).
 #[inline(always)]
 pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option<(L, L, L::Mask)> {
@@ -153,7 +153,7 @@ pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option
     let root = discriminant.max(L::zero()).sqrt();
     let q = b + root.copysign(b);
     let c = f.length_squared() - radius2;
-    // q = 0 only for a line that starts at the centre of its own touching point: both ends are 0.
+    // q = 0 only for a line that starts at its own tangent point: both ends are 0.
     let other = c / q;
     let other = L::select(q.abs().gt(L::zero()), other, L::zero());
     let behind = b.lt(L::zero());

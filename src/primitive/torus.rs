@@ -1,14 +1,15 @@
-//! Tori under any affine map. The ray goes back to the space of the torus about the y axis with a ring of
-//! radius 1 and a tube of radius r:
+//! Tori under any affine map. The ray goes back to the space of the torus about the y axis with a
+//! ring of radius 1 and a tube of radius r:
 //!   (rho - 1)^2 + y^2 <= r^2, rho^2 = x^2 + z^2
 //!
-//! With s the distance along the line from its point nearest to the centre, half the derivative of the left
-//! side is s - rho'(s). rho is the norm of an affine function, a hyperbola whose second derivative is
-//! largest at the point nearest to the axis and exceeds 1 between two known places. So the derivative is
-//! monotone on three pieces of the line and has one or three zeros, and the quartic is monotone between
-//! those: each of its roots has a bracket, and Newton's method kept inside it finds the root (bracketing by
-//! the derivative after Yuksel 2022, *High-Performance Polynomial Root Finding for Graphics*, with the
-//! distance from the ring in place of coefficients, which cancel for thin tubes).
+//! With s the distance along the line from its point nearest to the centre, half the derivative of
+//! the left side is s - rho'(s). rho is the norm of an affine function, a hyperbola whose second
+//! derivative is largest at the point nearest to the axis and exceeds 1 between two known places.
+//! So the derivative is monotone on three pieces of the line and has one or three zeros, and the
+//! quartic is monotone between those: each of its roots has a bracket, and Newton's method kept
+//! inside it finds the root (bracketing by the derivative after Yuksel 2022, *High-Performance
+//! Polynomial Root Finding for Graphics*, with the distance from the ring in place of coefficients,
+//! which cancel for thin tubes).
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -24,10 +25,10 @@ use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::TAU;
 
-/// The image under an invertible affine map of a torus about the y axis.
+/// Image under an invertible affine map of a torus about the y axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorusForm {
-    /// From the space of the torus, with its centre at the origin, to the scene's.
+    /// Map from the space of the torus, with its centre at the origin, to the scene.
     pub scene_from_torus: DAffine3,
     /// Radius of the circle in the middle of the tube, greater than 0.
     pub ring: f64,
@@ -36,13 +37,13 @@ pub struct TorusForm {
 }
 
 impl TorusForm {
-    /// From the space in which the ring has radius 1 to the scene's.
+    /// Returns the map from the space in which the ring has radius 1 to the scene.
     fn scene_from_unit(&self) -> DAffine3 {
         self.scene_from_torus * DAffine3::from_scale(DVec3::splat(self.ring))
     }
 
-    /// Distance of `point`, in the space of the torus, from the circle in the middle of the tube, and the
-    /// unit vector from there.
+    /// Returns the distance of `point`, in the space of the torus, from the circle in the middle of
+    /// the tube, and the unit vector from there.
     fn ring_distance(&self, point: DVec3) -> (f64, DVec3) {
         let outward = DVec3::new(point.x, 0.0, point.z).normalize_or(DVec3::X);
         let across = point - outward * self.ring;
@@ -61,7 +62,7 @@ impl CanonicalShape for TorusForm {
         1
     }
 
-    /// The solid is the sum of a disc's rim and a ball: half-widths of both add.
+    /// The solid is the sum of a circle and a ball: their half-widths add.
     fn bounds(&self) -> Option<Bounds> {
         let m = &self.scene_from_torus;
         let rows = m.matrix3.transpose();
@@ -95,15 +96,15 @@ impl CanonicalShape for TorusForm {
         false
     }
 
-    /// That of the box around a ball in the tube.
+    /// Returns the thickness of the box around a ball in the tube.
     fn thickness(&self) -> f64 {
         let rows = self.scene_from_torus.matrix3.inverse().transpose();
         let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
         2.0 * self.tube / rows.map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
-    /// Exact for similarities; for other maps the distance in the space of the torus times the least
-    /// factor by which the map scales lengths.
+    /// Exact for similarities; for other maps the distance in the space of the torus times the
+    /// least factor by which the map scales lengths.
     fn clearance(&self, point: DVec3) -> Option<f64> {
         let inverse = self.scene_from_torus.inverse();
         let (distance, _) = self.ring_distance(inverse.transform_point3(point));
@@ -128,7 +129,8 @@ impl CanonicalShape for TorusForm {
         cast_compiled((*self).into(), origin, direction)
     }
 
-    /// u: angle around the ring, v: angle around the tube, both from 0 to 1.
+    /// Texture coordinates: u is the angle around the ring, v the angle around the tube, both from
+    /// 0 to 1.
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Uv
     }
@@ -150,11 +152,11 @@ impl CanonicalShape for TorusForm {
     }
 }
 
-/// One torus. Matrices by rows.
+/// Compiled torus. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct Torus<S> {
     center: [S; 3],
-    /// To the space in which the ring has radius 1.
+    /// Map to the space in which the ring has radius 1.
     unit_from_scene: [[S; 3]; 3],
     scene_from_unit: [[S; 3]; 3],
     /// Radius of the tube in that space.
@@ -180,13 +182,13 @@ impl<S: Float> Torus<S> {
     }
 }
 
-/// Roundings of 1 by which the bounds of the roots are larger than the torus.
+/// Roundings of 1 by which the bounds of the roots exceed the torus.
 const ROOM: f64 = 64.0;
 
-/// Steps of a root search at most: bisection alone needs 54 in double precision.
+/// Largest number of steps of a root search: bisection alone needs 54 in double precision.
 const MAX_STEPS: usize = 64;
 
-/// A line in the space of the torus.
+/// Line in the space of the torus.
 #[derive(Clone, Copy)]
 struct UnitLine<L: SimdFloat> {
     /// Point nearest to the centre.
@@ -195,33 +197,34 @@ struct UnitLine<L: SimdFloat> {
     direction: Vec3<L>,
     /// Squared length of the direction across the axis.
     across2: L,
-    /// Place of the ray's origin on the line.
+    /// Position of the ray's origin on the line.
     origin: L,
     /// Length in the scene of a step of length 1.
     scale: L,
     tube: L,
-    /// Places between which the line is close to the torus.
+    /// Positions between which the line is close to the torus.
     low: L,
     high: L,
-    /// Lines that come close.
+    /// Lanes with a line close to the torus.
     near: L::Mask,
 }
 
-/// Places that separate the roots, in ascending order, with the lanes whose place lies inside the torus.
+/// Positions that separate the roots, in ascending order, and the lanes with the position inside
+/// the torus.
 struct Separators<L: SimdFloat> {
     places: [L; 5],
     inside: [L::Mask; 5],
 }
 
 impl<L: SimdFloat> UnitLine<L> {
-    /// The line of a ray; `None` if no line of the packet comes close.
+    /// Creates the line of a ray; `None` if no line of the packet is close to the torus.
     #[inline(always)]
     fn new(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<Self> {
         let f = times(&torus.unit_from_scene, ray.origin - Vec3::splat(torus.center));
         let d = times(&torus.unit_from_scene, ray.direction);
         let scale = L::one() / d.length_squared().sqrt();
         let d = d * scale;
-        // Twice: what the first step rounds off along the direction, the second takes away.
+        // The second step removes the rounding of the first step along the direction.
         let back = -f.dot(d);
         let p = d.mul_add(back, f);
         let again = -p.dot(d);
@@ -235,7 +238,7 @@ impl<L: SimdFloat> UnitLine<L> {
             return None;
         }
         let chord = chord2.max(L::zero()).sqrt();
-        // Between the planes above and below.
+        // Interval between the planes above and below.
         let inverse = L::one() / d.y.abs().max(L::from_f64(1e-30)).copysign(d.y);
         let half = tube + room;
         let (y0, y1) = ((-half - p.y) * inverse, (half - p.y) * inverse);
@@ -257,7 +260,8 @@ impl<L: SimdFloat> UnitLine<L> {
         })
     }
 
-    /// Distance from the axis less 1, height, and the derivative of that distance at `s`.
+    /// Returns the distance from the axis less 1, the height, the derivative of that distance at
+    /// `s`, and the reciprocal of the distance.
     #[inline(always)]
     fn place(&self, s: L) -> (L, L, L, L) {
         let p = self.direction.mul_add(s, self.point);
@@ -268,7 +272,7 @@ impl<L: SimdFloat> UnitLine<L> {
         (rho - L::one(), p.y, speed.max(-limit).min(limit), inward)
     }
 
-    /// Squared distance from the ring less that of the surface, and its derivative.
+    /// Returns the squared distance from the ring less that of the surface, and its derivative.
     #[inline(always)]
     fn height(&self, s: L) -> (L, L) {
         let (beyond, y, speed, _) = self.place(s);
@@ -277,7 +281,7 @@ impl<L: SimdFloat> UnitLine<L> {
         (height, slope + slope)
     }
 
-    /// Half the derivative of the height, and its own derivative.
+    /// Returns half the derivative of the height, and its own derivative.
     #[inline(always)]
     fn slope(&self, s: L) -> (L, L) {
         let (beyond, y, speed, inward) = self.place(s);
@@ -285,13 +289,14 @@ impl<L: SimdFloat> UnitLine<L> {
         (slope, L::one() - (self.across2 - speed * speed) * inward)
     }
 
-    /// Lanes whose place lies inside or on the surface.
+    /// Returns the lanes with the position `s` inside or on the surface.
     #[inline(always)]
     fn inside(&self, s: L) -> L::Mask {
         self.height(s).0.le(L::zero())
     }
 
-    /// Places of the extremes of the height: least, largest, least; where there is but one, thrice the same.
+    /// Returns the positions of the extremes of the height: least, largest, least; a single extreme
+    /// is repeated three times.
     #[inline(always)]
     fn extremes(&self) -> [L; 3] {
         let (zero, one) = (L::zero(), L::one());
@@ -299,7 +304,7 @@ impl<L: SimdFloat> UnitLine<L> {
         let a2 = self.across2.max(tiny);
         let a = a2.sqrt();
         let (p, d) = (self.point, self.direction);
-        // The point nearest to the axis, and its distance from there.
+        // Point nearest to the axis, and its distance from the axis.
         let middle = -(p.x.mul_add(d.x, p.z * d.z)) / a2;
         let least = (p.x.mul_add(d.z, -(p.z * d.x)) / a).abs();
         // rho'' > 1 where rho^3 < (a least)^2; the cube root by y <- (y x)^(1/4).
@@ -332,9 +337,9 @@ impl<L: SimdFloat> UnitLine<L> {
         [first, L::select(three, second, first), L::select(three, third, first)]
     }
 
-    /// Zero of `function` between `low`, where `sign` times it is negative, and `high`, where it is positive,
-    /// in the lanes of `open`: by Newton's method, or by bisection where that leaves the bracket or is slow.
-    /// A lane's steps do not depend on the others.
+    /// Returns the zero of `function` between `low`, where `sign` times it is negative, and `high`,
+    /// where it is positive, in the lanes of `open`: by Newton's method, or by bisection where
+    /// Newton's step leaves the bracket or is slow. A lane's steps do not depend on the others.
     #[inline(always)]
     fn root(
         &self,
@@ -368,13 +373,13 @@ impl<L: SimdFloat> UnitLine<L> {
         place
     }
 
-    /// Separators of the roots at `start` or beyond.
+    /// Returns the separators of the roots at `start` or beyond.
     #[inline(always)]
     fn separators(&self, start: L) -> Separators<L> {
         let within = |s: L| s.max(self.low).min(self.high).max(start);
         let [first, second, third] = self.extremes().map(within);
         let places = [self.low.max(start), first, second, third, self.high.max(start)];
-        // Both ends lie outside, but for a start inside.
+        // Both ends are outside, except for a start inside.
         let inside = [
             start.gt(self.low) & self.inside(places[0]),
             self.inside(first),
@@ -385,7 +390,7 @@ impl<L: SimdFloat> UnitLine<L> {
         Separators { places, inside }
     }
 
-    /// Distance along the ray of a place on the line.
+    /// Returns the distance along the ray of a position on the line.
     #[inline(always)]
     fn distance(&self, s: L) -> L {
         (s - self.origin) * self.scale
@@ -401,7 +406,7 @@ impl<L: SimdFloat> Primitive<L> for Torus<L::Scalar> {
             return None;
         }
         let Separators { places, inside } = line.separators(line.origin);
-        // The first bracket at whose ends the line is on different sides.
+        // First bracket with the line on different sides at its ends.
         let (mut low, mut high, mut sign) = (places[0], places[4], L::one());
         let mut open = ahead;
         for i in 0..4 {
@@ -429,7 +434,7 @@ impl<L: SimdFloat> Primitive<L> for Torus<L::Scalar> {
         let inverse = L::one() / L::select(on_axis, L::one(), rho);
         let ring = Vec3::new(L::select(on_axis, L::one(), p.x * inverse), L::zero(), p.z * inverse);
         let outward = (p - ring).normalize();
-        // The normal of the image is the inverse transpose times the normal: columns of the inverse.
+        // Normals transform by the inverse transpose: columns of the inverse.
         let m = &self.unit_from_scene;
         let normal = Vec3::splat(m[0]) * outward.x
             + Vec3::splat(m[1]) * outward.y
@@ -471,7 +476,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for Torus<L::Scalar> {
     }
 }
 
-/// The two spans of each line, of which the second may be empty, or both.
+/// Two spans of each line, of which the second or both may be empty.
 #[inline(never)]
 fn spans<L: SimdFloat>(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<[Span<L>; 2]> {
     let line = UnitLine::new(torus, ray)?;

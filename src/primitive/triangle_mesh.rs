@@ -1,8 +1,8 @@
-//! Rays through the triangles of one mesh, in the mesh's own space.
+//! Intersection of rays with the triangles of one mesh, in the space of the mesh.
 //!
-//! Packets whose rays stay together go through the tree together; others ray by ray, eight boxes or
-//! triangles at a time. Both compute each triangle by the same operations, so that a ray meets the
-//! same triangle at the same distance either way.
+//! Coherent packets traverse the BVH together; others ray by ray, eight boxes or triangles at a
+//! time. Both compute each triangle by the same operations, so that a ray hits the same triangle at
+//! the same distance either way.
 
 use crate::asset::{Mesh, TriangleBlock};
 use crate::bvh::BVH_WIDTH;
@@ -13,36 +13,37 @@ use crate::bvh::packet::{
 use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 
-/// Packets go together whose directions differ by no more than this for each lane over the root of the
-/// number of triangles (length of the difference of unit vectors), and whose origins by no more than that
-/// share of the mesh's size. Measured by `benches/mesh.rs`, lines `together or apart`: packets of eight are
-/// faster up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million; those of
-/// four up to half of that.
+/// Coherence limit: packets traverse together if their directions differ by no more than this for
+/// each lane, over the root of the number of triangles (length of the difference of unit vectors),
+/// and their origins by no more than that share of the mesh's size. Measured by `benches/mesh.rs`,
+/// lines `together or apart`: packets of eight are faster up to differences of 0.3 with 1,000
+/// triangles, 0.1 with 70,000, 0.02 with a million; packets of four up to half of that.
 const TOGETHER: f64 = 2.5;
 
-/// At most so much for each lane, however few triangles there are.
+/// Largest coherence limit for each lane, for any number of triangles.
 const TOGETHER_AT_MOST: f64 = 0.04;
 
-/// The nearest triangle of each lane.
+/// Closest triangle of each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleHit<L> {
-    /// Distance, in lengths of the ray's direction; the limit where nothing nearer was met.
+    /// Distance in lengths of the ray's direction; the limit if there is no nearer hit.
     pub t: L,
-    /// Tag of the triangle's number; meaningless where nothing was met.
+    /// Tag of the triangle's number; meaningless without a hit.
     pub triangle: L,
 }
 
-/// Rays as triangles want them: a packet, or one ray in every lane.
+/// Rays with a frame for triangle tests: a packet, or one ray in every lane.
 #[derive(Clone, Copy)]
 struct ShearedRay<L> {
     origin: Vec3<L>,
     frame: Frame<L>,
 }
 
-/// A packet as boxes want it. A ray that passes a box's edge within the rounding of its frame and of the
-/// corners' distances may still meet a triangle there.
+/// Returns a packet for box tests. Boxes grow by the rounding of the ray's frame and of the
+/// corners' distances, so that a ray that passes an edge within rounding still tests the triangles
+/// there.
 #[inline(always)]
-fn beam<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
+fn slab_packet<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
     let [low, high] = mesh.mesh().bounds;
     let reach = low.iter().chain(&high).fold(0.0f32, |m, x| m.max(x.abs()));
     let pad = (ray.origin.max_abs() + broadcast(reach)) * L::from_f64(8.0 * L::EPSILON);
@@ -55,7 +56,7 @@ impl<L: SimdFloat> ShearedRay<L> {
         Self { origin: ray.origin, frame: Frame::around(ray.direction) }
     }
 
-    /// Ray of each lane: origin and frame.
+    /// Returns origin and frame of the ray of each lane.
     #[inline(always)]
     fn each(&self) -> [[[L::Scalar; 3]; 4]; MAX_WIDTH] {
         let Frame { t, b, n } = self.frame;
@@ -66,35 +67,36 @@ impl<L: SimdFloat> ShearedRay<L> {
         each
     }
 
-    /// The ray of one lane in every lane.
+    /// Returns the ray of one lane in every lane.
     #[inline(always)]
     fn only(one: &[[L::Scalar; 3]; 4]) -> Self {
         let [origin, t, b, n] = one.map(Vec3::splat);
         Self { origin, frame: Frame { t, b, n } }
     }
 
-    /// Hit of the ray with a triangle, at a positive distance, on either side.
+    /// Returns distance and mask of the hits with a triangle, at a positive distance, on either
+    /// side.
     ///
     /// The corners are projected along the ray onto the plane through its origin. A corner has one
-    /// projection, whichever triangle it belongs to, and the sign of each edge's area is that of the
-    /// exact value or zero: so no ray slips between two triangles that share an edge or a corner
-    /// (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an orthonormal
-    /// frame for the shear).
+    /// projection in all triangles that share it, and the sign of each edge's area is that of the
+    /// exact value or zero: no ray passes between two triangles that share an edge or a corner
+    /// (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an
+    /// orthonormal frame for the shear).
     #[inline(always)]
     fn meet(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
         let p = corners.map(|c| self.frame.to_local(c - self.origin));
-        // Not fused: products rounded alike cannot change places.
+        // Products are not fused: equal rounding keeps their order.
         let area = |a: Vec3<L>, b: Vec3<L>| a.x * b.y - a.y * b.x;
         let (u, v, w) = (area(p[1], p[2]), area(p[2], p[0]), area(p[0], p[1]));
         let zero = L::zero();
         let left = u.ge(zero) & v.ge(zero) & w.ge(zero);
         let right = u.le(zero) & v.le(zero) & w.le(zero);
-        // Seen edge on, the triangle is a line: 0 / 0 is met nowhere.
+        // Edge-on triangles are a line: 0 / 0 is no hit.
         let t = (u * p[0].z + v * p[1].z + w * p[2].z) / (u + v + w);
         (t, (left | right) & t.gt(zero))
     }
 
-    /// The eight corners `k` of a leaf's triangles, a part of them in lanes.
+    /// Returns the corners of a leaf's eight triangles, those of the lanes in `part`.
     #[inline(always)]
     fn corners(leaf: &TriangleBlock, part: usize) -> [Vec3<L>; 3] {
         leaf.corners.each_ref().map(|c| {
@@ -104,33 +106,33 @@ impl<L: SimdFloat> ShearedRay<L> {
     }
 }
 
-/// A walk of some rays through a mesh. `ANY`: the first triangle ends the walk of a ray.
+/// Traversal of a mesh. With `ANY` the first triangle hit ends the traversal of a ray.
 struct MeshTraversal<'a, const ANY: bool> {
     mesh: &'a Mesh,
 }
 
 impl<const ANY: bool> MeshTraversal<'_, ANY> {
-    /// All lanes together.
+    /// Traverses all lanes together.
     #[inline(always)]
     fn together<L: SimdFloat>(
         &self,
-        (ray, beam): (&Ray<L>, &SlabPacket<L>),
+        (ray, packet): (&Ray<L>, &SlabPacket<L>),
         limit: L,
     ) -> TriangleHit<L> {
-        let pierce = ShearedRay::new(ray);
+        let sheared_ray = ShearedRay::new(ray);
         let wanted = limit.gt(L::zero()).bits();
         let mut found = TriangleHit { t: limit, triangle: L::from_id(0) };
         if wanted == 0 {
             return found;
         }
-        let bounds = PacketBounds::around(beam, wanted);
+        let bounds = PacketBounds::around(packet, wanted);
         let boxes = self.mesh.boxes();
         let leaf = |number: usize, _| {
             let leaf = &self.mesh.leaves()[number];
             let first = self.mesh.first_triangle(number);
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
                 let [a, b, c] = ShearedRay::<L>::corners(leaf, part);
-                // The triangles whose own boxes the packet may meet.
+                // Triangles with a box that the packet may hit.
                 let low = Vec3::new(a.x.min(b.x), a.y.min(b.y), a.z.min(b.z));
                 let high = Vec3::new(a.x.max(b.x), a.y.max(b.y), a.z.max(b.z));
                 let sides = [
@@ -151,11 +153,12 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                 while bits != 0 {
                     let i = part * L::WIDTH + bits.trailing_zeros() as usize;
                     bits &= bits - 1;
-                    let one = |c: &[[f32; BVH_WIDTH]; 3]| {
+                    let broadcast_corner = |c: &[[f32; BVH_WIDTH]; 3]| {
                         Vec3::new(broadcast(c[0][i]), broadcast(c[1][i]), broadcast(c[2][i]))
                     };
-                    let (t, met) = pierce.meet(leaf.corners.each_ref().map(one));
-                    let tie = met & t.le(found.t);
+                    let (t, hit_mask) =
+                        sheared_ray.meet(leaf.corners.each_ref().map(broadcast_corner));
+                    let tie = hit_mask & t.le(found.t);
                     if tie.none() {
                         continue;
                     }
@@ -169,26 +172,26 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             found.t
         };
         with_stack::<_, _, 128, 512>(BVH_WIDTH, boxes, |stack| {
-            traverse_packet(boxes, (beam, bounds.as_ref()), limit, stack, leaf)
+            traverse_packet(boxes, (packet, bounds.as_ref()), limit, stack, leaf)
         });
         found
     }
 
     #[inline(always)]
     fn run<L: SimdFloat>(&self, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
-        let beam = beam(ray, self.mesh);
+        let packet = slab_packet(ray, self.mesh);
         let wanted = limit.gt(L::zero()).bits();
         if is_together(ray, wanted, self.mesh) {
-            return self.together((ray, &beam), limit);
+            return self.together((ray, &packet), limit);
         }
-        self.apart((ray, &beam), limit)
+        self.apart((ray, &packet), limit)
     }
 
-    /// Each lane by itself.
+    /// Traverses each lane by itself.
     #[inline(always)]
     fn apart<L: SimdFloat>(
         &self,
-        (ray, beam): (&Ray<L>, &SlabPacket<L>),
+        (ray, packet): (&Ray<L>, &SlabPacket<L>),
         limit: L,
     ) -> TriangleHit<L> {
         let rays = ShearedRay::new(ray).each();
@@ -199,11 +202,11 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         }
         let leaf = |lane: usize, number: usize, limit: L::Scalar| {
             let leaf = &self.mesh.leaves()[number];
-            let pierce = ShearedRay::<L>::only(&rays[lane]);
+            let sheared_ray = ShearedRay::<L>::only(&rays[lane]);
             let (best, triangle) = &mut found[lane];
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
-                let (t, met) = pierce.meet(ShearedRay::corners(leaf, part));
-                let mut bits = (met & t.le(L::splat(*best))).bits() & valid_lanes();
+                let (t, hit_mask) = sheared_ray.meet(ShearedRay::corners(leaf, part));
+                let mut bits = (hit_mask & t.le(L::splat(*best))).bits() & valid_lanes();
                 while bits != 0 {
                     let lane = bits.trailing_zeros();
                     bits &= bits - 1;
@@ -222,21 +225,21 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         };
         let boxes = self.mesh.boxes();
         with_stack::<_, _, 64, 128>(L::WIDTH, boxes, |stack| {
-            traverse_rays(boxes, (beam, limit), wanted, stack, soon, leaf)
+            traverse_rays(boxes, (packet, limit), wanted, stack, soon, leaf)
         });
         let t = L::from_fn(|i| found[i].0);
         let t = if ANY { L::select(t.lt(limit), L::from_f64(-1.0), limit) } else { t };
         let mut triangle = L::from_id(0);
         let lanes = L::from_fn(|i| L::Scalar::from_f64(i as f64));
         for (lane, (_, number)) in found.iter().enumerate().take(L::WIDTH) {
-            let here = lanes.le(L::from_f64(lane as f64)) & lanes.ge(L::from_f64(lane as f64));
-            triangle = L::select(here, L::from_id(*number), triangle);
+            let lane_mask = lanes.le(L::from_f64(lane as f64)) & lanes.ge(L::from_f64(lane as f64));
+            triangle = L::select(lane_mask, L::from_id(*number), triangle);
         }
         TriangleHit { t, triangle }
     }
 }
 
-/// Returns `true` if the wanted rays of a packet are worth going together.
+/// Returns `true` if the wanted rays of a packet are coherent enough to traverse together.
 #[inline(always)]
 fn is_together<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     if L::WIDTH == 1 || wanted.count_ones() < 2 {
@@ -249,20 +252,21 @@ fn is_together<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     ray.is_coherent(wanted, turn, turn * size)
 }
 
-/// The nearest triangle nearer than `limit`; of several at the same distance the one with the lowest
-/// number. Directions have unit length. Lanes whose limit is not positive are left out.
+/// Returns the closest triangle within `limit`; at equal distances the one with the lowest number.
+/// Directions have unit length. Lanes with a limit that is not positive are inactive.
 #[inline(never)]
 pub fn closest<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
     MeshTraversal::<false> { mesh }.run(ray, limit)
 }
 
-/// Lanes that hit a triangle nearer than `limit`.
+/// Returns the lanes that hit a triangle nearer than `limit`.
 #[inline(never)]
 pub fn occluded<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
     MeshTraversal::<true> { mesh }.run(ray, limit).t.lt(limit)
 }
 
-/// As [`closest`], all lanes together or each by itself: for tests and benches.
+/// [`closest`] with all lanes together if `all` is set, otherwise each by itself; for tests and
+/// benches.
 #[inline(never)]
 pub fn closest_with<L: SimdFloat>(
     mesh: &Mesh,
@@ -270,6 +274,6 @@ pub fn closest_with<L: SimdFloat>(
     limit: L,
     all: bool,
 ) -> TriangleHit<L> {
-    let (beam, walk) = (beam(ray, mesh), MeshTraversal::<false> { mesh });
-    if all { walk.together((ray, &beam), limit) } else { walk.apart((ray, &beam), limit) }
+    let (packet, walk) = (slab_packet(ray, mesh), MeshTraversal::<false> { mesh });
+    if all { walk.together((ray, &packet), limit) } else { walk.apart((ray, &packet), limit) }
 }

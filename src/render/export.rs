@@ -1,5 +1,5 @@
-//! Export of pictures with provenance metadata. Equal pictures have equal metadata: no dates, times or
-//! numbers of threads.
+//! Export of pictures with metadata about their origin. Equal pictures have equal metadata, which
+//! therefore holds no dates, times or numbers of threads.
 
 use crate::film::{Depth, Display, ImageData, ImageOutput, Tone, WriteError};
 use crate::render::render_state::RenderState;
@@ -7,21 +7,21 @@ use crate::render::session::Report;
 use crate::sampling::SamplerKind;
 use crate::value::fnv1a64;
 
-/// Provenance of a picture beyond its render state.
+/// Origin of a picture: the metadata that its render state does not contain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Provenance {
-    /// Path of the scene file, as given by the user.
+    /// Path of the scene file, as the user has given it.
     pub source: String,
-    /// [`scene_hash`] of the scene file's text.
+    /// Hash of the scene file's text, see [`scene_hash`].
     pub scene_hash: String,
-    /// Sampler.
+    /// Sample sequence.
     pub sampler: SamplerKind,
-    /// Adaptive sampling.
+    /// `true` if the picture was rendered with adaptive sampling.
     pub adaptive: bool,
 }
 
 impl RenderState {
-    /// Writes the current picture with its metadata. `report` is the report on this film.
+    /// Writes the current picture with its metadata. `report` is the latest report on this film.
     ///
     /// # Errors
     /// Fails if the file cannot be written.

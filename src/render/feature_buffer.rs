@@ -1,4 +1,4 @@
-//! Feature buffer: the first hit in each cell of a display raster.
+//! Feature buffer: the first hit of a camera ray in each cell of a display raster.
 
 use crate::world::FirstHit;
 use rayon::prelude::*;
@@ -6,21 +6,22 @@ use rayon::prelude::*;
 /// Number of rays that a thread traces at a time.
 const CHUNK: usize = 512;
 
-/// First hits of the camera rays through the centres of a raster that covers the picture.
+/// First hits of the camera rays through the centres of a raster's cells. The raster covers the
+/// whole picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeatureBuffer {
-    /// Cells in a row.
+    /// Number of cells in a row.
     pub columns: usize,
-    /// Rows of cells.
+    /// Number of rows.
     pub rows: usize,
-    /// `[row][column]`.
+    /// First hit of each cell, `[row][column]`.
     texels: Vec<FirstHit>,
 }
 
 impl FeatureBuffer {
-    /// Traces a raster of `columns` x `rows` cells over a film of `width` x `height` pixels. `first_hits`
-    /// writes the first hits of the camera rays through points of the film, in pixels (see
-    /// [`AnyWorld::first_hit`](crate::world::AnyWorld::first_hit)).
+    /// Traces a raster of `columns` x `rows` cells over a film of `width` x `height` pixels.
+    /// `first_hits` traces camera rays through points of the film, given in pixels, and writes
+    /// their first hits (see [`AnyWorld::first_hit`](crate::world::AnyWorld::first_hit)).
     pub fn new(
         [width, height]: [usize; 2],
         [columns, rows]: [usize; 2],
@@ -43,7 +44,7 @@ impl FeatureBuffer {
         Self { columns, rows, texels }
     }
 
-    /// First hit of a cell; `None` outside of the raster.
+    /// Returns the first hit of a cell. Returns `None` if the cell is outside of the raster.
     pub fn at(&self, column: usize, row: usize) -> Option<&FirstHit> {
         if column >= self.columns {
             return None;

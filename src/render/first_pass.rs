@@ -1,4 +1,5 @@
-//! First pass: the first sample of every pixel, in interleaved order from coarse to fine.
+//! First pass: traces the first sample of every pixel in stages, from a coarse lattice of pixels to
+//! all pixels.
 
 use crate::film::{Film, TILE, TILE_PIXELS, Tile, TileHandle, lattice_pixels};
 use crate::lanes::SimdFloat;
@@ -8,10 +9,10 @@ use crate::world::{AnyWorld, Counts, TileTracer, World, dispatch};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
-/// Traces the first sample of replicate A: of every 8th pixel in x and y, then of the pixels
-/// between in three stages, each over the whole picture. Calls `on_stage` with the film after all
-/// stages but the last. A cancelled pass skips the stages after the first that have not started,
-/// and has no report.
+/// Traces the first sample of replicate A. The first stage traces every 8th pixel in x and y; three
+/// further stages trace the pixels between, with steps of 4, 2 and 1. Each stage covers the whole
+/// picture. Calls `on_stage` with the film after every stage except the last. A cancelled pass
+/// completes its first stage, starts no jobs of the later ones, and returns `None`.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
@@ -22,7 +23,7 @@ pub fn run(
     dispatch!(world, world => trace_first_pass(world, film, wave, context, on_stage))
 }
 
-/// Number of adjacent tiles that share packets while the lattice is coarse.
+/// Number of adjacent tiles that share packets while each tile adds only few pixels.
 const STRIP_TILES: usize = 8;
 
 /// Lattice step above which tiles share packets \[pixels\]. With smaller steps the pixels of one
@@ -75,14 +76,15 @@ fn trace_first_pass<L: SimdFloat>(
 struct StripPixel {
     /// Index of the tile in the strip.
     tile: usize,
-    /// Number of the pixel in its tile, row by row.
+    /// Number of the pixel in its tile; pixels are numbered row by row.
     pixel: usize,
     /// Column and row in the picture.
     position: (u32, u32),
 }
 
-/// Returns the pixels of `tiles`, given with their origins, that a lattice of `steps.1` pixels adds
-/// to one of `steps.0` (0: none).
+/// Returns the pixels that a stage adds to `tiles`, which are given with their origins: the pixels
+/// of the lattice with step `step` that are not in the lattice with step `previous_step` (0: no
+/// earlier lattice).
 fn pixels_to_add(
     tiles: &[([usize; 2], &mut Tile)],
     (previous_step, step): (usize, usize),
@@ -100,8 +102,9 @@ fn pixels_to_add(
 }
 
 impl<L: SimdFloat> TileRenderer<'_, L> {
-    /// Traces the first sample of the pixels that a lattice of `steps.1` pixels adds to one of
-    /// `steps.0` (0: none), in adjacent tiles, which share packets while these pixels are few.
+    /// Traces the first sample of the pixels that the lattice with step `steps.1` adds to the
+    /// lattice with step `steps.0` (0: no earlier lattice). `slots` are adjacent tiles, which share
+    /// packets while they add only few pixels.
     fn lattice(&self, slots: Vec<TileHandle>, steps: (usize, usize), counts: &mut [Counts]) {
         let mut tiles: Vec<_> =
             slots.into_iter().map(|slot| (slot.origin, slot.prepare())).collect();
@@ -123,7 +126,8 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
         tiles.into_iter().for_each(|(_, tile)| tile.set_lattice(step));
     }
 
-    /// Traces the first sample of `pixels`, those of `tracer`, into their tiles.
+    /// Traces the first sample of `pixels`, for which `tracer` was created, and adds it to their
+    /// tiles.
     fn add_pixels(
         &self,
         tiles: &mut [([usize; 2], &mut Tile)],
@@ -151,9 +155,9 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
                 }
             }
         });
-        // Rays of shared packets are divided among the tiles by their number of pixels, because the
-        // reported cost must not depend on the packet width. Glossy lobes are reported by packets
-        // of a single tile.
+        // The rays of shared packets are divided among the tiles by their numbers of pixels,
+        // because the reported cost must not depend on the packet width. Only packets of a single
+        // tile report glossy lobes.
         let packet_counts = tracer.counts();
         if let [counts] = counts {
             counts.rays += packet_counts.rays;

@@ -1,4 +1,5 @@
-//! Progressive rendering: schedule, passes, and the session that runs them on its threads.
+//! Progressive rendering: the schedule of samples, the passes that trace them, and the session that
+//! runs both in the background.
 
 pub mod export;
 mod feature_buffer;

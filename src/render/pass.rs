@@ -1,4 +1,4 @@
-//! Synchronous pass: traces the jobs of one wave into the film.
+//! Synchronous pass: traces the jobs of one wave and adds their samples to the film.
 
 use crate::film::{Estimator, Film, InvalidSample, TILE, TILE_PIXELS, Tile, TileHandle};
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -16,15 +16,15 @@ const _: () = assert!(TILE_PIXELS <= MAX_BLOCK_PIXELS);
 /// Inputs that all jobs of a pass share.
 #[derive(Clone, Copy)]
 pub struct PassContext<'a> {
-    /// Seed and sequence of the samples.
+    /// Seed and kind of the sample sequence.
     pub sampling: &'a SampleSettings,
-    /// Threads that trace.
+    /// Threads that trace the jobs.
     pub pool: &'a rayon::ThreadPool,
-    /// Cancels jobs that have not started when it becomes `true`.
+    /// While it is `true`, no further job starts.
     pub cancel: &'a AtomicBool,
 }
 
-/// Traces the jobs of `wave` into `film`. Cancelled jobs have no report.
+/// Traces the jobs of `wave` into `film`. The report of a cancelled job is `None`.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
@@ -57,7 +57,8 @@ pub fn run_typed<L: SimdFloat>(
         let error = if wave.estimate { estimator.tile(tile) } else { None };
         Some(JobReport { rays: counts.rays, glossy: counts.glossy, error })
     };
-    // A single job for a single thread is traced on the calling thread, which saves the hand-over.
+    // A single job for a single thread is traced on the calling thread, which saves the change of
+    // threads.
     let reports = if pool.current_num_threads() == 1 && slots.len() == 1 {
         slots.into_iter().zip(&wave.jobs).map(trace).collect()
     } else {
@@ -69,11 +70,11 @@ pub fn run_typed<L: SimdFloat>(
 /// Renderer of tiles: adds the radiance of samples to the film's fixed-point sums.
 pub(super) struct TileRenderer<'a, L: SimdFloat> {
     pub(super) tracer: CameraTracer<'a, L>,
-    /// Steps per unit of radiance, per light group.
+    /// Scale of each light group: the number of integer steps per unit of radiance.
     scales: &'a [f64],
-    /// Largest radiance of a sample that the film holds, per light group: 2^49 steps.
+    /// Largest radiance of a sample that the film can hold, for each light group: 2^49 steps.
     limits: [L; MAX_GROUPS],
-    /// Pixels of a tile that lies entirely inside the picture, see [`pixels_of`].
+    /// Pixels of a tile that is entirely inside the picture, see [`pixels_of`].
     whole_tile: Vec<u8>,
 }
 
@@ -91,8 +92,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Traces the samples of a job into its tile. Packets hold samples of one pixel where `WIDTH`
-    /// aligned indices are requested, of several pixels elsewhere.
+    /// Traces the samples of a job into its tile. A packet holds `WIDTH` samples of one pixel where
+    /// that many aligned indices remain, and samples of several pixels elsewhere.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
@@ -111,7 +112,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
             tile.advance(replicate, job.count);
             return Counts::default();
         };
-        // The sums arrive while the first samples are traced.
+        // The sums are loaded into the cache while the first samples are traced.
         tile.prefetch(replicate);
         let mut rejected = RejectedSamples::new(replicate);
         let (mut index, end) = (job.first, job.first + job.count);
@@ -139,8 +140,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         tracer.counts()
     }
 
-    /// Traces the samples `first..first + COUNT` of all pixels of a tile, several pixels per
-    /// packet.
+    /// Traces the samples `first..first + COUNT` of all pixels of a tile. A packet holds several
+    /// pixels.
     #[inline(never)]
     fn trace_shared<const COUNT: usize>(
         &self,
@@ -160,7 +161,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         });
     }
 
-    /// Calls `add(group, sums)` with the sums over all lanes of each light group.
+    /// Calls `add(group, sums)` for each light group with the sum over all lanes.
     #[inline(always)]
     fn sum(&self, radiance: &Radiance<L>, mut add: impl FnMut(usize, [i64; 3])) {
         for (group, scale) in self.scales.iter().enumerate() {
@@ -169,8 +170,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Calls `add(pixel, group, sums)` with the sums over the `COUNT` lanes of each pixel and light
-    /// group.
+    /// Calls `add(pixel, group, sums)` for each pixel and light group with the sum over the pixel's
+    /// `COUNT` lanes.
     #[inline(always)]
     pub(super) fn sum_by_pixel<const COUNT: usize, P>(
         &self,
@@ -188,8 +189,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Replaces and records samples that the film cannot hold. `sample_of` returns pixel and index
-    /// of a lane.
+    /// Replaces samples that the film cannot hold, and records them. `sample_of` returns the pixel
+    /// and the sample index of a lane.
     #[inline(always)]
     pub(super) fn reject_invalid(
         &self,
@@ -211,8 +212,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Sets samples to black in light groups where a channel is NaN or negative, and limits
-    /// brighter and infinite ones to the largest value that the film holds.
+    /// Makes samples valid. A sample that is NaN or negative in some channel of a light group
+    /// becomes black in that group. A sample above the film's limit, also an infinite one, is
+    /// reduced to the limit.
     #[cold]
     fn replace_invalid(
         &self,
@@ -240,9 +242,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
 /// Samples of one job that the film cannot hold.
 pub(super) struct RejectedSamples {
     replicate: usize,
-    /// Samples that are NaN or negative in some light group.
+    /// Samples that are NaN or negative in some light group; they are stored as black.
     pub(super) bad: Vec<InvalidSample>,
-    /// Samples that are brighter than the film's limit in some light group.
+    /// Samples above the film's limit in some light group; they are stored with the limit.
     pub(super) saturated: Vec<InvalidSample>,
 }
 
@@ -252,15 +254,15 @@ impl RejectedSamples {
     }
 }
 
-/// Returns how many of the samples `first..end` of a pixel the next packet holds: a power of two
-/// that divides `first`, at most `width`.
+/// Returns the number of samples of a pixel that the next packet holds, out of `first..end`: a
+/// power of two that divides `first`, at most `width`.
 fn samples_per_packet(first: u32, end: u32, width: usize) -> usize {
     let aligned = first | width as u32;
     1 << aligned.trailing_zeros().min((end - first).ilog2())
 }
 
-/// Pixels of a tile, numbered row by row, in Morton order. Pixels that share a packet are adjacent:
-/// 2 x 1, 2 x 2, 4 x 2 or 4 x 4 of them.
+/// Pixels of a tile in Morton order. Pixels are numbered row by row. In Morton order the pixels
+/// that share a packet form a block of 2 x 1, 2 x 2, 4 x 2 or 4 x 4.
 const MORTON_ORDER: [u8; TILE_PIXELS] = {
     let mut order = [0; TILE_PIXELS];
     let mut i = 0;
@@ -277,7 +279,7 @@ const MORTON_ORDER: [u8; TILE_PIXELS] = {
     order
 };
 
-/// Returns the pixels of a tile of the given extent, in [`MORTON_ORDER`].
+/// Returns the pixels of a tile with the given width and height, in [`MORTON_ORDER`].
 fn pixels_of([width, height]: [usize; 2]) -> Vec<u8> {
     let inside = |p: &u8| usize::from(*p) % TILE < width && usize::from(*p) / TILE < height;
     MORTON_ORDER.into_iter().filter(inside).collect()
@@ -290,8 +292,8 @@ mod tests {
     use crate::lanes::{Float, Single, Vec3};
     use crate::sampling::SamplerKind;
 
-    /// Invalid samples are counted and add nothing. Samples brighter than the film's limit add the
-    /// limit. Other groups are not affected.
+    /// Invalid samples are counted and add nothing to the sums. Samples above the film's limit add
+    /// the limit. The sums of other light groups are not affected.
     #[test]
     fn extreme_30_a_bad_sample_is_counted_and_leaves_the_pixel_finite() {
         let scene = crate::scene::Scene::parse(

@@ -1,11 +1,12 @@
-//! Relighting: light weights with which a film shows scenes that differ only in their light groups.
+//! Relighting: shows the samples of one scene under the lights of another, by new weights of the
+//! light groups.
 
 use crate::film::LightWeights;
 use crate::scene::Scene;
 use crate::world::LightGroups;
 use std::sync::Arc;
 
-/// Light groups of a film and the scene that they were compiled for.
+/// Light groups of a film, and the scene for which its samples were traced.
 #[derive(Clone, Debug)]
 pub struct Relighting {
     compiled: Arc<Scene>,
@@ -13,21 +14,24 @@ pub struct Relighting {
 }
 
 impl Relighting {
-    /// Creates the relighting of a film whose scene `compiled` has the light groups `groups`.
+    /// Creates the relighting of a film whose samples belong to the scene `compiled` with the light
+    /// groups `groups`.
     pub fn new(compiled: Arc<Scene>, groups: LightGroups) -> Self {
         Self { compiled, groups }
     }
 
-    /// Light weights with which the film shows `scene`. `None` if the scene needs samples of its own: it
-    /// differs in more than colours, intensities and switches of lights, ambient and background that have
-    /// groups of their own.
+    /// Returns the light weights with which the film shows `scene`. Returns `None` if `scene` needs
+    /// samples of its own. That is the case if it differs from the compiled scene in more than the
+    /// colours, intensities and on/off switches of lights, ambient light and background that have
+    /// light groups of their own.
     pub fn mix(&self, scene: &Scene) -> Option<LightWeights> {
         let can_reuse =
             std::ptr::eq(scene, &*self.compiled) || self.groups.can_reuse(&self.compiled, scene);
         can_reuse.then(|| LightWeights { weights: self.groups.mix(scene) })
     }
 
-    /// Name of each group, for layers of files; `scene` is one that the film can show.
+    /// Returns the name of each light group, for layers of image files. `scene` is a scene that the
+    /// film can show.
     pub fn names(&self, scene: &Scene) -> Vec<String> {
         self.groups.names(scene)
     }

@@ -1,4 +1,4 @@
-//! Compiled scene with its film: the state of one progressive render.
+//! State of one progressive render: compiled scene, film and noise estimator.
 
 use crate::film::{Display, Estimator, Film, Header, LightWeights, TILE};
 use crate::render::pass::PassContext;
@@ -12,14 +12,14 @@ use crate::world::{self, AnyWorld};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Settings of compilation, sampling and noise estimation.
+/// Settings of scene compilation, sampling and noise estimation.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Compilation of the scene into a world.
     pub world: world::Options,
     /// Seed and kind of the sampler.
     pub sampling: SampleSettings,
-    /// The display for which the noise is estimated, in 8-bit levels.
+    /// Display transform under which the noise is estimated, in 8-bit levels.
     pub display: Display,
 }
 
@@ -27,9 +27,9 @@ pub struct Options {
 pub struct RenderState {
     /// The compiled scene.
     pub world: AnyWorld,
-    /// The samples.
+    /// Film that holds the samples.
     pub film: Film,
-    /// Colour and strength of each light group in the scene.
+    /// Weight of each light group in the picture of the current scene: colour times intensity.
     pub mix: LightWeights,
     scene: Arc<Scene>,
     lighting: Arc<Relighting>,
@@ -39,8 +39,8 @@ pub struct RenderState {
 }
 
 impl RenderState {
-    /// Compiles `scene`, which has no faults, and gives it an empty film in the memory of the film
-    /// of `previous`.
+    /// Compiles `scene`, which has no faults, and creates an empty film. The film reuses the memory
+    /// of the film of `previous`.
     pub fn new(scene: &Scene, options: &Options, previous: Option<Self>) -> Self {
         Self::compile(Arc::new(scene.clone()), options, previous)
     }
@@ -48,7 +48,7 @@ impl RenderState {
     /// Compiles `scene` as [`RenderState::new`] does, if it is valid.
     ///
     /// # Errors
-    /// Returns the first fault of the scene.
+    /// Returns the first validation error of the scene.
     pub fn checked(
         scene: &Arc<Scene>,
         options: &Options,
@@ -89,8 +89,8 @@ impl RenderState {
         }
     }
 
-    /// Takes `scene` over and returns `true` if the samples at hand are samples of it as well.
-    /// Otherwise nothing changes.
+    /// Shows `scene` from now on and returns `true` if the samples at hand are valid for it.
+    /// Otherwise returns `false` and changes nothing.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let Some(mix) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
             return false;
@@ -102,7 +102,7 @@ impl RenderState {
     }
 
     /// Scene that the picture shows. It may differ from the compiled scene in the colours and
-    /// strengths of its lights.
+    /// intensities of its lights.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
@@ -112,23 +112,23 @@ impl RenderState {
         self.lighting.names(&self.scene)
     }
 
-    /// The set of scenes that the samples serve.
+    /// Relighting of this film, which determines the scenes that its samples can show.
     pub fn lighting(&self) -> &Arc<Relighting> {
         &self.lighting
     }
 
-    /// Display for which the noise is estimated.
+    /// Display transform under which the noise is estimated.
     pub fn display(&self) -> Display {
         self.display
     }
 
-    /// Estimates the noise for `display` from now on.
+    /// Sets the display transform under which the noise is estimated.
     pub fn set_display(&mut self, display: Display) {
         self.display = display;
         self.rebuild_estimator();
     }
 
-    /// Estimator of the noise under the current light weights and display.
+    /// Estimator of the noise under the current light weights and display transform.
     pub fn estimator(&self) -> &Estimator {
         &self.estimator
     }
@@ -137,7 +137,7 @@ impl RenderState {
         self.estimator = Estimator::new(self.film.scales(), &self.mix, &self.display);
     }
 
-    /// Schedule for this film.
+    /// Creates a schedule for this film.
     pub fn schedule(&self, settings: Settings) -> Schedule {
         let film = &self.film;
         let pixels_of_tile = |tile: usize| {
@@ -148,10 +148,10 @@ impl RenderState {
         Schedule::new(&pixels, settings)
     }
 
-    /// Traces the wave that holds the first sample of every pixel, coarse to fine, and calls
-    /// `on_refined` whenever the picture has become finer. A raised `cancel_first_pass` ends the
-    /// pass after the first call of `on_refined`; the result is then `None`, and the film is fit for
-    /// display only.
+    /// Traces the wave that holds the first sample of every pixel, from coarse to fine. Calls
+    /// `on_refined` after each stage but the last. A raised `cancel_first_pass` ends the pass after
+    /// the first call of `on_refined`. The result is then `None`, and the film may only be
+    /// displayed: no further samples may be added to it.
     pub fn trace_first_pass(
         &mut self,
         wave: &Wave,
@@ -163,7 +163,7 @@ impl RenderState {
         first_pass::run(&self.world, &mut self.film, wave, context, on_refined)
     }
 
-    /// Traces a wave. A raised `cancel_wave` keeps further jobs from starting.
+    /// Traces a wave. While `cancel_wave` is raised, no further job starts.
     pub fn trace_wave(
         &mut self,
         wave: &Wave,

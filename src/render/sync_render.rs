@@ -1,5 +1,5 @@
-//! Synchronous progressive render in the caller's thread, for measurements that must not depend on the
-//! times of snapshots.
+//! Synchronous progressive render in the caller's thread. It is meant for measurements, which must
+//! not depend on the times of snapshots.
 
 use crate::render::schedule::{Schedule, Settings, Spp, Step, StoppedBy};
 
@@ -18,10 +18,10 @@ pub struct SyncRender {
 }
 
 impl SyncRender {
-    /// Compiles `scene`, which has no faults, for `threads` threads.
+    /// Compiles `scene`, which has no validation errors, for `threads` threads.
     ///
     /// # Errors
-    /// Returns the error of the system that refuses to start a thread.
+    /// Returns the operating system's error if a thread cannot be started.
     pub fn new(
         scene: &Scene,
         options: &Options,
@@ -38,8 +38,9 @@ impl SyncRender {
         Ok(Self { rendering, schedule, pool, seconds: 0.0 })
     }
 
-    /// Traces the next decision of the schedule in both replicates, so that the picture's error is known
-    /// afterwards. Returns the reason if nothing is left to do.
+    /// Traces the next decision of the schedule in both replicates, so that the error of the
+    /// picture is known afterwards. If nothing is left to trace, returns the reason; otherwise
+    /// returns `None`.
     pub fn step(&mut self) -> Option<StoppedBy> {
         loop {
             let wave = match self.schedule.next(self.seconds) {
@@ -56,34 +57,34 @@ impl SyncRender {
         }
     }
 
-    /// Seconds of tracing so far, without compilation.
+    /// Seconds spent on tracing so far, without compilation.
     pub fn seconds(&self) -> f64 {
         self.seconds
     }
 
-    /// Number of samples so far, over all pixels.
+    /// Number of samples traced so far, over all pixels.
     pub fn samples(&self) -> u64 {
         self.schedule.samples()
     }
 
-    /// Samples per pixel.
+    /// Samples per pixel so far.
     pub fn spp(&self) -> Spp {
         self.schedule.spp()
     }
 
-    /// Estimated RMSE as displayed, in 8-bit levels.
+    /// Estimated RMSE of the displayed picture, in 8-bit levels. `None` before the first estimate.
     pub fn noise_codes(&self) -> Option<f64> {
         self.schedule.noise().map(|noise| noise.rmse_codes)
     }
 
-    /// Lower and upper estimate of the total seconds of tracing at which that error falls to `codes` 8-bit
-    /// levels; `None` before an error is known.
+    /// Lower and upper estimate of the total seconds of tracing at which the displayed RMSE falls
+    /// to `codes` 8-bit levels. `None` before the first estimate.
     pub fn seconds_to_noise(&self, codes: f64) -> Option<(f64, f64)> {
         let (low, high) = self.schedule.seconds_to_noise(codes, self.seconds)?;
         Some((self.seconds + low, self.seconds + high))
     }
 
-    /// The world and the film.
+    /// The compiled scene and its film.
     pub fn rendering(&self) -> &RenderState {
         &self.rendering
     }

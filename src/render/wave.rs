@@ -1,11 +1,11 @@
-//! Waves of jobs: the schedule's decisions, carried out by a pass.
+//! Waves: sets of jobs in which the schedule's decisions are traced.
 
 use crate::film::{TILE_PIXELS, TileNoise};
 
-/// Samples to trace in every pixel of one tile: indices `first..first + count` of one replicate.
+/// Job: the samples `first..first + count` of one replicate, in every pixel of one tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Job {
-    /// Number of the tile, row by row.
+    /// Number of the tile; tiles are numbered row by row.
     pub tile: u32,
     /// First sample index.
     pub first: u32,
@@ -13,21 +13,22 @@ pub struct Job {
     pub count: u32,
 }
 
-/// Jobs between two barriers; a tile occurs at most once.
+/// Jobs that are traced concurrently. All jobs of a wave end before the next wave starts. A wave
+/// has at most one job for each tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wave {
-    /// 0: replicate A, 1: replicate B.
+    /// Replicate to which the samples are added; 0: A, 1: B.
     pub replicate: usize,
     /// The jobs, in any order.
     pub jobs: Vec<Job>,
-    /// Each job ends with an estimate of its tile's error. Only set in waves of B, after which both
-    /// replicates of the tile hold equally many samples.
+    /// `true` if each job ends with an estimate of its tile's error. Only waves of B estimate;
+    /// after them both replicates of the tile hold equally many samples.
     pub estimate: bool,
 }
 
 impl Wave {
-    /// Cuts the wave to its first jobs, of about `pixel_samples` pixel samples together (at least one job),
-    /// and each job to at most `longest` samples per pixel.
+    /// Shortens the wave to its first jobs, at least one and about `pixel_samples` pixel samples in
+    /// total, and each job to at most `longest` samples per pixel.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;
@@ -44,20 +45,20 @@ impl Wave {
 /// Result of a finished job.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JobReport {
-    /// Number of rays of every kind (camera, shadow, reflected): the cost of the job, equal on every
-    /// machine.
+    /// Number of rays of every kind (camera, shadow, reflected, transmitted). It is the cost of the
+    /// job, and is equal on every machine.
     pub rays: u64,
-    /// A path hit a glossy lobe.
+    /// `true` if a path has hit a glossy lobe.
     pub glossy: bool,
-    /// Error of the tile's pixels, if [`Wave::estimate`] is set.
+    /// Estimated error of the tile's pixels, if [`Wave::estimate`] is set.
     pub error: Option<TileNoise>,
 }
 
 /// Result of a wave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaveReport {
-    /// One entry per job, in the order of the wave; `None` if it was cancelled before its start and left no
-    /// sample in the film.
+    /// One entry for each job, in the order of the wave. `None` if the job was cancelled before it
+    /// started; it has then added no samples.
     pub reports: Vec<Option<JobReport>>,
 }
 

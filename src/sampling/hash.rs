@@ -1,4 +1,4 @@
-//! Integer hashes, scalar and in lanes.
+//! Integer hashes, for single words and for vectors of words.
 
 use crate::lanes::SimdU32;
 
@@ -11,7 +11,7 @@ pub fn hash<B: SimdU32>(x: B) -> B {
     x ^ (x >> 16)
 }
 
-/// [`hash`] of one word.
+/// Hash of a single word, equal to [`hash`].
 pub const fn hash_scalar(mut x: u32) -> u32 {
     x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
     x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
@@ -25,8 +25,8 @@ pub fn hash_words(words: &[u32]) -> u32 {
     })
 }
 
-/// Owen scrambling of numbers whose first binary digit is in bit 0: a function of `seed` and of the
-/// preceding digits decides whether a digit is flipped.
+/// Owen scrambling of numbers whose first binary digit is in bit 0. A digit is flipped or not,
+/// depending on `seed` and on all preceding digits.
 ///
 /// Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
 #[inline(always)]
@@ -34,13 +34,13 @@ pub fn owen<B: SimdU32>(x: B, seed: B) -> B {
     owen_scramble_suffix(owen_scramble_prefix(x), seed, owen_factor(seed))
 }
 
-/// First part of [`owen`], independent of the seed.
+/// First part of [`owen`]. It does not depend on the seed.
 #[inline(always)]
 pub fn owen_scramble_prefix<B: SimdU32>(x: B) -> B {
     x ^ (x * B::splat(0x3d20_adea))
 }
 
-/// Factor of [`owen`], from its seed.
+/// Factor by which [`owen`] multiplies, computed from its seed.
 #[inline(always)]
 pub fn owen_factor<B: SimdU32>(seed: B) -> B {
     (seed >> 16) | B::splat(1)

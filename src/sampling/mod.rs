@@ -1,5 +1,5 @@
-//! Random numbers of samples: pure functions of (seed, pixel, replicate, index), independent of
-//! thread, order and time.
+//! Random numbers of samples. They are pure functions of seed, pixel, replicate and sample index,
+//! and do not depend on threads, order or time.
 
 mod hash;
 mod packet_sampler;

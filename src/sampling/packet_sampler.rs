@@ -1,4 +1,4 @@
-//! Sampler of a packet: random numbers of the samples in its lanes.
+//! Packet sampler: the random numbers of the samples in the lanes of a packet.
 
 use crate::lanes::{MAX_WIDTH, SimdFloat, SimdU32};
 use crate::sampling::hash::{
@@ -10,7 +10,8 @@ use crate::sampling::sobol::DIMENSIONS;
 /// Sample sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SamplerKind {
-    /// Joint Owen-scrambled Sobol set in eight dimensions, padded with further sets.
+    /// Owen-scrambled Sobol points in eight dimensions (the joint set). Further dimensions come
+    /// from further such sets with shuffled indices (the padded sets).
     Sobol,
     /// Independent random numbers.
     Random,
@@ -26,38 +27,41 @@ impl SamplerKind {
     }
 }
 
-/// Settings that determine all samples of a picture, together with pixel, replicate and index.
+/// Settings that determine all samples of a picture. A sample depends only on these settings, its
+/// pixel, its replicate and its index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleSettings {
-    /// Random seed. Pictures with different seeds are independent.
+    /// Random seed. The errors of pictures with different seeds are independent.
     pub seed: u64,
     /// Sample sequence.
     pub kind: SamplerKind,
 }
 
-/// Number of dimensions at the end of the joint set that are reserved for a path's first branch
-/// choices.
+/// Number of dimensions at the end of the joint set that are reserved for the first branch choices
+/// of a path (reflection or transmission).
 const CHOICES: u32 = 2;
 
-/// Number of powers of two up to the widest packet.
+/// Number of powers of two up to the widest packet: the possible numbers of samples of one pixel in
+/// a packet.
 const PACKET_SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
 
-/// Sampler of all samples of a picture: tables and constants.
+/// Sampler of a picture: tables and constants that all packets share.
 pub struct Sampler<L: SimdFloat> {
     settings: SampleSettings,
     /// Two words per replicate, hashed from the seed.
     seeds: [[u32; 2]; 2],
-    /// First dimension of the first lobe: after the two of the pixel, if these are used.
+    /// First dimension of the first lobe. If samples are jittered, the first two dimensions are the
+    /// position in the pixel.
     first_lobe: usize,
-    /// `low_bits[k][d]`: Sobol points 0..2^k in dimension d, repeated over the lanes.
+    /// `low_bits[k][d]` holds the Sobol points 0..2^k in dimension d, repeated over the lanes.
     low_bits: [[L::SimdU32; DIMENSIONS]; PACKET_SHAPES],
-    /// Lane indices.
+    /// Lane indices 0, 1, 2 and so on.
     ramp: L::SimdU32,
-    /// Constant per dimension that decorrelates its scrambling.
+    /// Constant for each dimension, which makes its scrambling independent of the other dimensions.
     dimension_salt: [u32; DIMENSIONS],
 }
 
-/// Part of a packet's random numbers that depends on the sample indices only.
+/// Part of a packet's random numbers that depends only on the sample indices, not on the pixels.
 pub struct SampleBlock<'a, L: SimdFloat> {
     sampler: &'a Sampler<L>,
     /// Sample index in each lane.
@@ -111,13 +115,14 @@ impl<L: SimdFloat> Sampler<L> {
 }
 
 impl<L: SimdFloat> SampleBlock<'_, L> {
-    /// Sampler of a packet of one pixel, given by its [`Sampler::key`].
+    /// Creates the sampler of a packet with samples of one pixel. `key` is its [`Sampler::key`].
     #[inline(always)]
     pub fn for_pixel(&self, key: u32) -> PacketSampler<'_, L> {
         PacketSampler { points: self, key: L::SimdU32::splat(key), single_key: Some(key) }
     }
 
-    /// Sampler of a packet of several pixels, given by the keys in the lanes.
+    /// Creates the sampler of a packet with samples of several pixels. `keys` holds the
+    /// [`Sampler::key`] of the pixel in each lane.
     #[inline(always)]
     pub fn for_pixels(&self, keys: L::SimdU32) -> PacketSampler<'_, L> {
         PacketSampler { points: self, key: keys, single_key: None }
@@ -129,25 +134,27 @@ pub struct PacketSampler<'a, L: SimdFloat> {
     points: &'a SampleBlock<'a, L>,
     /// Key of the pixel in each lane.
     key: L::SimdU32,
-    /// Key of all lanes, if the packet has one pixel.
+    /// Key of the pixel, if all lanes have the same one.
     single_key: Option<u32>,
 }
 
 impl<L: SimdFloat> PacketSampler<'_, L> {
-    /// Position of samples in their pixel, each coordinate in [0, 1).
+    /// Returns the position of each sample in its pixel, two coordinates in [0, 1).
     #[inline(always)]
     pub fn pixel(&self) -> (L, L) {
         (self.joint(0), self.joint(1))
     }
 
-    /// Two numbers in [0, 1) for the lobe of the surface after `bounce` reflections.
+    /// Returns two numbers in [0, 1) for the lobe of the surface that a path hits after `bounce`
+    /// reflections.
     #[inline(always)]
     pub fn lobe_2d(&self, bounce: u32) -> (L, L) {
         let d = self.points.sampler.first_lobe + 2 * bounce as usize;
         if bounce < 2 { (self.joint(d), self.joint(d + 1)) } else { self.padded(bounce - 2) }
     }
 
-    /// A number in [0, 1) for branch choice `number` of a path, from 0: reflection or transmission.
+    /// Returns a number in [0, 1) for branch choice `number` of a path: reflection or transmission.
+    /// Choices are numbered from 0.
     #[inline(always)]
     pub fn branch_1d(&self, number: u32) -> L {
         if number < CHOICES {
@@ -157,7 +164,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Dimension `d` of the joint set.
+    /// Returns dimension `d` of the joint set.
     #[inline(always)]
     fn joint(&self, d: usize) -> L {
         let points = self.points;
@@ -174,7 +181,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Two numbers for lobe `pair` of the padded sets; four lobes share a set.
+    /// Returns two numbers for lobe `pair` of the padded sets. Four lobes share a set.
     #[cold]
     fn padded(&self, pair: u32) -> (L, L) {
         let d = 2 * (pair % 4) as usize;
@@ -182,7 +189,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         (a, b)
     }
 
-    /// A number for branch choice `number` of the padded sets; eight choices share a set.
+    /// Returns a number for branch choice `number` of the padded sets. Eight choices share a set.
     #[cold]
     fn padded_choice(&self, number: u32) -> L {
         let per_set = DIMENSIONS as u32;
@@ -191,7 +198,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         x
     }
 
-    /// Some dimensions of the padded set `set`, whose indices are shuffled by a separate key.
+    /// Returns the given `dimensions` of the padded set `set`. Each padded set shuffles the sample
+    /// indices by a key of its own.
     #[inline(always)]
     fn padded_set<const N: usize>(&self, set: u32, dimensions: [usize; N]) -> [L; N] {
         let SampleBlock { sampler, index, .. } = self.points;

@@ -1,23 +1,24 @@
-//! Sobol points in eight dimensions with a 32-bit index: four pairs, each the first two dimensions
-//! of the Sobol sequence, a (0, 2)-sequence in base 2.
+//! Sobol points in eight dimensions with a 32-bit index. The dimensions form four pairs. Each pair
+//! consists of the first two dimensions of the Sobol sequence, a (0, 2)-sequence in base 2.
 //!
-//! Pair k has its own order of that sequence: the index is `M_k i`, where `M_k` is an upper
-//! triangular matrix of bits with ones on its diagonal. Such a matrix permutes the first 2^m
-//! indices for every m, so that each pair remains a (0, 2)-sequence (Faure and Tezuka 2002,
-//! *Another Random Scrambling of Digital (t,s)-Sequences*). With the usual direction numbers (Joe
-//! and Kuo 2008) only the first pair is one. The image in a mirror depends on single pairs:
-//! position in the pixel, and direction in the lobe. docs/accuracy.md has the measured benefit.
+//! Pair k uses the points of that sequence in an order of its own: the index is `M_k i`, where
+//! `M_k` is an upper triangular matrix of bits with ones on its diagonal. Such a matrix permutes
+//! the first 2^m indices for every m, so that each pair is still a (0, 2)-sequence (Faure and
+//! Tezuka 2002, *Another Random Scrambling of Digital (t,s)-Sequences*). With the usual direction
+//! numbers (Joe and Kuo 2008) only the first pair is a (0, 2)-sequence. The image in a mirror
+//! depends on single pairs: the position in the pixel, and the direction in the lobe.
+//! docs/accuracy.md has the measured benefit.
 //!
-//! The first columns of the matrices were found by search, one after the other. The criterion is
-//! the error with which 2^m randomly scrambled points estimate the volume on one side of a random
-//! plane that leans towards the axes of several pairs, and the mean of a smooth product over
-//! several pairs. Further columns are random.
+//! The first columns of the matrices were found by search, one column after the other. The search
+//! minimised the errors of two estimates from 2^m randomly scrambled points: the volume on one side
+//! of a random plane that leans towards the axes of several pairs, and the mean of a smooth product
+//! over several pairs. Further columns are random.
 //!
 //! Values are stored with the first binary digit in bit 0, as the scrambling hash requires.
 
 use crate::sampling::hash::hash_scalar;
 
-/// Number of dimensions of one joint set.
+/// Number of dimensions of one set of points.
 pub const DIMENSIONS: usize = 8;
 
 /// First columns of `M_1`, `M_2` and `M_3`, found by search; bit r is row r.
@@ -27,7 +28,7 @@ const COLUMNS: [&[u32]; 3] = [
     &[1, 2, 7, 12, 22, 39, 88, 191, 277],
 ];
 
-/// Column `bit` of the matrix of pair `pair`.
+/// Returns column `bit` of the matrix of pair `pair`.
 const fn column(pair: usize, bit: usize) -> u32 {
     let diagonal = 1 << bit;
     if pair == 0 {
@@ -40,7 +41,8 @@ const fn column(pair: usize, bit: usize) -> u32 {
     diagonal | (hash_scalar((32 * (pair - 1) + bit) as u32) & (diagonal - 1))
 }
 
-/// Direction number of the Sobol sequence in dimension 0 or 1, first digit in bit 0.
+/// Returns a direction number of the Sobol sequence in dimension 0 or 1. The first binary digit is
+/// in bit 0.
 const fn direction(dimension: usize, bit: usize) -> u32 {
     let mut row = 1 << bit;
     if dimension == 1 {
@@ -55,7 +57,7 @@ const fn direction(dimension: usize, bit: usize) -> u32 {
     row
 }
 
-/// Direction numbers of a dimension, first digit in bit 0.
+/// Returns all direction numbers of a dimension. The first binary digit is in bit 0.
 const fn directions(dimension: usize) -> [u32; 32] {
     let mut v = [0; 32];
     let mut bit = 0;
@@ -72,7 +74,8 @@ const fn directions(dimension: usize) -> [u32; 32] {
 
 type Tables = [[[u32; 256]; 4]; DIMENSIONS];
 
-/// `TABLES[d][k][byte]`: contribution (XOR) of byte k of the index to dimension d, digits reversed.
+/// Lookup tables: `TABLES[d][k][byte]` is the contribution (XOR) of byte k of the index to
+/// dimension d. The first binary digit is in bit 0.
 static TABLES: Tables = {
     let mut tables = [[[0u32; 256]; 4]; DIMENSIONS];
     let mut d = 0;
@@ -93,7 +96,8 @@ static TABLES: Tables = {
     tables
 };
 
-/// Point `index` of the sequence in `dimension` (below [`DIMENSIONS`]), first digit in bit 0.
+/// Returns point `index` of the sequence in `dimension` (below [`DIMENSIONS`]). The first binary
+/// digit is in bit 0.
 #[inline(always)]
 pub fn point(dimension: usize, index: u32) -> u32 {
     let t = &TABLES[dimension];
@@ -115,7 +119,8 @@ mod tests {
     }
 
     /// Every pair is a (0, m, 2)-net for every m: each elementary interval of volume 2^-m holds
-    /// exactly one of the first 2^m points, and of every later 2^m that are aligned.
+    /// exactly one of the first 2^m points. The same is true for later aligned groups of 2^m
+    /// points.
     #[test]
     fn elementary_intervals_hold_one_point_each() {
         for (pair, m) in (0..DIMENSIONS / 2).flat_map(|pair| (0..=12u32).map(move |m| (pair, m))) {
@@ -140,14 +145,14 @@ mod tests {
     #[test]
     fn first_points_are_the_published_ones() {
         let row = |i| [0, 1].map(|d| f64::from(digits(d, i)) / 4_294_967_296.0);
-        // Index order without Gray code: 0, 1, 2, 3 in radical-inverse order.
+        // Points are in the order of radical inverses, without Gray code.
         let rows = [[0.0, 0.0], [0.5, 0.5], [0.25, 0.75], [0.75, 0.25], [0.125, 0.625]];
         (0..).zip(rows).for_each(|(i, published)| assert_eq!(row(i), published));
     }
 
-    /// Error of the estimated volume of random half-spaces, relative to independent points: in the
-    /// plane of one pair (where the usual second pair has 0.30 and 0.23), and over the first four
-    /// dimensions.
+    /// Error of the estimated volume of random half-spaces, relative to independent points. It is
+    /// measured in the plane of one pair (where the usual second pair has 0.30 and 0.23), and over
+    /// the first four dimensions.
     #[test]
     fn scrambled_points_estimate_half_spaces_better_than_random_points() {
         use crate::lanes::{SimdFloat, SimdU32};
@@ -201,17 +206,17 @@ mod tests {
         }
     }
 
-    /// Largest gain coefficient of two dimensions: the variance of the first 2^m scrambled points
-    /// over that of independent points, for the worst integrand of both dimensions (Owen 1997,
-    /// *Monte Carlo Variance of Scrambled Net Quadrature*). It is the maximum over the Haar
-    /// components (j, k) of the mean over the points p, q of the product over both dimensions of 2
-    /// [same cell of 2^-(j+1)] - [same cell of 2^-j].
+    /// Largest gain coefficient of two dimensions: the ratio of the variance of the first 2^m
+    /// scrambled points to that of independent points, for the worst integrand of both dimensions
+    /// (Owen 1997, *Monte Carlo Variance of Scrambled Net Quadrature*). It is the maximum over the
+    /// Haar components (j, k) of a mean over the pairs of points p, q. The averaged value is the
+    /// product over both dimensions of 2 [same cell of 2^-(j+1)] - [same cell of 2^-j].
     fn gain(a: usize, b: usize, m: u32) -> f64 {
         let count = 1u32 << m;
         let alike = |d: usize| {
             let first = digits(d, 0);
-            // The first 2^m points are a group under XOR: the distances from every point are the
-            // same.
+            // The first 2^m points are a group under XOR, so that the distances from every point
+            // are the same.
             (0..count).map(move |i| (digits(d, i) ^ first).leading_zeros()).collect::<Vec<u32>>()
         };
         let (a, b) = (alike(a), alike(b));
@@ -224,8 +229,8 @@ mod tests {
         levels.map(|(j, k)| component(j, k)).fold(0.0, f64::max)
     }
 
-    /// Table in docs/accuracy.md. The worst pairs join the second lobe and the branch choices: 4 to
-    /// 7.
+    /// Checks the table in docs/accuracy.md. The worst pairs of dimensions join the second lobe and
+    /// the branch choices: dimensions 4 to 7.
     #[test]
     fn worst_pairs_of_dimensions_are_the_documented_ones() {
         for (m, worst, first_lobes) in [
@@ -246,8 +251,8 @@ mod tests {
         assert!((0..4).all(|pair| gain(2 * pair, 2 * pair + 1, 6) <= 2.0));
     }
 
-    /// Sixteen points at aligned indices are one point XOR sixteen constants, as [`Sampler::block`]
-    /// requires.
+    /// Sixteen points at aligned indices are one point XOR sixteen constants. [`Sampler::block`]
+    /// relies on this.
     #[test]
     fn aligned_points_are_one_point_and_constants() {
         for d in 0..DIMENSIONS {

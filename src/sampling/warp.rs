@@ -1,15 +1,16 @@
-//! Sample warps from the unit square to directions: lobes of reflected rays and microfacet normals,
-//! with their densities.
+//! Sample warps: maps from the unit square to directions. They sample lobes of reflected rays and
+//! microfacet normals; their densities are included.
 //!
-//! Directions are in the frame of the lobe. Its z axis is the mirror direction for cone and square,
-//! the surface normal for microfacets.
+//! Directions are in the local frame of the lobe. The z axis is the mirror direction for cone and
+//! square lobes, and the surface normal for microfacets.
 
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
-/// Uniform point of the unit disk, and its squared distance from the centre. Concentric squares
-/// become circles, so that neighbours stay neighbours. An edge across the disk costs as many
-/// samples as one across the square, and fewer if it is parallel to an axis.
+/// Maps the unit square to the unit disk with uniform density. Returns the point and its squared
+/// distance from the centre. Concentric squares become circles, so that neighbouring points stay
+/// neighbours. An integrand with an edge across the disk needs as many samples as one with an edge
+/// across the square, and fewer if the edge is parallel to an axis.
 ///
 /// Shirley and Chiu 1997, *A Low Distortion Map Between Disk and Square*.
 #[inline(always)]
@@ -18,13 +19,13 @@ pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
     let (a, b) = (centred(u), centred(v));
     let wide = a.abs().gt(b.abs());
     let (far, near) = (L::select(wide, a, b), L::select(wide, b, a));
-    // In the centre the angle is arbitrary.
+    // At the centre the angle is arbitrary.
     let (s, c) = sin_cos_eighth(near / far.abs().max(L::from_f64(1e-30)).copysign(far));
     (far * L::select(wide, c, s), far * L::select(wide, s, c), far * far)
 }
 
-/// Coefficients by powers of x^2 of the series of the sine (`first` is 1) or cosine (0) of x
-/// eighths of a turn.
+/// Returns the coefficients of the power series in x^2 of the sine (`first` is 1) or cosine
+/// (`first` is 0) of x eighths of a turn.
 const fn series(first: u32) -> [f64; 8] {
     let mut terms = [0.0; 8];
     let (mut k, mut n, mut term) = (0, 0, 1.0);
@@ -39,8 +40,8 @@ const fn series(first: u32) -> [f64; 8] {
     terms
 }
 
-/// Sine and cosine of `x` eighths of a turn, for x in [-1, 1]: the first eight terms of their
-/// series, with an error of 1e-15.
+/// Sine and cosine of `x` eighths of a turn, for x in [-1, 1]. The error of the eight terms of the
+/// series is 1e-15.
 #[inline(always)]
 fn sin_cos_eighth<L: SimdFloat>(x: L) -> (L, L) {
     const SINE: [f64; 8] = series(1);
@@ -55,55 +56,57 @@ fn polynomial<L: SimdFloat>(k: &[f64], x: L) -> L {
     k.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::from_f64(*k)))
 }
 
-/// Uniform direction in the cone of half-angle theta about z.
+/// Samples a direction uniformly in the cone with half-angle theta around z.
 ///
-/// `one_minus_cos` is 1 - cos(theta), best computed as 2 sin^2(theta / 2); its range is [0, 1].
+/// `one_minus_cos` is 1 - cos(theta), in [0, 1]. It is computed most exactly as 2 sin^2(theta / 2).
 #[inline(always)]
 pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     let (x, y, r2) = disk(u, v);
     let drop = r2 * one_minus_cos;
-    // Areas on the sphere are proportional to areas on the disk; sin = r scale.
+    // The map preserves ratios of areas between disk and sphere. The sine of the angle is r times
+    // `scale`.
     let scale = (one_minus_cos * (L::from_f64(2.0) - drop)).max(L::zero()).sqrt();
     Vec3::new(x * scale, y * scale, L::one() - drop)
 }
 
-/// Density of [`cone`] [1/sr]: constant inside, 0 outside.
+/// Density of [`cone`] [1/sr]: constant inside of the cone, 0 outside.
 pub fn cone_pdf(direction_z: f64, one_minus_cos: f64) -> f64 {
     if 1.0 - direction_z <= one_minus_cos { 1.0 / (TAU * one_minus_cos) } else { 0.0 }
 }
 
-/// Direction through a uniform point of the square with sides `side` at unit distance,
-/// perpendicular to z and centred on it.
+/// Samples the direction through a uniform point of a square. The square has the side `side`, is
+/// perpendicular to z at unit distance, and is centred on z.
 #[inline(always)]
 pub fn square<L: SimdFloat>(u: L, v: L, side: L) -> Vec3<L> {
     let half = L::from_f64(0.5);
     Vec3::new((u - half) * side, (v - half) * side, L::one()).normalize()
 }
 
-/// Density of [`square`] [1/sr]: 1 / (side^2 cos^3) inside, 0 outside.
+/// Density of [`square`] [1/sr]: 1 / (side^2 cos^3) inside of the square, 0 outside.
 pub fn square_pdf(direction: [f64; 3], side: f64) -> f64 {
     let [x, y, z] = direction;
     let inside = z > 0.0 && x.abs().max(y.abs()) <= 0.5 * side * z;
     if inside { 1.0 / (side * side * z * z * z) } else { 0.0 }
 }
 
-/// Microfacet normal with density D(h) cos(h), Beckmann distribution of slope `alpha`. The slopes
-/// along x and y are independent normal deviates with variance alpha^2 / 2, one from each number,
-/// so that reflections of edges along the mirror's axes depend almost entirely on one number.
+/// Samples a microfacet normal h with the density D(h) cos(h), where D is the Beckmann distribution
+/// with the roughness `alpha`. The slopes along x and y are independent normal deviates with the
+/// variance alpha^2 / 2, each computed from one of the two numbers. Reflections of edges along the
+/// mirror's axes therefore depend almost entirely on one number.
 ///
-/// Walter et al. 2007, *Microfacet Models for Refraction through Rough Surfaces*, eq. 28, has the
-/// same density by radius and angle.
+/// Walter et al. 2007, *Microfacet Models for Refraction through Rough Surfaces*, eq. 28, sample
+/// the same density by radius and angle.
 #[inline(always)]
 pub fn beckmann<L: SimdFloat>(u: L, v: L, alpha: L) -> Vec3<L> {
     Vec3::new(alpha * erf_inverse(u), alpha * erf_inverse(v), L::one()).normalize()
 }
 
-/// Inverse of the error function at 2 u - 1, for u in [0, 1), to 4e-7 of its value (in double
-/// precision to 1.4e-7); at 0, where it is infinite, -4.7.
+/// Inverse of the error function at 2 u - 1, for u in [0, 1). The relative error is at most 4e-7,
+/// in double precision 1.4e-7. At u = 0, where the inverse is infinite, the result is -4.7.
 ///
-/// Form of Giles 2010, *Approximating the erfinv Function*, GPU Computing Gems, chapter 10:
-/// (2 u - 1) times a function of `w = -ln(1 - (2 u - 1)^2)`. The polynomials are fitted for the
-/// least relative error with w up to 23.
+/// The form is that of Giles 2010, *Approximating the erfinv Function*, GPU Computing Gems, chapter
+/// 10: (2 u - 1) times a function of `w = -ln(1 - (2 u - 1)^2)`. The polynomials were fitted for
+/// the smallest relative error with w up to 23.
 #[inline(always)]
 fn erf_inverse<L: SimdFloat>(u: L) -> L {
     const MIDDLE: [f64; 10] = [
@@ -134,7 +137,7 @@ fn erf_inverse<L: SimdFloat>(u: L) -> L {
     let w = -(L::from_f64(4.0) * positive * (L::one() - positive)).ln();
     let mut ratio = polynomial(&MIDDLE, w - L::from_f64(2.5));
     let in_tail = w.gt(L::from_f64(5.0));
-    // Probability 1 / 300.
+    // The probability of this case is 1 / 300.
     if in_tail.any() {
         let root = w.max(L::zero()).sqrt();
         ratio = L::select(in_tail, polynomial(&TAILS, root - L::from_f64(3.5)), ratio);
@@ -142,10 +145,11 @@ fn erf_inverse<L: SimdFloat>(u: L) -> L {
     ratio * (u + u - L::one())
 }
 
-/// Microfacet normal with density D_v(h): the GGX normals visible from `view` (unit, z >= 0).
+/// Samples a microfacet normal of the GGX distribution that is visible from `view` (unit vector, z
+/// >= 0), with the density D_v(h).
 ///
-/// Dupuy and Benyoub 2023, *Sampling Visible GGX Normals with Spherical Caps*. The cap is the image
-/// of a disk.
+/// Dupuy and Benyoub 2023, *Sampling Visible GGX Normals with Spherical Caps*. The spherical cap is
+/// sampled by the map from the disk.
 #[inline(always)]
 pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
     let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();
@@ -157,8 +161,8 @@ pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L>
     Vec3::new(h.x * alpha, h.y * alpha, h.z.max(L::zero())).normalize()
 }
 
-/// Beckmann distribution D [1/sr] of microfacet normals at squared tangent `tan2` from the surface
-/// normal: exp(-tan2 / alpha^2) / (pi alpha^2 cos^4), with 1 / cos^2 = 1 + tan2.
+/// Beckmann distribution D [1/sr] of microfacet normals: exp(-tan2 / alpha^2) / (pi alpha^2 cos^4).
+/// `tan2` is the squared tangent of the angle to the surface normal, and 1 / cos^2 = 1 + tan2.
 #[inline(always)]
 pub fn beckmann_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
     let secant2 = tan2 + L::one();
@@ -167,7 +171,8 @@ pub fn beckmann_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
         * (inverse_alpha2 * L::from_f64(FRAC_1_PI))
 }
 
-/// GGX distribution D [1/sr]: 1 / (pi alpha^2 cos^4 (1 + tan2 / alpha^2)^2).
+/// GGX distribution D [1/sr]: 1 / (pi alpha^2 cos^4 (1 + tan2 / alpha^2)^2), with the parameters of
+/// [`beckmann_d`].
 #[inline(always)]
 pub fn ggx_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
     let ratio = (tan2 + L::one()) / (tan2 * inverse_alpha2 + L::one());
@@ -180,7 +185,8 @@ mod tests {
     use crate::lanes::{Double, Float, Single};
     use std::f64::consts::PI;
 
-    /// Complementary error function 1 - erf(x) for x >= 0, by its continued fraction or series.
+    /// Complementary error function 1 - erf(x) for x >= 0, computed by its series or its continued
+    /// fraction.
     fn erfc(x: f64) -> f64 {
         let two_over_root_pi = 2.0 / PI.sqrt();
         if x < 2.0 {
@@ -201,7 +207,7 @@ mod tests {
     fn check_erf_inverse<L: SimdFloat>(numbers: &[f64], max_error: f64) {
         for u in numbers {
             let x: f64 = erf_inverse(L::from_f64(*u)).lane(0).to_f64();
-            // Error of u, converted to an error of x by the slope.
+            // Error of u, converted to an error of x by the slope of the error function.
             let tail = u.min(1.0 - u);
             let u_error = 0.5 * erfc(x.abs()) - tail;
             let per_x = (-x * x).exp() / PI.sqrt();
@@ -235,7 +241,7 @@ mod tests {
         assert!((-5.0..-4.5).contains(&inverse(0.0)), "{}", inverse(0.0));
     }
 
-    /// Checks that concentric squares become circles and that equal areas stay equal.
+    /// Checks that concentric squares become circles, and that the ratios of areas are preserved.
     fn check_disk<L: SimdFloat>(max_error: f64) {
         let point = |u: f64, v: f64| {
             let (x, y, r2) = disk(L::from_f64(u), L::from_f64(v));
@@ -249,7 +255,7 @@ mod tests {
             let side = (2.0 * u - 1.0).abs().max((2.0 * v - 1.0).abs());
             assert!((r2 - side * side).abs() < max_error && (x * x + y * y - r2).abs() < max_error);
             let angle = y.atan2(x);
-            // Quadrants in the order right, up, left, down.
+            // Directions are visited in the order right, up, left, down.
             let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
             let (eighths, ahead) = if a.abs() > b.abs() { (b / a, a) } else { (2.0 - a / b, b) };
             let eighth = if ahead > 0.0 { eighths } else { eighths + 4.0 };

@@ -1,19 +1,21 @@
-//! Resolution of the mesh and image files that a scene names.
+//! Resolver of the mesh and image files that a scene refers to.
 
 use crate::asset::{AssetError, Assets, Image, Mesh};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// Folder to which file names in a scene are relative, and a cache of the files that were read.
-/// Scenes derived from one another by edits share both, so that a file is read once.
+/// Resolver of the file names in a scene. It holds the folder to which the names are relative, and
+/// a cache of the files read so far. Scenes derived from one another by edits share the folder and
+/// the cache, so that each file is read once.
 #[derive(Clone, Debug, Default)]
 pub struct AssetResolver {
     folder: Arc<RwLock<PathBuf>>,
     assets: Arc<Assets>,
 }
 
-/// Always equal: two scenes with the same description are equal wherever their files are.
+/// Compares all resolvers as equal: two scenes with the same description are equal even if their
+/// files are in different folders.
 impl PartialEq for AssetResolver {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -21,8 +23,8 @@ impl PartialEq for AssetResolver {
 }
 
 impl AssetResolver {
-    /// Creates the resolver of a scene that is stored in the file `scene`; `assets` caches what is
-    /// read.
+    /// Creates the resolver of a scene that is stored in the file `scene`. `assets` is the cache of
+    /// the files that the scene refers to.
     pub fn new(scene: &Path, assets: Arc<Assets>) -> Self {
         let out = Self { folder: Arc::default(), assets };
         out.move_to(scene);
@@ -49,8 +51,8 @@ impl AssetResolver {
         self.assets.image(&self.folder().join(name))
     }
 
-    /// Returns `true` if `name` leads to a file from the present folder, but not to the same file
-    /// from the folder of `scene`.
+    /// Returns `true` if `name` is a file relative to the present folder, but not the same file
+    /// relative to the folder of the scene file `scene`.
     pub(super) fn breaks_when_moved(&self, name: &str, scene: &Path) -> bool {
         let there = fs::canonicalize(folder_of(scene).join(name));
         fs::canonicalize(self.folder().join(name))

@@ -8,9 +8,10 @@ use std::fmt;
 pub struct Diagnostic {
     /// The file, as the user named it.
     pub file: String,
-    /// Line and column, from 1; columns count characters. `None` means the file as a whole.
+    /// Line and column, both counted from 1; the column counts characters. `None` if the diagnostic
+    /// is about the whole file.
     pub line_column: Option<(usize, usize)>,
-    /// Table in question: `object "queen"`; empty means the scene.
+    /// Table that the diagnostic is about: `object "queen"`. Empty for the scene as a whole.
     pub subject: String,
     /// Finding, as a phrase.
     pub found: String,
@@ -18,7 +19,8 @@ pub struct Diagnostic {
     pub help: String,
 }
 
-/// Widest indentation of the second line.
+/// Largest indentation of the second line of a printed diagnostic [characters]. A shorter file name
+/// and location indent the second line by their own width.
 const MAX_INDENT: usize = 24;
 
 impl fmt::Display for Diagnostic {
@@ -41,7 +43,7 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// Errors in a scene file: at least one, in the order of the file.
+/// All errors of one scene file: at least one, sorted by location.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneErrors {
     messages: Vec<Diagnostic>,
@@ -51,7 +53,7 @@ pub struct SceneErrors {
 const MAX_SHOWN: usize = 20;
 
 impl SceneErrors {
-    /// Creates the errors from `messages`, at least one, and sorts them by location.
+    /// Creates the errors from `messages`, which must not be empty, and sorts them by location.
     pub(super) fn new(mut messages: Vec<Diagnostic>) -> Self {
         debug_assert!(!messages.is_empty(), "errors without a message");
         messages.sort_by_key(|m| m.line_column);
@@ -77,7 +79,7 @@ impl SceneErrors {
         }
     }
 
-    /// Returns the diagnostics, in the order of the file.
+    /// Returns the diagnostics, sorted by location.
     pub fn messages(&self) -> &[Diagnostic] {
         &self.messages
     }

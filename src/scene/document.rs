@@ -15,14 +15,14 @@ use toml_edit::DocumentMut;
 #[derive(Clone, Debug)]
 pub struct Document {
     name: String,
-    /// Text and scene as read. Every edit starts from these, so that undone changes come back with
-    /// their comments.
+    /// Text and scene as read. [`Document::apply`] changes a copy of this text each time, so that
+    /// undone changes come back with their comments.
     origin: (String, Scene),
-    /// Words of earlier versions in the text as read.
+    /// Keys and values in the text as read that have names of earlier versions of the program.
     former_words: Vec<FormerWord>,
     /// Warnings about the text as read.
     warnings: Vec<Diagnostic>,
-    /// The one of the warnings that is about words of earlier versions.
+    /// The warning in `warnings` that is about names of earlier versions.
     migration_warning: Option<Diagnostic>,
     text: String,
     scene: Scene,
@@ -37,7 +37,8 @@ impl Document {
         Self::read_with(path, Arc::default())
     }
 
-    /// Does the same as [`Document::read`]; `assets` caches the files that the scene names.
+    /// Reads and validates the scene file at `path`. `assets` is the cache of the files that the
+    /// scene refers to.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -47,7 +48,7 @@ impl Document {
             .and_then(|text| Self::parse_in(text, &name, AssetResolver::new(path, assets)))
     }
 
-    /// Reads and validates a scene from `text`; diagnostics call it `name`.
+    /// Parses and validates a scene from `text`. `name` is the file name in diagnostics.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -71,7 +72,7 @@ impl Document {
         })
     }
 
-    /// Creates a document for the valid `scene`; diagnostics call it `name`.
+    /// Creates a document for `scene`, which must be valid. `name` is the file name in diagnostics.
     pub fn new(scene: &Scene, name: &str) -> Self {
         let text = new_text(String::new(), &[], &Scene::default(), scene);
         Self {
@@ -85,7 +86,7 @@ impl Document {
         }
     }
 
-    /// Makes the text describe the valid `scene`.
+    /// Changes the text so that it describes `scene`, which must be valid.
     pub fn apply(&mut self, scene: &Scene) {
         let (text, old) = &self.origin;
         self.text = if scene == old && self.former_words.is_empty() {
@@ -117,20 +118,22 @@ impl Document {
         &self.text
     }
 
-    /// Returns the warnings about the file as it was read, in its order: [`Scene::warnings`] with
-    /// line and column, and one about words of earlier versions.
+    /// Returns the warnings about the file as it was read, sorted by location: those of
+    /// [`Scene::warnings`] with line and column, and one about names of earlier versions.
     pub fn warnings(&self) -> &[Diagnostic] {
         &self.warnings
     }
 
-    /// Returns the warning about words of earlier versions in the file as it was read.
+    /// Returns the warning about names of earlier versions in the file as it was read. Returns
+    /// `None` if the file has none of these names.
     pub fn migration_warning(&self) -> Option<&Diagnostic> {
         self.migration_warning.as_ref()
     }
 }
 
-/// Returns `text`, which describes `old`, changed to describe `new`. Uniform line ends are kept (a
-/// mixture becomes LF), as are a byte order mark and a missing line end at the end of the file.
+/// Changes `text`, which describes the scene `old`, to describe the scene `new`, and returns the
+/// result. Uniform line ends are kept, as are a byte order mark and a missing line end at the end
+/// of the file. Mixed line ends become LF.
 fn new_text(text: String, former_words: &[FormerWord], old: &Scene, new: &Scene) -> String {
     let (mark, body) = match text.strip_prefix('\u{feff}') {
         Some(body) => ("\u{feff}", body),
@@ -138,7 +141,7 @@ fn new_text(text: String, former_words: &[FormerWord], old: &Scene, new: &Scene)
     };
     let crlf = body.contains('\n') && body.matches('\n').count() == body.matches("\r\n").count();
     let open_end = !body.is_empty() && !body.ends_with('\n');
-    // Neither can fail: the text was parsed before, and TOML can express every scene.
+    // Neither call can fail: the text was parsed before, and TOML can express every scene.
     let mut document: DocumentMut = body.replace("\r\n", "\n").parse().expect("text that was read");
     let tree = |scene| toml::Table::try_from(scene).expect("a scene is a TOML table");
     write_present(&mut document, former_words);

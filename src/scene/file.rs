@@ -22,11 +22,11 @@ pub struct SceneFile {
 /// State of the file, compared with the bytes that this program last read or wrote.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DiskState {
-    /// Equal, or there is no file yet.
+    /// The file has these bytes, or the scene has no file yet.
     Unchanged,
-    /// Written by another program, or no longer readable.
+    /// Another program has written the file, or the file is no longer readable.
     Changed,
-    /// Deleted or moved.
+    /// The file has been deleted or moved.
     Missing,
 }
 
@@ -78,7 +78,8 @@ impl SceneFile {
         Self::open_with(path, Arc::default())
     }
 
-    /// Does the same as [`SceneFile::open`]; `assets` caches the files that the scene names.
+    /// Reads and validates the scene file at `path`. `assets` is the cache of the files that the
+    /// scene refers to.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -88,7 +89,7 @@ impl SceneFile {
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }
 
-    /// Creates a scene without a file; diagnostics call it `name`.
+    /// Creates a scene without a file. `name` is the file name in diagnostics.
     ///
     /// # Errors
     /// As [`Scene::parse`].
@@ -96,8 +97,8 @@ impl SceneFile {
         Ok(Self { path: None, document: Document::parse(text, name)?, fingerprint: 0 })
     }
 
-    /// Creates a scene from the recovered `text` of the file at `path`, which has other content
-    /// now. Saving replaces that content.
+    /// Creates a scene from `text`, the recovered edits of the file at `path`. The file has other
+    /// content now; saving replaces that content.
     ///
     /// # Errors
     /// As [`Scene::parse`].
@@ -107,8 +108,8 @@ impl SceneFile {
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }
 
-    /// Reads `text` as a scene, with this file's folder for the files that it names; diagnostics
-    /// call it `name`.
+    /// Parses `text` as a scene. File names in the scene are relative to the folder of this file.
+    /// `name` is the file name in diagnostics.
     ///
     /// # Errors
     /// As [`Scene::parse`].
@@ -116,14 +117,14 @@ impl SceneFile {
         Scene::parse_in(text, name, self.document.scene().resolver.clone())
     }
 
-    /// Returns the hash of the bytes that this program last read from or wrote to the file; `None`
-    /// without a file.
+    /// Returns the hash of the bytes that this program last read from or wrote to the file. Returns
+    /// `None` if the scene has no file.
     pub fn fingerprint(&self) -> Option<u64> {
         self.path.as_ref().map(|_| self.fingerprint)
     }
 
-    /// Returns `true` if `text` is what this program last read from or wrote to the file; without a
-    /// file, if it is the text that the scene started from.
+    /// Returns `true` if `text` is the text that this program last read from or wrote to the file.
+    /// For a scene without a file, the text from which the scene was created counts.
     pub fn holds(&self, text: &str) -> bool {
         match self.path {
             Some(_) => fnv1a64(text.as_bytes()) == self.fingerprint,
@@ -138,7 +139,7 @@ impl SceneFile {
         document.text().to_string()
     }
 
-    /// Returns the path of the file.
+    /// Returns the path of the file; `None` if the scene has no file.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()
     }
@@ -176,8 +177,8 @@ impl SceneFile {
     /// The file is replaced atomically; a symbolic link stays a link, and permissions stay.
     ///
     /// # Errors
-    /// If there is no file yet, if another program has written it (unless `overwrite`), or if it
-    /// cannot be written.
+    /// If there is no file yet, if another program has written the file (unless `overwrite` is
+    /// `true`), or if the file cannot be written.
     pub fn save(&mut self, scene: &Scene, overwrite: bool) -> Result<(), SaveError> {
         let Some(path) = self.path.clone() else { return Err(SaveError::Untitled) };
         if !overwrite && self.on_disk() == DiskState::Changed {
@@ -194,7 +195,7 @@ impl SceneFile {
     /// Writes the valid `scene` to another file, which becomes the scene's file.
     ///
     /// # Errors
-    /// If the file exists (unless `overwrite`), or if it cannot be written.
+    /// If the file exists (unless `overwrite` is `true`), or if the file cannot be written.
     pub fn save_as(
         &mut self,
         path: &Path,
@@ -265,7 +266,8 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
     let mut builder = tempfile::Builder::new();
     let [prefix, suffix] = TEMPORARY;
     builder.prefix(prefix).suffix(suffix);
-    // An existing file keeps its permissions; a new one gets those that the umask leaves.
+    // An existing file keeps its permissions; a new file gets the permissions that the umask
+    // leaves.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -282,7 +284,7 @@ fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
     });
     let explained = |error: io::Error| failed(explain(&error, directory));
     let temporary = written.map_err(explained)?;
-    // A file that was created in the meantime is not overwritten either.
+    // The file is not overwritten even if it was created in the meantime.
     let persisted =
         if overwrite { temporary.persist(&file) } else { temporary.persist_noclobber(&file) };
     persisted.map_err(|e| match e.error.kind() {

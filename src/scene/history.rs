@@ -7,7 +7,7 @@ use crate::scene::{Object, Scene, TransformOp};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Largest memory of the scenes in the history [bytes], estimated.
+/// Largest estimated memory of all scenes in the history [bytes].
 const MAX_BYTES: usize = 64 << 20;
 /// Largest number of steps that can be undone.
 const MAX_STEPS: usize = 10_000;
@@ -19,9 +19,9 @@ pub struct History {
     /// Scenes before each step that can be undone, the oldest first.
     past: VecDeque<HistoryEntry>,
     now: Arc<Scene>,
-    /// Scenes after each step that can be redone, the next one last.
+    /// Scenes after each step that can be redone; the step to redo next is the last entry.
     future: Vec<HistoryEntry>,
-    /// `true` while the next step of the same gesture is coalesced with the last one.
+    /// `true` while a gesture lasts: its next step is coalesced with its last one.
     open: bool,
     saved: Arc<Scene>,
 }
@@ -64,7 +64,7 @@ impl History {
         let before = std::mem::replace(&mut self.now, scene);
         self.open = held;
         if grows {
-            // A gesture that ends at its start leaves no step.
+            // A gesture that returns to the scene at its start leaves no step.
             if self.past.back().is_some_and(|last| *last.scene == *self.now) {
                 self.now = self.past.pop_back().map_or(before, |last| last.scene);
                 self.open = false;
@@ -81,7 +81,7 @@ impl History {
         self.open = false;
     }
 
-    /// Goes back one step and returns its label; `None` if there is none.
+    /// Undoes the last step and returns its label; `None` if no step can be undone.
     pub fn undo(&mut self) -> Option<String> {
         self.open = false;
         let HistoryEntry { scene, label, .. } = self.past.pop_back()?;
@@ -90,7 +90,7 @@ impl History {
         Some(label)
     }
 
-    /// Goes forward one undone step and returns its label; `None` if there is none.
+    /// Redoes the step undone last and returns its label; `None` if no step can be redone.
     pub fn redo(&mut self) -> Option<String> {
         self.open = false;
         let HistoryEntry { scene, label, .. } = self.future.pop()?;
@@ -99,12 +99,12 @@ impl History {
         Some(label)
     }
 
-    /// Returns the label of the step that [`History::undo`] would undo.
+    /// Returns the label of the step that [`History::undo`] would undo; `None` if there is none.
     pub fn undo_label(&self) -> Option<&str> {
         self.past.back().map(|entry| entry.label.as_str())
     }
 
-    /// Returns the label of the step that [`History::redo`] would redo.
+    /// Returns the label of the step that [`History::redo`] would redo; `None` if there is none.
     pub fn redo_label(&self) -> Option<&str> {
         self.future.last().map(|entry| entry.label.as_str())
     }
@@ -120,12 +120,12 @@ impl History {
         Arc::ptr_eq(&self.saved, &self.now) || *self.saved == *self.now
     }
 
-    /// Drops all steps; `scene` is the current and the saved one.
+    /// Drops all steps and makes `scene` the current and the saved scene.
     pub fn restart(&mut self, scene: Arc<Scene>) {
         *self = Self::new(scene);
     }
 
-    /// Drops the oldest steps beyond the memory limit.
+    /// Drops the oldest steps until the rest keeps the memory limit.
     fn forget(&mut self) {
         let mut total: usize = self.past.iter().map(|entry| entry.bytes).sum();
         while self.past.len() > 1 && (total > MAX_BYTES || self.past.len() > MAX_STEPS) {

@@ -6,8 +6,9 @@ use crate::scene::validate::Problem;
 use crate::value::{Color, number};
 
 impl Scene {
-    /// Returns one warning for each kind of doubtful value: the first case, and the number of
-    /// others. [`Document::warnings`](crate::scene::Document::warnings) adds file, line and column.
+    /// Returns one warning for each kind of doubtful value. The warning states the first such value
+    /// and the number of others. [`Document::warnings`](crate::scene::Document::warnings) adds
+    /// file, line and column.
     pub fn warnings(&self) -> Vec<Problem> {
         let materials = |lint: &dyn Fn(&Material) -> Option<(&'static str, String)>| {
             let mut cases = self.materials.iter().filter_map(|(n, m)| Some((n, lint(m)?)));
@@ -83,8 +84,9 @@ impl Scene {
     }
 }
 
-/// Finds responses to the same light that add up to more than 1: diffuse, highlight, reflection. A
-/// Cook-Torrance highlight is the reflection of a light in the surface and is not added to it.
+/// Finds a material that may reflect more light than it receives: its diffuse, highlight and
+/// reflection parts add up to more than 1. A Cook-Torrance highlight is itself the reflection of a
+/// light, so that the larger of highlight and reflection counts.
 fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     let mirrored = match m.highlight {
         Highlight::Phong => m.specular + m.reflection,
@@ -92,7 +94,7 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     };
     let f0 = m.metal.map(|metal| metal.f0()).or(m.f0).unwrap_or(Color::WHITE).largest();
     let passed = match m.fresnel_mode() {
-        // F and 1 - F of the same light.
+        // A dielectric divides the same light into F and 1 - F: the larger weight bounds the sum.
         Fresnel::Dielectric => mirrored.max(m.transmission),
         _ => mirrored * f0 + m.transmission,
     };

@@ -1,8 +1,8 @@
 //! The scene: the user's description, validated, in double precision, editable.
 //!
-//! Reading a file parses and validates once ([`Document`]), and so does every edit ([`edit::Edit`]).
-//! The fields of [`Scene`] are public and may be set to invalid values in between, so that a render
-//! session validates the scene that it is given.
+//! [`Document`] parses and validates a file once; every edit ([`edit::Edit`]) is validated once,
+//! too. The fields of [`Scene`] are public and may be set to invalid values in between, so that a
+//! render session validates the scene that it is given.
 
 mod asset_resolver;
 mod builtin;

@@ -23,7 +23,8 @@ description! {
 pub const OBJECT_FIELDS: &[Field] = Object::FIELDS;
 
 impl Object {
-    /// Returns the material of each part of the compiled form; a simple object has one part.
+    /// Returns the material name of each part of the compiled form; an object that is no compound
+    /// has one part.
     pub fn materials(&self) -> Vec<&str> {
         self.shape.part_materials(&self.material)
     }
@@ -33,8 +34,8 @@ impl Object {
         self.material == name || self.shape.named_materials().iter().any(|(_, own)| *own == name)
     }
 
-    /// Replaces the material `old` of the object and its parts by `new`. An empty name means the
-    /// default material, in a part the material of the whole.
+    /// Replaces the material name `old` of the object and its parts by `new`. An empty name means
+    /// the default material in an object, and the material of the whole in a part.
     pub fn rename_material(&mut self, old: &str, new: &str) {
         let names = self.shape.part_names_mut().into_iter().chain([&mut self.material]);
         for name in names.filter(|name| *name == old) {
@@ -55,8 +56,8 @@ impl Object {
         }
     }
 
-    /// Validates the object, except that its material exists, which
-    /// [`Scene::faults`](crate::scene::Scene::faults) checks.
+    /// Returns the validation errors of the object. [`Scene::faults`](crate::scene::Scene::faults)
+    /// checks in addition that its material exists.
     pub fn faults(&self) -> Vec<ValidationError> {
         let checks = self.validator();
         let moved =

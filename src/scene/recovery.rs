@@ -2,9 +2,9 @@
 //!
 //! The text that saving would write is kept in a hidden file beside the scene. It is replaced
 //! atomically, and removed when the scene is saved or closed deliberately. The process that writes
-//! the file holds a lock on it, which ends with the process: an unlocked recovery file is an orphan
-//! of a process that was killed. The lock is taken before the file gets its name, so that other
-//! processes never see the file of a running process unlocked.
+//! the file holds a lock on it; the lock ends with the process. An unlocked recovery file is an
+//! orphan of a process that was killed. The lock is taken before the file gets its name, so that
+//! other processes never see the file of a running process unlocked.
 
 use crate::value::fnv1a64;
 use std::ffi::{OsStr, OsString};
@@ -19,9 +19,9 @@ use tempfile::NamedTempFile;
 const MAX_FILES: u32 = 9;
 /// Size above which a file is not read [bytes].
 const MAX_BYTES: u64 = 64 << 20;
-/// Start of the first line; the fingerprint of the scene's file follows.
+/// Start of the first line of a recovery file; the fingerprint of the scene's file follows.
 const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
-/// Replaces the fingerprint if there was no file.
+/// Word in place of the fingerprint if the scene had no file.
 const NO_FILE: &str = "none";
 /// Prefix and suffix of the names of temporary files.
 pub(super) const TEMPORARY: [&str; 2] = [".zerkalo-", ".tmp"];
@@ -43,19 +43,19 @@ struct Saved {
     file: File,
 }
 
-/// Recovery files found at the start.
+/// Result of the search for recovery files of a scene.
 #[derive(Debug, Default)]
 pub struct RecoveryFile {
     /// Orphaned edits, the newest first.
     pub orphans: Vec<Orphan>,
-    /// Files that cannot be read, and the reason. They stay on disk.
+    /// Recovery files that cannot be read, each with the reason. These files stay on disk.
     pub unreadable: Vec<(PathBuf, String)>,
     /// `true` if another running process has unsaved edits of the scene.
     pub elsewhere: bool,
 }
 
-/// Edits of a process that was killed. The file is locked while this exists, so that no other
-/// process finds it.
+/// Unsaved edits of a process that was killed. The recovery file stays locked as long as this value
+/// exists, so that no other process finds the file.
 #[derive(Debug)]
 pub struct Orphan {
     kept: Saved,
@@ -68,9 +68,9 @@ pub struct Orphan {
     pub written: SystemTime,
 }
 
-/// Returns the user's state folder (XDG Base Directory Specification) from the environment
-/// `variable`s. It holds the recovery files of scenes that have no file, or whose folder is not
-/// writable.
+/// Returns the user's state folder (XDG Base Directory Specification); `None` if the environment
+/// does not define it. `variable` returns the value of an environment variable. The folder holds
+/// the recovery files of scenes that have no file, or whose folder is not writable.
 pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     let absolute = |name| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let folder = absolute("XDG_STATE_HOME");
@@ -79,11 +79,11 @@ pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathB
 }
 
 impl Recovery {
-    /// Creates the recovery of the scene in the file at `path`, or, without a file, of the scene
-    /// called `name`. `state` is [`state_folder`].
+    /// Creates the recovery of the scene in the file at `path`, or of a scene without a file that
+    /// is called `name`. `state` is the folder from [`state_folder`].
     pub fn new(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
         let mut candidates = Vec::new();
-        let called = match path {
+        let stem = match path {
             Some(path) => {
                 // Every path to the same file gives the same name.
                 let canonical = fs::canonicalize(path).or_else(|_| std::path::absolute(path));
@@ -100,16 +100,17 @@ impl Recovery {
             None => format!("{:.40}", name.replace('/', "-")),
         };
         candidates
-            .extend(state.map(|folder| (folder.to_path_buf(), format!("{called}.unsaved").into())));
+            .extend(state.map(|folder| (folder.to_path_buf(), format!("{stem}.unsaved").into())));
         Self { candidates, saved: None }
     }
 
-    /// Returns the path of the recovery file, if there is one.
+    /// Returns the path of the recovery file; `None` if none is written.
     pub fn path(&self) -> Option<&Path> {
         self.saved.as_ref().map(|saved| saved.path.as_path())
     }
 
-    /// Writes `text`, the file that saving would write over one with the fingerprint `base`.
+    /// Writes the recovery file. `text` is the scene file as saving would write it; `base` is the
+    /// fingerprint of the scene file that saving would replace.
     ///
     /// # Errors
     /// If no candidate folder is writable; the previous recovery file stays.
@@ -135,7 +136,7 @@ impl Recovery {
         Err(failed)
     }
 
-    /// Removes the recovery file, since no edits are unsaved.
+    /// Removes the recovery file. Callers use this when no edits are unsaved.
     pub fn forget(&mut self) {
         if let Some(saved) = self.saved.take() {
             saved.remove();
@@ -164,7 +165,7 @@ impl Recovery {
         found
     }
 
-    /// Makes the orphaned edits those of this session.
+    /// Takes over the recovery file of `lost` as that of this session.
     pub fn take_up(&mut self, lost: Orphan) {
         self.forget();
         self.saved = Some(lost.kept);
@@ -210,7 +211,7 @@ fn is_same(a: &Metadata, b: &Metadata) -> bool {
     a.created().ok() == b.created().ok()
 }
 
-/// Returns `name`, `name-2`, `name-3`.
+/// Returns `name` for the number 1, `name-2` for 2, `name-3` for 3.
 fn numbered(name: &OsStr, number: u32) -> OsString {
     let mut name = name.to_os_string();
     if number > 1 {
@@ -257,7 +258,8 @@ fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved>
     ))
 }
 
-/// Opens for writing as well, without which some file systems grant no lock.
+/// Opens the file at `path` for reading and for writing; some file systems grant a lock only on a
+/// file that is open for writing.
 fn open(path: &Path) -> io::Result<File> {
     File::options().read(true).write(true).open(path)
 }
@@ -265,9 +267,10 @@ fn open(path: &Path) -> io::Result<File> {
 /// Returns the orphaned edits in the file at `path`; `None` if there is no such file.
 ///
 /// # Errors
-/// [`ErrorKind::WouldBlock`] if a running process holds the lock; otherwise if it cannot be read.
+/// [`ErrorKind::WouldBlock`] if a running process holds the lock; any other error if the file
+/// cannot be read.
 fn read_orphan(path: &Path) -> io::Result<Option<Orphan>> {
-    // Another process may replace the file after it was opened: then the new one is read.
+    // Another process may replace the file after it was opened here: then the new file is read.
     for _ in 0..5 {
         // The type is checked before opening, since opening a pipe can block forever.
         match fs::symlink_metadata(path) {

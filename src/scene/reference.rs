@@ -102,7 +102,8 @@ fn push(out: &mut String, text: &str) {
     out.push_str(text);
 }
 
-/// Appends what the row of `field` refers to: its words, or its own keys.
+/// Appends the details that the row of `field` refers to: the words that it accepts, or the keys of
+/// its table.
 fn nested(out: &mut String, field: &Field) {
     match field.takes {
         ValueType::Choice(choices) => {

@@ -95,7 +95,7 @@ impl FieldValue for Acceleration {
     }
 }
 
-/// Largest number of pixels: 8192 x 8192.
+/// Largest number of pixels of a picture: that of 8192 x 8192.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
 /// Keys of `[film]`.
@@ -108,7 +108,7 @@ pub const BACKGROUND_FIELDS: &[Field] = Background::FIELDS;
 pub const AMBIENT_FIELDS: &[Field] = Ambient::FIELDS;
 
 impl FilmSettings {
-    /// Returns the errors in the film settings.
+    /// Returns the validation errors of the film settings.
     pub fn faults(&self) -> Vec<ValidationError> {
         let [width, height] = self.size;
         let errors = self.validator().errors();
@@ -126,21 +126,21 @@ impl FilmSettings {
 }
 
 impl IntegratorSettings {
-    /// Returns the errors in the integrator settings.
+    /// Returns the validation errors of the integrator settings.
     pub fn faults(&self) -> Vec<ValidationError> {
         self.validator().errors()
     }
 }
 
 impl Background {
-    /// Returns the errors in the background.
+    /// Returns the validation errors of the background settings.
     pub fn faults(&self) -> Vec<ValidationError> {
         self.validator().errors()
     }
 }
 
 impl Ambient {
-    /// Returns the errors in the ambient light.
+    /// Returns the validation errors of the ambient light settings.
     pub fn faults(&self) -> Vec<ValidationError> {
         self.validator().errors()
     }

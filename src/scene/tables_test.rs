@@ -25,7 +25,8 @@ fn same_keys<T: DeserializeOwned>(what: &str, fields: &[Field]) {
     assert_eq!(serde_keys, documented, "{what}");
 }
 
-/// Compares documented defaults with what is read when only the keys in `needed` are given.
+/// Asserts that the documented defaults of `fields` are those that serde uses for missing keys.
+/// `needed` is a table with only the required keys.
 fn same_defaults<T: DeserializeOwned + Serialize>(what: &str, fields: &[Field], needed: &str) {
     let read: T = toml::from_str(needed).unwrap_or_else(|e| panic!("{what}: {e}"));
     let written = toml::Table::try_from(&read).unwrap();
@@ -230,7 +231,7 @@ fn every_shape_number_is_range_checked() {
     }
 }
 
-/// Returns the errors of a union of a ball and `part`.
+/// Returns the validation errors of a union of a ball and `part`, as key and message.
 fn faults_of(part: &str) -> Vec<(String, String)> {
     let ball = "{ shape.sphere = { center = [0, 0, 0], radius = 1 } }";
     let shape: Shape = toml::from_str(&format!("union.of = [{ball}, {part}]")).unwrap();

@@ -10,9 +10,10 @@ use std::fmt;
 /// An error or a warning about a scene, without file and line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Path to the value, keys and positions in lists (from 0): `object`, `3`, `shape`, `sphere`.
+    /// Path to the value, which consists of keys and list indices (from 0): `object`, `3`, `shape`,
+    /// `sphere`.
     pub path: Vec<String>,
-    /// Table in question: `object "queen"`; empty means the scene.
+    /// Table that the problem is about: `object "queen"`. Empty for the scene as a whole.
     pub subject: String,
     /// Finding, as a phrase.
     pub found: String,
@@ -66,8 +67,8 @@ impl Scene {
         Problem { subject: self.subject(&path), path, found, help }
     }
 
-    /// Loads the files that the scene names, unless they are loaded already. Errors in them are
-    /// found by the next validation.
+    /// Loads the files that the scene refers to, unless they are loaded already. The next
+    /// validation reports the files that cannot be read.
     pub fn resolve(&mut self) {
         let resolver = &self.resolver;
         for object in &mut self.objects {
@@ -78,7 +79,8 @@ impl Scene {
         }
     }
 
-    /// Validates the scene. A scene that was read is valid; an edited one may not be.
+    /// Returns all validation errors of the scene. A scene that was read from a file has none; an
+    /// edited scene may have some.
     pub fn faults(&self) -> Vec<Problem> {
         let mut problems = Vec::new();
         let mut add = |path: &[&str], faults: Vec<ValidationError>| {
@@ -114,8 +116,8 @@ impl Scene {
         problems
     }
 
-    /// Finds materials whose textures need coordinates that the object's shape does not have. The
-    /// shapes must be valid.
+    /// Adds a problem for each material whose textures need coordinates that the object's shape
+    /// does not have. The shapes must be valid.
     fn missing_coordinates(&self, problems: &mut Vec<Problem>) {
         let uv_key = |name: &str| {
             let material = self.materials.get(name)?;

@@ -6,8 +6,8 @@ use crate::shape::texture_space::around_axis;
 use crate::value::{ValidationError, unit};
 use glam::{DAffine3, DMat3, DVec3};
 
-/// Conical frustum around the axis from `base` to `top`, two different points. The radii at the ends
-/// are at least 0 and not both 0.
+/// Returns a conical frustum around the axis from `base` to `top`, two different points. The radii
+/// at the ends are at least 0 and not both 0.
 pub(super) fn frustum_between(
     base: [f64; 3],
     top: [f64; 3],
@@ -33,7 +33,7 @@ pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
     around_axis(unit(axis).unwrap_or(DVec3::Y))
 }
 
-/// Returns an error if the axis, which ends at the key `name`, has length 0.
+/// Returns an error for the key `name`, which is an end of the axis, if the axis has length 0.
 pub(super) fn degenerate_axis(
     base: [f64; 3],
     top: [f64; 3],

@@ -44,7 +44,8 @@ impl ShapeDesc for Cone {
         vec![&mut self.base, &mut self.apex]
     }
 
-    /// An upright cone is symmetric about the vertical.
+    /// Returns `true`, without a change, if the cone is upright: it is symmetric about the
+    /// vertical.
     fn rotate_y(&mut self, _: f64) -> bool {
         is_upright(self.base, self.apex)
     }

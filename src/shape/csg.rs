@@ -19,18 +19,18 @@ pub const MAX_DEPTH: usize = 64;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CsgOperand {
-    /// Shape of the part: a solid, or a plane for the half-space behind it.
+    /// Shape of the part: a solid, or a plane, which means the half-space behind the plane.
     pub shape: Shape,
-    /// Key of the scene's `materials`; empty for the material of the whole.
+    /// Name of one of the scene's materials; empty for the material of the whole compound.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub material: String,
-    /// Steps that move, rotate and scale the part inside the whole, in order.
+    /// Steps that move, rotate and scale the part inside the whole compound, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub transform: Vec<TransformOp>,
 }
 
-// A `description!` would have constants, and a constant cannot be part of a table that refers to
-// itself: shapes have parts, parts have shapes.
+// `description!` would declare constants, and constants cannot refer to each other in a cycle. The
+// fields of shapes contain the fields of parts, and the fields of parts contain those of shapes.
 static PART_FIELDS: [Field; 3] = [
     Field::required(
         "shape",
@@ -54,7 +54,7 @@ static PART_FIELDS: [Field; 3] = [
     ),
 ];
 
-/// Keys of a compound kind.
+/// Keys of a union, an intersection or a difference.
 pub(super) static OF_FIELDS: [Field; 1] = [Field::required(
     "of",
     ValueType::Tables(&PART_FIELDS),
@@ -138,7 +138,8 @@ compounds! {
 ]";
 }
 
-/// Returns a block of this size on `base`, and a ball that protrudes at its upper right near corner.
+/// Returns a block on `base` of nine tenths of `size`, and a ball that protrudes from the block at
+/// its upper right near corner.
 fn fitted_to(base: DVec3, size: DVec3) -> [Shape; 2] {
     let block = Cuboid::fitted_to(base, size * 0.9);
     let radius = 0.4 * size.min_element();
@@ -154,7 +155,7 @@ impl CsgOperand {
     }
 }
 
-/// Returns the parts of a compound; `None` if the shape is a simple one.
+/// Returns the parts of a compound; `None` if the shape is no compound.
 pub(super) fn parts_of(shape: &Shape) -> Option<&[CsgOperand]> {
     match shape {
         Shape::Union(Union { of })
@@ -164,7 +165,7 @@ pub(super) fn parts_of(shape: &Shape) -> Option<&[CsgOperand]> {
     }
 }
 
-/// Mutable [`parts_of`]; empty if the shape is a simple one.
+/// Returns the parts of a compound for changes; empty if the shape is no compound.
 fn parts_of_mut(shape: &mut Shape) -> &mut [CsgOperand] {
     match shape {
         Shape::Union(Union { of })
@@ -174,7 +175,8 @@ fn parts_of_mut(shape: &mut Shape) -> &mut [CsgOperand] {
     }
 }
 
-/// Compiles parts to one solid: `join` combines their trees.
+/// Compiles `of`, the parts of a compound, to one solid. `join` combines the CSG trees of the
+/// parts.
 fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     let mut parts = Vec::new();
     let mut trees = Vec::new();
@@ -193,7 +195,7 @@ fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     CsgSolid { parts, tree: join(trees) }
 }
 
-/// Returns the reason why `shape` cannot be a part, if there is one.
+/// Returns the reason why `shape` cannot be a part of a compound; `None` if it can be one.
 fn unfit_reason(shape: &Shape) -> Option<&'static str> {
     match shape {
         Shape::Rectangle(_) | Shape::HorizontalRectangle(_) => {
@@ -204,7 +206,7 @@ fn unfit_reason(shape: &Shape) -> Option<&'static str> {
     }
 }
 
-/// Returns the errors of the parts of a compound that is nested `depth` deep.
+/// Returns the validation errors of `of`, the parts of a compound that is nested `depth` deep.
 fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     let mut faults = Vec::new();
     if of.len() < 2 {
@@ -244,12 +246,14 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     faults
 }
 
-/// A reference to a material in a compound: dotted key below the shape's, and material name.
+/// A reference to a material from inside a compound: the dotted key below that of the shape, and
+/// the name of the material.
 pub type Named<'a> = (String, &'a str);
 
 impl Shape {
-    /// Returns the material of each part of the shape's form, in the order of [`CsgSolid::parts`]: the
-    /// part's own, else that of the enclosing part, else `whole`. A simple shape has one part.
+    /// Returns the material name of each part of the shape's form, in the order of
+    /// [`CsgSolid::parts`]. A part without a material of its own has that of the enclosing part, or
+    /// `whole` if no enclosing part has one. A shape that is no compound has one part.
     pub fn part_materials<'a>(&'a self, whole: &'a str) -> Vec<&'a str> {
         match parts_of(self) {
             None => vec![whole],
@@ -263,7 +267,7 @@ impl Shape {
         }
     }
 
-    /// Returns the material names of all parts, including empty ones.
+    /// Returns the material names of all parts; the name of a part without a material is empty.
     pub fn part_names_mut(&mut self) -> Vec<&mut String> {
         let mut names = Vec::new();
         for part in parts_of_mut(self) {
@@ -273,7 +277,7 @@ impl Shape {
         names
     }
 
-    /// Returns the materials that its parts name.
+    /// Returns the references to materials in the parts of the shape; empty if it is no compound.
     pub fn named_materials(&self) -> Vec<Named<'_>> {
         let mut named = Vec::new();
         for (i, part) in parts_of(self).into_iter().flatten().enumerate() {

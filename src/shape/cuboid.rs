@@ -1,7 +1,8 @@
 //! Box with sides parallel to the axes.
 //!
-//! Described by centre and sizes, like platform and rectangle: one key moves it, and the description
-//! cannot be inside out, as a pair of corners could. A `transform` rotates it.
+//! A box is described by its centre and sizes, as platform and rectangle are. One key moves the
+//! box, and the description cannot be inside out, as a pair of corners could. A `transform` rotates
+//! the box.
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;

@@ -42,7 +42,8 @@ static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
             corners.push(DVec3::from(corner));
         }
     }
-    // Edges are 2 long; every three corners that are pairwise neighbours form a triangle.
+    // The edges of the icosahedron have length 2. Every three corners that are pairwise neighbours
+    // form a triangle.
     let near = |a: usize, b: usize| corners[a].distance_squared(corners[b]) < 4.1;
     let mut triangles = Vec::new();
     for a in 0..12 {
@@ -78,7 +79,7 @@ static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
 });
 
 impl MeshDesc {
-    /// Returns the mesh of the file, or the placeholder if there is none.
+    /// Returns the mesh of the file, or the placeholder if no mesh was read.
     fn mesh(&self) -> &Arc<Mesh> {
         match &self.content {
             Some(Ok(mesh)) => mesh,
@@ -109,7 +110,8 @@ impl ShapeDesc for MeshDesc {
         }
     }
 
-    /// Creates the placeholder at the origin; only a transform moves a mesh.
+    /// Creates a mesh without a file, which is the placeholder at the origin; only a transform
+    /// moves a mesh.
     fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self::default()
     }
@@ -124,7 +126,8 @@ impl ShapeDesc for MeshDesc {
 }
 
 impl Shape {
-    /// Loads the file that the shape names with `load`, unless it has been searched already.
+    /// Loads the file that the shape names with `load`, unless its content or an error is there
+    /// already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
         if let Self::MeshDesc(mesh) = self
             && !mesh.file.is_empty()
@@ -134,7 +137,7 @@ impl Shape {
         }
     }
 
-    /// Takes the content of the file from `other`, if both shapes name the same file.
+    /// Copies the content of the file from `other`, if both shapes name the same file.
     pub fn resolve_as(&mut self, other: &Self) {
         if let (Self::MeshDesc(new), Self::MeshDesc(old)) = (self, other)
             && new.file == old.file
@@ -143,7 +146,7 @@ impl Shape {
         }
     }
 
-    /// Returns the file that the shape names, if any.
+    /// Returns the file that the shape names; `None` if the shape is no mesh or names no file.
     pub fn file(&self) -> Option<&str> {
         match self {
             Self::MeshDesc(mesh) if !mesh.file.is_empty() => Some(&mesh.file),
@@ -164,7 +167,7 @@ mod tests {
         let (low, high) = form.bounds().unwrap();
         assert!((low - DVec3::new(-0.5, 0.0, -0.5)).length() < 1e-6, "{low}");
         assert!((high - DVec3::new(0.5, 1.0, 0.5)).length() < 1e-6, "{high}");
-        // All corners have the same distance from the centre; all fronts face outwards.
+        // All corners are at the same distance from the centre, and all fronts face outwards.
         let point =
             |i: u32| DVec3::from(mesh.positions[i as usize].map(f64::from)) - DVec3::Y * 0.5;
         for t in &mesh.triangles {

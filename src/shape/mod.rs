@@ -1,4 +1,5 @@
-//! Shapes as users describe them, one kind per file. `primitive` has what rays intersect.
+//! Shapes as users describe them, one kind per file. The module `primitive` has the compiled
+//! geometry that rays intersect.
 
 mod axial;
 mod cone;

@@ -23,17 +23,17 @@ pub(super) fn prismoid(
     let centroid = base.iter().sum::<DVec2>() / base.len() as f64;
     let (sin, cos) = sin_cos_degrees(rotation);
     let turned = |v: DVec2| DVec2::new(v.x * cos + v.y * sin, v.y * cos - v.x * sin);
-    // (b - c) + c is exact where (b + corner - c) + c is rounded: a cube without rotation keeps its
+    // (b - c) + c is exact, but (b + corner - c) + c is rounded: a cube without rotation keeps its
     // corner.
-    let place = |scale: f64, b: DVec2, y: f64| {
+    let corner_at = |scale: f64, b: DVec2, y: f64| {
         let offset = centroid + turned(b - centroid) * scale;
         corner + DVec3::new(offset.x, y, offset.y)
     };
-    let mut corners: Vec<DVec3> = base.iter().map(|b| place(1.0, *b, 0.0)).collect();
+    let mut corners: Vec<DVec3> = base.iter().map(|b| corner_at(1.0, *b, 0.0)).collect();
     if top_over_base > 0.0 {
-        corners.extend(base.iter().map(|b| place(top_over_base, *b, height)));
+        corners.extend(base.iter().map(|b| corner_at(top_over_base, *b, height)));
     } else {
-        corners.push(place(0.0, centroid, height));
+        corners.push(corner_at(0.0, centroid, height));
     }
 
     let through = |point: DVec3, normal: DVec3| HalfSpace { normal, offset: normal.dot(point) };
@@ -54,8 +54,8 @@ pub(super) fn prismoid(
     Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners })
 }
 
-/// Returns the corner of a base `width` wide and `depth` deep around `base`, half of both away towards
-/// -x and +z, rounded to short decimals.
+/// Returns the corner of a base with the centre `base`, rounded to short decimals. The corner is
+/// half of `width` from the centre towards -x and half of `depth` towards +z.
 pub(super) fn corner_of_centered(base: DVec3, width: f64, depth: f64) -> [f64; 3] {
     let scale = width.min(depth);
     [round_nice(base.x - width / 2.0, scale), base.y, round_nice(base.z + depth / 2.0, scale)]

@@ -24,12 +24,12 @@ fn up() -> [f64; 3] {
 }
 
 impl Rectangle {
-    /// Returns unit vectors to the right (seen from the front), up and to the front; `None` if `up` is
-    /// parallel to the normal.
+    /// Returns unit vectors to the right (seen from the front), up and to the front. Returns `None`
+    /// if `up` is parallel to the normal.
     fn frame(&self) -> Option<[DVec3; 3]> {
         let front = unit(self.normal)?;
         let right = unit(self.up)?.cross(front);
-        // Within 1e-6 of parallel, rounding errors determine the direction.
+        // If the vectors are parallel within 1e-6, rounding errors would determine the direction.
         (right.length() > 1e-6).then(|| {
             let right = right.normalize();
             [right, front.cross(right), front]

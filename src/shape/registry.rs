@@ -1,4 +1,4 @@
-//! Table of shape kinds. A new kind is one file and one line here.
+//! Table of shape kinds. A new kind needs a file of its own and one line in this table.
 
 use crate::primitive::Form;
 use crate::shape::csg::OF_FIELDS;
@@ -16,10 +16,10 @@ pub trait ShapeDesc: Description {
     /// Example for a scene file.
     const EXAMPLE: &'static str;
 
-    /// Compiles the geometry in double precision. The description has no faults.
+    /// Compiles the geometry in double precision. The description must be valid.
     fn form(&self) -> Form;
 
-    /// Returns the errors of the description.
+    /// Returns the validation errors of the description.
     fn faults(&self) -> Vec<ValidationError> {
         self.validator().errors()
     }
@@ -33,24 +33,25 @@ pub trait ShapeDesc: Description {
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]>;
 
     /// Rotates the shape by `degrees` about the vertical through its centre, counter-clockwise seen
-    /// from above. Returns `false`, without a change, if the kind has no key for it.
+    /// from above. Returns `false`, without a change, if the keys of the kind cannot express the
+    /// rotation.
     fn rotate_y(&mut self, degrees: f64) -> bool;
 
-    /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace) in the shape's space:
-    /// right-handed, orthonormal.
+    /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace), as right-handed,
+    /// orthonormal vectors in the shape's space.
     fn texture_axes(&self) -> DMat3 {
         DMat3::IDENTITY
     }
 }
 
-/// Returns the angle `rotation + degrees` in the form of a scene file: above -180, at most 180.
+/// Returns the angle `rotation + degrees` in the range of scene files: above -180, at most 180.
 pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
     let angle = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
 }
 
-/// Keys of a kind. Compounds pass the name of their static: a constant cannot be part of a table that
-/// refers to itself.
+/// Returns the keys of a kind. A compound passes the name of a static with its keys: a constant
+/// cannot be part of a table that refers to itself.
 macro_rules! keys {
     ($kind:ident) => {
         $kind::FIELDS
@@ -72,7 +73,8 @@ macro_rules! kinds {
             )+
         }
 
-        // A static, because the parts of compounds have shapes: the table refers to itself.
+        // A static instead of a constant, because the table refers to itself: parts of compounds
+        // have shapes.
         pub(super) static KIND_TABLE: [Field; [$($key),+].len()] = [
             $(Field::required($key, ValueType::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
         ];
@@ -84,22 +86,23 @@ macro_rules! kinds {
         pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE),)+];
 
         impl Shape {
-            /// Returns the key of its kind.
+            /// Returns the key of the shape's kind.
             pub fn key(&self) -> &'static str {
                 match self {
                     $(Self::$kind(_) => $key,)+
                 }
             }
 
-            /// Compiles the geometry in double precision, before the object's transform. The shape has
-            /// no faults.
+            /// Compiles the geometry in double precision, before the object's transform. The shape
+            /// must be valid.
             pub fn form(&self) -> Form {
                 match self {
                     $(Self::$kind(kind) => kind.form(),)+
                 }
             }
 
-            /// Returns the errors of the description, with keys that begin with the kind's.
+            /// Returns the validation errors of the shape; their keys begin with the key of its
+            /// kind.
             pub fn faults(&self) -> Vec<ValidationError> {
                 let faults = match self {
                     $(Self::$kind(kind) => kind.faults(),)+
@@ -114,7 +117,8 @@ macro_rules! kinds {
                 }
             }
 
-            /// Creates the kind with this key by [`ShapeDesc::fitted_to`]; `None` if no kind has it.
+            /// Creates a shape of the kind `key` by [`ShapeDesc::fitted_to`]; `None` if there is no
+            /// such kind.
             pub fn fitted_to(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
                 match key {
                     $($key => Some(Self::$kind($kind::fitted_to(base, size))),)+
@@ -130,8 +134,9 @@ macro_rules! kinds {
                 }
             }
 
-            /// Rotates the shape by `degrees` about the vertical through its centre, counter-clockwise
-            /// seen from above. Returns `false`, without a change, if its kind has no key for it.
+            /// Rotates the shape by `degrees` about the vertical through its centre,
+            /// counter-clockwise seen from above. Returns `false`, without a change, if the keys of
+            /// its kind cannot express the rotation.
             pub fn rotate_y(&mut self, degrees: f64) -> bool {
                 match self {
                     $(Self::$kind(kind) => kind.rotate_y(degrees),)+
@@ -175,7 +180,7 @@ impl FieldValue for Shape {
 }
 
 impl Shape {
-    /// Returns the first of the points that place the shape; the origin if there are none.
+    /// Returns the first of the points that place the shape; the origin if there is none.
     pub fn position(&self) -> DVec3 {
         self.clone()
             .anchor_points_mut()

@@ -35,7 +35,7 @@ impl ShapeDesc for Sphere {
         vec![&mut self.center]
     }
 
-    /// A sphere is symmetric about the vertical.
+    /// Returns `true` without a change: a sphere is symmetric about the vertical.
     fn rotate_y(&mut self, _: f64) -> bool {
         true
     }

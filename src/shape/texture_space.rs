@@ -6,20 +6,22 @@ use crate::shape::csg::parts_of;
 use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
 
-/// Texture space of a simple shape: x to the right, y up or along its axis, z to the front or along
-/// its normal. Its unit is the scene unit before the object's transform.
+/// Texture space of a shape that is no compound: x to the right, y up or along the axis of the
+/// shape, z to the front or along its normal. The unit is the scene unit before the object's
+/// transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureSpace {
     /// Map from the texture space to the space of the whole shape.
     pub shape_from_texture: DAffine3,
-    /// Corners of the shape's bounding box in texture space; both are the `point` of a plane.
+    /// Lowest and highest corner of the shape's bounding box, in texture space. For a plane, both
+    /// corners are its `point`.
     pub corners: [DVec3; 2],
-    /// Mapping for `mapping = "auto"`.
+    /// Mapping that `mapping = "auto"` selects for the shape.
     pub default_mapping: DefaultMapping,
 }
 
 impl TextureSpace {
-    /// Creates the texture space of a simple shape without faults.
+    /// Creates the texture space of a valid shape that is no compound.
     fn new(shape: &Shape) -> Self {
         let form = shape.form();
         let shape_from_texture = DAffine3::from_mat3(shape.texture_axes());
@@ -43,8 +45,8 @@ impl TextureSpace {
 }
 
 impl Shape {
-    /// Returns the texture spaces of its parts, in the order of [`Form::parts`](crate::primitive::Form::parts). The shape has no
-    /// faults.
+    /// Returns the texture space of each part of the shape, in the order of
+    /// [`Form::parts`](crate::primitive::Form::parts). The shape must be valid.
     pub fn texture_spaces(&self) -> Vec<TextureSpace> {
         let Some(of) = parts_of(self) else { return vec![TextureSpace::new(self)] };
         let inner = |part: &crate::shape::CsgOperand| {
@@ -59,7 +61,8 @@ impl Shape {
     }
 }
 
-/// Returns orthonormal axes around `y`, with x as close to the right as possible.
+/// Returns orthonormal axes whose second one is the unit vector `y`; x points as far to the right
+/// as possible.
 pub(super) fn around_axis(y: DVec3) -> DMat3 {
     let across = y.cross(DVec3::Z);
     let x = if across.length() > 1e-3 { across.normalize() } else { DVec3::X };
@@ -67,8 +70,8 @@ pub(super) fn around_axis(y: DVec3) -> DMat3 {
     DMat3::from_cols(x, y, x.cross(y))
 }
 
-/// Returns orthonormal axes on a plane with the unit normal `z`, with y as close to up as possible; on
-/// a horizontal plane y points away from the viewer.
+/// Returns orthonormal axes of a plane with the unit normal `z`; y points up as far as possible. On
+/// a horizontal plane that faces up, y points away from the viewer.
 pub(super) fn on_plane(z: DVec3) -> DMat3 {
     let up = if z.y.abs() > 0.999 { DVec3::NEG_Z * z.y.signum() } else { DVec3::Y };
     let x = up.cross(z).normalize();

@@ -30,7 +30,8 @@ impl ShapeDesc for Torus {
         TorusForm { scene_from_torus, ring: self.ring, tube: self.tube }.into()
     }
 
-    /// A tube that is wider than the ring would cross itself: a spindle torus has two surfaces.
+    /// Returns the validation errors. A tube that is wider than the ring is an error: it would
+    /// cross itself, and such a spindle torus has two surfaces.
     fn faults(&self) -> Vec<ValidationError> {
         let spindle = (self.ring > 0.0 && self.tube > self.ring).then(|| {
             let found = format!("tube ({}) is larger than ring ({})", self.tube, self.ring);
@@ -42,7 +43,8 @@ impl ShapeDesc for Torus {
             .errors()
     }
 
-    /// Lies flat, with a tube of a third of the ring.
+    /// Creates a torus that lies flat; the radius of its tube is at most a third of that of the
+    /// ring.
     fn fitted_to(base: DVec3, size: DVec3) -> Self {
         let across = size.x.min(size.z);
         let tube = round_nice((across / 8.0).min(size.y / 2.0), across);

@@ -10,7 +10,8 @@ use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 
-/// One step of a transform. Angles are in degrees, counter-clockwise seen against the axis.
+/// One step of a transform. Angles are in degrees, counter-clockwise for a viewer at whom the axis
+/// points.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TransformOp {
@@ -105,7 +106,7 @@ pub const TRANSFORM_OP_FIELDS: &[Field] = &[
 const ANGLE: ValueType = ValueType::Number(NumberRange::FINITE);
 
 impl TransformOp {
-    /// Returns the step as an affine map. The step has no faults.
+    /// Returns the step as an affine map. The step must be valid.
     pub fn map(&self) -> DAffine3 {
         match *self {
             Self::Translate(by) => DAffine3::from_translation(DVec3::from_array(by)),
@@ -119,7 +120,7 @@ impl TransformOp {
         }
     }
 
-    /// Returns the errors of the step.
+    /// Returns the validation errors of the step.
     pub fn faults(&self) -> Vec<ValidationError> {
         let checks = Validator::new(TRANSFORM_OP_FIELDS);
         match self {
@@ -181,7 +182,9 @@ pub fn compose(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |map, step| step.map() * map)
 }
 
-/// Returns the error of `steps` as a whole on `shape`, although each step is valid.
+/// Returns an error if all `steps` together flatten or tear apart `shape`, move it beyond the
+/// largest coordinate, or make it too small for its distance from the origin. Each of the steps
+/// must be valid.
 pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<ValidationError> {
     if steps.is_empty() {
         return None;

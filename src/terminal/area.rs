@@ -7,20 +7,20 @@ pub struct Area {
     pub x: u16,
     /// First row.
     pub y: u16,
-    /// Columns.
+    /// Number of columns.
     pub width: u16,
-    /// Rows.
+    /// Number of rows.
     pub height: u16,
 }
 
 impl Area {
-    /// Returns `true` if the cell in this column and row is inside.
+    /// Returns `true` if the cell at `column` and `row` is inside the area.
     pub fn contains(&self, column: u16, row: u16) -> bool {
         (self.x..self.x + self.width).contains(&column)
             && (self.y..self.y + self.height).contains(&row)
     }
 
-    /// Returns the area inside a border of one cell.
+    /// Returns the area that remains inside a border of one cell on each side.
     pub fn inner(&self) -> Self {
         Self {
             x: self.x + 1,

@@ -1,9 +1,10 @@
-//! Capabilities of the terminal and of a multiplexer before it, by environment and replies.
+//! Capabilities of the terminal, and of a multiplexer if the program runs inside one. They are
+//! derived from the environment and from the terminal's replies.
 
 use crate::terminal::cells::Colors;
 use std::time::Duration;
 
-/// Program between the dashboard and the terminal that keeps a screen of its own.
+/// Terminal multiplexer: a program between the dashboard and the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Multiplexer {
     /// tmux.
@@ -21,45 +22,47 @@ pub struct Environment {
     pub color_term: String,
     /// `true` if `NO_COLOR` is set and not empty.
     pub no_color: bool,
-    /// `SSH_CONNECTION`: address and port of the client, then of the server; `None` without SSH.
+    /// `SSH_CONNECTION`: address and port of the client, then of the server. `None` without SSH.
     pub ssh: Option<String>,
-    /// Multiplexer by `TMUX`, `STY` or `TERM`.
+    /// Multiplexer, recognised by `TMUX`, `STY` or `TERM`.
     pub multiplexer: Option<Multiplexer>,
 }
 
-/// Capabilities of the terminal. `None` means that it has not replied.
+/// Capabilities of the terminal. A field is `None` if the terminal has not replied to its request.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capabilities {
     /// Environment variables.
     pub environment: Environment,
-    /// Number of colours, by environment and replies.
+    /// Number of colours, derived from environment and replies.
     pub colors: Colors,
-    /// `true` if it knows synchronised updates (mode 2026).
+    /// `true` if the terminal supports synchronised updates (mode 2026).
     pub synchronised: bool,
     /// Name and version (XTVERSION).
     pub version: Option<String>,
-    /// Background, 8-bit sRGB (OSC 11).
+    /// Background colour, 8-bit sRGB (OSC 11).
     pub background: Option<[u8; 3]>,
-    /// `true` if it knows kitty's graphics protocol.
+    /// `true` if the terminal supports kitty's graphics protocol.
     pub kitty_graphics: bool,
     /// `true` if kitty's images can be placed by Unicode placeholders, as tmux requires.
     pub placeholders: bool,
-    /// `true` if it knows sixel.
+    /// `true` if the terminal supports sixel.
     pub sixel: bool,
-    /// Most colours of a sixel image.
+    /// Largest number of colours of a sixel image.
     pub sixel_colors: Option<u16>,
     /// Largest width and height of a sixel image in pixels.
     pub sixel_px: Option<[u16; 2]>,
     /// Width and height of a cell in pixels.
     pub cell_px: Option<[u16; 2]>,
-    /// Round trip of the first request.
+    /// Time from the first request to its reply, by the multiplexer if there is one.
     pub round_trip: Option<Duration>,
-    /// Round trip of a request that passes through the multiplexer to the outermost terminal.
+    /// Round trip of a request that the multiplexer passes through to the terminal outside it.
+    /// `None` if it was not measured or the multiplexer passes no requests through.
     pub passthrough: Option<Duration>,
 }
 
 impl Environment {
-    /// Reads the environment. `variable` returns the value of a variable.
+    /// Reads the environment. `variable` is a function that returns the value of the variable of a
+    /// given name.
     pub fn of(variable: impl Fn(&str) -> Option<String>) -> Self {
         let variable = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = variable("TERM").unwrap_or_default();
@@ -79,7 +82,7 @@ impl Environment {
         }
     }
 
-    /// Returns the number of colours by the environment alone.
+    /// Returns the number of colours that the environment alone indicates.
     pub fn colors(&self) -> Colors {
         /// Values of `TERM` with 24-bit colour that do not end in `-direct` or `-truecolor`.
         const TRUE: [&str; 8] = [

@@ -1,19 +1,20 @@
 //! Decoder of terminal input: bytes to keys, mouse reports, pasted text and replies.
 //!
 //! `vte` divides the input into characters, control sequences and strings (ECMA-48), and
-//! [`Interpreter`] reads these as a whole. An unknown reply is therefore skipped as a whole: it never
-//! becomes keys and never hides later keys. `vte` is made for the output of programs; the decoder
-//! handles these parts of keyboard input before it:
+//! [`Interpreter`] interprets each of them as a unit. An unknown reply is therefore skipped as a
+//! unit: it is never decoded as keys and never hides later keys. `vte` is made for the output of
+//! programs, not for keyboard input. The decoder therefore handles these cases before `vte` does:
 //!
-//! - A lone ESC is the key Escape and `ESC c` is Alt-c for any `c`. `vte` waits after ESC without
-//!   end, executes a control character in place, and takes `ESC X` and `ESC ^` for strings. It gets
-//!   ESC together with the byte that proves the sequence.
-//! - `ESC O c` (SS3), `ESC [ [ c` (Linux console) and `ESC [ M b x y` (X10 mouse) end after the
-//!   final byte that `vte` knows.
+//! - A lone ESC is the key Escape and `ESC c` is Alt-c for any `c`. After ESC `vte` waits without
+//!   limit, executes a control character at once, and takes `ESC X` and `ESC ^` for the start of a
+//!   string. The decoder passes ESC on only together with a byte that proves a sequence.
+//! - `ESC O c` (SS3), `ESC [ [ c` (Linux console) and `ESC [ M b x y` (X10 mouse) have further
+//!   bytes after the byte that `vte` takes for the final one.
 //! - Pasted text may hold any bytes.
-//! - `vte` discards the data of APC strings, in which kitty replies. It gets `ESC P` for `ESC _`.
+//! - `vte` discards the data of APC strings (`ESC _`), in which kitty replies. The decoder passes
+//!   them on as DCS strings (`ESC P`).
 //! - `vte` ends a DCS string at the byte 9C, which is also part of UTF-8 characters such as Ü.
-//! - `vte` keeps a control sequence open across control characters. A key typed after a cut-off
+//! - `vte` keeps a control sequence open across control characters. A key typed after an incomplete
 //!   sequence would be lost.
 
 use crate::terminal::event::Code;
@@ -21,15 +22,16 @@ use crate::terminal::sequence::{Interpreter, console_key, single_shift, x10_mous
 use crate::terminal::{Event, Key, Reply};
 use std::time::Duration;
 
-/// Longest pause after an introducer that is also a key with Alt (`ESC [`, `ESC O`, …).
+/// Longest pause after an introducer (`ESC [`, `ESC O`, …), which can also be a key pressed with
+/// Alt.
 const INTRODUCER_WAIT: Duration = Duration::from_millis(500);
-/// Longest pause inside any other sequence.
+/// Longest pause inside any other sequence but pasted text.
 const SEQUENCE_WAIT: Duration = Duration::from_secs(2);
 /// Longest pause inside pasted text.
 const PASTE_WAIT: Duration = Duration::from_secs(10);
-/// Most bytes of a string that are kept; further ones are skipped.
+/// Largest number of bytes of a string that are kept. Further bytes are skipped.
 const MAX_STRING: usize = 4096;
-/// Most bytes of pasted text that are kept; further ones are skipped.
+/// Largest number of bytes of pasted text that are kept. Further bytes are skipped.
 const MAX_PASTE: usize = 1 << 20;
 
 const ESC: u8 = 0x1b;
@@ -38,16 +40,16 @@ const CAN: u8 = 0x18;
 const SUB: u8 = 0x1a;
 const PASTE_END: &[u8] = b"\x1b[201~";
 
-/// Position in the input, as far as the decoder needs it.
+/// State of the decoder: the kind of sequence that the next byte belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Ground,
     /// Inside a UTF-8 character.
     Character,
     Escape,
-    /// After ESC and this byte, which begin a sequence or are a key with Alt.
+    /// After ESC and this byte, which start a sequence or are a key pressed with Alt.
     Introducer(u8),
-    /// After `ESC O` and the modifiers.
+    /// After `ESC O` and this number for the modifiers.
     SingleShift(u16),
     /// Inside a control sequence.
     ControlSequence,
@@ -55,22 +57,22 @@ enum State {
     Console,
     /// After `ESC [ M`.
     X10Mouse,
-    /// In a string that ESC and this byte have begun.
+    /// Inside a string that started with ESC and this byte.
     String(u8),
-    /// After ESC in such a string.
+    /// After ESC inside a string that started with ESC and this byte.
     StringEscape(u8),
     Paste,
 }
 
-/// Decoder of terminal input. The caller measures time: after [`Decoder::patience`] without a byte
-/// it calls [`Decoder::give_up`].
+/// Decoder of terminal input. The caller measures time: if no byte comes within
+/// [`Decoder::patience`], the caller calls [`Decoder::give_up`].
 pub struct Decoder {
     parser: vte::Parser,
     interpreter: Interpreter,
     state: State,
-    /// Pasted text, or the bytes of an X10 mouse report.
+    /// Bytes of the pasted text or of the X10 mouse report that is being decoded.
     taken: Vec<u8>,
-    /// Bytes of the string so far.
+    /// Number of bytes of the current string so far.
     string_length: usize,
     escape_wait: Duration,
     /// `true` if the last byte was an ESC that became the key Escape.
@@ -78,8 +80,8 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// Creates a decoder. `escape_wait` is the longest pause between ESC and a byte that belongs to
-    /// it; only then is it certain that ESC is the key Escape.
+    /// Creates a decoder. `escape_wait` is the longest pause between ESC and the next byte of its
+    /// sequence. After a longer pause ESC is the key Escape.
     pub fn new(escape_wait: Duration) -> Self {
         Self {
             parser: vte::Parser::new(),
@@ -92,7 +94,7 @@ impl Decoder {
         }
     }
 
-    /// Decodes bytes that were read together. Returns the events that they complete.
+    /// Decodes `bytes`, which were read together. Returns the events that these bytes complete.
     pub fn take(&mut self, bytes: &[u8]) -> Vec<Event> {
         if std::mem::take(&mut self.escape_given_up) && is_reply_without_escape(bytes) {
             self.state = State::Escape;
@@ -103,7 +105,8 @@ impl Decoder {
         std::mem::take(&mut self.interpreter.events)
     }
 
-    /// Longest time to wait for the next byte; `None` between sequences.
+    /// Longest time to wait for the next byte before [`Decoder::give_up`]. Returns `None` between
+    /// sequences.
     pub fn patience(&self) -> Option<Duration> {
         match self.state {
             State::Ground => None,
@@ -114,7 +117,7 @@ impl Decoder {
         }
     }
 
-    /// Ends the sequence in progress after a pause. Returns the events that its bytes make.
+    /// Ends an incomplete sequence after a pause. Returns the events decoded from its bytes.
     pub fn give_up(&mut self) -> Vec<Event> {
         match self.state {
             State::Escape => {
@@ -141,7 +144,7 @@ impl Decoder {
                 let is_complete = self.interpreter.is_character_complete;
                 self.state = if is_complete { State::Ground } else { State::Character };
             }
-            // The character was cut off.
+            // The UTF-8 character is incomplete.
             (State::Character, _) => {
                 self.restart();
                 self.byte(byte);
@@ -218,7 +221,7 @@ impl Decoder {
             }
             (State::StringEscape(_), b'\\') => self.end_string(b"\x1b\\"),
             (State::StringEscape(_), _) => {
-                // The string was cut off by another sequence.
+                // Another sequence interrupts the string.
                 self.restart();
                 self.state = State::Escape;
                 self.byte(byte);
@@ -230,7 +233,7 @@ impl Decoder {
         self.parser.advance(&mut self.interpreter, bytes);
     }
 
-    /// Returns to the ground state of decoder and parser.
+    /// Resets the decoder and the parser to the ground state.
     fn restart(&mut self) {
         self.parser = vte::Parser::new();
         self.interpreter.alt = false;
@@ -238,7 +241,7 @@ impl Decoder {
         self.taken.clear();
     }
 
-    /// Decodes `byte` as if no sequence had begun.
+    /// Decodes `byte` as the first one after a complete sequence.
     fn in_ground(&mut self, byte: u8) {
         let alt = self.interpreter.alt;
         self.restart();
@@ -252,7 +255,7 @@ impl Decoder {
         self.restart();
     }
 
-    /// Ends a string with `terminator`, which makes the parser report it.
+    /// Ends a string. `terminator` makes the parser report the string to the interpreter.
     fn end_string(&mut self, terminator: &[u8]) {
         self.parse(terminator);
         let reply = std::mem::replace(&mut self.interpreter.reply, Reply::Other);
@@ -260,7 +263,7 @@ impl Decoder {
     }
 
     fn paste(&mut self, byte: u8) {
-        // Skipped bytes are still searched for the end.
+        // Skipped bytes are still examined for the end of the paste.
         if self.taken.len() >= MAX_PASTE + PASTE_END.len() {
             self.taken.remove(MAX_PASTE);
         }
@@ -276,7 +279,8 @@ impl Decoder {
         self.complete(Some(Event::Paste(text)));
     }
 
-    /// Reports an introducer without successor as a key with Alt.
+    /// Reports the key Alt-`[`, Alt-`O` or the like if the incomplete sequence consists of an
+    /// introducer alone.
     fn abandon(&mut self) {
         if let State::Introducer(introducer) = self.state {
             self.interpreter.alt = true;
@@ -285,8 +289,8 @@ impl Decoder {
     }
 }
 
-/// Returns `true` if bytes read together after a lone ESC can only be the remainder of a reply:
-/// these are not typed within one read.
+/// Returns `true` if `bytes`, read together after a lone ESC, can only be the rest of a reply.
+/// Typed bytes would not come together in one read.
 fn is_reply_without_escape(bytes: &[u8]) -> bool {
     matches!(
         bytes,

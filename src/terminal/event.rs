@@ -6,13 +6,13 @@ use std::str::FromStr;
 /// Key without modifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Code {
-    /// A character as typed. A capital letter has no `shift`.
+    /// A character as typed. `shift` is `false` for a capital letter.
     Char(char),
     /// Enter.
     Enter,
     /// Escape.
     Esc,
-    /// Tab; with `shift` back-tab.
+    /// Tab. Together with `shift` it is back-tab.
     Tab,
     /// Backspace.
     Backspace,
@@ -34,7 +34,7 @@ pub enum Code {
     PageUp,
     /// Page down.
     PageDown,
-    /// A function key.
+    /// Function key with its number, 1 for F1.
     F(u8),
 }
 
@@ -47,7 +47,7 @@ pub struct Key {
     pub ctrl: bool,
     /// Alt is pressed.
     pub alt: bool,
-    /// Shift is pressed; `false` for characters.
+    /// Shift is pressed. Always `false` for characters.
     pub shift: bool,
 }
 
@@ -61,13 +61,13 @@ impl Key {
 /// Kind of a mouse event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MouseKind {
-    /// A button went down.
+    /// A button was pressed.
     Press(Button),
-    /// The mouse moved with a button down.
+    /// The mouse moved while a button was pressed.
     Drag(Button),
-    /// A button came up.
+    /// A button was released.
     Release(Button),
-    /// Wheel: ticks towards (negative) or away from the user (positive).
+    /// The wheel was turned by this number of ticks: negative towards the user, positive away.
     Scroll(i32),
 }
 
@@ -87,15 +87,16 @@ pub enum Button {
 pub struct Mouse {
     /// Kind.
     pub kind: MouseKind,
-    /// Column of the cell, from 0.
+    /// Column of the cell, counted from 0.
     pub column: u16,
-    /// Row of the cell, from 0.
+    /// Row of the cell, counted from 0.
     pub row: u16,
-    /// With Control or Alt (terminals keep Shift for themselves).
+    /// `true` if Control or Alt is pressed. Terminals do not report Shift, which they use
+    /// themselves.
     pub modified: bool,
 }
 
-/// Names of keys without a character.
+/// Names of the keys that are not named by their character.
 const NAMED: &[(&str, Code)] = &[
     ("Enter", Code::Enter),
     ("Esc", Code::Esc),

@@ -6,9 +6,10 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::{self, Stdin};
 use std::time::{Duration, Instant};
 
-/// Longest pause between ESC and a byte that belongs to it.
+/// Longest pause between ESC and the next byte of its sequence. After a longer pause ESC is the key
+/// Escape.
 const ESCAPE_WAIT: Duration = Duration::from_millis(40);
-/// Longest such pause over SSH, where packets can split a sequence.
+/// The longest pause after ESC over SSH, where a sequence can be split between packets.
 const ESCAPE_WAIT_OVER_SSH: Duration = Duration::from_millis(120);
 
 /// Event with the time at which it was read.
@@ -20,7 +21,7 @@ pub struct Timed {
     pub event: Event,
 }
 
-/// Reader of the terminal on stdin.
+/// Reader of keys, mouse events and replies from stdin.
 pub struct Keyboard {
     stdin: Stdin,
     decoder: Decoder,
@@ -29,7 +30,7 @@ pub struct Keyboard {
 }
 
 impl Keyboard {
-    /// Creates a reader for a terminal with this `environment`.
+    /// Creates a reader of stdin. `environment` describes its terminal.
     pub fn new(environment: &Environment) -> Self {
         let wait = if environment.ssh.is_some() { ESCAPE_WAIT_OVER_SSH } else { ESCAPE_WAIT };
         Self {
@@ -40,7 +41,8 @@ impl Keyboard {
         }
     }
 
-    /// Waits for events until `deadline`. Returns none if none has come.
+    /// Waits for events until `deadline`, without limit if it is `None`. Returns an empty list if
+    /// no event has come by then.
     ///
     /// # Errors
     /// If the terminal is gone.
@@ -75,12 +77,13 @@ impl Keyboard {
         }
     }
 
-    /// Keeps events for the next [`Keyboard::wait`].
+    /// Stores events that the next [`Keyboard::wait`] returns.
     pub fn keep(&mut self, early: Vec<Timed>) {
         self.early.extend(early);
     }
 
-    /// Returns `true` if input comes within `wait`, `None` if a signal interrupted.
+    /// Returns `true` if input comes within `wait`. Returns `None` if a signal interrupted the
+    /// wait.
     fn is_ready(&self, wait: Option<Duration>) -> io::Result<Option<bool>> {
         let wait = wait.map(|wait| Timespec {
             tv_sec: wait.as_secs() as _,

@@ -1,5 +1,6 @@
 //! Terminal driver: decoding of input, probing of capabilities, raw mode and restoration, cells and
-//! images as bytes, frame differences, flow control. It knows no scene and no renderer.
+//! images as bytes, frame differences, flow control. The module is independent of scenes and of the
+//! renderer.
 
 mod area;
 mod capabilities;
@@ -36,7 +37,7 @@ pub enum Event {
     Mouse(Mouse),
     /// Pasted text.
     Paste(String),
-    /// Reply to a request.
+    /// Reply of the terminal to a request of the program.
     Reply(Reply),
 }
 
@@ -50,26 +51,26 @@ pub enum Reply {
         /// Column.
         column: u16,
     },
-    /// Device attributes (DA1), such as 4 for sixel.
+    /// Device attributes (DA1): numbers of the supported features, such as 4 for sixel.
     Attributes(Vec<u16>),
     /// State of a private mode (DECRPM).
     Mode {
-        /// The mode.
+        /// Number of the mode.
         mode: u16,
-        /// 0 unknown, 1 set, 2 reset, 3 always set, 4 never set.
+        /// State: 0 unknown, 1 set, 2 reset, 3 permanently set, 4 permanently reset.
         setting: u16,
     },
-    /// Colour of the background, 8-bit sRGB (OSC 11).
+    /// Default background colour, 8-bit sRGB (OSC 11).
     Background([u8; 3]),
     /// Name and version (XTVERSION).
     Version(String),
-    /// Valid reply to DECRQSS.
+    /// Current value of a setting: a valid reply to DECRQSS, which requests one.
     Setting(String),
-    /// Reply of kitty's graphics protocol; `true` for `OK`.
+    /// Reply of kitty's graphics protocol. `true` means `OK`.
     Graphics(bool),
     /// Width and height of a cell in pixels.
     CellSize([u16; 2]),
-    /// Most colours of a sixel image (XTSMGRAPHICS).
+    /// Largest number of colours of a sixel image (XTSMGRAPHICS).
     SixelColors(u16),
     /// Largest width and height of a sixel image in pixels (XTSMGRAPHICS).
     SixelSize([u16; 2]),

@@ -1,8 +1,8 @@
 //! Probe of the terminal's capabilities, before the first frame.
 //!
-//! All requests go out in one write. Terminals reply in order, and every terminal replies to the last
-//! request, for the device attributes: its reply ends the probe. Replies after the timeout are skipped
-//! by later readers.
+//! All requests are sent in one write. Terminals reply in the order of the requests. The last
+//! request is for the device attributes, to which every terminal replies. The probe ends with this
+//! reply. Replies that come after the timeout are ignored by later readers.
 
 use crate::terminal::capabilities::{Capabilities, Environment, Multiplexer};
 use crate::terminal::cells::Colors;
@@ -14,31 +14,34 @@ use std::time::{Duration, Instant};
 
 /// Longest wait for the replies.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Longest such wait over SSH.
+/// The longest wait for the replies over SSH.
 const PATIENCE_OVER_SSH: Duration = Duration::from_secs(2);
 
-/// Interval at which `is_ending` is checked.
+/// Interval at which the probe checks whether it is to stop.
 const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Request of the device attributes (DA1), to which every terminal replies.
 const ATTRIBUTES: &str = "\x1b[c";
-/// Requests: a 24-bit colour, the colour that the terminal has set (DECRQSS), default colours; name and
-/// version; background; mode 2026; an image by kitty's protocol (checked, not shown); colours and size
-/// of sixel images; size of a cell.
+/// Sequences and requests, in this order: set a 24-bit colour, request the colour that is now set
+/// (DECRQSS), restore default colours; request name and version; background colour; mode 2026; the
+/// validation of an image by kitty's protocol, which is not shown; largest number of colours and
+/// largest size of sixel images; size of a cell.
 const REQUESTS: &str = "\x1b[48;2;1;2;3m\x1bP$qm\x1b\\\x1b[0m\x1b[>q\x1b]11;?\x1b\\\x1b[?2026$p\
                          \x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\\x1b[?1;1;0S\x1b[?2;1;0S\x1b[16t";
-/// Requests of an image by kitty's protocol, and of name and version, to the terminal behind tmux.
+/// Requests to the terminal outside tmux: the validation of an image by kitty's protocol; name and
+/// version.
 const REQUESTS_THROUGH_TMUX: &str = "\x1bPtmux;\x1b\x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\x1b\\\x1b\\\
                                       \x1bPtmux;\x1b\x1b[>q\x1b\\";
 /// First version of kitty with Unicode placeholders.
 const PLACEHOLDERS_SINCE: [u32; 2] = [0, 28];
-/// Forms of the colour 1, 2, 3 in the DECRQSS reply of terminals with 24-bit colour.
+/// Notations of the RGB colour 1, 2, 3 in the DECRQSS replies of terminals with 24-bit colour.
 const TRUE_COLOR: [&str; 3] = ["2::1:2:3", "2:1:2:3", "2;1;2;3"];
 /// Private mode of synchronised updates.
 const SYNCHRONISED: u16 = 2026;
 
-/// Request of the cursor position, to which a terminal replies once it has processed the bytes before.
-/// Inside a multiplexer it is wrapped so that the outermost terminal replies.
+/// Returns the request of the cursor position, to which a terminal replies once it has processed
+/// all earlier bytes. For the multiplexer `through` the request is wrapped, so that the terminal
+/// outside the multiplexer replies.
 pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
     match through {
         None => "\x1b[6n",
@@ -47,10 +50,10 @@ pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
     }
 }
 
-/// Probes the terminal. Takes about one round trip, and two inside a multiplexer over SSH. Keys that
-/// come meanwhile are kept in `keyboard`. Replies from behind a tmux on this machine may never come and
-/// are not awaited; the caller passes them to [`Capabilities::learn`]. `is_ending` returns `true` if the
-/// probe is to stop.
+/// Probes the terminal. This takes about one round trip, or two inside a multiplexer over SSH. Keys
+/// that are pressed meanwhile are kept in `keyboard`. Inside a local tmux, replies of the terminal
+/// outside tmux may never come; the probe does not wait for them, and the caller passes late ones
+/// to [`Capabilities::learn`]. `is_ending` returns `true` if the probe is to stop.
 ///
 /// # Errors
 /// If the terminal is gone.
@@ -93,7 +96,8 @@ pub fn probe(
     Ok(capabilities)
 }
 
-/// Passes replies to `take` until it returns `true`, `deadline` has passed, or `is_ending` returns `true`.
+/// Passes replies to `take`. Ends when `take` returns `true`, `deadline` has passed, or `is_ending`
+/// returns `true`.
 fn listen(
     keyboard: &mut Keyboard,
     deadline: Instant,
@@ -116,7 +120,7 @@ fn listen(
 }
 
 impl Capabilities {
-    /// Applies a reply.
+    /// Updates the capabilities by a reply of the terminal.
     pub fn learn(&mut self, reply: &Reply) {
         match reply {
             Reply::Attributes(attributes) => {

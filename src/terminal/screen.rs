@@ -1,5 +1,5 @@
-//! The terminal while a program fills its screen, and its restoration: raw mode, alternate screen,
-//! mouse, bracketed paste.
+//! Full-screen use of the terminal and its restoration: raw mode, alternate screen, mouse,
+//! bracketed paste.
 
 use crossbeam_channel::{Receiver, Sender, bounded};
 use crossterm::style::{Attribute, SetAttribute};
@@ -16,9 +16,9 @@ use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Bracketed paste and the mouse, on or off. The mouse reports buttons, the wheel and drags (mode
-/// 1002) with decimal coordinates (1006). `EnableMouseCapture` of crossterm also sets 1003, which
-/// sends every motion over the connection.
+/// Command that turns bracketed paste and mouse reports on or off. Reports cover buttons, the wheel
+/// and drags (mode 1002), with decimal coordinates (mode 1006). `EnableMouseCapture` of crossterm
+/// also sets mode 1003, in which every motion is sent over the connection.
 struct Input {
     is_on: bool,
 }
@@ -32,8 +32,8 @@ impl Command for Input {
     }
 }
 
-/// Bytes that take the terminal: alternate screen, hidden cursor, bracketed paste and mouse, an
-/// empty screen.
+/// Bytes that prepare the terminal for full-screen use: alternate screen, hidden cursor, bracketed
+/// paste and mouse, an empty screen.
 pub static ENTER: LazyLock<String> = LazyLock::new(|| {
     let mut out = String::new();
     append(&mut out, EnterAlternateScreen);
@@ -43,8 +43,8 @@ pub static ENTER: LazyLock<String> = LazyLock::new(|| {
     out
 });
 
-/// Bytes that restore the terminal: the end of a frame that was cut off, default colours and
-/// attributes, and the inverse of [`ENTER`] in the opposite order.
+/// Bytes that restore the terminal: the end of an incomplete frame, default colours and attributes,
+/// and the inverse of [`ENTER`] in the opposite order.
 pub static LEAVE: LazyLock<String> = LazyLock::new(|| {
     let mut out = String::new();
     append(&mut out, EndSynchronizedUpdate);
@@ -55,33 +55,33 @@ pub static LEAVE: LazyLock<String> = LazyLock::new(|| {
     out
 });
 
-/// Appends the bytes of a command of crossterm.
+/// Appends the bytes of `command`, a command of crossterm.
 pub(crate) fn append(out: &mut String, command: impl Command) {
     command.write_ansi(out).expect("a `String` takes any text");
 }
 
-/// Longest wait for a frame that the terminal is slow to take, before the terminal is restored.
+/// Longest time for which restoration waits until a slow terminal has read the frame being written.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// The terminal while the program fills its screen. Dropping it restores the terminal; a panic in
-/// any thread does so, too.
+/// Full-screen use of the terminal. Dropping this value restores the terminal, as does a panic in
+/// any thread.
 pub struct Screen {
     tty: Arc<Tty>,
     left: Receiver<()>,
 }
 
-/// Writer to the terminal, shared by threads.
+/// Writer to the terminal, shared between threads.
 pub struct Tty {
     out: Mutex<Box<dyn Write + Send>>,
     entered: AtomicBool,
-    /// Modes of stdin before [`Screen::enter`].
+    /// Terminal modes of stdin before [`Screen::enter`].
     modes_before: Option<Termios>,
     leaving: Sender<()>,
     /// Bytes to send before [`LEAVE`].
     exit_sequence: Mutex<Vec<u8>>,
 }
 
-/// Returns columns and rows of the terminal, 80 and 24 if it reports none.
+/// Returns the columns and rows of the terminal, or 80 and 24 if the terminal does not report them.
 ///
 /// # Errors
 /// If neither the process nor stdout has a terminal.
@@ -91,14 +91,15 @@ pub fn size() -> io::Result<[u16; 2]> {
     Ok(if is_known { [size.columns, size.rows] } else { [80, 24] })
 }
 
-/// Returns width and height of a cell in pixels, if the terminal reports its size in pixels.
+/// Returns the width and height of a cell in pixels. Returns `None` if the terminal does not report
+/// its size in pixels.
 pub fn cell_px() -> Option<[u16; 2]> {
     let size = terminal::window_size().ok()?;
     let cell = |px: u16, cells: u16| px.checked_div(cells).filter(|px| *px > 0);
     Some([cell(size.width, size.columns)?, cell(size.height, size.rows)?])
 }
 
-/// Repeats a change of modes that a signal has interrupted.
+/// Calls `change`, which changes terminal modes, until no signal interrupts it.
 fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
     loop {
         match change() {
@@ -108,8 +109,8 @@ fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Sets raw mode. crossterm restores the modes that it finds, and a shell may have left its own, so
-/// `modes_before` is set first.
+/// Sets raw mode. crossterm later restores the modes that it finds here, and a shell may have set
+/// its own in the meantime. `modes_before` is therefore set first.
 fn set_raw_mode(modes_before: &Termios) -> io::Result<()> {
     uninterrupted(terminal::disable_raw_mode)?;
     uninterrupted(|| Ok(tcsetattr(io::stdin(), OptionalActions::Now, modes_before)?))?;
@@ -117,14 +118,14 @@ fn set_raw_mode(modes_before: &Termios) -> io::Result<()> {
 }
 
 impl Screen {
-    /// Takes the terminal of stdin and stdout.
+    /// Starts full-screen use of the terminal at stdin and stdout.
     ///
     /// # Errors
     /// If stdin is no terminal or stdout cannot be written.
     pub fn enter() -> io::Result<Self> {
         let modes_before = tcgetattr(io::stdin())?;
         set_raw_mode(&modes_before)?;
-        // From here on `Drop` restores the terminal, also if entering fails half-way.
+        // From here on `Drop` restores the terminal, even if `over` fails.
         Self::over(Box::new(io::stdout()), Some(modes_before))
     }
 
@@ -137,13 +138,14 @@ impl Screen {
             leaving,
             exit_sequence: Mutex::default(),
         });
-        // Prepared now: a panic hook shall do little.
+        // Prepared here, because a panic hook should do little.
         LazyLock::force(&LEAVE);
         let screen = Self { tty, left };
         let tty = Arc::clone(&screen.tty);
         let report = panic::take_hook();
         panic::set_hook(Box::new(move |panic| {
-            // First, so that the message is not lost with the alternate screen.
+            // The terminal is restored before the report, because the message would disappear with
+            // the alternate screen.
             tty.leave();
             report(panic);
         }));
@@ -151,7 +153,8 @@ impl Screen {
         Ok(screen)
     }
 
-    /// Channel that receives a message when a panic in some thread has restored the terminal.
+    /// Channel that receives a message when [`Tty::leave`] has restored the terminal, as after a
+    /// panic in another thread.
     pub fn left(&self) -> &Receiver<()> {
         &self.left
     }
@@ -169,7 +172,7 @@ impl Drop for Screen {
 }
 
 impl Tty {
-    /// Writes `bytes` in one call. Does nothing after the terminal was restored.
+    /// Writes `bytes` in one call. Does nothing while the terminal is restored.
     ///
     /// # Errors
     /// If the terminal is gone.
@@ -182,46 +185,50 @@ impl Tty {
         Ok(())
     }
 
-    /// Sets the bytes that are sent first when the terminal is restored, in place of earlier ones.
+    /// Sets the bytes that are sent first when the terminal is restored. They replace those of an
+    /// earlier call.
     pub fn set_exit_sequence(&self, bytes: &[u8]) {
         let mut exit_sequence = self.exit_sequence.lock().unwrap_or_else(PoisonError::into_inner);
         exit_sequence.clear();
         exit_sequence.extend(bytes);
     }
 
-    /// Restores the terminal for good. Does nothing the second time.
+    /// Restores the terminal at the end of full-screen use. Does nothing if the terminal is
+    /// restored already.
     pub fn leave(&self) {
         if self.suspend() {
             let _ = self.leaving.try_send(());
         }
     }
 
-    /// Restores the terminal until [`Tty::resume`]. Returns `false` if it was restored already.
+    /// Restores the terminal until [`Tty::resume`]. Returns `false` if the terminal is restored
+    /// already.
     pub fn suspend(&self) -> bool {
         if !self.entered.swap(false, Ordering::AcqRel) {
             return false;
         }
-        // A terminal that has stopped reading shall not keep the program from ending.
+        // The wait is limited, so that the program can end even if the terminal has stopped
+        // reading.
         if let Some(mut out) = self.lock_within(PATIENCE) {
             let mut exit_sequence =
                 self.exit_sequence.lock().unwrap_or_else(PoisonError::into_inner);
             let bytes = [&*exit_sequence, LEAVE.as_bytes()].concat();
             exit_sequence.clear();
-            // If the terminal has gone there is nothing left to restore.
+            // Errors are ignored: a terminal that is gone needs no restoration.
             let _ = out.write_all(&bytes).and_then(|()| out.flush());
         }
         if self.modes_before.is_some() {
             let _ = uninterrupted(terminal::disable_raw_mode);
-            // Unread input, such as late replies, is not for the shell.
+            // Unread input, such as late replies, is discarded. The shell would read it otherwise.
             let _ = tcflush(io::stdin(), QueueSelector::IFlush);
         }
         true
     }
 
-    /// Takes the terminal again, whatever modes other programs have set.
+    /// Resumes full-screen use of the terminal, whatever modes other programs have set.
     ///
     /// # Errors
-    /// If it is gone.
+    /// If the terminal is gone.
     pub fn resume(&self) -> io::Result<()> {
         if let Some(modes_before) = &self.modes_before {
             set_raw_mode(modes_before)?;
@@ -249,7 +256,7 @@ impl Tty {
 mod tests {
     use super::*;
 
-    /// Writer whose text is still readable after it was given away.
+    /// Writer whose clones share one buffer, so that a test can read the text written by a screen.
     #[derive(Clone, Default)]
     struct SharedWriter(Arc<Mutex<Vec<u8>>>);
 
@@ -269,7 +276,8 @@ mod tests {
         }
     }
 
-    /// Returns a screen, its output, and a lock against the panic of another test, which would leave it.
+    /// Returns a screen, its output, and a lock. A test that panics would restore the screens of
+    /// other tests; the lock lets only one test at a time have a screen.
     fn screen() -> (Screen, SharedWriter, MutexGuard<'static, ()>) {
         static TURN: Mutex<()> = Mutex::new(());
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -277,7 +285,7 @@ mod tests {
         (Screen::over(Box::new(out.clone()), None).unwrap(), out, turn)
     }
 
-    /// Returns `parts` after each other, each `[` standing for [`ENTER`] and `]` for [`LEAVE`].
+    /// Returns `parts` with each `[` replaced by [`ENTER`] and each `]` by [`LEAVE`].
     fn expected(parts: &str) -> String {
         parts.replace(']', "LEAVE").replace('[', &ENTER).replace("LEAVE", &LEAVE)
     }
@@ -331,11 +339,11 @@ mod tests {
             let modes = text.split("\x1b[?").skip(1).filter_map(|mode| mode.split_once(end));
             modes.map(|(mode, _)| mode.to_string()).collect()
         };
-        // The cursor is the one mode that is on outside.
+        // The cursor is the only mode that is on outside full-screen use.
         let mut set = modes(&ENTER, 'h');
         set.retain(|mode| !mode.contains('l'));
         let mut reset = modes(&LEAVE, 'l');
-        // Each frame sets and resets 2026, unless it is cut off.
+        // Each frame sets and resets mode 2026. `LEAVE` resets it for a frame that was cut off.
         reset.retain(|mode| !mode.contains('h') && mode != "2026");
         reset.reverse();
         assert_eq!(set, ["1049", "2004", "1002", "1006"]);

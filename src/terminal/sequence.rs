@@ -5,24 +5,24 @@ use crate::terminal::event::{Button, Code, Key, Mouse, MouseKind};
 use crate::terminal::{Event, Reply};
 use vte::{Params, Perform};
 
-/// Receiver of the parts into which [`vte::Parser`] divides the input.
+/// Interpreter of the characters and sequences into which [`vte::Parser`] divides the input.
 #[derive(Debug)]
 pub struct Interpreter {
     /// Events in the order of input.
     pub events: Vec<Event>,
-    /// `true` if the next key has Alt, because ESC came before it.
+    /// `true` if the next key is pressed with Alt, because ESC preceded it.
     pub alt: bool,
-    /// `true` if the last character has ended or was invalid.
+    /// `true` if the last UTF-8 character is complete or invalid.
     pub is_character_complete: bool,
-    /// `true` if the last control sequence begins a bracketed paste.
+    /// `true` if the last control sequence starts a bracketed paste.
     pub is_paste: bool,
-    /// `true` if the device control string that is parsed was an APC string in the input.
+    /// `true` if the device control string being parsed was an APC string in the input.
     pub is_apc: bool,
-    /// Reply in the last string.
+    /// Reply decoded from the last string.
     pub reply: Reply,
-    /// Data of the device control string that is parsed.
+    /// Data of the device control string being parsed.
     data: Vec<u8>,
-    /// Reader of `data`.
+    /// Function that converts `data` to a reply.
     to_reply: fn(String) -> Reply,
 }
 
@@ -52,7 +52,7 @@ impl Interpreter {
 impl Perform for Interpreter {
     fn print(&mut self, c: char) {
         self.is_character_complete = true;
-        // The parser replaces invalid UTF-8; nothing was typed then.
+        // The parser passes a replacement character for invalid UTF-8, which is no key.
         if let Some(key) = character(c).filter(|_| c != char::REPLACEMENT_CHARACTER) {
             self.press(key);
         }
@@ -97,7 +97,7 @@ impl Perform for Interpreter {
     }
 }
 
-/// Returns the key of a character.
+/// Returns the key of a character. Returns `None` for control characters without a key.
 fn character(c: char) -> Option<Key> {
     let ctrl = |c: char| Key { ctrl: true, ..Key::plain(Code::Char(c)) };
     Some(match c {
@@ -112,8 +112,8 @@ fn character(c: char) -> Option<Key> {
     })
 }
 
-/// Interprets a control sequence. `params` are its parameters with their subparameters,
-/// `intermediates` its private marker and intermediate bytes, `last` is its final byte.
+/// Interprets a control sequence. `params` are its parameters with their subparameters.
+/// `intermediates` are its private marker and intermediate bytes. `last` is its final byte.
 fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Option<Event> {
     let numbers: Vec<_> = params.iter().map(|param| param[0]).collect();
     let reply = match (intermediates, last, &numbers[..]) {
@@ -134,11 +134,12 @@ fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Opti
     Some(Event::Reply(reply))
 }
 
-/// Returns the key of a control sequence; `None` for a release.
+/// Returns the key of a control sequence. Returns `None` for the release of a key and for unknown
+/// keys.
 fn key(params: &[&[u16]], last: char) -> Option<Key> {
     let number = params[0][0];
     let key = match (last, number) {
-        // modifyOtherKeys of xterm: 27 ; modifiers ; character.
+        // Format of xterm's modifyOtherKeys: 27 ; modifiers ; character.
         ('~', 27) => character(char::from_u32(params.get(2)?[0].into())?)?,
         ('~', 1 | 7) => Key::plain(Code::Home),
         ('~', 3) => Key::plain(Code::Delete),
@@ -148,8 +149,8 @@ fn key(params: &[&[u16]], last: char) -> Option<Key> {
         ('~', 11..=15) => Key::plain(Code::F(number as u8 - 10)),
         ('~', 17..=21) => Key::plain(Code::F(number as u8 - 11)),
         ('~', 23 | 24) => Key::plain(Code::F(number as u8 - 12)),
-        // kitty's keyboard protocol: code point, or 57344 and above for keys without character. The
-        // parser saturates larger code points at 65535.
+        // In kitty's keyboard protocol the number is a code point, or 57344 and above for keys
+        // without a character. The parser clamps larger code points to 65535.
         ('u', 0 | 57_344..) => return None,
         ('u', 27) => Key::plain(Code::Esc),
         ('u', _) => character(char::from_u32(number.into())?)?,
@@ -192,7 +193,7 @@ pub fn x10_mouse(bytes: &[u8]) -> Option<Event> {
     mouse(button, [column, row], is_release).map(Event::Mouse)
 }
 
-/// Returns the key that the final byte alone denotes.
+/// Returns the key that the final byte of a sequence denotes without parameters.
 fn named(last: char) -> Option<Code> {
     Some(match last {
         'A' => Code::Up,
@@ -209,7 +210,8 @@ fn named(last: char) -> Option<Code> {
     })
 }
 
-/// Adds modifiers to a key. `modifiers` is 1 more than the sum of Shift 1, Alt 2 and Control 4.
+/// Adds modifiers to a key. `modifiers` is 1 plus the bits 1 for Shift, 2 for Alt and 4 for
+/// Control.
 fn modified(key: Key, modifiers: u16) -> Key {
     let bits = modifiers.saturating_sub(1);
     let is_character = matches!(key.code, Code::Char(_));
@@ -226,8 +228,9 @@ fn modified(key: Key, modifiers: u16) -> Key {
     }
 }
 
-/// Interprets a mouse report. Bits of `button`: 0 to 2 the button, 4 Shift, 8 Alt, 16 Control,
-/// 32 motion, 64 wheel. Column and row count from 1.
+/// Interprets a mouse report. `button` is the number of the button, 0 to 2, plus the bits 4 for
+/// Shift, 8 for Alt, 16 for Control, 32 for motion and 64 for the wheel. `column` and `row` count
+/// from 1.
 fn mouse(button: u16, [column, row]: [u16; 2], is_release: bool) -> Option<Mouse> {
     let pressed = match button & 0b11 {
         0 => Button::Left,
@@ -250,7 +253,7 @@ fn mouse(button: u16, [column, row]: [u16; 2], is_release: bool) -> Option<Mouse
     Some(Mouse { kind, column: column.checked_sub(1)?, row: row.checked_sub(1)?, modified })
 }
 
-/// Parses `rgb:RRRR/GGGG/BBBB`, each channel with 1 to 4 hexadecimal digits, as 8-bit sRGB.
+/// Parses `rgb:RRRR/GGGG/BBBB` as 8-bit sRGB. Each channel has 1 to 4 hexadecimal digits.
 fn parse_color(text: &[u8]) -> Option<[u8; 3]> {
     let channel = |digits: &str| {
         let max = 16u32.checked_pow(digits.len() as u32).filter(|_| digits.len() <= 4)? - 1;

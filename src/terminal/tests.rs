@@ -10,7 +10,7 @@ use std::time::Duration;
 
 const WAIT: Duration = Duration::from_millis(40);
 
-/// Bytes that keyboards send, and the names of the keys.
+/// Byte sequences that terminals send for keys, each with the name of its key.
 const KEYS: &[(&str, &str)] = &[
     ("a", "a"),
     ("A", "A"),
@@ -61,7 +61,8 @@ const KEYS: &[(&str, &str)] = &[
     ("\x1b[27;5;97~", "Ctrl-a"),
 ];
 
-/// Replies of terminals, known and unknown, on which other decoders lose or invent keys.
+/// Replies of terminals, including replies to requests that the program does not send. Other
+/// decoders lose or invent keys on them.
 const REPLIES: &[&str] = &[
     "\x1b[?2026;2$y",
     "\x1b[?2026;0$y",
@@ -172,7 +173,7 @@ fn replies_set_capabilities() {
         ..Capabilities::from_environment(Environment::default())
     };
     assert_eq!(capabilities, expected);
-    // Only some terminals behind tmux show pictures among text.
+    // Placeholders depend on the terminal outside tmux, which is the second to report its version.
     let multiplexer = Some(Multiplexer::Tmux);
     for (version, expected) in [
         ("tmux 3.3a", false),
@@ -227,7 +228,7 @@ fn lone_escape_is_a_key_after_timeout() {
     assert_eq!(decoder.patience(), Some(WAIT));
     assert_eq!(keys(&decoder.give_up()), ["Esc"]);
     assert_eq!(decoder.patience(), None);
-    // A key typed afterwards is decoded by itself.
+    // A key typed afterwards is decoded as a key of its own.
     for next in ["[", "]", "q", "O", "P", "_", "]]]", "[["] {
         assert_eq!(decoder.take(b"\x1b"), []);
         assert_eq!(keys(&decoder.give_up()), ["Esc"]);
@@ -257,7 +258,7 @@ fn incomplete_sequences_are_given_up() {
     for prefix in ["\x1b[12;", "\x1b]11;rgb:", "\x1bP1$r", "\x1b_Gi=", "\x1bO1", "\u{e9}"] {
         let mut decoder = Decoder::new(WAIT);
         let bytes = prefix.as_bytes();
-        // Only the first byte of the character.
+        // Of the character é only the first byte is decoded.
         let bytes = if prefix.starts_with('\x1b') { bytes } else { &bytes[..1] };
         assert_eq!(decoder.take(bytes), [], "{prefix:?}");
         assert!(decoder.patience().is_some_and(|p| p >= Duration::from_millis(500)));
@@ -282,7 +283,7 @@ fn pasted_text_produces_no_keys() {
     let pasted = all_at_once(&format!("\x1b[200~{long}\x1b[201~x"));
     assert!(matches!(&pasted[0], Event::Paste(kept) if kept.len() == 1 << 20));
     assert_eq!(keys(&pasted[1..]), ["x"]);
-    // A paste without end is reported after a pause.
+    // A paste whose end never comes is reported after a pause.
     let mut decoder = Decoder::new(WAIT);
     assert_eq!(decoder.take(b"\x1b[200~half"), []);
     assert_eq!(decoder.give_up(), [Event::Paste("half".into())]);
@@ -301,14 +302,15 @@ fn reply_flood_hides_no_key() {
         }
     }
     assert_eq!(keys(&all_at_once(&bytes)), expected);
-    // An endless reply takes bounded memory.
+    // A reply without an end needs only bounded memory.
     let mut decoder = Decoder::new(WAIT);
     decoder.take(b"\x1b]52;c;");
     (0..1000).for_each(|_| assert_eq!(decoder.take(&[b'A'; 1 << 12]), []));
     assert_eq!(keys(&decoder.take(b"\x07q")), ["q"]);
 }
 
-/// Strategy for a key or a reply: its bytes, and the key's name.
+/// Strategy for a key or a reply: its bytes, and the name of the key. The name of a reply is
+/// `None`.
 fn key_or_reply() -> impl Strategy<Value = (&'static str, Option<&'static str>)> {
     prop_oneof![
         select(KEYS).prop_map(|(bytes, name)| (bytes, Some(name))),
@@ -316,7 +318,8 @@ fn key_or_reply() -> impl Strategy<Value = (&'static str, Option<&'static str>)>
     ]
 }
 
-/// Strategy for bytes: keys, replies, mouse reports and pastes, whole or cut off, and noise.
+/// Strategy for arbitrary input: keys, replies, mouse reports and pastes, complete or cut off, and
+/// random bytes.
 fn any_input() -> impl Strategy<Value = Vec<u8>> {
     const OTHERS: &[&str] = &[
         "\x1b[<0;3;4M",
@@ -336,7 +339,8 @@ fn any_input() -> impl Strategy<Value = Vec<u8>> {
     ]
 }
 
-/// Feeds `bytes` in pieces that end at `cuts`, each taken modulo the length.
+/// Decodes `bytes` in pieces. The pieces end at `cuts`, which are taken modulo the length of
+/// `bytes` plus 1.
 fn in_pieces(decoder: &mut Decoder, bytes: &[u8], cuts: &[usize]) -> Vec<Event> {
     let mut cuts: Vec<_> = cuts.iter().map(|cut| cut % (bytes.len() + 1)).collect();
     cuts.extend([0, bytes.len()]);
@@ -344,7 +348,7 @@ fn in_pieces(decoder: &mut Decoder, bytes: &[u8], cuts: &[usize]) -> Vec<Event> 
     cuts.windows(2).flat_map(|piece| decoder.take(&bytes[piece[0]..piece[1]])).collect()
 }
 
-/// Sequences that `vte` alone reads otherwise (module `decode`).
+/// `vte` alone would decode these sequences differently (see the module `decode`).
 #[test]
 fn keyboard_sequences_beyond_vte_are_decoded() {
     for (bytes, expected) in [

@@ -48,7 +48,8 @@ impl Color {
     }
 }
 
-/// Linear light 0..=1 to sRGB 0..=1 (IEC 61966-2-1, piecewise): inverse of [`linear_from_srgb`].
+/// Converts linear light in 0..=1 to an sRGB level in 0..=1 (IEC 61966-2-1, piecewise). The inverse
+/// is [`linear_from_srgb`].
 pub fn srgb_from_linear(linear: f64) -> f64 {
     if linear <= 0.0031308 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }

@@ -1,7 +1,8 @@
 //! One declaration per table of a scene file.
 //!
-//! [`description!`] makes from it the struct, its serde implementation, its defaults, its table of
-//! fields and the checks of its ranges. [`choices!`] does the same for a fixed set of words.
+//! [`description!`] generates the struct from the declaration, with its serde implementation, its
+//! defaults, its table of fields and the checks of its ranges. [`choices!`] does this for a fixed
+//! set of words.
 
 use crate::value::{Color, Field, NumberRange, ValidationError, Validator, ValueType};
 
@@ -12,25 +13,25 @@ pub trait Description {
     /// Keys of the table, in the order of the declaration.
     const FIELDS: &'static [Field];
 
-    /// Checks each value against its field. Checks across fields can be added.
+    /// Checks each value against its field. Callers can add checks that concern several fields.
     fn validator(&self) -> Validator;
 }
 
 /// A Rust type that a key of a scene file can have.
 pub trait FieldValue {
-    /// A default as a scene file writes it.
+    /// Type of a default in a declaration, which is written as in a scene file.
     type Written;
 
     /// Type of the value in the table of fields; numbers have the range `FINITE`.
     const TYPE: ValueType;
 
-    /// Converts a default.
+    /// Converts a default from a declaration to the type.
     ///
     /// # Panics
-    /// If `written` is no value of the type, which is a mistake in a declaration.
+    /// If `written` is no value of the type, which is an error in a declaration.
     fn from_written(written: Self::Written) -> Self;
 
-    /// Errors of the value, with keys that begin with the field's.
+    /// Returns the validation errors of the value; their keys begin with that of `field`.
     fn errors(&self, field: &Field) -> Vec<ValidationError>;
 
     /// Returns `true` if the key is left out when the value is written.
@@ -39,17 +40,17 @@ pub trait FieldValue {
     }
 }
 
-/// [`FieldValue::is_absent`] as a function that serde can name.
+/// Calls [`FieldValue::is_absent`]; serde attributes can name this function.
 pub(crate) fn is_absent(value: &impl FieldValue) -> bool {
     value.is_absent()
 }
 
-/// Doc comments, joined, without the space after `///`.
+/// Returns a doc comment, whose lines are joined, without the space after `///`.
 pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
     doc.split_at(1).1
 }
 
-/// Numbers, which a scene file writes like Rust does.
+/// Implements [`FieldValue`] for types of numbers, which scene files write like Rust does.
 macro_rules! numeric {
     ($([$($n:ident)?] $type:ty => $value_type:expr, $numbers:expr;)+) => {$(
         impl $(<const $n: usize>)? FieldValue for $type {
@@ -135,7 +136,7 @@ impl<T: FieldValue> FieldValue for Option<T> {
     }
 }
 
-/// A table inside a table.
+/// Implements [`FieldValue`] for a table inside a table.
 impl<T: Description> FieldValue for T {
     type Written = Self;
     const TYPE: ValueType = ValueType::Table(T::FIELDS);
@@ -218,7 +219,7 @@ pub(crate) use choices;
 ///         center: [f64; 3], in COORDINATE "scene units";
 ///         /// A key with a default, written as in a scene file.
 ///         rotation: f64 = 0.0, in closed(-180.0, 180.0) "degrees";
-///         /// A key that may be left out, and the phrase that says what holds then.
+/// A key that may be left out, with a phrase for the result of leaving it out.
 ///         alpha: Option<f64>, or "roughness / (2 √2)", in SHARE;
 ///         /// A value type other than that of the Rust type.
 ///         normal: [f64; 3], as Direction;
@@ -241,8 +242,9 @@ macro_rules! description {
         $crate::value::description!(@struct all any [$($doc)+] [$($derived)?] $name $($fields)+);
     };
 
-    // `$per_field` and `$whole` are `all` and `any`, true and false as conditions: serde takes
-    // defaults from the Rust type of each field, or from the struct's `Default`.
+    // One of `$per_field` and `$whole` is `all`, the other is `any`. As conditions of `cfg_attr`,
+    // `all()` is true and `any()` is false. They select the source of serde's defaults: the Rust
+    // type of each field, or the `Default` of the struct.
     (
         @struct $per_field:ident $whole:ident [$($doc:literal)+] [$($derived:ident)?] $name:ident
         $(

@@ -2,11 +2,12 @@
 
 use glam::DVec3;
 
-/// Smallest magnitude of a vector's largest component at which squaring it keeps full precision; the
-/// largest such magnitude is the inverse.
+/// Smallest magnitude of the largest component of a vector at which its square keeps full
+/// precision. The inverse is the largest such magnitude.
 const MIN_EXACT: f64 = 1e-100;
 
-/// Factor that brings any other vector into that range: 2^600, a power of two and therefore exact.
+/// Factor for vectors outside of that range; small vectors are multiplied by it, large ones
+/// divided. It is 2^600, a power of two and therefore exact.
 const RESCALE: f64 = f64::from_bits((1023 + 600) << 52);
 
 /// Returns `direction` scaled to length 1; `None` if its length is 0 or not finite.

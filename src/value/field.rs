@@ -9,9 +9,9 @@ use std::fmt;
 pub struct Field {
     /// The key.
     pub name: &'static str,
-    /// Type of its value.
+    /// Type of the key's value.
     pub takes: ValueType,
-    /// Unit of its numbers; empty if there is none.
+    /// Unit of the numbers in the value; empty if there is none.
     pub unit: &'static str,
     /// Default if the key is left out.
     pub preset: DefaultValue,
@@ -26,7 +26,7 @@ pub enum DefaultValue {
     Required,
     /// A value, as TOML text.
     Is(&'static str),
-    /// No value; the phrase describes the result.
+    /// No default value; the phrase describes the result of leaving the key out.
     Without(&'static str),
 }
 
@@ -106,7 +106,7 @@ impl Field {
         Self { preset: DefaultValue::Without(instead), ..self }
     }
 
-    /// Checks `values` against the value type; returns the error if one is out of range.
+    /// Checks `values` against the value type. Returns an error if one of them is out of range.
     pub fn check(&self, values: &[f64]) -> Option<ValidationError> {
         let each = |range: NumberRange| values.iter().all(|x| range.holds(*x));
         let valid = match self.takes {
@@ -152,7 +152,7 @@ impl ValueType {
 
 const COUNTS: [&str; 5] = ["no", "one", "two", "three", "four"];
 
-/// Object of the phrase "Expected ...": `a number from 0 to 1`.
+/// Formats the type as the object of the phrase "Expected ...": `a number from 0 to 1`.
 impl fmt::Display for ValueType {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {

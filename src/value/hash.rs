@@ -1,6 +1,7 @@
 //! A hash that is stable across platforms and versions.
 
-/// 64-bit FNV-1a (Fowler, Noll, Vo), with the offset basis and prime of draft-eastlake-fnv.
+/// Returns the 64-bit FNV-1a hash (Fowler, Noll, Vo), with the offset basis and prime of
+/// draft-eastlake-fnv.
 pub fn fnv1a64(bytes: &[u8]) -> u64 {
     const OFFSET_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;

@@ -29,22 +29,22 @@ impl NumberRange {
     /// A fraction: from 0 to 1.
     pub const SHARE: Self = Self::closed(0.0, 1.0);
 
-    /// A coefficient or a body colour: sums above 1 are valid.
+    /// A coefficient or a channel of a body colour: from 0 to 1e6, because sums above 1 are valid.
     pub const COEFFICIENT: Self = Self::closed(0.0, 1e6);
-    /// An amount of light.
+    /// An amount of light: from 0 to 1e15.
     pub const LIGHT: Self = Self::closed(0.0, 1e15);
 
-    /// Interval from `low` to `high`, both included.
+    /// Creates the interval from `low` to `high`, both included.
     pub const fn closed(low: f64, high: f64) -> Self {
         Self { low, low_in: true, high, high_in: true }
     }
 
-    /// Interval of numbers greater than `low` and at most `high`.
+    /// Creates the interval of the numbers greater than `low` and at most `high`.
     pub const fn above(low: f64, high: f64) -> Self {
         Self { low, low_in: false, high, high_in: true }
     }
 
-    /// Interval between `low` and `high`, both excluded.
+    /// Creates the interval between `low` and `high`, both excluded.
     pub const fn between(low: f64, high: f64) -> Self {
         Self { low, low_in: false, high, high_in: false }
     }
@@ -57,7 +57,7 @@ impl NumberRange {
     }
 }
 
-/// End of the phrase `a number ...`: `from 0 to 1`.
+/// Formats the interval as the end of the phrase `a number ...`: `from 0 to 1`.
 impl fmt::Display for NumberRange {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let (low, high) = (number(self.low), number(self.high));

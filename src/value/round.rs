@@ -1,6 +1,7 @@
 //! Rounding of computed numbers to short decimals.
 
-/// Rounds `x` to a multiple of 10^`exponent`: the nearest number to that decimal, never `-0`.
+/// Rounds `x` to a multiple of 10^`exponent`. The result is the floating-point number nearest to
+/// that decimal, never `-0`.
 pub fn rounded_to(x: f64, exponent: i32) -> f64 {
     if !x.is_finite() {
         return x;

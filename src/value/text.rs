@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-/// Escapes the characters of `text` that could control a terminal or hide: control characters, line
-/// ends, directional and invisible formatting characters become `\u{..}`.
+/// Escapes the characters of `text` that could control a terminal or hide other text. Control
+/// characters, line ends, directional and invisible formatting characters become `\u{..}`.
 pub fn sanitized(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -22,7 +22,8 @@ pub fn sanitized(text: &str) -> String {
 }
 
 /// Returns `true` for format characters (Unicode category Cf, and the line and paragraph separators).
-/// They reorder or hide text, so that a name on screen would differ from the name in the file.
+/// Format characters reorder or hide text, so that a name on screen would differ from that in the
+/// file.
 fn controls_terminal(c: char) -> bool {
     matches!(c,
         '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'

@@ -1,4 +1,4 @@
-//! Validation errors of a description, before they have a place in a file.
+//! Validation errors of a description, without their position in a file.
 
 use crate::value::{Field, FieldValue, number};
 
@@ -20,7 +20,8 @@ impl ValidationError {
         Self { key: key.to_string(), found: found.into(), expected: expected.into() }
     }
 
-    /// Returns the error with `outer` before its key: the description is the value of that key.
+    /// Returns the error with `outer` before its key. `outer` is the key whose value the
+    /// description is.
     pub fn prefixed(mut self, outer: &str) -> Self {
         self.key =
             if self.key.is_empty() { outer.to_string() } else { format!("{outer}.{}", self.key) };
@@ -28,7 +29,8 @@ impl ValidationError {
     }
 }
 
-/// Collects the errors of one description against its table of fields.
+/// Collector of the validation errors of one description, which is checked against its table of
+/// fields.
 #[derive(Debug)]
 pub struct Validator {
     fields: &'static [Field],
@@ -56,8 +58,9 @@ impl Validator {
         field.unwrap_or_else(|| panic!("no field `{name}` in its table"))
     }
 
-    /// Checks that no number is more than 1e12 times as large as the smallest of `sizes`: beyond that
-    /// a coordinate has no digits left for the size. Skipped if there are errors already.
+    /// Checks that no size or coordinate is more than 1e12 times as large as the smallest of
+    /// `sizes`. Beyond that ratio, a coordinate has no digits left for the size. The check is
+    /// skipped if there are errors already.
     pub fn ratio(mut self, sizes: &[(&str, f64)], coordinates: &[f64]) -> Self {
         let smallest = sizes.iter().copied().reduce(|a, b| if b.1 < a.1 { b } else { a });
         let largest = sizes
@@ -99,7 +102,7 @@ impl Validator {
         self.errors.is_empty()
     }
 
-    /// Returns the errors.
+    /// Returns the errors that were found.
     pub fn errors(self) -> Vec<ValidationError> {
         self.errors
     }

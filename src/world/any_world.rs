@@ -24,7 +24,7 @@ pub enum Precision {
 /// Options of scene compilation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The precision.
+    /// Precision in which the world is compiled.
     pub precision: Precision,
 }
 
@@ -48,7 +48,7 @@ macro_rules! dispatch {
 pub(crate) use dispatch;
 
 impl AnyWorld {
-    /// Compiles a scene without validation errors.
+    /// Compiles `scene`, which has no validation errors.
     pub fn compile(scene: &Scene, options: &Options) -> Self {
         let geometry = RecenteredGeometry::new(scene);
         let single = match options.precision {
@@ -66,7 +66,7 @@ impl AnyWorld {
         }
     }
 
-    /// `single` or `double`.
+    /// Name of the precision: `single` or `double`.
     pub fn precision(&self) -> &'static str {
         match self {
             Self::Single(_) => "single",
@@ -74,7 +74,7 @@ impl AnyWorld {
         }
     }
 
-    /// Name of the lane type.
+    /// Name of the lane type, such as `f32x8`.
     pub fn lanes(&self) -> &'static str {
         match self {
             Self::Single(_) => Single::NAME,
@@ -87,18 +87,19 @@ impl AnyWorld {
         dispatch!(self, world => world.group_names.clone())
     }
 
-    /// The light groups.
+    /// Light groups of the world: the parts of the picture that the film stores separately.
     pub fn light_groups(&self) -> &LightGroups {
         dispatch!(self, world => &world.groups)
     }
 
     /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
-    /// same length. Points are columns and rows of the raster in pixels, with fractions.
+    /// same length. A point is a column and a row of the raster in pixels, with fractions.
     pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
         dispatch!(self, world => world.first_hit(points, hits))
     }
 
-    /// Steps per unit of radiance in the film's integers, per light group; powers of two.
+    /// Scale of each light group: the number of integer steps per unit of radiance in the film, a
+    /// power of two.
     pub fn group_scales(&self) -> Vec<f64> {
         dispatch!(self, world => world.scales.clone())
     }

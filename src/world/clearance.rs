@@ -1,10 +1,10 @@
-//! Distance of a point from the surfaces of a scene.
+//! Distance between a point and the closest surface of a scene.
 
 use crate::primitive::Form;
 use glam::DVec3;
 
-/// Lower bound of the distance of `point` from the surfaces of `forms`
-/// ([`CanonicalShape::clearance`](crate::primitive::CanonicalShape::clearance)).
+/// Returns a lower bound of the distance between `point` and the closest surface of `forms`. See
+/// [`CanonicalShape::clearance`](crate::primitive::CanonicalShape::clearance).
 pub(super) fn clearance(forms: &[Form], point: DVec3) -> f64 {
     forms.iter().filter_map(|form| form.clearance(point)).fold(f64::INFINITY, f64::min)
 }
@@ -47,7 +47,7 @@ mod tests {
         near(cylinder, [1.9, 0.0, 0.0], 0.1);
         near(cylinder, [0.0, 4.75, 0.5], 0.25);
         near(cylinder, [0.0, 0.0, 0.0], 2.0);
-        // In its box, but not in it.
+        // Inside of the bounding box, but outside of the cylinder.
         let corner = (2.0 * 0.95f64.powi(2) * 4.0).sqrt() - 2.0;
         near(cylinder, [1.9, 0.0, 1.9], corner);
         let cone = &forms(
@@ -63,7 +63,7 @@ mod tests {
         near(rectangle, [0.0, 0.0, 1.5], 0.5);
     }
 
-    /// Needles and sheets, against many points of their surfaces.
+    /// Needles and sheets, compared with many points on their surfaces.
     #[test]
     fn stretched_things_are_no_nearer_and_no_farther_than_their_points() {
         let shapes = [

@@ -25,9 +25,9 @@ use glam::{DAffine3, DVec3};
 pub(super) struct RecenteredGeometry {
     /// Scene coordinates of the new origin.
     pub origin: DVec3,
-    /// Form of each object.
+    /// Shape of each object, with its transform applied.
     pub forms: Vec<Form>,
-    /// Largest magnitude of a coordinate of bounded forms and the eye.
+    /// Largest magnitude of a coordinate of the bounded forms and the eye.
     pub extent: f64,
 }
 
@@ -55,8 +55,8 @@ impl RecenteredGeometry {
         Self { origin, forms, extent }
     }
 
-    /// Largest rounding error of the coordinates in the scene file, caused by the distance of the
-    /// scene's centre from its origin.
+    /// Returns the largest rounding error of the coordinates in the scene file. It grows with the
+    /// distance of the scene's centre from the origin of the file's coordinates.
     pub fn input_error(&self) -> f64 {
         f64::EPSILON * self.origin.abs().max_element()
     }
@@ -68,13 +68,13 @@ struct CompiledMaterials<'a, S> {
     materials: Vec<&'a Material>,
     /// BSDF of each of `materials`.
     bsdfs: Vec<Bsdf<S>>,
-    /// Indices into `materials`, by object and part.
+    /// Indices into `materials`, first by object, then by part of the object.
     of_object: Vec<Vec<u32>>,
 }
 
 impl<'a, S: Float> CompiledMaterials<'a, S> {
-    /// Compiles the materials of all parts. `default` is that of names that the scene does not
-    /// define.
+    /// Compiles the materials of all parts. `default` is the material of names that the scene does
+    /// not define.
     fn new(scene: &'a Scene, default: &'a Material) -> Self {
         let mut materials: Vec<&Material> = Vec::new();
         let mut index_of = |name: &str| {
@@ -111,12 +111,12 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         self.of_object[object].iter().map(|index| self.materials[*index as usize]).collect()
     }
 
-    /// Returns `true` if some surface returns direct light.
+    /// Returns `true` if some material reflects direct light of lights.
     fn has_direct(&self) -> bool {
         self.bsdfs.iter().any(|bsdf| bsdf.has_direct)
     }
 
-    /// Returns `true` if some surface returns ambient light.
+    /// Returns `true` if some material reflects ambient light.
     fn has_ambient(&self) -> bool {
         self.materials.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3])
     }
@@ -173,7 +173,8 @@ impl<S: Float> CompiledLights<S> {
     }
 }
 
-/// Candidate sets known before any tile, and the source of those of each tile.
+/// Candidate lists (primitives that a ray must be tested against) for all rays, and the source of
+/// the lists of each tile.
 struct CompiledCulling<S> {
     mode: CullingMode,
     all_candidates: TileCandidates,
@@ -181,8 +182,8 @@ struct CompiledCulling<S> {
 }
 
 impl<S: Float> CompiledCulling<S> {
-    /// Compiles the culling of a scene. `entered` is `true` for each primitive that paths can be
-    /// inside.
+    /// Compiles the culling of a scene. `entered` holds `true` for each primitive that paths can be
+    /// inside of.
     fn new<L: SimdFloat<Scalar = S>>(
         scene: &Scene,
         recentered: &RecenteredGeometry,
@@ -226,7 +227,8 @@ impl<S: Float> CompiledCulling<S> {
     }
 }
 
-/// The region in which camera rays start: within the farthest point of the near plane from the eye.
+/// Returns the region in which camera rays start: a ball around the eye that reaches to the
+/// farthest corner of the near plane.
 fn start_region(scene: &Scene, camera: &PinholeCamera) -> StartRegion {
     let size = scene.film.size.map(|n| n as usize);
     let corner_distances = camera.corners([0, 0], size).map(DVec3::length);
@@ -235,7 +237,7 @@ fn start_region(scene: &Scene, camera: &PinholeCamera) -> StartRegion {
 }
 
 impl<L: SimdFloat> World<L> {
-    /// Compiles a scene without validation errors.
+    /// Compiles `scene`, which has no validation errors.
     pub fn new(scene: &Scene) -> Self {
         Self::compile(scene, &RecenteredGeometry::new(scene))
     }

@@ -1,17 +1,17 @@
-//! Inventory: names of the features that a world contains.
+//! Inventory: list of the features that a compiled scene contains, for reports.
 
 use crate::material::{Bsdf, ReflectionLobe, SpecularModel};
 use crate::scene::{BelowHorizon, Filter, RayTypes, Scene};
 use crate::world::light_groups::LightGroupSource;
 use std::fmt;
 
-/// Features that a world contains. Its `Display` is one line.
+/// List of the features that a world contains. `Display` formats it as one line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Inventory {
     parts: Vec<String>,
 }
 
-/// Parts of a compiled scene that the inventory names.
+/// Parts of a compiled scene from which the inventory is made.
 pub(super) struct InventorySources<'a, S> {
     /// Description of the primitives.
     pub geometry: String,

@@ -1,5 +1,6 @@
-//! Light groups: parts of the picture that are linear in the colour and intensity of one light. The
-//! film keeps them apart, so that both can change without new samples.
+//! Light groups. A light group is the part of the picture that comes from one light, ambient light
+//! or the background, and is linear in its colour and intensity. The film stores each group
+//! separately, so that colour and intensity can change without new samples.
 
 use crate::lanes::Float;
 use crate::light::{DeltaLight, Light};
@@ -8,13 +9,15 @@ use crate::value::Color;
 use crate::world::radiance_range::{RadianceRange, SceneDistances};
 use glam::DVec3;
 
-/// Largest number of light groups for lights. Of more lights, several share the last group.
+/// Largest number of light groups for lights. If there are more lights, the remaining ones share
+/// the last group.
 const MAX_LIGHT_GROUPS: usize = 8;
 
-/// Largest number of light groups: those of lights, ambient light and background.
+/// Largest number of light groups: the groups of lights, one for ambient light and one for the
+/// background.
 pub const MAX_GROUPS: usize = MAX_LIGHT_GROUPS + 2;
 
-/// Size of the film's sums beyond which lights share groups \[bytes\].
+/// Size of the film's sums above which lights share groups \[bytes\].
 const FILM_BYTES: u64 = 1 << 30;
 
 /// Bytes per pixel and light group: two replicates of three channels.
@@ -25,28 +28,28 @@ const GROUP_BYTES: u64 = 2 * 3 * 8;
 pub enum LightGroupSource {
     /// Ambient light.
     Ambient,
-    /// Background, which rays see that miss all primitives.
+    /// Background: the radiance of rays that miss all primitives.
     Background,
     /// One light, by its index in the scene.
     Light(usize),
-    /// Several lights. The samples contain the colour and intensity of each.
+    /// Several lights. Their samples already contain the colour and intensity of each light.
     Shared(Vec<usize>),
 }
 
-/// Light groups of a scene: those that can be other than black.
+/// Light groups of a scene. Groups that are certainly black are left out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightGroups {
     /// Source of each group, in the order of the film.
     pub members: Vec<LightGroupSource>,
-    /// `true` if some surface returns direct light.
+    /// `true` if some surface reflects direct light.
     pub(super) lit: bool,
-    /// `true` if some surface returns ambient light.
+    /// `true` if some surface reflects ambient light.
     pub(super) ambient: bool,
 }
 
 impl LightGroups {
-    /// Creates the light groups of `scene`. `lit` and `ambient` are `true` if some surface returns
-    /// direct or ambient light.
+    /// Creates the light groups of `scene`. `lit` is `true` if some surface reflects direct light,
+    /// `ambient` if some surface reflects ambient light.
     pub fn new(scene: &Scene, lit: bool, ambient: bool) -> Self {
         let mut members = Vec::new();
         if ambient && scene.ambient.color != Color::BLACK {
@@ -70,18 +73,20 @@ impl LightGroups {
             members.push(LightGroupSource::Shared(shared.to_vec()));
         }
         if members.is_empty() {
-            // A black picture needs one group as well.
+            // The film needs at least one group, even for a black picture.
             members.push(LightGroupSource::Background);
         }
         Self { members, lit, ambient }
     }
 
-    /// Returns the index of the group with a source.
+    /// Returns the index of the group whose source is `wanted`. Returns `None` if there is no such
+    /// group.
     pub fn find(&self, wanted: &LightGroupSource) -> Option<usize> {
         self.members.iter().position(|m| m == wanted)
     }
 
-    /// Returns index, group, and emission in the samples of that group, of each light that emits.
+    /// Returns a triple for each light that emits: its index in the scene, its group, and the
+    /// emission that the group's samples contain.
     pub fn lights(&self, scene: &Scene) -> Vec<(usize, usize, [f64; 3])> {
         let mut out = Vec::new();
         for (group, member) in self.members.iter().enumerate() {
@@ -96,9 +101,9 @@ impl LightGroups {
         out
     }
 
-    /// Returns the weight of each group in the picture of `scene`, which may differ from the
-    /// compiled scene in the colours, intensities and switches of lights, ambient light and
-    /// background.
+    /// Returns the factor for red, green and blue by which the sums of each group are multiplied in
+    /// the picture of `scene`. Compared with the compiled scene, `scene` may have other colours,
+    /// intensities and on/off switches of lights, ambient light and background.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         let weight = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => scene.ambient.color.0,
@@ -123,8 +128,8 @@ impl LightGroups {
         self.members.iter().map(name).collect()
     }
 
-    /// Returns the steps per unit of radiance in the film's integers, a power of two for each
-    /// group, from its [`RadianceRange`].
+    /// Returns the scale of each group: the number of integer steps per unit of radiance in the
+    /// film, a power of two. It follows from the group's [`RadianceRange`].
     pub(super) fn scales<S: Float>(
         &self,
         scene: &Scene,
@@ -148,7 +153,7 @@ impl LightGroups {
                 list.iter().filter_map(range_of_emission).reduce(RadianceRange::or)
             }
         };
-        // The limits of samples and their squares have to be finite in the samples' precision.
+        // The largest sample and its square have to be finite in the precision of the samples.
         let (min_exponent, max_exponent) =
             if S::EPSILON > 1e-10 { (-78.0, 170.0) } else { (-400.0, 900.0) };
         let scale = |member| {
@@ -257,7 +262,7 @@ mod tests {
         assert!(can_reuse(&groups, &scene, |s| s.lights[1].on = true));
         assert!(can_reuse(&groups, &scene, |s| s.lights.push(s.lights[0].clone())));
         assert!(can_reuse(&groups, &scene, |s| s.ambient.color = Color::WHITE));
-        // The group of a black picture holds no background.
+        // The group that a black picture needs does not make a background reusable.
         assert_eq!(groups.members, [LightGroupSource::Background]);
         assert!(!can_reuse(&groups, &scene, |s| s.background.color = Color::WHITE));
     }

@@ -1,38 +1,43 @@
-//! Lamps that lie on surfaces, such as ceiling lamps: where the shadow rays to them end.
+//! End points of shadow rays to point lights that are located on a surface, such as ceiling lights.
 //!
-//! Shadow rays begin a little off the surface that they leave. To such a lamp they end as far off the
-//! surfaces that it lies on, on the side that they come from: each of them goes to the limit of lamps that
-//! come to the surface from there. A ray that ended at the lamp would be blocked or not by rounding, and
-//! one that ended before it by a fixed length would be blocked by surfaces that it meets flatly.
+//! Shadow rays start a small offset above the surface that they leave. Shadow rays to a light on a
+//! surface end the same kind of offset before that surface, on the side from which they arrive. The
+//! result is the limit of the shadows of a light that approaches the surface from that side. With
+//! an end point at the light itself, rounding would decide whether the surface occludes it. With an
+//! end point a fixed length before the light, a ray at a grazing angle would be occluded by the
+//! surface.
 
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::Form;
 use glam::DVec3;
 
-/// A lamp that is no farther from a surface than so many roundings of the largest coordinate lies on it.
+/// Largest distance between a light and a surface on which it counts as located, in rounding errors
+/// of the largest coordinate.
 const ON: f64 = 8.0;
 
-/// Shadow rays end so many roundings of the largest coordinate off the surface.
+/// Height above the surface at which shadow rays end, in rounding errors of the largest coordinate.
 const LIFT: f64 = 16.0;
 
-/// At sharp edges shadow rays end farther off, to be clear of both sides; at most so many times.
+/// Largest factor by which the distance between light and end point exceeds the height above the
+/// surfaces. At a sharp edge the end point is farther from the light, so that it clears both sides
+/// of the edge.
 const SHARPEST: f64 = 4.0;
 
-/// A lamp and the surfaces that it lies on.
+/// A light and the surfaces on which it is located.
 pub(super) struct OnSurface<S> {
     position: [S; 3],
-    /// By convex solid, flat shape or mesh the unit normals there.
+    /// Unit normals at the light, one list for each convex solid, flat shape or mesh.
     solids: Vec<Vec<[S; 3]>>,
     lift: S,
 }
 
 impl<S: Float> OnSurface<S> {
-    /// Creates the record of a lamp at `position` among `forms`, both around `origin`, where coordinates are rounded to
-    /// `epsilon`; `None`: it lies on none.
+    /// Creates the record of a light at `position` among `forms`. Both have coordinates relative to
+    /// `origin`, rounded to `epsilon`. Returns `None` if the light is on no surface.
     pub fn new(forms: &[Form], position: DVec3, origin: DVec3, epsilon: f64) -> Option<Self> {
         let mut solids = Vec::new();
         let mut largest = 0.0f64;
-        // What the scene's own coordinates, in double precision, round off.
+        // Rounding error of the coordinates in the scene file, which are in double precision.
         let given = f64::EPSILON * origin.abs().max_element();
         for form in forms {
             let reach = form.max_coordinate();
@@ -42,19 +47,20 @@ impl<S: Float> OnSurface<S> {
                 largest = largest.max(rounding);
             }
             let rounded = |normal: DVec3| normal.to_array().map(S::from_f64);
-            solids.extend(normals.into_iter().map(|of| of.into_iter().map(rounded).collect()));
+            solids.extend(normals.into_iter().map(|list| list.into_iter().map(rounded).collect()));
         }
         let lift = S::from_f64(LIFT * largest);
         let position = position.to_array().map(S::from_f64);
         (!solids.is_empty()).then_some(Self { position, solids, lift })
     }
 
-    /// Largest distance from the lamp at which shadow rays end.
+    /// Returns the largest distance from the light at which shadow rays end.
     pub fn farthest(&self) -> f64 {
         SHARPEST * self.lift.to_f64() * self.solids.len() as f64
     }
 
-    /// Unit directions from `start` to where shadow rays end, and how far that is.
+    /// Returns the unit directions from `start` to the end points of the shadow rays, and the
+    /// distances.
     #[inline(never)]
     pub fn end<L: SimdFloat<Scalar = S>>(&self, start: Vec3<L>) -> (Vec3<L>, L) {
         let to = Vec3::splat(self.position) - start;
@@ -69,7 +75,7 @@ impl<S: Float> OnSurface<S> {
                 inward = inward - normal;
             }
             let lift = Vec3::select(outside, out, inward);
-            // The least height over the surfaces that the ray ends before.
+            // Smallest height above the surfaces in front of which the ray ends.
             let mut least = L::from_f64(L::MAX);
             for normal in normals.iter().map(|n| Vec3::splat(*n)) {
                 let before = to.dot(normal).lt(L::zero()) | !outside;

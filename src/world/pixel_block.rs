@@ -1,5 +1,5 @@
-//! Per-tile state of pixels that all their samples share: coordinates, sampler keys, corner
-//! directions.
+//! State of pixels that is the same for all their samples, computed once per tile: coordinates,
+//! sampler keys, corner directions.
 
 use crate::camera::PinholeCamera;
 use crate::lanes::{Float, SimdFloat, SimdU32, Vec3};
@@ -9,22 +9,23 @@ use std::ops::Range;
 /// Largest number of pixels in a block; a multiple of every packet width.
 pub const MAX_BLOCK_PIXELS: usize = 256;
 
-/// Up to [`MAX_BLOCK_PIXELS`] pixels, in the order in which they share packets. Copies of the last
-/// pixel fill the last packet.
+/// Up to [`MAX_BLOCK_PIXELS`] pixels. Adjacent pixels share a packet. Copies of the last pixel fill
+/// the last packet.
 pub(super) struct PixelBlock<S> {
     count: usize,
     /// Columns of the raster \[pixels\].
     x: [u32; MAX_BLOCK_PIXELS],
     /// Rows of the raster \[pixels\].
     y: [u32; MAX_BLOCK_PIXELS],
-    /// Keys of the pixels' random numbers.
+    /// Key of each pixel's random numbers, see [`Sampler::key`].
     keys: [u32; MAX_BLOCK_PIXELS],
-    /// Vectors from the eye to the pixels' corners on the plane at unit distance, by axis.
+    /// Vectors from the eye to the pixels' corners on the plane at unit distance: the x coordinates
+    /// of all pixels, then y, then z.
     corner_directions: [[S; MAX_BLOCK_PIXELS]; 3],
 }
 
 impl<S: Float> PixelBlock<S> {
-    /// Creates the block of `pixels` (column and row) in one replicate.
+    /// Creates the block of `pixels`, given as column and row, in one replicate.
     pub fn new<L: SimdFloat<Scalar = S>>(
         camera: &PinholeCamera,
         sampler: &Sampler<L>,
@@ -69,14 +70,14 @@ impl<S: Float> PixelBlock<S> {
         (self.x[i], self.y[i])
     }
 
-    /// Key and corner direction of pixel `i`, the latter in all lanes.
+    /// Returns the key of pixel `i`, and its corner direction in all lanes.
     #[inline(always)]
     pub fn broadcast<L: SimdFloat<Scalar = S>>(&self, i: usize) -> (u32, Vec3<L>) {
         (self.keys[i], Vec3::splat(self.corner_directions.each_ref().map(|axis| axis[i])))
     }
 
-    /// Keys and corner directions of the pixels from `first` on, each in `COUNT` adjacent lanes.
-    /// `COUNT` is a power of two, `first` a multiple of `WIDTH / COUNT`.
+    /// Returns the keys and corner directions of the pixels from `first` on. Each pixel occupies
+    /// `COUNT` adjacent lanes. `COUNT` is a power of two, `first` a multiple of `WIDTH / COUNT`.
     #[inline(always)]
     pub fn gather<L: SimdFloat<Scalar = S>, const COUNT: usize>(
         &self,
@@ -91,7 +92,7 @@ impl<S: Float> PixelBlock<S> {
         (L::SimdU32::from_fn(|lane| keys[lane / COUNT]), Vec3::new(x, y, z))
     }
 
-    /// Ranges of pixels, `packet_pixels` each, the last one possibly shorter.
+    /// Returns ranges of `packet_pixels` pixels each; the last one may be shorter.
     pub fn packets(&self, packet_pixels: usize) -> impl Iterator<Item = Range<usize>> + use<S> {
         let count = self.count;
         (0..count).step_by(packet_pixels).map(move |first| first..count.min(first + packet_pixels))

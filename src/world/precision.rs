@@ -1,10 +1,12 @@
-//! Choice of the precision: single as long as nothing that it blurs can be seen.
+//! Choice between single and double precision. Single precision is chosen if its errors are too
+//! small to be visible.
 //!
-//! In single precision a coordinate is known to some 2^-23 of the scene's extent, and rays that leave a
-//! surface start 2^-20 of the extent above it. What is smaller than a few times that is lost: thin
-//! objects, gaps between objects, the surroundings of a lamp, and what a pixel shows of an object close
-//! to the eye. Each of them has its ratio here; `tests/extremes/precision.rs` measures what single
-//! precision gets wrong at each.
+//! In single precision a coordinate is exact to about 2^-23 of the scene's extent, and rays that
+//! leave a surface start 2^-20 of the extent above it (the ray offset). Details smaller than a few
+//! ray offsets are lost: thin objects, gaps between objects, the surroundings of a light, and the
+//! part of a close object that one pixel shows. Each kind of detail has a largest ratio of scene
+//! extent to its size below. `tests/extremes/precision.rs` measures the errors of single precision
+//! at each ratio.
 
 use crate::camera::PinholeCamera;
 use crate::primitive::{BoundingSphere, Form, HalfSpace, Proxy, ProxyFace};
@@ -13,37 +15,42 @@ use crate::world::clearance::clearance;
 use glam::DVec3;
 use std::ops::Range;
 
-/// Largest ratio of scene extent to thickness for single precision. At this ratio a ray's offset is 1/128 of
-/// the thickness.
+/// Largest ratio of scene extent to the thickness of an object. At this ratio the ray offset is
+/// 1/128 of the thickness.
 const MAX_EXTENT_PER_THICKNESS: f64 = 8192.0;
 
-/// The largest extent over the narrowest gap between objects: eight times the height at which rays start.
+/// Largest ratio of scene extent to the width of a gap between objects. At this ratio the gap is
+/// eight ray offsets wide.
 const MAX_EXTENT_PER_GAP: f64 = 131_072.0;
 
-/// The largest extent over what a pixel shows of the object nearest to the eye: 32 times the height at
-/// which rays start.
+/// Largest ratio of scene extent to the side of a pixel's footprint on the object closest to the
+/// eye. At this ratio the side is 32 ray offsets.
 const MAX_EXTENT_PER_PIXEL: f64 = 32_768.0;
 
-/// Factor by which the eye may be closer to flat objects: points are put back on a plane almost exactly, and its
-/// normal is the same everywhere.
+/// Factor by which the eye may be closer to flat objects than to curved ones. Hit points on a plane
+/// are projected back to it almost exactly, and its normal is constant.
 const FLAT: f64 = 8.0;
 
-/// The largest extent over the distance of a lamp from objects: the height at which rays start is then
-/// 1/512 of it, and so is the error of the light's angle.
+/// Largest ratio of scene extent to the distance of a light from objects. At this ratio the ray
+/// offset is 1/512 of the distance, and the direction to the light is wrong by 1/512 radians.
 const MAX_EXTENT_PER_LIGHT_DISTANCE: f64 = 2048.0;
 
-/// The least angle between the rays of neighbouring pixels \[radians\]: 64 roundings of a direction.
+/// Smallest angle between the rays of neighbouring pixels \[radians\]: 64 times the rounding error
+/// of a direction.
 const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 
-/// Gaps below this part of the extent, and below a few roundings of the place in the file, are between
-/// numbers that were meant to be equal.
+/// Ratio of a gap to the scene extent, 2^-44, below which two surfaces are regarded as coincident.
+/// Gaps below a few rounding errors of the coordinates in the scene file are regarded as coincident
+/// too.
 const COINCIDENT_GAP: f64 = 1.0 / 17_592_186_044_416.0;
 
-/// Largest number of pairs of objects that are searched for gaps; a scene that crowded has no room for more.
+/// Largest number of pairs of objects that are searched for gaps. The search ends there without a
+/// result, to bound its time.
 const MOST_PAIRS: usize = 1 << 20;
 
-/// Returns `true` if single precision shows `scene` as well as double does, as far as its proportions show.
-/// `forms` are all objects, around `origin`; `extent` is the largest coordinate of objects and eye there.
+/// Returns `true` if the proportions of `scene` let single precision render it as well as double
+/// precision. `forms` are all objects, in coordinates relative to `origin`. `extent` is the largest
+/// magnitude of a coordinate of the objects and the eye in that frame.
 pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
     let thinnest = forms.iter().map(Form::thickness).fold(f64::INFINITY, f64::min);
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
@@ -69,22 +76,23 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     !has_gap(forms, narrow, pixel)
 }
 
-/// Returns `true` if two boxes are no farther than `limit` from each other along any axis.
+/// Returns `true` if the distance between two bounding boxes is at most `limit` along every axis.
 fn are_near(a: &Proxy, b: &Proxy, limit: f64) -> bool {
     (a.low - b.high).max(b.low - a.high).max_element() <= limit
 }
 
-/// Closest place of two faces.
+/// Gap between two faces of different objects, at the point where they are closest.
 struct Clearance {
     width: f64,
-    /// For sides that bend away from each other: the place, and the radius of a ball that would bend away
-    /// from a plane as they do.
+    /// Closest point, and the radius of the sphere that curves away from a plane as the two faces
+    /// curve away from each other. `None` if the faces are parallel planes.
     round: Option<(DVec3, f64)>,
 }
 
 impl Clearance {
-    /// Returns `true` if it is narrow, and wherever it is narrow so is more than half a pixel around: a ball beside
-    /// another, or on a floor, is close to it in a spot too small to see.
+    /// Returns `true` if the width of the gap is within `narrow` and the narrow region is wider
+    /// than a pixel. A sphere that touches another one, or a floor, is close to it only in a spot
+    /// that is too small to see. `pixel` returns the side of a pixel's footprint at a point.
     fn is_seen(&self, narrow: &Range<f64>, pixel: &impl Fn(DVec3) -> f64) -> bool {
         let wide =
             |(place, radius): (DVec3, f64)| (2.0 * radius * narrow.end).sqrt() > 0.5 * pixel(place);
@@ -92,7 +100,7 @@ impl Clearance {
     }
 }
 
-/// The gaps between two sides that run side by side.
+/// Returns the gaps between two faces: at most one if a face is a plane, two between spheres.
 fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
     match (a, b) {
         (ProxyFace::Flat(a), ProxyFace::Flat(b)) => {
@@ -120,14 +128,14 @@ fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
             let gap = |distance: f64, radius: f64| {
                 Some(Clearance { width: (between - distance).abs(), round: Some((place, radius)) })
             };
-            // Beside each other, and one in the other.
+            // Spheres side by side, and one sphere inside the other.
             [gap(r + s, r * s / (r + s)), gap((r - s).abs(), r * s / (r - s).abs())]
         }
     }
 }
 
-/// Returns `true` if faces of two objects run at a distance within `narrow` of each other where that can be seen;
-/// `pixel`: what a pixel shows at a place.
+/// Returns `true` if two objects have a gap whose width is within `narrow` and that is large enough
+/// to see. `pixel` returns the side of a pixel's footprint at a point.
 fn has_gap(forms: &[Form], narrow: Range<f64>, pixel: impl Fn(DVec3) -> f64) -> bool {
     let seen = |a: &ProxyFace, b: &ProxyFace| {
         gaps(a, b).iter().flatten().any(|gap| gap.is_seen(&narrow, &pixel))

@@ -1,9 +1,10 @@
-//! Range of the radiance of a light group's samples, and the step of the film's integers that
-//! follows from it.
+//! Range of the radiance of a light group's samples. It determines the scale of the group: the
+//! number of integer steps per unit of radiance in the film.
 //!
-//! A pixel's sum has 63 bits, a sample at most 49 of them (`SimdFloat::fixed_sum`). Each sample is
-//! rounded to whole steps. Where all samples are equal, as on a matt surface, the mean is wrong by
-//! up to half a step for any number of samples. The step therefore has two bounds:
+//! A pixel's sum has 63 bits, a sample at most 49 bits (`SimdFloat::fixed_sum`). Each sample is
+//! rounded to whole steps. If all samples of a pixel are equal, as on a matt surface, their mean
+//! has an error of up to half a step, which more samples do not reduce. The size of a step
+//! therefore has two bounds:
 //!
 //! - *The dim end.* The darkest 8-bit level of a display is 2^-11.7 of white. A surface whose
 //!   brightest spot is white at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit
@@ -12,11 +13,12 @@
 //!   holds 2^19 samples of each replicate before its sum saturates: a million per pixel. Five bits
 //!   remain for single samples that are brighter.
 //!
-//! The ends are 28 bits apart. By default light of typical intensity has 2^28 steps; the bright end
-//! is 2^16 times as bright, the dim end 2^-12 times. Where both ends do not fit, the bright end has
-//! precedence: a sample that saturates changes the picture visibly, a sample smaller than a step
-//! does not. The dim end has precedence over two kinds of brightness: spots smaller than a pixel,
-//! and light amplified by mirrors. Such samples may saturate; they are counted.
+//! The two bounds are 28 bits apart. By default light of typical intensity has 2^28 steps. The
+//! brightest spot may then be 2^16 times as bright, and the brightest spot of the dimmest surface
+//! 2^-12 times. If a scene exceeds both bounds, the bright end has precedence: a saturated sample
+//! changes the picture visibly, a sample smaller than a step does not. The dim end has precedence
+//! over two kinds of bright light: spots smaller than a pixel, and light amplified by mirrors. Such
+//! samples may saturate; the film counts saturated samples.
 
 use crate::camera::PinholeCamera;
 use crate::lanes::Float;
@@ -29,40 +31,40 @@ use crate::world::compile::RecenteredGeometry;
 use glam::DVec3;
 use std::f64::consts::{FRAC_1_PI, PI};
 
-/// Bits of a sample of typical radiance.
+/// Number of bits of a sample of typical radiance.
 const TYPICAL_BITS: f64 = 28.0;
 
-/// Smallest number of bits of the brightest spot of the dimmest surface.
+/// Smallest number of bits of a sample in the brightest spot of the dimmest surface.
 const DIM_BITS: f64 = 16.0;
 
-/// Bits of the brightest radiance that a whole pixel can have.
+/// Largest number of bits of the radiance that can fill a whole pixel.
 const BRIGHT_BITS: f64 = 44.0;
 
 /// Largest number of bits of a single sample.
 const SAMPLE_BITS: f64 = 49.0;
 
-/// Largest number of bits given up for spots of any size.
+/// Largest number of bits by which the scale is lowered for spots smaller than a pixel.
 const SPOT_BITS: f64 = 12.0;
 
-/// Radiance of a group's samples.
+/// Radiance of the samples of a light group in different parts of the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RadianceRange {
-    /// On a white surface in the middle of the scene.
+    /// Radiance of a white surface in the middle of the scene.
     pub typical: f64,
-    /// In the brightest spot of the dimmest surface.
+    /// Radiance of the brightest spot of the dimmest surface.
     pub dimmest: f64,
-    /// In the brightest spot of the brightest surface, among spots of at least a fraction of a
-    /// pixel.
+    /// Radiance of the brightest spot of the brightest surface. Spots smaller than a quarter of a
+    /// pixel are left out.
     pub brightest: f64,
-    /// In the brightest spot of any size.
+    /// Radiance of the brightest spot of any size.
     pub spots: f64,
-    /// In highlights and after amplifying mirrors.
+    /// Radiance of highlights, and of light amplified by mirrors.
     pub extreme: f64,
 }
 
 impl RadianceRange {
-    /// Returns the range of light that is `least` to `most` times as intense, depending on the
-    /// channel.
+    /// Returns the range of light that is `least` times as intense in the darkest channel and
+    /// `most` times in the brightest.
     pub fn times(self, least: f64, most: f64) -> Self {
         Self {
             typical: self.typical * most,
@@ -73,7 +75,7 @@ impl RadianceRange {
         }
     }
 
-    /// Returns the range of two lights that share a group.
+    /// Returns the range of two light sources that share a group.
     pub fn or(self, other: Self) -> Self {
         Self {
             typical: self.typical.max(other.typical),
@@ -101,8 +103,8 @@ impl RadianceRange {
     }
 }
 
-/// Returns the smallest integer `n` with 2^n >= `x`, computed from the bits of `x`. Exponents of
-/// light that is 2^k times as intense differ by exactly k.
+/// Returns the smallest integer `n` with 2^n >= `x`, computed from the bits of `x`. If `x` is
+/// multiplied by 2^k, the result grows by exactly k.
 fn ceil_log2(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return -1022.0;
@@ -112,25 +114,25 @@ fn ceil_log2(x: f64) -> f64 {
     floor + f64::from(u8::from(bits << 12 != 0))
 }
 
-/// Reflected light of some surfaces, relative to a white matt surface.
+/// Factors of the light that the materials of an object reflect, relative to a white matt surface.
 #[derive(Clone, Copy, Debug)]
 struct Response {
-    /// Smallest factor in a channel that is not black.
+    /// Smallest factor of a channel that is not black.
     least: f64,
-    /// Largest factor outside of highlights.
+    /// Largest factor outside of highlights, over all channels.
     most: f64,
     /// Largest factor in highlights.
     peak: f64,
 }
 
 impl Response {
-    /// Creates the response of a material to direct light; `None` if it returns none.
+    /// Creates the response of a material to direct light. Returns `None` if it reflects none.
     fn new(material: &Material) -> Option<Self> {
         let diffuse = material.color.0.map(|c| c * material.diffuse);
         let specular = material.specular;
         let highlight = match material.highlight {
             Highlight::Phong => 1.0,
-            // D F G / 4 of microfacets seen and lit straight on, with D = 1 / (pi alpha^2).
+            // D F G / 4 of microfacets at normal incidence and view, with D = 1 / (pi alpha^2).
             Highlight::CookTorrance => 0.25 / material.microfacet_alpha().max(SMOOTH_ALPHA).powi(2),
         };
         let most = diffuse.into_iter().fold(0.0, f64::max) + specular;
@@ -147,7 +149,7 @@ impl Response {
     }
 }
 
-/// Returns the smallest positive number.
+/// Returns the smallest number above 0. Returns `None` if there is none.
 fn least_of(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
     numbers.into_iter().filter(|x| *x > 0.0).reduce(f64::min)
 }
@@ -155,25 +157,26 @@ fn least_of(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
 /// Properties of a scene, apart from its lights, that determine the range of radiance.
 pub(super) struct SceneDistances<'a> {
     forms: &'a [Form],
-    /// Response of each form's parts to direct light.
+    /// Response of each object to direct light, over all its parts. `None` if it reflects none.
     responses: Vec<Option<Response>>,
-    /// Responses of all materials to ambient light, per channel.
+    /// Ambient factors of all materials, each channel separately.
     ambient: Vec<f64>,
-    /// Smallest share of light that a purely reflecting or transmitting surface passes on.
+    /// Smallest factor by which a surface without direct lighting multiplies reflected or
+    /// transmitted light.
     faintest: f64,
-    /// Largest product of the factors of all mirrors on a path, at least 1.
+    /// Largest product of the factors of all mirrors on a path; at least 1.
     gain: f64,
-    /// Radius around the scene's centre within which light is typical.
+    /// Radius around the scene's centre at which the irradiance of a light counts as typical.
     radius: f64,
-    /// Position of the eye, and the side of a pixel at unit distance.
+    /// Position of the eye, and the side of a pixel on the plane at unit distance.
     eye: (DVec3, f64),
     /// Largest distance above a surface at which rays start.
     ray_offset: f64,
 }
 
 impl<'a> SceneDistances<'a> {
-    /// `materials_of` returns the materials of a form's parts; `epsilon` is that of the world's
-    /// precision.
+    /// Computes the properties of `scene`. `materials_of` returns the materials of the parts of an
+    /// object. `epsilon` is the rounding error of the world's precision.
     pub fn new(
         scene: &Scene,
         geometry: &'a RecenteredGeometry,
@@ -196,8 +199,8 @@ impl<'a> SceneDistances<'a> {
         };
         let without_direct = materials.iter().filter(|m| Response::new(m).is_none());
         let faintest = least_of(without_direct.copied().filter_map(passed_on).flatten());
-        // Fresnel's equations divide the light between both; fixed coefficients may exceed 1 in
-        // total.
+        // Fresnel's equations divide the light between reflection and transmission. Constant
+        // coefficients may have a sum above 1.
         let max_factors = materials.iter().map(|m| match m.fresnel_mode() {
             Fresnel::Dielectric => m.reflection.max(m.transmission),
             _ => m.reflection + m.transmission,
@@ -242,21 +245,22 @@ impl<'a> SceneDistances<'a> {
         let position = DVec3::from(position.map(S::to_f64));
         let radiance_at = |distance: f64| (distance * distance * PI).recip();
         let (eye, pixel) = self.eye;
-        // The bright spot under a light is about as large as the distance of the light.
+        // The bright spot below a light has about the size of the distance between light and
+        // surface.
         let min_distance = (0.25 * pixel * eye.distance(position)).max(self.ray_offset);
         let spots = radiance_at(clearance(self.forms, position));
         let mut out =
             RadianceRange { typical, dimmest: f64::INFINITY, brightest: 0.0, spots, extreme: 0.0 };
         for (form, response) in self.forms.iter().zip(&self.responses) {
             let Some(response) = response else { continue };
-            // A light in a surface does not illuminate it: shading starts above the light.
+            // A light on a surface does not illuminate it: rays start above the light.
             if let Some(distance) = form.clearance(position).filter(|d| *d > self.ray_offset) {
                 let radiance = radiance_at(distance.max(min_distance));
                 out.brightest = out.brightest.max(radiance * response.most);
                 out.spots = out.spots.max(radiance_at(distance) * response.most);
                 out.extreme = out.extreme.max(radiance * response.peak * self.gain);
             }
-            // Inside of the bounding box, half its diagonal stands for the distance.
+            // For a light inside of the bounding box, half of the box's diagonal is the distance.
             let far = match form.bounds() {
                 Some(bounds) => match box_distance(bounds, position) {
                     away if away > 0.0 => away,
@@ -276,7 +280,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Range of light with the typical radiance `light`, reflected with the given factors.
+    /// Range of light with the typical radiance `light`. Surfaces multiply it by `least` to `most`,
+    /// in highlights by `peak`.
     fn range_of(&self, light: f64, (least, most, peak): (f64, f64, f64)) -> RadianceRange {
         RadianceRange {
             typical: light,
@@ -315,14 +320,14 @@ mod tests {
         assert_eq!(exponent(&|_| ()), 28.0);
         assert_eq!(ONE.times(0.5, 0.75).scale_exponent(), 28.0);
         assert_eq!(ONE.times(2f64.powi(40), 2f64.powi(40)).scale_exponent(), -12.0);
-        // Dim surfaces, and bright surfaces.
+        // The first exponent is that of a dim surface, the others are those of bright surfaces.
         let [dim, bright, far] = [-40, 20, 60].map(|e| 2f64.powi(e));
         assert_eq!(exponent(&|b| b.dimmest = dim), 44.0);
         assert_eq!(exponent(&|b| b.dimmest = 2f64.powi(-20)), 36.0);
         assert_eq!(exponent(&|b| b.dimmest = 2f64.powi(-12)), 28.0);
         assert_eq!(exponent(&|b| (b.brightest, b.spots) = (bright, bright)), 24.0);
         assert_eq!(exponent(&|b| (b.brightest, b.spots) = (far, far)), -16.0);
-        // The dim end keeps its bits beside spots smaller than a pixel and amplified light.
+        // Spots smaller than a pixel and amplified light do not lower the scale of the dim end.
         assert_eq!(exponent(&|b| b.spots = far), 16.0);
         assert_eq!(exponent(&|b| b.spots = f64::INFINITY), 16.0);
         assert_eq!(exponent(&|b| b.extreme = bright), 28.0);

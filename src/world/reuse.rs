@@ -1,8 +1,8 @@
-//! Reuse of samples: comparison of a scene with the compiled one.
+//! Reuse of samples: decides if the samples of one scene are valid for an edited scene.
 //!
-//! Descriptions are compared as a whole, by `==`, after the few fields that may differ were set to
-//! one value or were named in a pattern without `..`. A key that is added to a description is
-//! therefore compared, or has to be named here before the program compiles.
+//! Descriptions of scenes are compared as a whole, by `==`. Before that, the few fields that may
+//! differ are set to equal values, or are named in a pattern without `..`. A field that is added to
+//! a description is therefore compared by default, or causes a compile error here.
 
 use crate::light::Light;
 use crate::material::Material;
@@ -13,10 +13,10 @@ use crate::world::light_groups::{LightGroupSource, LightGroups, emission, emits}
 use std::borrow::Cow;
 
 impl LightGroups {
-    /// Returns `true` if the samples of `compiled`, whose groups these are, are samples of `scene`
-    /// with other group weights. The scenes may differ in the emission of lights, ambient light and
-    /// background that have groups, in names, in unused materials, and in the cap on rays per
-    /// pixel.
+    /// Returns `true` if the samples of the scene `compiled` are valid for `scene` after a change
+    /// of the group weights. These groups are those of `compiled`. The scenes may differ in the
+    /// emission of lights, ambient light and background that have groups of their own, in names, in
+    /// unused materials, and in the cap on rays per pixel.
     pub fn can_reuse(&self, compiled: &Scene, scene: &Scene) -> bool {
         let Scene {
             film,
@@ -46,8 +46,8 @@ impl LightGroups {
             && self.can_relight(compiled, scene)
     }
 
-    /// Returns `true` if the lights of `scene` allow reuse. Lights that do not emit may be
-    /// anywhere.
+    /// Returns `true` if the lights of `scene` allow reuse. Lights that do not emit are not
+    /// compared.
     fn can_relight(&self, compiled: &Scene, scene: &Scene) -> bool {
         let is_compiled = |i: usize| {
             let contains = |source: &LightGroupSource| match source {
@@ -75,19 +75,19 @@ impl LightGroups {
     }
 }
 
-/// Returns the settings without the cap on rays per pixel.
+/// Returns a copy of the settings with the cap on rays per pixel set to 0.
 fn uncapped(film: &FilmSettings) -> FilmSettings {
     FilmSettings { rays_per_pixel: 0, ..film.clone() }
 }
 
-/// Returns the light without name, white and of unit intensity, as the samples of its own group
-/// contain it.
+/// Returns a copy of the light without name, white and of unit intensity. The samples of a light in
+/// a group of its own contain this emission.
 fn with_unit_emission(light: &Light) -> Light {
     Light { name: String::new(), color: Color::WHITE, intensity: 1.0, on: true, ..light.clone() }
 }
 
-/// Returns `true` if objects of two scenes differ in their names and the names of their materials
-/// only.
+/// Returns `true` if two objects of two scenes are equal except for their names and the names of
+/// their materials.
 fn same_object((scene_a, a): (&Scene, &Object), (scene_b, b): (&Scene, &Object)) -> bool {
     let Object { name: _, material: _, shape, transform } = b;
     *transform == a.transform
@@ -95,7 +95,7 @@ fn same_object((scene_a, a): (&Scene, &Object), (scene_b, b): (&Scene, &Object))
         && materials(scene_b, b).eq(materials(scene_a, a))
 }
 
-/// Returns the shape without the names of its parts' materials.
+/// Returns a copy of the shape in which the parts name no materials.
 fn unnamed(shape: &Shape) -> Cow<'_, Shape> {
     if shape.named_materials().is_empty() {
         return Cow::Borrowed(shape);

@@ -1,4 +1,4 @@
-//! Camera samples of a tile's pixels: the renderer's only way to radiance.
+//! Tracing of camera samples for the pixels of a tile. The renderer gets radiance only from here.
 
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::sampling::{PacketSampler, SampleSettings, Sampler};
@@ -9,7 +9,7 @@ use crate::world::pixel_block::PixelBlock;
 use crate::world::world::World;
 use std::ops::Range;
 
-/// A world with a sample sequence.
+/// A world together with the sample sequence of a picture; source of [`TileTracer`]s.
 pub struct CameraTracer<'a, L: SimdFloat> {
     world: &'a World<L>,
     sampler: Sampler<L>,
@@ -20,10 +20,10 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
         Self { world, sampler: Sampler::new(*sampling, world.jitter()) }
     }
 
-    /// Creates the tracer of `pixels` (column and row), at most
-    /// [`MAX_BLOCK_PIXELS`](crate::world::MAX_BLOCK_PIXELS) of them, that lie in a rectangle of the
-    /// raster. Returns `None` if all samples there are black: all camera rays miss and the
-    /// background is black.
+    /// Creates the tracer of `pixels`, at most [`MAX_BLOCK_PIXELS`](crate::world::MAX_BLOCK_PIXELS)
+    /// columns and rows. All pixels are in the rectangle of the raster that `origin` and `extent`
+    /// give, and culling assumes this. Returns `None` if all samples of the rectangle are certainly
+    /// black: every camera ray misses and the background is black.
     pub fn tile(
         &self,
         replicate: usize,
@@ -37,7 +37,7 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
         Some(TileTracer { candidates, ..self.scattered(replicate, pixels) })
     }
 
-    /// Creates the tracer of `pixels` anywhere in the raster, without culling.
+    /// Creates the tracer of `pixels` at any positions in the raster, without culling.
     pub fn scattered(
         &self,
         replicate: usize,
@@ -54,7 +54,8 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
     }
 }
 
-/// Tracer of the samples of some pixels in one replicate, with the candidate sets of their tile.
+/// Tracer of the samples of some pixels in one replicate. It tests rays against the candidate
+/// primitives of the tile.
 pub struct TileTracer<'a, L: SimdFloat> {
     world: &'a World<L>,
     sampler: &'a Sampler<L>,
@@ -65,8 +66,8 @@ pub struct TileTracer<'a, L: SimdFloat> {
 }
 
 impl<L: SimdFloat> TileTracer<'_, L> {
-    /// Traces the samples `first..first + WIDTH` of every pixel, one packet a pixel, and passes the
-    /// radiance of each packet to `sink`. `first` is a multiple of `WIDTH`.
+    /// Traces the samples `first..first + WIDTH` of every pixel and passes the radiance of each
+    /// packet to `sink`. A packet holds samples of one pixel. `first` is a multiple of `WIDTH`.
     #[inline(always)]
     pub fn radiance(
         &mut self,
@@ -87,10 +88,10 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         }
     }
 
-    /// Traces the samples `first..first + COUNT` of every pixel in packets of `WIDTH / COUNT`
-    /// pixels, and passes the radiance of each packet to `sink`. Pixel `i` of a packet has the
-    /// lanes from `i * COUNT` on. `COUNT` is a power of two below `WIDTH`, `first` a multiple of
-    /// it.
+    /// Traces the samples `first..first + COUNT` of every pixel and passes the radiance of each
+    /// packet to `sink`. A packet holds samples of `WIDTH / COUNT` pixels; its pixel `i` occupies
+    /// the `COUNT` lanes from `i * COUNT` on. `COUNT` is a power of two below `WIDTH`, and `first`
+    /// is a multiple of `COUNT`.
     #[inline(always)]
     pub fn radiance_shared<const COUNT: usize>(
         &mut self,
@@ -108,7 +109,7 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         }
     }
 
-    /// Cost of all packets traced so far.
+    /// Number of rays of all packets traced so far, with [`Counts::glossy`].
     pub fn counts(&self) -> Counts {
         self.counts
     }
@@ -131,17 +132,17 @@ impl<L: SimdFloat> TileTracer<'_, L> {
     }
 }
 
-/// Pixels and sample indices of a packet.
+/// Pixels and sample indices of a traced packet.
 pub struct TracedPacket<'a, S> {
     block: &'a PixelBlock<S>,
-    /// Pixels of the packet, numbered as the tracer's pixels.
+    /// Pixels of the packet, as indices into the pixels of the tracer.
     pub pixels: Range<usize>,
     first: u32,
     samples_per_pixel: usize,
 }
 
 impl<S: Float> TracedPacket<'_, S> {
-    /// Pixel (column and row) and sample index of a lane.
+    /// Returns the pixel (column and row) and the sample index of a lane.
     pub fn sample(&self, lane: usize) -> ((u32, u32), u32) {
         let pixel = self.pixels.start + lane / self.samples_per_pixel;
         (self.block.pixel(pixel), self.first + (lane % self.samples_per_pixel) as u32)

@@ -1,36 +1,38 @@
-//! Bound of the bias by the limits of path tracing.
+//! Upper bounds of the bias that truncated paths cause (`max_depth` and `min_throughput`).
 
 use crate::material::{Fresnel, Material};
 use crate::scene::{Object, RayTypes, Scene};
 use glam::DVec3;
 
-/// Largest share of light that a material sends on, reflected and transmitted together, of any channel.
+/// Returns the largest share of light that a material reflects and transmits together, over all
+/// channels and angles.
 fn max_albedo(material: &Material, flat: bool) -> f64 {
     let (k_r, k_t) = (material.reflection, material.transmission);
     let f = match material.fresnel_mode() {
         Fresnel::Constant => material.f0().0.into_iter().fold(0.0, f64::max).min(1.0),
-        // At grazing angles.
+        // At grazing angles Fresnel reflectance reaches 1.
         _ => 1.0,
     };
     match material.fresnel_mode() {
         _ if k_t == 0.0 => k_r * f,
         Fresnel::Dielectric => k_r.max(k_t),
         _ if flat => k_r * f + k_t,
-        // Or everything, past the critical angle.
+        // Past the critical angle all light is reflected.
         _ => (k_r * f + k_t).max(1.0),
     }
 }
 
-/// Properties of an object's geometry that the bound needs.
+/// Properties of an object's geometry on which the bound depends.
 struct ObjectTraits {
     flat: bool,
-    /// The outside may see itself.
+    /// `true` if a ray that leaves the outside may hit the object again.
     concave: bool,
-    /// Paths may begin inside.
+    /// `true` if camera rays may start inside of the object.
     contains_eye: bool,
 }
 
-/// Largest displacement of the eye by rounding to single precision, as a share of the scene's extent.
+/// Largest displacement of the eye by rounding to single precision, as a ratio to the scene's
+/// extent.
 const ROUNDING: f64 = 1e-6;
 
 impl ObjectTraits {
@@ -50,22 +52,24 @@ impl ObjectTraits {
         }
     }
 
-    /// Returns `true` if a path may hit the object twice in a row. The outside of a convex form cannot see itself: only
-    /// its inside sees itself, and only paths that begin inside, or are let in, get there. Bumps do not change
-    /// that: what they would reflect into the surface leaves it, and what they would keep outside goes in.
+    /// Returns `true` if a path may hit the object twice in a row. A ray that leaves the outside of
+    /// a convex form cannot hit it again. Only rays inside can, and paths are inside only if they
+    /// start there or are transmitted. Bump maps change nothing: a reflected direction that would
+    /// point into the surface is mirrored out of it, and a transmitted direction that would point
+    /// out is mirrored into it.
     fn sees_itself(&self, material: &Material) -> bool {
         let let_in = !self.flat && material.transmission > 0.0;
         self.concave || let_in || self.contains_eye && material.two_sided
     }
 }
 
-/// Shares of light that surfaces send on.
+/// Largest factors by which surfaces of the scene multiply the throughput of a path.
 struct Reach {
-    /// The largest share of one surface.
+    /// Largest factor of one surface.
     first: f64,
-    /// The largest product of the shares of two surfaces of which one sees the other.
+    /// Largest product of the factors of two surfaces that a path can hit one after the other.
     round_trip_albedo: f64,
-    /// Some surface sends on reflected and transmitted light.
+    /// `true` if some surface transmits light. Paths may then split at surfaces.
     through: bool,
 }
 
@@ -75,16 +79,16 @@ impl Reach {
         let (mut first, mut second, mut round_trip_albedo) = (0.0f64, 0.0f64, 0.0f64);
         let (mut entered, mut through) = (0, false);
         for object in &scene.objects {
-            let place = ObjectTraits::new(object, scene);
+            let traits = ObjectTraits::new(object, scene);
             let mut enters = false;
             for name in object.materials() {
                 let material = scene.materials.get(name).unwrap_or(&default);
-                let rho = max_albedo(material, place.flat);
-                if rho > 0.0 && place.sees_itself(material) {
+                let rho = max_albedo(material, traits.flat);
+                if rho > 0.0 && traits.sees_itself(material) {
                     round_trip_albedo = round_trip_albedo.max(rho * rho);
                 }
                 through |= material.transmission > 0.0;
-                enters |= material.transmission > 0.0 && !place.flat;
+                enters |= material.transmission > 0.0 && !traits.flat;
                 second = second.max(rho.min(first));
                 first = first.max(rho);
             }
@@ -92,19 +96,21 @@ impl Reach {
         }
         round_trip_albedo = round_trip_albedo.max(first * second);
         if entered > 1 {
-            // Where they overlap, paths meet surfaces that change nothing.
+            // Where solids overlap, paths cross suppressed boundaries, which leave the throughput
+            // unchanged.
             (first, round_trip_albedo) = (first.max(1.0), round_trip_albedo.max(1.0));
         }
         Self { first, round_trip_albedo, through }
     }
 
-    /// The most that paths weigh which have met `n` surfaces.
+    /// Returns the largest total throughput of the paths that have hit `n` surfaces.
     fn weight(&self, n: u32) -> f64 {
         let pairs = self.round_trip_albedo.powi(i32::try_from(n / 2).unwrap_or(i32::MAX));
         if n.is_multiple_of(2) { pairs } else { pairs * self.first }
     }
 
-    /// The most that paths weigh which have met `n` surfaces or more; infinite: nothing is known.
+    /// Returns the largest total throughput of the paths that have hit at least `n` surfaces;
+    /// infinite if there is no bound.
     fn from(&self, n: u32) -> f64 {
         let sum = self.weight(n) + self.weight(n.saturating_add(1));
         if self.round_trip_albedo < 1.0 {
@@ -114,9 +120,10 @@ impl Reach {
         }
     }
 
-    /// The most that paths weigh where they end because they weigh less than `least`, at surfaces of at most
-    /// `depth` after the first. A path that goes one way ends once. One that divides ends in up to two ways at
-    /// every surface, and of such paths there are up to four side by side.
+    /// Returns the largest total throughput that is cut off where it falls below `least`, at up to
+    /// `depth` surfaces after the first. A path that never splits is cut off once. Among split
+    /// paths, each surface cuts off at most two branches of each of at most four simultaneous
+    /// paths.
     fn ended(&self, least: f64, depth: u32) -> f64 {
         if !self.through {
             return least;
@@ -125,17 +132,20 @@ impl Reach {
     }
 }
 
-/// The brightness that `scene`'s limits can cut off, in words; empty: they cut nothing.
+/// Returns one sentence for each limit of `scene` that truncates paths, with a bound of the lost
+/// radiance. Returns no sentence if the limits truncate nothing.
 ///
-/// Two surfaces in a row send on at most `round_trip_albedo`, the largest product of the shares of two surfaces of
-/// which one sees the other. So all paths that have met n surfaces weigh at most
-/// w(n) = pair^(n/2) together, for odd n that of n - 1 times the largest share, and all of n and
-/// more at most (w(n) + w(n + 1)) / (1 - pair). What they add is at most that times the brightest surface (or the
-/// background, if that is brighter). So nothing is cut only where nothing sends light on, or a flat or convex form
-/// does alone, which is met once.
+/// Two consecutive surfaces multiply the throughput by at most r, the `round_trip_albedo`. Let f be
+/// the largest factor of one surface. The paths that have hit n surfaces therefore have a total
+/// throughput of at most w(n) = r^(n/2) for even n, and w(n) = r^((n-1)/2) f for odd n. The total
+/// over n and all larger numbers is at most (w(n) + w(n + 1)) / (1 - r). The lost radiance is at
+/// most this total times the radiance of the brightest surface (or of the background, if that is
+/// brighter). Nothing is truncated only if no surface reflects or transmits, or if the only one
+/// that does is flat or convex, which a path hits once.
 ///
-/// A transparent ball carries no claim that light leaves it where it comes to its surface again: the angles are
-/// equal there, but at the rim rounding decides whether the critical angle is passed, and bumps change them.
+/// Total internal reflection in a transparent ball is included in the bound, although the angle of
+/// incidence is the same at every hit and light that entered can also leave. At the rim rounding
+/// decides on which side of the critical angle a ray is, and bump maps change the angle.
 pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
     let reach = Reach::new(scene);
     if scene.trace.ray_types < RayTypes::Full || reach.first == 0.0 {
@@ -155,7 +165,7 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
         out.push(format!("max_depth {depth} cuts longer paths ({})", bound(cut)));
     }
     let least = scene.trace.min_throughput;
-    // At depth 0 nothing goes on that could end.
+    // At depth 0 no path continues, so that none can be cut off.
     if least > 0.0 && depth > 0 {
         let ended = reach.ended(least, depth) * reach.from(0);
         out.push(format!("min_throughput {least} cuts weaker paths ({})", bound(ended)));
@@ -163,10 +173,10 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
     out
 }
 
-/// To three digits, and no less than it is.
+/// Formats `x` with three digits, rounded up.
 fn rounded_up(x: f64) -> String {
     let text = format!("{x:.2e}");
-    // A last digit that doubles cannot hold is no reason to go up.
+    // A difference in the last digits of a double is a rounding error, not a reason to round up.
     let short = text.parse::<f64>().is_ok_and(|shown| shown < x * (1.0 - 1e-12));
     if short { format!("{:.2e}", x + 0.005 * 10f64.powf(x.log10().floor())) } else { text }
 }
@@ -243,7 +253,7 @@ mod tests {
             truncation_bounds(&with(0.4, Fresnel::Dielectric, outside, BALL)),
             ["max_depth 16 cuts longer paths (at most 1.53e-5 of the brightest surface)"]
         );
-        // A pane alone is met once.
+        // A path hits a single pane only once.
         assert_eq!(truncation_bounds(&with(0.4, Fresnel::Dielectric, outside, FLOOR)), [""; 0]);
     }
 

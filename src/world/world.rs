@@ -20,28 +20,29 @@ use crate::world::light_groups::LightGroups;
 use crate::world::lights_on_surfaces::OnSurface;
 use crate::world::tile_tracer::CameraTracer;
 
-/// A light with its group.
+/// A light of the world, with its light group.
 pub(super) struct LightSource<S> {
     pub light: DeltaLight<S>,
     /// Index of the light group.
     pub group: usize,
-    /// Emission that the group's samples contain; `None` is 1 in every channel.
+    /// Emission that is multiplied into the samples of the group. `None` means 1 in every channel.
     pub emission: Option<[S; 3]>,
-    /// End points of shadow rays, for a light that lies on a surface.
+    /// End points of shadow rays. `None` for a light that is not on a surface.
     pub on_surface: Option<OnSurface<S>>,
 }
 
-/// A scene compiled for the lane type `L`. It holds only what the scene requires.
+/// A scene compiled for the lane type `L`. Fields of features that the scene does not use are empty
+/// or `None`.
 pub struct World<L: SimdFloat> {
     /// All primitives, in coordinates relative to the scene's centre.
     pub(super) geometry: Aggregate<L>,
-    /// Index into `bsdfs` of each primitive.
+    /// BSDF of each primitive, as an index into `bsdfs`.
     pub(super) bsdf_of: Vec<u32>,
     pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
     pub(super) sources: Vec<LightSource<L::Scalar>>,
-    /// Light group of ambient light; `None` if no surface returns any.
+    /// Light group of ambient light. `None` if no surface reflects ambient light.
     pub(super) ambient: Option<usize>,
-    /// Light group of the background; `None` if it is black.
+    /// Light group of the background. `None` if the background is black.
     pub(super) background: Option<usize>,
     /// `true` if shadow rays are traced.
     pub(super) shadows: bool,
@@ -50,30 +51,31 @@ pub struct World<L: SimdFloat> {
     /// `true` if vertex colours or textures multiply the albedo somewhere.
     pub(super) colored: bool,
     /// `true` if the world is neither `smooth` nor `colored` and all its primitives are in linear
-    /// lists, without BVH and bounding boxes.
+    /// lists, without BVH and bounding boxes. Kernels have a faster instance for such worlds.
     pub(super) simple: bool,
-    /// Textures and bump maps; `None` if there are none.
+    /// Textures and bump maps. `None` if the scene has neither.
     pub(super) surface_textures: Option<SurfaceTextures<L>>,
-    /// Transmissive surfaces; `None` if there are none.
+    /// Transmissive surfaces. `None` if the scene has none.
     pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,
     /// Largest number of surfaces on a path after the first; 0 if no surface reflects or transmits.
     pub(super) depth: u32,
-    /// Throughput below which a path ends.
+    /// Throughput below which a path is cut off.
     pub(super) min_weight: f64,
-    /// `true` if lobe directions below the horizon are mirrored above it.
+    /// `true` if sampled lobe directions that point into the surface are mirrored out of it.
     pub(super) fold: bool,
     pub(super) camera: PinholeCamera,
-    /// Candidates of rays about which nothing is known.
+    /// Candidates of rays for which no culling is possible.
     pub(super) all_candidates: TileCandidates,
-    /// Light buffer of each light; empty, or `None`, where shadow rays traverse the BVH.
+    /// Light buffer of each light: its possible occluders by direction. The list is empty, or the
+    /// entry `None`, if shadow rays to the light traverse the BVH.
     pub(super) light_buffers: Vec<Option<LightBuffer<L::Scalar>>>,
     pub(super) culling: CullingMode,
     pub(super) groups: LightGroups,
     /// Name of each light group.
     pub(super) group_names: Vec<String>,
-    /// Steps per unit of radiance in the film's integers, per light group.
+    /// Scale of each light group: the number of integer steps per unit of radiance in the film.
     pub(super) scales: Vec<f64>,
-    /// `true` if samples are distributed over their pixel.
+    /// `true` if samples are distributed over the area of their pixel instead of its centre.
     pub(super) jitter: bool,
     pub(super) inventory: Inventory,
     /// One sentence for each limit of the scene that truncates paths.
@@ -86,12 +88,13 @@ impl<L: SimdFloat> World<L> {
         self.scales.len()
     }
 
-    /// Steps per unit of radiance in the film's integers, per light group.
+    /// Scale of each light group: the number of integer steps per unit of radiance in the film.
     pub fn scales(&self) -> &[f64] {
         &self.scales
     }
 
-    /// Returns `true` if samples are distributed over their pixel.
+    /// Returns `true` if samples are distributed over the area of their pixel instead of its
+    /// centre.
     pub fn jitter(&self) -> bool {
         self.jitter
     }
@@ -101,13 +104,14 @@ impl<L: SimdFloat> World<L> {
         &self.camera
     }
 
-    /// Creates the tracer of camera samples.
+    /// Creates the tracer of camera samples with the given seed and sample sequence.
     pub fn camera_tracer(&self, sampling: &SampleSettings) -> CameraTracer<'_, L> {
         CameraTracer::new(self, sampling)
     }
 
-    /// Candidates of the camera rays through a rectangle of the raster, and of the shadow rays from
-    /// their hit points; `None` if no primitive is ruled out.
+    /// Returns the candidates of the camera rays through the rectangle of the raster at `origin`
+    /// with size `extent`, and of the shadow rays from their hit points. Returns `None` if no
+    /// primitive can be excluded.
     pub(super) fn candidates(
         &self,
         origin: [usize; 2],
@@ -117,14 +121,16 @@ impl<L: SimdFloat> World<L> {
         self.culling.candidates(&self.geometry, lights, &self.camera, (origin, extent))
     }
 
-    /// Returns `true` if all camera rays with these candidates miss and the background is black.
+    /// Returns `true` if the samples of a tile with these candidates are certainly black: no
+    /// primitive is a candidate of its camera rays, and the background is black.
     pub(super) fn is_black(&self, candidates: &TileCandidates) -> bool {
         self.background.is_none() && candidates.primary.is_empty()
     }
 
     /// Traces one packet of paths. `origin` and `direction` are those of camera rays, as
-    /// [`PinholeCamera::rays`] makes them. Lanes outside `active` stay black. `candidates` are
-    /// those of the camera rays and of the shadow rays from their hit points, if they are known.
+    /// [`PinholeCamera::rays`] returns them. Lanes outside of `active` stay black. `candidates` are
+    /// the candidates of the camera rays and of the shadow rays from their hit points; `None` if
+    /// they are unknown.
     #[inline(always)]
     pub fn trace(
         &self,
@@ -150,7 +156,7 @@ impl<L: SimdFloat> World<L> {
     }
 
     /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
-    /// same length. Points are columns and rows of the raster in pixels, with fractions.
+    /// same length. A point is a column and a row of the raster in pixels, with fractions.
     pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
         first_hit::trace_first_hits(self, points, hits);
     }

@@ -226,7 +226,8 @@ fn light_intensity_in_powers_of_two_scales_picture_exactly() {
         ),
     ];
     for scene in scenes {
-        let pixels_of = |scene: &Scene| picture(&rendered(scene, 1, Precision::Auto, 8), Replicates::Both);
+        let pixels_of =
+            |scene: &Scene| picture(&rendered(scene, 1, Precision::Auto, 8), Replicates::Both);
         let expected = pixels_of(&scene);
         for ev in [-40, 40] {
             let factor = f64::from(ev).exp2();

@@ -1,4 +1,4 @@
-//! Cameras and frames at their extremes.
+//! Extremes of cameras and of orthonormal frames.
 
 use crate::common::Numbers;
 use crate::rays::to_dvec3;
@@ -18,17 +18,17 @@ fn check_finite<L: SimdFloat>(camera: &Camera, size: [u32; 2], name: &str) {
     }
     let xs = [0, size[0] / 2, size[0] - 1];
     let ys = [0, size[1] / 2, size[1] - 1];
-    for at in xs.into_iter().flat_map(|x| ys.map(|y| (x, y))) {
+    for pixel in xs.into_iter().flat_map(|x| ys.map(|y| (x, y))) {
         for offset in [0.0, 0.5, 1.0] {
             let (o, d) = view.rays(
-                Vec3::<L>::splat(view.pixel_corner_direction(at)),
+                Vec3::<L>::splat(view.pixel_corner_direction(pixel)),
                 (L::from_f64(offset), L::from_f64(offset)),
             );
             for lane in 0..L::WIDTH {
                 let (o, d) = (to_dvec3(o, lane), to_dvec3(d, lane));
-                assert!(o.is_finite() && d.is_finite(), "{name}: pixel {at:?}: {o} {d}");
-                assert!((d.length() - 1.0).abs() < 4.0 * L::EPSILON, "{name}: {at:?}: {d}");
-                assert!(d.dot(w) > 0.0, "{name}: pixel {at:?} looks back: {d}");
+                assert!(o.is_finite() && d.is_finite(), "{name}: pixel {pixel:?}: {o} {d}");
+                assert!((d.length() - 1.0).abs() < 4.0 * L::EPSILON, "{name}: {pixel:?}: {d}");
+                assert!(d.dot(w) > 0.0, "{name}: pixel {pixel:?} points backwards: {d}");
             }
         }
     }
@@ -58,7 +58,7 @@ fn extreme_17_odd_cameras() {
     report(17, "both", "rays finite");
 }
 
-/// The angle between the outermost rays is the view angle.
+/// The angle between the outermost rays equals the view angle.
 #[test]
 fn extreme_17_narrow_and_wide_angles_are_right() {
     let mut worst = 0f64;
@@ -75,7 +75,7 @@ fn extreme_17_narrow_and_wide_angles_are_right() {
             a.cross(b).length().atan2(a.dot(b)).to_degrees()
         };
         let found = angle(0.5);
-        // Unit vectors are known to 1e-16: so is the angle, in radians.
+        // Unit vectors are rounded to 1e-16; so is the angle, in radians.
         let tolerance = 1e-13 + 1e-13 * degrees;
         assert!((found - degrees).abs() < tolerance, "{degrees}: {found}");
         worst = worst.max((found - degrees).abs());
@@ -93,11 +93,11 @@ fn extreme_17_impossible_views_are_located_errors() {
         ("target = [0.0, 0.0, 0.0]\nview_angle.horizontal = 180.0", "test:3:25"),
     ] {
         let text = format!("[camera]\n{line}\n");
-        let words = match Scene::parse(&text, "test") {
+        let message = match Scene::parse(&text, "test") {
             Ok(_) => panic!("accepted: {text}"),
             Err(errors) => errors.to_string(),
         };
-        assert!(words.starts_with(place), "expected at {place}: {words}");
+        assert!(message.starts_with(place), "expected at {place}: {message}");
     }
     report(17, "both", "errors located");
 }
@@ -106,12 +106,12 @@ fn check_frames<L: SimdFloat>(bound: f64) {
     let mut numbers = Numbers::new(18);
     let mut worst: f64 = 0.0;
     for round in 0..1_000_000 / L::WIDTH {
-        // Single precision's normals are rounded again: as far from unit length as it allows.
+        // Normals in single precision are rounded again, as far from unit length as it allows.
         let mut normals = [[0.0; 3]; 16];
         for n in &mut normals {
             let around = match round % 4 {
                 0 => numbers.direction(),
-                // Towards the poles, down to differences that round away.
+                // Normals near the poles, down to differences that round away.
                 _ => {
                     let tilt = 10f64.powf(numbers.between(-17.0, -3.0));
                     let pole = if numbers.bits() & 1 == 0 { 1.0 } else { -1.0 };
@@ -122,7 +122,7 @@ fn check_frames<L: SimdFloat>(bound: f64) {
                         2 => {
                             DVec3::new(0.0, side.y * tilt * 1e-6, pole * (1.0 - f64::EPSILON / 2.0))
                         }
-                        // The equator, where the sign changes.
+                        // Normals near the equator, where the sign changes.
                         _ => DVec3::new(side.x, side.y, pole * tilt).normalize(),
                     }
                 }

@@ -236,10 +236,18 @@ fn extreme_07_cauchy() {
         // A line that passes an edge within rounding may hit from one end only, or have its point
         // on the next face: about a share of the rounding.
         let limit = 100.0 * f64::from(f32::EPSILON) * single.lines;
-        assert!(single.inconsistent as f64 <= limit, "{name}: {} lines of {LINES}", single.inconsistent);
+        assert!(
+            single.inconsistent as f64 <= limit,
+            "{name}: {} lines of {LINES}",
+            single.inconsistent
+        );
     }
     report(7, "double", &format!("{:.1} sigma at most, 0 lines out of order", worst[0]));
-    report(7, "single", &format!("{:.1} sigma at most, {inconsistent} lines out of order", worst[1]));
+    report(
+        7,
+        "single",
+        &format!("{:.1} sigma at most, {inconsistent} lines out of order", worst[1]),
+    );
 }
 
 #[test]
@@ -325,7 +333,11 @@ fn extreme_13_slivers() {
         worst = worst.max(found.check(name, surface / outer, 4.0 * volume / surface));
         // Parity. Coordinates about 1 are rounded to 1e-16 times the distance of 4: 1e-9 of the
         // thin side.
-        assert_eq!(found.inconsistent, 0, "{name}: {} of {} lines", found.inconsistent, found.lines);
+        assert_eq!(
+            found.inconsistent, 0,
+            "{name}: {} of {} lines",
+            found.inconsistent, found.lines
+        );
     }
     report(13, "double", &format!("{worst:.1} sigma at most, 0 lines out of order"));
     report(13, "single", LEFT_TO_DOUBLE);

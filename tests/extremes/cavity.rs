@@ -1,4 +1,4 @@
-//! A camera in the hollow of a compound.
+//! Cameras in the cavity of a compound solid.
 
 use crate::common::Numbers;
 use crate::compound::{block, difference, geometry};
@@ -12,24 +12,24 @@ fn ball(radius: f64) -> Form {
     Form::Sphere(SphereForm { center: DVec3::ZERO, radius })
 }
 
-/// From inside the hollow of a solid whose walls are at least 0.2 thick: the wall is met where it
-/// begins, then where it ends, and beyond there is nothing.
-fn check_hollow<L: SimdFloat>(name: &str, form: &Form, seed: u64) {
+/// Checks rays from inside the cavity of a solid whose walls are at least 0.2 thick: they hit the
+/// wall where it begins, then where it ends, and nothing beyond.
+fn check_cavity<L: SimdFloat>(name: &str, form: &Form, seed: u64) {
     let geometry = geometry::<L>(form);
     let mut numbers = Numbers::new(seed);
     let mut lines: Vec<Line> =
         (0..100_000).map(|_| (numbers.in_cube(0.25), numbers.direction())).collect();
     for outward in [false, true] {
-        let met = closest(&geometry, &lines);
-        for (line, met) in lines.iter_mut().zip(met) {
-            let told = || format!("{name}, {}: {line:?} {met:?}", L::NAME);
-            let met = met.unwrap_or_else(|| panic!("lost: {}", told()));
-            assert_eq!(met.normal.dot(line.1) > 0.0, outward, "{}", told());
-            line.0 += line.1 * (met.t + 1e-3);
+        let hits = closest(&geometry, &lines);
+        for (line, hit) in lines.iter_mut().zip(hits) {
+            let context = || format!("{name}, {}: {line:?} {hit:?}", L::NAME);
+            let hit = hit.unwrap_or_else(|| panic!("lost: {}", context()));
+            assert_eq!(hit.normal.dot(line.1) > 0.0, outward, "{}", context());
+            line.0 += line.1 * (hit.t + 1e-3);
         }
     }
-    for (line, met) in lines.iter().zip(closest(&geometry, &lines)) {
-        assert!(met.is_none(), "{name}, {}: beyond, {line:?} {met:?}", L::NAME);
+    for (line, hit) in lines.iter().zip(closest(&geometry, &lines)) {
+        assert!(hit.is_none(), "{name}, {}: beyond, {line:?} {hit:?}", L::NAME);
     }
 }
 
@@ -45,7 +45,7 @@ fn extreme_04_camera_inside_a_cavity() {
     .into_iter()
     .enumerate()
     {
-        check_hollow::<Double>(name, &form, 400 + i as u64);
-        check_hollow::<Single>(name, &form, 420 + i as u64);
+        check_cavity::<Double>(name, &form, 400 + i as u64);
+        check_cavity::<Single>(name, &form, 420 + i as u64);
     }
 }

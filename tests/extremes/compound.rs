@@ -19,7 +19,7 @@ pub fn block(center: [f64; 3], size: [f64; 3]) -> Form {
     Cuboid { center, size }.form()
 }
 
-/// All parts joined in one way.
+/// Returns a compound of all parts, combined by `join`.
 fn joined(join: fn(Vec<Tree>) -> Tree, parts: Vec<Form>) -> Form {
     let tree = join((0..parts.len()).map(Tree::Part).collect());
     Form::Csg(CsgSolid { parts, tree })
@@ -41,7 +41,7 @@ pub fn geometry<L: SimdFloat>(form: &Form) -> Aggregate<L> {
     Aggregate::new(std::slice::from_ref(form))
 }
 
-/// A line from outside the ball of radius 4 through a random point near the origin.
+/// Returns a line from outside the ball of radius 4 through a random point near the origin.
 fn line(numbers: &mut Numbers) -> Line {
     let d = numbers.direction();
     (numbers.in_cube(1.5) - d * 6.0, d)
@@ -52,7 +52,7 @@ pub fn lines(seed: u64, count: usize) -> Vec<Line> {
     (0..count).map(|_| line(&mut numbers)).collect()
 }
 
-/// Every surface along each line, by going on from one to the next.
+/// Returns every hit along each line, tracing from one to the next.
 fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<LineHit>> {
     let mut out = vec![Vec::new(); lines.len()];
     let mut open: Vec<(usize, f64)> = (0..lines.len()).map(|i| (i, 0.0)).collect();
@@ -60,12 +60,12 @@ fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<Li
         let starts: Vec<Line> =
             open.iter().map(|(i, t)| (lines[*i].0 + lines[*i].1 * *t, lines[*i].1)).collect();
         let mut next = Vec::new();
-        for ((i, t), met) in open.iter().zip(closest(geometry, &starts)) {
-            let Some(met) = met else { continue };
-            let t = t + met.t;
-            out[*i].push(LineHit { t, ..met });
-            // Past the surface by more than what it may be off, flat or not.
-            let cosine = met.normal.dot(lines[*i].1).abs().max(1e-7);
+        for ((i, t), hit) in open.iter().zip(closest(geometry, &starts)) {
+            let Some(hit) = hit else { continue };
+            let t = t + hit.t;
+            out[*i].push(LineHit { t, ..hit });
+            // The next ray starts past the surface by more than its rounding error, grazing or not.
+            let cosine = hit.normal.dot(lines[*i].1).abs().max(1e-7);
             next.push((*i, t + 64.0 * L::EPSILON * 8.0 / cosine));
             assert!(out[*i].len() < 200, "{:?} has no end", lines[*i]);
         }
@@ -74,21 +74,22 @@ fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<Li
     out
 }
 
-/// The length of a line inside; every surface must be the right way round, in turn.
-fn chord(name: &str, line: &Line, met: &[LineHit]) -> f64 {
-    let told = || format!("{name}: {line:?} {met:?}");
-    assert!(met.len().is_multiple_of(2), "odd: {}", told());
-    for (i, met) in met.iter().enumerate() {
-        let cosine = met.normal.dot(line.1);
-        assert!(if i % 2 == 0 { cosine < 0.0 } else { cosine > 0.0 }, "{}", told());
+/// Returns the length of a line inside the solid, and checks that its hits enter and leave
+/// alternately.
+fn chord(name: &str, line: &Line, hits: &[LineHit]) -> f64 {
+    let context = || format!("{name}: {line:?} {hits:?}");
+    assert!(hits.len().is_multiple_of(2), "odd: {}", context());
+    for (i, hit) in hits.iter().enumerate() {
+        let cosine = hit.normal.dot(line.1);
+        assert!(if i % 2 == 0 { cosine < 0.0 } else { cosine > 0.0 }, "{}", context());
     }
-    met.chunks(2).map(|pair| pair[1].t - pair[0].t).sum()
+    hits.chunks(2).map(|pair| pair[1].t - pair[0].t).sum()
 }
 
-/// The lengths of lines inside.
+/// Returns the lengths of lines inside `form`.
 pub fn chords<L: SimdFloat>(name: &str, form: &Form, lines: &[Line]) -> Vec<f64> {
     let all = surfaces(&geometry::<L>(form), lines);
-    lines.iter().zip(all).map(|(line, met)| chord(name, line, &met)).collect()
+    lines.iter().zip(all).map(|(line, hits)| chord(name, line, &hits)).collect()
 }
 
 fn random_solid(numbers: &mut Numbers) -> Form {
@@ -106,7 +107,7 @@ fn random_solid(numbers: &mut Numbers) -> Form {
     form.transformed(&DAffine3::from_scale_rotation_translation(scale, turn, place))
 }
 
-/// A random tree of this depth; some parts are used again, so that faces lie on each other.
+/// Returns a random tree of at most `depth` levels; some parts occur twice, so that faces coincide.
 fn random_tree(numbers: &mut Numbers, depth: usize, parts: &mut Vec<Form>) -> Tree {
     if depth == 0 || numbers.below(6) == 0 {
         let part = match numbers.below(4) {
@@ -153,11 +154,11 @@ fn tree_contains(tree: &Tree, parts: &[Form], p: DVec3) -> bool {
     }
 }
 
-/// Random trees of depth 8: surfaces in turn, and between them what the points themselves say. Half a
-/// million rays each way.
+/// Random trees of depth 8 have alternating surfaces, and the points between them agree with the
+/// parts. Half a million rays are traced in each precision.
 #[test]
 fn extreme_08_parity() {
-    let (mut seen, mut odd, mut asked) = (0, 0, 0);
+    let (mut seen, mut odd, mut line_count) = (0, 0, 0);
     for seed in 0..100 {
         let mut numbers = Numbers::new(800 + seed);
         let mut parts = Vec::new();
@@ -170,14 +171,14 @@ fn extreme_08_parity() {
         let lines: Vec<Line> = (0..5_000).map(|_| line(&mut numbers)).collect();
         let all = surfaces(&double, &lines);
         let single = surfaces(&geometry::<Single>(&form), &lines);
-        odd += lines.iter().zip(&single).filter(|(line, met)| !in_turn(line, met)).count();
-        asked += lines.len();
+        odd += lines.iter().zip(&single).filter(|(line, hits)| !alternates(line, hits)).count();
+        line_count += lines.len();
         let name = format!("tree {seed}");
-        for (line, met) in lines.iter().zip(&all) {
-            chord(&name, line, met);
-            seen += met.len();
+        for (line, hits) in lines.iter().zip(&all) {
+            chord(&name, line, hits);
+            seen += hits.len();
             let mut ends = vec![0.0];
-            ends.extend(met.iter().map(|m| m.t));
+            ends.extend(hits.iter().map(|m| m.t));
             ends.push(ends[ends.len() - 1] + 1.0);
             for (n, gap) in ends.windows(2).enumerate() {
                 if gap[1] - gap[0] < 1e-6 {
@@ -185,37 +186,42 @@ fn extreme_08_parity() {
                 }
                 let t = gap[0] + numbers.between(0.01, 0.99) * (gap[1] - gap[0]);
                 let inside = tree_contains(&tree, &parts, line.0 + line.1 * t);
-                // A random point lies in a sliver that a tie hides as rarely as that is thin.
+                // A random point lies in a sliver that the tie tolerance hides as rarely as the
+                // sliver is thin.
                 assert_eq!(inside, n % 2 == 1, "{name}: {line:?} at {t} of {ends:?}");
             }
         }
-        // Inside, in cavities and outside: the first surface ahead tells where the origin is.
+        // Rays from inside, cavities and outside: the side of the first surface hit decides where
+        // the origin is.
         let starts: Vec<Line> =
             (0..5_000).map(|_| (numbers.in_cube(1.5), numbers.direction())).collect();
-        for (line, met) in starts.iter().zip(closest(&double, &starts)) {
+        for (line, hit) in starts.iter().zip(closest(&double, &starts)) {
             let inside = tree_contains(&tree, &parts, line.0);
-            let told = || format!("{name}: {line:?} {met:?}");
-            match met {
-                Some(met) => assert_eq!(met.normal.dot(line.1) > 0.0, inside, "{}", told()),
-                None => assert!(!inside, "{}", told()),
+            let context = || format!("{name}: {line:?} {hit:?}");
+            match hit {
+                Some(hit) => assert_eq!(hit.normal.dot(line.1) > 0.0, inside, "{}", context()),
+                None => assert!(!inside, "{}", context()),
             }
         }
     }
     assert!(seen > 150_000, "{seen} surfaces");
-    // Single precision loses what is thinner than 2e-5 across, which a line here meets as seldom.
-    assert!(odd * 10_000 <= asked, "single precision: {odd} of {asked} lines out of turn");
-    report(8, "double", &format!("0 of {asked} lines out of turn"));
-    report(8, "single", &format!("{odd} of {asked} lines out of turn"));
+    // Single precision loses parts thinner than 2e-5, which a line here hits as rarely.
+    assert!(
+        odd * 10_000 <= line_count,
+        "single precision: {odd} of {line_count} lines out of turn"
+    );
+    report(8, "double", &format!("0 of {line_count} lines out of turn"));
+    report(8, "single", &format!("{odd} of {line_count} lines out of turn"));
 }
 
-/// Whether surfaces are entered and left in turn.
-fn in_turn(line: &Line, met: &[LineHit]) -> bool {
-    let turned = |(i, m): (usize, &LineHit)| (m.normal.dot(line.1) < 0.0) == (i % 2 == 0);
-    met.len().is_multiple_of(2) && met.iter().enumerate().all(turned)
+/// Returns `true` if surfaces are entered and left alternately.
+fn alternates(line: &Line, hits: &[LineHit]) -> bool {
+    let right_side = |(i, m): (usize, &LineHit)| (m.normal.dot(line.1) < 0.0) == (i % 2 == 0);
+    hits.len().is_multiple_of(2) && hits.iter().enumerate().all(right_side)
 }
 
-/// How many lines meet other surfaces in single precision: another number, or more than 1e-5 of the
-/// distance apart over the cosine.
+/// Returns the number of lines whose surfaces differ in single precision: in number, or by more
+/// than 1e-5 of the distance over the cosine.
 fn differing(a: &Form, b: &Form, lines: &[Line]) -> usize {
     let (a, b) = (geometry::<Single>(a), geometry::<Single>(b));
     let apart = |line: &Line, a: &LineHit, b: &LineHit| {
@@ -228,7 +234,8 @@ fn differing(a: &Form, b: &Form, lines: &[Line]) -> usize {
     lines.iter().zip(both).filter(differs).count()
 }
 
-/// The same surfaces, to 1e-12 of the distance; beside a tie's width at flat ends.
+/// Checks that both have the same surfaces to 1e-12 of the distance. Lines with a grazing hit are
+/// skipped: the tie tolerance is wide there.
 fn same_surfaces(name: &str, a: &Form, b: &Form, lines: &[Line]) {
     let (a, b) = (geometry::<Double>(a), geometry::<Double>(b));
     for ((line, a), b) in lines.iter().zip(surfaces(&a, lines)).zip(surfaces(&b, lines)) {
@@ -284,5 +291,5 @@ fn extreme_09_csg_algebra() {
         same_surfaces(&named("(A - B) - C"), &steps, &at_once, &lines);
     }
     report(9, "double", "surfaces the same");
-    report(9, "single", &format!("at most {most} of {} lines meet other surfaces", lines.len()));
+    report(9, "single", &format!("at most {most} of {} lines hit other surfaces", lines.len()));
 }

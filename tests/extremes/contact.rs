@@ -1,4 +1,4 @@
-//! Transparent things that touch others: the picture is the limit of a vanishing gap.
+//! Transparent objects in contact with others: the picture is the limit of a vanishing gap.
 
 use crate::common::Numbers;
 use crate::rays::{Line, Traced};
@@ -8,10 +8,10 @@ use std::path::Path;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// How wide the gap is that contact is compared with.
+/// Width of the gap that contact is compared with.
 const GAP: f64 = 1e-4;
 
-/// Things that stand on the plane y = 0, up to y = 1, or lie in it.
+/// Shapes on the plane y = 0 that reach up to y = 1, or lie in it.
 const UPPER: [&str; 7] = [
     "box = { center = [0, 0.5, 0], size = [2, 1, 2] }",
     "mesh = { file = \"upper.obj\", normals = \"flat\" }",
@@ -23,7 +23,7 @@ const UPPER: [&str; 7] = [
     "platform = { center = [0, 0, 0], size = [2, 2] }",
 ];
 
-/// Things whose highest points are at y = 0.
+/// Shapes with their highest points at y = 0.
 const LOWER: [&str; 6] = [
     "platform = { center = [0, 0, 0], size = [5, 5] }",
     "plane = { point = [0, 0, 0], normal = [0, 1, 0] }",
@@ -34,7 +34,7 @@ const LOWER: [&str; 6] = [
     "cylinder = { base = [0, -1, 0], top = [0, 0, 0], radius = 3 }",
 ];
 
-/// The materials of the upper and the lower thing.
+/// Materials of the upper and the lower shape.
 const MATERIALS: [(&str, &str); 8] = [
     ("glass", "matte"),
     ("glass", "mirror"),
@@ -46,7 +46,7 @@ const MATERIALS: [(&str, &str); 8] = [
     ("thin", "thin"),
 ];
 
-/// A box between two corners as a mesh.
+/// Returns the OBJ text of a box between two corners.
 fn slab(low: DVec3, high: DVec3) -> String {
     let mut out = String::new();
     for z in [low.z, high.z] {
@@ -65,27 +65,27 @@ struct Setting<'a> {
     folder: &'a Path,
 }
 
-/// A box whose lower face is common with that of a larger one around it.
+/// Box whose lower face lies in that of a smaller box inside it.
 const OUTER: &str = "box = { center = [0, 0.5, 0], size = [3, 1, 3] }";
 const INNER: &str = "box = { center = [0, 0.25, 0], size = [1.4, 0.5, 1.4] }";
 
 impl Setting<'_> {
-    /// With the upper thing lifted by `gap`.
+    /// Compiles the scene with the upper shape lifted by `gap`.
     fn traced(&self, gap: f64, precision: Precision) -> Traced {
         let (scale, turn, offset) = self.place.to_scale_rotation_translation();
         let (axis, angle) = turn.to_axis_angle();
-        let at = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
-        let moved = |lift: f64| {
+        let vector_text = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+        let transform_text = |lift: f64| {
             format!(
                 "transform = [{{ translate = [0, {lift:?}, 0] }}, {{ scale = {:?} }}, \
                  {{ rotate = {{ axis = {}, degrees = {:?} }} }}, {{ translate = {} }}]\n",
                 scale.x,
-                at(axis),
+                vector_text(axis),
                 angle.to_degrees(),
-                at(offset)
+                vector_text(offset)
             )
         };
-        let placed = |p: DVec3| at(self.place.transform_point3(p));
+        let placed_text = |p: DVec3| vector_text(self.place.transform_point3(p));
         let text = format!(
             "background.color = [0.2, 0.5, 0.9]\nambient.color = [1, 1, 1]\n\
              trace.max_depth = 6\n[camera]\neye = {}\ntarget = {}\n\
@@ -99,32 +99,32 @@ impl Setting<'_> {
              [materials.thin]\ncolor = [0.3, 0.9, 0.6]\nambient = 0.1\ndiffuse = 0.1\nreflection = 0.2\n\
              transmission = 0.7\n\
              [[object]]\nmaterial = \"{}\"\nshape.{}\n{}[[object]]\nmaterial = \"{}\"\nshape.{}\n{}",
-            placed(DVec3::new(0.3, 4.0, 5.0)),
-            placed(DVec3::ZERO),
-            placed(DVec3::new(3.0, 4.0, 2.0)),
+            placed_text(DVec3::new(0.3, 4.0, 5.0)),
+            placed_text(DVec3::ZERO),
+            placed_text(DVec3::new(3.0, 4.0, 2.0)),
             self.materials.0,
             self.upper,
-            moved(gap),
+            transform_text(gap),
             self.materials.1,
             self.lower,
-            moved(0.0),
+            transform_text(0.0),
         );
-        let file = |name: &str, text: &str| fs::write(self.folder.join(name), text).unwrap();
-        file("upper.obj", &slab(DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 1.0, 1.0)));
-        file("lower.obj", &slab(DVec3::new(-2.5, -1.0, -2.5), DVec3::new(2.5, 0.0, 2.5)));
-        file("scene.toml", &text);
+        let write_file = |name: &str, text: &str| fs::write(self.folder.join(name), text).unwrap();
+        write_file("upper.obj", &slab(DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 1.0, 1.0)));
+        write_file("lower.obj", &slab(DVec3::new(-2.5, -1.0, -2.5), DVec3::new(2.5, 0.0, 2.5)));
+        write_file("scene.toml", &text);
         let scene = Scene::read(&self.folder.join("scene.toml"));
         Traced::new(&scene.unwrap_or_else(|e| panic!("{e}\n{text}")), precision)
     }
 
-    /// Lines through the middle of the contact, from above or from below.
+    /// Returns lines through the middle of the contact, from above or from below.
     fn lines(&self, above: bool, count: usize) -> Vec<Line> {
         let mut numbers = Numbers::new(5);
         let line = |_| {
             let [x, z] = [numbers.between(-0.5, 0.5), numbers.between(-0.5, 0.5)];
-            let mut way = numbers.direction();
-            way.y = way.y.abs() + 0.1;
-            let from = DVec3::new(x, 0.0, z) + way * if above { 4.0 } else { -4.0 };
+            let mut direction = numbers.direction();
+            direction.y = direction.y.abs() + 0.1;
+            let from = DVec3::new(x, 0.0, z) + direction * if above { 4.0 } else { -4.0 };
             let (from, to) = (
                 self.place.transform_point3(from),
                 self.place.transform_point3(DVec3::new(x, 0.0, z)),
@@ -134,10 +134,10 @@ impl Setting<'_> {
         (0..count).map(line).collect()
     }
 
-    /// Contact from both sides.
+    /// Checks contact from both sides.
     fn check(&self, precision: Precision, count: usize) {
-        let both_flat = !solid(self.upper) && !solid(self.lower);
-        // Of two flat things in one plane the transparent one, or the one listed last, is in front.
+        let both_flat = !is_solid(self.upper) && !is_solid(self.lower);
+        // In front is the transparent one of two flat shapes in one plane, or the one listed last.
         let front_is_lower = !["matte", "mirror"].contains(&self.materials.1);
         for above in [true, false] {
             let gap = if both_flat && above == front_is_lower { -GAP } else { GAP };
@@ -145,7 +145,7 @@ impl Setting<'_> {
         }
     }
 
-    /// Contact with the upper thing lifted by `gap`.
+    /// Compares contact with the upper shape lifted by `gap`.
     fn compare(&self, gap: f64, above: bool, precision: Precision, count: usize) {
         let lines = self.lines(above, count);
         let touching = self.traced(0.0, precision).radiance(&lines);
@@ -158,30 +158,30 @@ impl Setting<'_> {
             differ += usize::from(difference.abs().max_element() > 0.02);
         }
         let mean = (sum / count as f64).abs().max_element();
-        let told = || {
+        let context = || {
             format!(
                 "{} on {}, {:?}, {}, {precision:?}, above: {above}: {differ} of {count} differ, \
                      the mean by {mean}",
                 self.upper, self.lower, self.materials, self.place
             )
         };
-        assert!(differ * 100 <= 2 * count, "{}", told());
-        assert!(mean < 4e-3, "{}", told());
+        assert!(differ * 100 <= 2 * count, "{}", context());
+        assert!(mean < 4e-3, "{}", context());
     }
 }
 
-fn solid(shape: &str) -> bool {
+fn is_solid(shape: &str) -> bool {
     !shape.starts_with("pla")
 }
 
-/// Every pair of kinds, with every pair of materials, in either precision.
+/// Covers every pair of shapes with every pair of materials, in both precisions.
 #[test]
 fn contact_is_the_limit_of_a_gap() {
     let folder = tempfile::tempdir().unwrap();
     for upper in UPPER {
         for lower in LOWER {
             for materials in MATERIALS {
-                if materials == ("thin", "thin") && (solid(upper) || solid(lower)) {
+                if materials == ("thin", "thin") && (is_solid(upper) || is_solid(lower)) {
                     continue;
                 }
                 let (place, folder) = (DAffine3::IDENTITY, folder.path());
@@ -194,14 +194,14 @@ fn contact_is_the_limit_of_a_gap() {
     }
 }
 
-/// Tilted, far from the origin, small and large.
+/// Contact tilted, far from the origin, small and large.
 #[test]
-fn contact_is_the_limit_of_a_gap_everywhere() {
+fn transformed_contact_is_the_limit_of_a_gap() {
     let folder = tempfile::tempdir().unwrap();
     let mut numbers = Numbers::new(9);
     for scale in [1e-4, 1.0, 1e4] {
         for far in [0.0, 1.0, 1e5] {
-            // Decimals of the file end at 1e-16 of the offset.
+            // Decimals in the scene file are rounded to 1e-16 of the offset.
             if far == 1e5 && scale < 1.0 {
                 continue;
             }
@@ -227,8 +227,8 @@ fn contact_is_the_limit_of_a_gap_everywhere() {
     }
 }
 
-/// Of solids on the same side of a common face, a transparent one lies outside of an opaque one, and of
-/// transparent ones the one that is listed last.
+/// Solids on the same side of a common face have an order: a transparent one lies outside of an
+/// opaque one, and the last one listed outside of other transparent ones.
 #[test]
 fn common_faces_of_nested_solids_have_an_order() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Rays that start inside, on faces, in the planes of faces, along the axes.
+//! Rays that start inside solids or on faces, or run in planes of faces or along axes.
 
 use crate::common::Numbers;
 use crate::rays::{Line, any_line, blocked, bounding_sphere, closest, every_kind, forms};
@@ -10,12 +10,12 @@ use zerkalo::primitive::{
 };
 use zerkalo::shape::{Cuboid, ShapeDesc};
 
-/// Convex solids: compounds and meshes have tests of their own.
+/// Returns `true` for convex solids. Compounds and meshes have tests of their own.
 fn is_solid(form: &Form) -> bool {
     form.is_solid() && form.is_convex()
 }
 
-/// A point well inside a solid.
+/// Returns a point well inside a convex solid.
 fn inside(numbers: &mut Numbers, form: &Form) -> DVec3 {
     match form {
         Form::Sphere(SphereForm { center, radius }) => {
@@ -46,25 +46,25 @@ fn check_inside<L: SimdFloat>(name: &str, form: &Form, seed: u64, rays: usize) {
     let (_, radius) = bounding_sphere(form).unwrap();
     let lines: Vec<Line> =
         (0..rays).map(|_| (inside(&mut numbers, form), numbers.direction())).collect();
-    let met = closest(&geometry, &lines);
+    let hits = closest(&geometry, &lines);
     let mut onward = Vec::new();
-    for (line, met) in lines.iter().zip(&met) {
-        let met = met.unwrap_or_else(|| panic!("{name}, {}: lost {line:?}", L::NAME));
-        assert!(met.normal.dot(line.1) > 0.0, "{name}, {}: {line:?} {met:?}", L::NAME);
-        // Past the exit there is nothing; back from there, the exit and then the entry.
-        onward.push((line.0 + line.1 * (met.t + 1e-3 * radius), line.1));
+    for (line, hit) in lines.iter().zip(&hits) {
+        let hit = hit.unwrap_or_else(|| panic!("{name}, {}: lost {line:?}", L::NAME));
+        assert!(hit.normal.dot(line.1) > 0.0, "{name}, {}: {line:?} {hit:?}", L::NAME);
+        // Rays past the exit hit nothing; reversed, they hit the exit first.
+        onward.push((line.0 + line.1 * (hit.t + 1e-3 * radius), line.1));
     }
-    for (line, met) in onward.iter().zip(closest(&geometry, &onward)) {
-        assert!(met.is_none(), "{name}, {}: behind the exit {line:?} meets {met:?}", L::NAME);
+    for (line, hit) in onward.iter().zip(closest(&geometry, &onward)) {
+        assert!(hit.is_none(), "{name}, {}: behind the exit {line:?} hits {hit:?}", L::NAME);
     }
     assert!(blocked(&geometry, &onward, L::MAX).iter().all(|b| !b), "{name}, {}", L::NAME);
     assert!(blocked(&geometry, &lines, L::MAX).iter().all(|b| *b), "{name}, {}", L::NAME);
     let back: Vec<Line> = onward.iter().map(|(o, d)| (*o, -*d)).collect();
-    for ((line, first), exit) in back.iter().zip(closest(&geometry, &back)).zip(&met) {
+    for ((line, first), exit) in back.iter().zip(closest(&geometry, &back)).zip(&hits) {
         let (Some(first), Some(exit)) = (first, exit) else {
             panic!("{name}, {}: lost {line:?}", L::NAME)
         };
-        // Along the surface the meeting point moves by rounding over the cosine.
+        // The hit point moves along the surface by rounding over the cosine.
         let rounding = 64.0 * L::EPSILON * (radius + line.0.length());
         let apart = (first.point - exit.point).length();
         let grazing = exit.normal.dot(line.1).abs();
@@ -85,8 +85,9 @@ fn extreme_04_camera_inside() {
     report(4, "both", &format!("0 wrong of 100,000 rays in each of {solids} solids"));
 }
 
-/// Where a line meets the closed box from -1 to 1, in exact integers scaled by `UNIT`: `None` if it
-/// misses, `(enter, leave)` as fractions `n / d` with d > 0 of the length of `d`.
+/// Returns the fractions `(enter, leave)` at which a line intersects the closed box from -1 to 1,
+/// as `n / d` with d > 0 of the length of `d`, in exact integers scaled by `UNIT`; `None` if it
+/// misses.
 fn slabs(origin: [i64; 3], d: [i64; 3]) -> Option<[(i64, i64); 2]> {
     let less = |a: (i64, i64), b: (i64, i64)| a.0 * b.1 < b.0 * a.1;
     let mut ends: Option<[(i64, i64); 2]> = None;
@@ -111,7 +112,7 @@ fn slabs(origin: [i64; 3], d: [i64; 3]) -> Option<[(i64, i64); 2]> {
     ends.filter(|[enter, leave]| !less(*leave, *enter))
 }
 
-/// Steps of the lattice that ray origins lie on, per half side of the box.
+/// Steps of the lattice of ray origins, per half side of the box.
 const UNIT: i64 = 2;
 
 fn check_lattice<L: SimdFloat>() -> [usize; 3] {
@@ -124,7 +125,7 @@ fn check_lattice<L: SimdFloat>() -> [usize; 3] {
         for k in 0..27 * 8 {
             let mut d = [k % 3, k / 3 % 3, k / 9 % 3].map(|x| x as i64 - 1);
             let zeros = [k / 27 % 2, k / 54 % 2, k / 108].map(|b| if b == 0 { 0.0 } else { -0.0 });
-            // Directions with unequal parts too.
+            // Directions with unequal components are included.
             d[0] *= 1 + (n % 3) as i64;
             d[2] *= 1 + (n % 4) as i64;
             if d == [0; 3] {
@@ -135,30 +136,31 @@ fn check_lattice<L: SimdFloat>() -> [usize; 3] {
             }));
             let length = real.length();
             let line = (DVec3::from(origin.map(|x| x as f64 / UNIT as f64)), real / length);
-            let met = closest(&geometry, &[line])[0];
+            let hit = closest(&geometry, &[line])[0];
             let blocked = blocked(&geometry, &[line], 100.0)[0];
-            let told = || format!("{}: {line:?}: {met:?}", L::NAME);
-            assert_eq!(met.is_some(), blocked, "{}", told());
+            let context = || format!("{}: {line:?}: {hit:?}", L::NAME);
+            assert_eq!(hit.is_some(), blocked, "{}", context());
             let t = |f: (i64, i64)| f.0 as f64 / (f.1 * UNIT) as f64 * length;
             let truth = slabs(origin, d).map(|ends| ends.map(t));
-            if let Some(met) = met {
-                assert!(met.t.is_finite() && met.point.is_finite(), "{}", told());
-                let Some([enter, leave]) = truth else { panic!("no box there: {}", told()) };
-                let near = |x: f64| (met.t - x).abs() <= 8.0 * L::EPSILON * (1.0 + x.abs());
-                assert!(near(enter) || near(leave), "{}, not {enter} or {leave}", told());
+            if let Some(hit) = hit {
+                assert!(hit.t.is_finite() && hit.point.is_finite(), "{}", context());
+                let Some([enter, leave]) = truth else { panic!("no box there: {}", context()) };
+                let near = |x: f64| (hit.t - x).abs() <= 8.0 * L::EPSILON * (1.0 + x.abs());
+                assert!(near(enter) || near(leave), "{}, not {enter} or {leave}", context());
             }
             let Some([enter, leave]) = truth else {
                 counts[0] += 1;
                 continue;
             };
-            // In the plane of a face or through an edge it touches the box: both answers are right.
+            // A line in the plane of a face or through an edge touches the box: hit and miss are
+            // both right.
             let in_face = (0..3).any(|i| d[i] == 0 && origin[i].abs() == UNIT);
             if in_face || leave - enter < 1e-9 {
                 counts[1] += 1;
                 continue;
             }
             counts[2] += 1;
-            // An origin on a face starts on either side of it.
+            // Rays from a face may start on either side of it.
             let expected = if enter.abs() < 1e-9 || leave.abs() < 1e-9 {
                 continue;
             } else if enter > 0.0 {
@@ -166,17 +168,21 @@ fn check_lattice<L: SimdFloat>() -> [usize; 3] {
             } else {
                 Some(leave).filter(|t| *t > 0.0)
             };
-            match (met, expected) {
+            match (hit, expected) {
                 (None, None) => {}
                 (Some(m), Some(t)) => {
-                    assert!((m.t - t).abs() <= 8.0 * L::EPSILON * (1.0 + t), "{} not {t}", told());
+                    assert!(
+                        (m.t - t).abs() <= 8.0 * L::EPSILON * (1.0 + t),
+                        "{} not {t}",
+                        context()
+                    );
                 }
-                _ => panic!("expected {expected:?}: {}", told()),
+                _ => panic!("expected {expected:?}: {}", context()),
             }
         }
     }
-    let asked = counts.iter().sum::<usize>();
-    report(6, precision::<L>(), &format!("0 wrong of {asked} rays"));
+    let ray_count = counts.iter().sum::<usize>();
+    report(6, precision::<L>(), &format!("0 wrong of {ray_count} rays"));
     counts
 }
 
@@ -192,12 +198,12 @@ fn check_finite<L: SimdFloat>(name: &str, form: &Form, seed: u64) {
     let mut numbers = Numbers::new(seed);
     let (center, radius) = bounding_sphere(form).unwrap_or((DVec3::ZERO, f64::INFINITY));
     let lines: Vec<Line> = (0..40_000).map(|_| any_line(&mut numbers, form)).collect();
-    for (n, (line, met)) in lines.iter().zip(closest(&geometry, &lines)).enumerate() {
-        let Some(met) = met else { continue };
-        let told = || format!("{name}, {}, ray {n} of seed {seed}: {line:?} {met:?}", L::NAME);
-        assert!(met.t.is_finite() && met.t > 0.0, "{}", told());
-        assert!((met.normal.length() - 1.0).abs() < 8.0 * L::EPSILON, "{}", told());
-        assert!((met.point - center).length() <= 1.001 * radius, "{}", told());
+    for (n, (line, hit)) in lines.iter().zip(closest(&geometry, &lines)).enumerate() {
+        let Some(hit) = hit else { continue };
+        let context = || format!("{name}, {}, ray {n} of seed {seed}: {line:?} {hit:?}", L::NAME);
+        assert!(hit.t.is_finite() && hit.t > 0.0, "{}", context());
+        assert!((hit.normal.length() - 1.0).abs() < 8.0 * L::EPSILON, "{}", context());
+        assert!((hit.point - center).length() <= 1.001 * radius, "{}", context());
     }
 }
 
@@ -209,8 +215,8 @@ fn extreme_06_degenerate_rays_at_every_kind() {
     }
 }
 
-/// A ray beside a solid, parallel to a face of it that has no opposite: the sign of a zero must not
-/// open that face.
+/// A ray beside a solid, parallel to a face that has no opposite face, misses for either sign of
+/// its zeros.
 #[test]
 fn extreme_06_zeros_of_either_sign_beside_every_solid() {
     for (name, form) in every_kind() {
@@ -223,7 +229,7 @@ fn extreme_06_zeros_of_either_sign_beside_every_solid() {
                 let zero = |bit: i32| if n >> bit & 1 == 0 { 0.0 } else { -0.0 };
                 let mut d = DVec3::new(zero(0), zero(1), zero(2));
                 d[axis] = if n & 8 == 0 { 1.0 } else { -1.0 };
-                // Outside the box across the ray, within the ball around it.
+                // Origin outside the box across the ray, within the ball around the box.
                 let mut o = low + size * DVec3::new(numbers.unit(), numbers.unit(), numbers.unit());
                 let beside = (axis + 1 + (n >> 4 & 1) as usize) % 3;
                 let out = numbers.between(1e-3, 0.3) * (size[beside] + 0.1);
@@ -234,8 +240,8 @@ fn extreme_06_zeros_of_either_sign_beside_every_solid() {
         }
         let double = closest(&Aggregate::<Double>::new(std::slice::from_ref(&form)), &lines);
         let single = closest(&Aggregate::<Single>::new(std::slice::from_ref(&form)), &lines);
-        for (line, met) in lines.iter().zip(double).chain(lines.iter().zip(single)) {
-            assert!(met.is_none(), "{name}: {line:?} passes beside, but meets {met:?}");
+        for (line, hit) in lines.iter().zip(double).chain(lines.iter().zip(single)) {
+            assert!(hit.is_none(), "{name}: {line:?} passes beside, but hits {hit:?}");
         }
     }
 }

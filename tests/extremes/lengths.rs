@@ -1,4 +1,4 @@
-//! Directions of every length that a file can hold: only where they point matters.
+//! Directions of every length that a file can hold render the same picture.
 
 use crate::support::{parsed, rendered};
 use crate::tables::{keys, scene, table, value_at};
@@ -8,7 +8,7 @@ use zerkalo::scene::{FIELDS, Scene};
 use zerkalo::value::{Field, ValueType};
 use zerkalo::world::Precision;
 
-/// Every key that takes a direction, with a value.
+/// Scene with a value for every key that takes a direction.
 const TEXT: &str = "
     film.size = [24, 18]
     [camera]
@@ -35,7 +35,8 @@ const TEXT: &str = "
     transform = [{ rotate = { axis = [0.5, 1.0, 0.25], degrees = 30.0 } }]
 ";
 
-/// The names of all keys that take a direction. Compounds hold shapes again: twice is enough.
+/// Collects the names of all keys that take a direction. Compound shapes hold shapes again: two
+/// levels are enough.
 fn directions(fields: &[Field], depth: usize, out: &mut BTreeSet<&'static str>) {
     for field in fields.iter().filter(|_| depth < 8) {
         match field.takes {
@@ -52,25 +53,28 @@ fn directions(fields: &[Field], depth: usize, out: &mut BTreeSet<&'static str>) 
     }
 }
 
-/// The scene with each of its directions `factor` times as long.
+/// Returns the scene with each of its directions `factor` times as long.
 fn stretched(base: &Scene, factor: f64) -> Scene {
     let mut changed = table(base);
-    let mut met = BTreeSet::new();
+    let mut stretched_keys = BTreeSet::new();
     for key in keys(&changed).iter().filter(|key| matches!(key.takes, ValueType::Direction)) {
         let Some(Value::Array(numbers)) = value_at(&mut changed, &key.path) else { continue };
         for number in numbers {
             *number = Value::Float(number.as_float().unwrap() * factor);
         }
-        met.insert(key.path.last().unwrap().clone());
+        stretched_keys.insert(key.path.last().unwrap().clone());
     }
     let mut all = BTreeSet::new();
     directions(FIELDS, 0, &mut all);
-    assert!(met.iter().map(String::as_str).eq(all), "the scene has only {met:?}");
-    scene(&changed, &base.resolver).unwrap_or_else(|| panic!("{factor:e}: the scene is refused"))
+    assert!(
+        stretched_keys.iter().map(String::as_str).eq(all),
+        "the scene has only {stretched_keys:?}"
+    );
+    scene(&changed, &base.resolver).unwrap_or_else(|| panic!("{factor:e}: the scene is invalid"))
 }
 
 #[test]
-fn only_where_a_direction_points_matters() {
+fn length_of_directions_does_not_change_the_picture() {
     let base = parsed(TEXT);
     for precision in [Precision::Single, Precision::Double] {
         let expected = rendered(&base, 1, precision, 4).film.bytes();
@@ -81,17 +85,17 @@ fn only_where_a_direction_points_matters() {
             assert!(found == expected, "2^{exponent} in {precision:?}");
         }
     }
-    // Others change the last digits, which a picture in codes does not show.
-    let codes = |scene: &Scene| {
+    // Other factors change the last digits, which an 8-bit picture does not show.
+    let green_values = |scene: &Scene| {
         let rendering = rendered(scene, 1, Precision::Single, 4);
         let picture = crate::support::picture(&rendering, zerkalo::film::Replicates::Both);
         picture.into_iter().map(|p| p[1]).collect::<Vec<f64>>()
     };
-    let expected = codes(&base);
+    let expected = green_values(&base);
     assert!(expected.iter().sum::<f64>() > 50.0);
     for length in [1e-300, 1e-200, 1e200, 1e300] {
-        let found = codes(&stretched(&base, length));
-        let apart = found.iter().zip(&expected).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
-        assert!(apart <= 2, "{length:e}: {apart} pixels differ");
+        let found = green_values(&stretched(&base, length));
+        let differing = found.iter().zip(&expected).filter(|(a, b)| (*a - *b).abs() > 1e-3).count();
+        assert!(differing <= 2, "{length:e}: {differing} pixels differ");
     }
 }

@@ -8,7 +8,8 @@ use std::path::Path;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// What the lamp at (0, 3, 0) lies on, and the distance from the axis beyond which it lights points at y = 4.
+/// Surface on which the lamp at (0, 3, 0) lies, and the distance from the axis beyond which the
+/// lamp lights points at y = 4.
 const CEILINGS: [(&str, f64); 9] = [
     ("platform = { center = [0, 3, 0], size = [4, 4] }", 0.0),
     ("plane = { point = [0, 3, 0], normal = [0, -1, 0] }", 0.0),
@@ -25,18 +26,19 @@ const CEILINGS: [(&str, f64); 9] = [
     ),
 ];
 
-/// From -3 to 3 and from 3 to 3.2 upwards.
+/// OBJ text of a box from -3 to 3, and from 3 to 3.2 upwards.
 const SLAB: &str = "v -3 3 -3\nv 3 3 -3\nv 3 3.2 -3\nv -3 3.2 -3\nv -3 3 3\nv 3 3 3\nv 3 3.2 3\nv -3 3.2 3\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
 
-/// Points of a room's floor and of a wall that reaches up to the ceiling, and of a board above.
+/// Returns points and normals of a room's floor and of a wall that reaches up to the ceiling, and
+/// of a board above.
 fn receivers(numbers: &mut Numbers, count: usize) -> [Vec<(DVec3, DVec3)>; 2] {
     let mut below = Vec::new();
     let mut above = Vec::new();
     for _ in 0..count {
         let [x, z] = [numbers.between(-1.9, 1.9), numbers.between(-1.9, 1.9)];
         below.push((DVec3::new(x, 0.0, z), DVec3::Y));
-        // As near as a thousandth of its distance under the ceiling.
+        // Height down to a thousandth of the ceiling's distance below it.
         let height = 3.0 - 10f64.powf(numbers.between(-2.7, 0.4));
         below.push((DVec3::new(-2.0, height, z), DVec3::X));
         above.push((DVec3::new(x, 4.0, z), DVec3::NEG_Y));
@@ -47,27 +49,27 @@ fn receivers(numbers: &mut Numbers, count: usize) -> [Vec<(DVec3, DVec3)>; 2] {
 fn check(ceiling: &str, open: f64, place: &DAffine3, folder: &Path, precision: Precision) {
     let (scale, turn, offset) = place.to_scale_rotation_translation();
     let (axis, angle) = turn.to_axis_angle();
-    let at = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
-    let moved = format!(
+    let vector_text = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+    let transform = format!(
         "transform = [{{ scale = {:?} }}, {{ rotate = {{ axis = {}, degrees = {:?} }} }}, \
          {{ translate = {} }}]\n",
         scale.x,
-        at(axis),
+        vector_text(axis),
         angle.to_degrees(),
-        at(offset)
+        vector_text(offset)
     );
     let lamp = DVec3::new(0.0, 3.0, 0.0);
     let text = format!(
         "[camera]\neye = {}\ntarget = {}\n[[light]]\npoint.position = {}\nfalloff = \"none\"\n\
          [materials.white]\ncolor = [1, 1, 1]\ndiffuse = 1\n\
-         [[object]]\nmaterial = \"white\"\nshape.{ceiling}\n{moved}\
-         [[object]]\nmaterial = \"white\"\nshape.platform = {{ center = [0, 0, 0], size = [4, 4] }}\n{moved}\
-         [[object]]\nmaterial = \"white\"\nshape.platform = {{ center = [0, 4, 0], size = [4, 4] }}\n{moved}\
+         [[object]]\nmaterial = \"white\"\nshape.{ceiling}\n{transform}\
+         [[object]]\nmaterial = \"white\"\nshape.platform = {{ center = [0, 0, 0], size = [4, 4] }}\n{transform}\
+         [[object]]\nmaterial = \"white\"\nshape.platform = {{ center = [0, 4, 0], size = [4, 4] }}\n{transform}\
          [[object]]\nmaterial = \"white\"\nshape.rectangle = {{ center = [-2, 1.5, 0], size = [4, 3], \
-         normal = [1, 0, 0] }}\n{moved}",
-        at(place.transform_point3(DVec3::new(1.0, 1.0, 1.0))),
-        at(place.transform_point3(DVec3::ZERO)),
-        at(place.transform_point3(lamp)),
+         normal = [1, 0, 0] }}\n{transform}",
+        vector_text(place.transform_point3(DVec3::new(1.0, 1.0, 1.0))),
+        vector_text(place.transform_point3(DVec3::ZERO)),
+        vector_text(place.transform_point3(lamp)),
     );
     let path = folder.join("scene.toml");
     fs::write(folder.join("slab.obj"), SLAB).unwrap();
@@ -75,7 +77,7 @@ fn check(ceiling: &str, open: f64, place: &DAffine3, folder: &Path, precision: P
     let scene = Scene::read(&path).unwrap_or_else(|e| panic!("{e}\n{text}"));
     let traced = Traced::new(&scene, precision);
     let mut numbers = Numbers::new(4);
-    let told = |p: DVec3| format!("{ceiling}, {place}, {precision:?}: {p}");
+    let context = |p: DVec3| format!("{ceiling}, {place}, {precision:?}: {p}");
     for (points, open) in receivers(&mut numbers, 2000).into_iter().zip([0.0, open]) {
         let line = |(p, n): &(DVec3, DVec3)| -> Line {
             let from = place.transform_point3(*p + *n * 0.002 + DVec3::new(1e-4, 0.0, 2e-4));
@@ -88,13 +90,17 @@ fn check(ceiling: &str, open: f64, place: &DAffine3, folder: &Path, precision: P
                 continue;
             }
             let expected = if off_axis > open { n.dot((lamp - *p).normalize()) } else { 0.0 };
-            assert!((light[0] - expected).abs() < 2e-3, "{}: {light:?}, not {expected}", told(*p));
+            assert!(
+                (light[0] - expected).abs() < 2e-3,
+                "{}: {light:?}, not {expected}",
+                context(*p)
+            );
         }
     }
     if ceiling.starts_with("sphere") || ceiling.starts_with("cone") {
         return;
     }
-    // What the lamp lies on is dark.
+    // The surface on which the lamp lies is dark.
     let flat = |x: f64| -> Line {
         let p = DVec3::new(x, 3.0, 0.3 * x);
         let from = place.transform_point3(p + DVec3::new(0.01, -0.3, 0.02));
@@ -102,20 +108,20 @@ fn check(ceiling: &str, open: f64, place: &DAffine3, folder: &Path, precision: P
     };
     let lines: Vec<Line> = (1..200).map(|i| flat(f64::from(i) * 0.009)).collect();
     for ((_, direction), light) in lines.iter().zip(traced.radiance(&lines)) {
-        assert!(light[0] < 1e-2, "{}", told(*direction));
+        assert!(light[0] < 1e-2, "{}", context(*direction));
     }
 }
 
-/// Every receiver that a lamp a hair off the surface would light, is lit, and no other.
+/// Exactly those receivers are lit that a lamp slightly off the surface would light.
 #[test]
-fn lamps_on_surfaces_light_as_if_they_were_a_hair_off() {
+fn lamp_on_surface_lights_like_lamp_just_off_it() {
     let folder = tempfile::tempdir().unwrap();
     let mut numbers = Numbers::new(44);
     for (ceiling, open) in CEILINGS {
         for scale in [1e-4, 1.0, 1e4] {
             for far in [0.0, 1.0, 1e5] {
                 for degrees in [0.0f64, 33.0] {
-                    // Decimals of the file end at 1e-16 of the offset.
+                    // Decimals in the scene file are rounded to 1e-16 of the offset.
                     if far == 1e5 && scale < 1.0 {
                         continue;
                     }

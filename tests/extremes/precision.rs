@@ -1,6 +1,6 @@
-//! `auto` takes double precision where single would show, and only there. In each family of scenes one
-//! proportion shrinks; what single precision gets wrong is measured as the RMSE beside double precision
-//! with the same samples, in codes.
+//! Choice of precision by `auto`: double where errors of single precision would be visible, single
+//! elsewhere. In each family of scenes one proportion shrinks; the error of single precision is
+//! measured as the RMSE against double precision with the same samples, in 8-bit levels.
 
 use crate::report::report;
 use crate::support::{all_shipped, parsed, picture, rendered, shipped, sized};
@@ -10,38 +10,40 @@ use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 const SIZE: [u32; 2] = [48, 36];
-/// Enough that paths which a rounding turns aside, equally often to either side, are no noise.
+/// Samples enough that paths diverted by rounding, equally often to either side, add no visible
+/// noise.
 const SAMPLES: u32 = 64;
 
-/// What single precision may get wrong where `auto` takes it: a quarter of the noise at which pictures
-/// are converged by default.
+/// Largest error of single precision where `auto` takes it: a quarter of the noise at which
+/// pictures count as converged by default.
 const INVISIBLE: f64 = 0.125;
 
 fn takes_single(scene: &Scene) -> bool {
     matches!(AnyWorld::compile(scene, &Options::default()), AnyWorld::Single(_))
 }
 
-/// The RMSE of single precision beside double [codes].
+/// Returns the RMSE of single precision against double precision [8-bit levels].
 fn error(scene: &Scene) -> f64 {
     let display = Display::default();
-    let codes = |precision| -> Vec<f64> {
+    let levels_of_picture = |precision| -> Vec<f64> {
         let rendering = rendered(scene, 3, precision, SAMPLES);
         assert_eq!(rendering.film.bad_samples().count, 0);
         picture(&rendering, Replicates::Both).iter().flat_map(|p| display.codes(*p)).collect()
     };
-    let (single, double) = (codes(Precision::Single), codes(Precision::Double));
+    let (single, double) =
+        (levels_of_picture(Precision::Single), levels_of_picture(Precision::Double));
     let sum: f64 = single.iter().zip(&double).map(|(a, b)| (a - b).powi(2)).sum();
     (sum / single.len() as f64).sqrt()
 }
 
-/// A family of scenes.
+/// Family of scenes over one proportion.
 struct Family {
     name: &'static str,
-    /// The scene in which the proportion is this, from 1/4 down.
+    /// Returns the scene text for a proportion, from 1/4 down.
     text: fn(f64) -> String,
-    /// The smallest proportion that is tried.
+    /// Smallest proportion tested.
     least: f64,
-    /// How visible single precision's error is there at least [codes].
+    /// Least error of single precision at that proportion [8-bit levels].
     visible: f64,
 }
 
@@ -59,7 +61,7 @@ const FLOOR: &str = "[materials.floor]\ncolor = [0.6, 0.55, 0.5]\n[[object]]\n\
 const RED: &str = "[materials.red]\ncolor = [0.8, 0.2, 0.1]\n\
     specular = 0.5\nexponent = 80.0\nreflection = 0.3\n";
 
-/// A ball on a large floor, seen from close.
+/// Returns a ball of radius `r` on a large floor, seen from close.
 fn small_ball(r: f64) -> String {
     camera([2.0 * r, 2.5 * r, 5.0 * r], [0.0, r, 0.0], 40.0)
         + SUN
@@ -71,7 +73,7 @@ fn small_ball(r: f64) -> String {
         )
 }
 
-/// A lying sheet of this thickness, seen from close to its edge.
+/// Returns a sheet of thickness `t` lying on the floor, seen from close to its edge.
 fn thin_slab(t: f64) -> String {
     camera([-4.0 * t, 3.0 * t, 6.0 * t], [0.0, 0.5 * t, 0.0], 40.0)
         + SUN
@@ -84,7 +86,7 @@ fn thin_slab(t: f64) -> String {
         )
 }
 
-/// A pane of glass that lies this high above the floor.
+/// Returns a pane of glass at the height `g` above the floor.
 fn narrow_gap(g: f64) -> String {
     camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0)
         + SUN
@@ -97,7 +99,7 @@ fn narrow_gap(g: f64) -> String {
         )
 }
 
-/// A hollow ball whose wall is this thin, with a lamp in it.
+/// Returns a hollow ball with a wall of thickness `t` and a lamp inside.
 fn thin_shell(t: f64) -> String {
     camera([1.0, 2.5, 4.0], [0.0, 0.6, 0.0], 40.0)
         + "[[light]]\npoint = { position = [0.1, 1.1, 0.1] }\n"
@@ -110,7 +112,7 @@ fn thin_shell(t: f64) -> String {
         )
 }
 
-/// A lamp this high above the floor, so bright that the floor shows.
+/// Returns a lamp at the height `h` above the floor, bright enough for the floor to be visible.
 fn low_lamp(h: f64) -> String {
     camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0)
         + FLOOR
@@ -120,7 +122,7 @@ fn low_lamp(h: f64) -> String {
         )
 }
 
-/// Through a tube at the edges of things.
+/// Returns a narrow view, 40 degrees times `a`, of the edges of objects.
 fn narrow_view(a: f64) -> String {
     camera([0.6, 1.4, 4.5], [0.4, 0.8, 0.1], 40.0 * a)
         + SUN
@@ -129,7 +131,7 @@ fn narrow_view(a: f64) -> String {
         + "[[object]]\nmaterial = \"red\"\nshape.cube = { corner = [-0.4, 0.0, 0.1], edge = 0.8 }\n"
 }
 
-/// The eye this high above the floor, before the shadow of a far pole.
+/// Returns an eye at the height `h` above the floor, in front of the shadow of a far pole.
 fn low_eye(h: f64) -> String {
     camera([0.3, h, 0.2], [0.3 - 4.0 * h, 0.0, 0.2 - 3.0 * h], 40.0)
         + &format!("[[light]]\npoint = {{ position = [3.0, 4.0, {:?}] }}\n", 0.2 - 3.0 * h)
@@ -140,7 +142,7 @@ fn low_eye(h: f64) -> String {
         )
 }
 
-/// A ball on a ball: the ground is the reciprocal in radius.
+/// Returns a ball on a ground ball of radius 1 / `p`.
 fn round_ground(p: f64) -> String {
     let r = 1.0 / p;
     camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0)
@@ -154,7 +156,7 @@ fn round_ground(p: f64) -> String {
         )
 }
 
-/// Nothing but the ground, round, seen from a man's height.
+/// Returns a bare ground ball of radius 1 / `p`, seen from eye height.
 fn bare_round_ground(p: f64) -> String {
     let r = 1.0 / p;
     camera([0.0, 1.7, 0.0], [0.0, 1.2, -5.0], 40.0)
@@ -165,7 +167,7 @@ fn bare_round_ground(p: f64) -> String {
         )
 }
 
-/// Two balls so far apart, seen from one of them.
+/// Returns two balls at the distance 1 / `p`, seen from near one of them.
 fn far_apart(p: f64) -> String {
     camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0)
         + SUN
@@ -181,7 +183,8 @@ fn far_apart(p: f64) -> String {
 const FAMILIES: [Family; 10] = [
     Family { name: "a small ball on a floor", text: small_ball, least: 1e-6, visible: 1.0 },
     Family { name: "a thin slab", text: thin_slab, least: 1e-6, visible: 1.0 },
-    // Surfaces within rounding of each other are met in their order: single precision is right here, too.
+    // Surfaces within rounding of each other are hit in their order: single precision is right
+    // here, too.
     Family { name: "a narrow gap under glass", text: narrow_gap, least: 1e-7, visible: 0.0 },
     Family { name: "a thin shell around a lamp", text: thin_shell, least: 1e-7, visible: 1.0 },
     Family { name: "a low lamp", text: low_lamp, least: 1e-6, visible: 1.0 },
@@ -189,11 +192,11 @@ const FAMILIES: [Family; 10] = [
     Family { name: "a low eye", text: low_eye, least: 5e-7, visible: 1.0 },
     Family { name: "a round ground with a ball", text: round_ground, least: 1e-8, visible: 1.0 },
     Family { name: "a bare round ground", text: bare_round_ground, least: 1e-8, visible: 1.0 },
-    Family { name: "things far apart", text: far_apart, least: 1e-7, visible: 1.0 },
+    Family { name: "two balls far apart", text: far_apart, least: 1e-7, visible: 1.0 },
 ];
 
-/// Along each family: single precision first, then double, and where single is taken its error does not
-/// show; where double is taken at last, it would have.
+/// Along each family `auto` takes single precision first, then double. Where it takes single the
+/// error is invisible; at the smallest proportion it would be visible.
 #[test]
 fn auto_takes_double_where_single_would_show() {
     let mut wrong = Vec::new();
@@ -206,7 +209,7 @@ fn auto_takes_double_where_single_would_show() {
             let single = takes_single(&scene);
             last = error(&scene);
             println!(
-                "{name} {p:.1e}: {}, single precision is {last:.4} codes off",
+                "{name} {p:.1e}: {}, single precision is {last:.4} levels off",
                 if single { "single" } else { "double" }
             );
             if single {
@@ -222,19 +225,19 @@ fn auto_takes_double_where_single_would_show() {
             wrong.push(format!("{name}: no change of precision"));
         }
         if worst > INVISIBLE {
-            wrong.push(format!("{name}: {worst} codes off where single is taken"));
+            wrong.push(format!("{name}: {worst} levels off where single is taken"));
         }
         if last < visible {
-            wrong.push(format!("{name}: only {last} codes off at the end"));
+            wrong.push(format!("{name}: only {last} levels off at the end"));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// What is small or far away as a whole is not hard: only proportions count.
+/// Size and place of the whole scene do not matter: only proportions count.
 #[test]
 fn auto_takes_single_where_proportions_are_harmless() {
-    let at = |place: f64, size: f64| {
+    let scene_text = |place: f64, size: f64| {
         let x = |offset: f64| place + size * offset;
         format!(
             "[camera]\neye = [{:?}, {:?}, {:?}]\ntarget = [{:?}, {:?}, {:?}]\n\
@@ -255,51 +258,59 @@ fn auto_takes_single_where_proportions_are_harmless() {
         )
     };
     for (place, size) in [(0.0, 1e-6), (0.0, 1e6), (1e6, 1.0), (-1e7, 10.0), (1e3, 1e-3)] {
-        assert!(takes_single(&parsed(&at(place, size))), "at {place:e}, of size {size:e}");
+        assert!(takes_single(&parsed(&scene_text(place, size))), "at {place:e}, of size {size:e}");
     }
-    // Two balls that all but touch do so in a spot smaller than a pixel, unless one looks closely.
-    let beside = |degrees: f64| {
+    // Two balls that almost touch do so in a spot smaller than a pixel, except in a close view.
+    let two_balls = |degrees: f64| {
         let ball = |x: f64| {
             format!("[[object]]\nshape.sphere = {{ center = [{x:?}, 0.0, 0.0], radius = 0.25 }}\n")
         };
         let camera = camera([0.0, 0.5, 2.0], [0.0, 0.0, 0.0], degrees);
         parsed(&(camera + SUN + &ball(-0.25) + &ball(0.250_001)))
     };
-    assert!(takes_single(&beside(40.0)) && !takes_single(&beside(0.4)));
+    assert!(takes_single(&two_balls(40.0)) && !takes_single(&two_balls(0.4)));
 }
 
-/// Scenes with the numbered extremes. Those that single precision cannot meet go to double by `auto`;
-/// the others, of which a shipped scene stands for many, stay in single.
+/// Scenes with the numbered extremes. `auto` takes double precision for those beyond single
+/// precision and single for the others. One shipped scene represents many.
 #[test]
 fn auto_takes_double_for_the_extremes_beyond_single() {
-    let seen = |eye: [f64; 3], degrees: f64, shape: &str| {
+    let scene_from = |eye: [f64; 3], degrees: f64, shape: &str| {
         camera(eye, [0.0, 0.0, 0.0], degrees) + SUN + "[[object]]\nshape." + shape + "\n"
     };
     let ball = "sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }";
     let cylinder = |height: f64| {
         format!("cylinder = {{ base = [0, 0, 0], top = [0, {height:e}, 0], radius = 1.0 }}")
     };
-    let own = [
-        (1, true, seen([1e6, 0.0, 0.0], 1e-4, ball)),
+    let inline_scenes = [
+        (1, true, scene_from([1e6, 0.0, 0.0], 1e-4, ball)),
         (2, true, bare_round_ground(1e-9)),
-        (3, true, seen([1.0, 0.0, 0.0], 1e-3, "sphere = { center = [0, 0, 0], radius = 1e-6 }")),
-        (4, false, seen([0.1, 0.2, 0.3], 90.0, ball)),
-        (5, false, seen([3.0, 1.0, 0.0], 40.0, ball)),
-        (6, false, seen([3.0, 0.5, 0.0], 40.0, "box = { center = [0, 0, 0], size = [1, 1, 1] }")),
-        (11, true, seen([3.0, 2.0, 3.0], 40.0, &cylinder(1e-9))),
-        (11, true, seen([3.0, 2.0, 3.0], 40.0, &cylinder(1e9))),
+        (
+            3,
+            true,
+            scene_from([1.0, 0.0, 0.0], 1e-3, "sphere = { center = [0, 0, 0], radius = 1e-6 }"),
+        ),
+        (4, false, scene_from([0.1, 0.2, 0.3], 90.0, ball)),
+        (5, false, scene_from([3.0, 1.0, 0.0], 40.0, ball)),
+        (
+            6,
+            false,
+            scene_from([3.0, 0.5, 0.0], 40.0, "box = { center = [0, 0, 0], size = [1, 1, 1] }"),
+        ),
+        (11, true, scene_from([3.0, 2.0, 3.0], 40.0, &cylinder(1e-9))),
+        (11, true, scene_from([3.0, 2.0, 3.0], 40.0, &cylinder(1e9))),
         (
             13,
             true,
-            seen([3.0, 2.0, 3.0], 40.0, "box = { center = [0, 0, 0], size = [1, 1e-6, 1] }"),
+            scene_from([3.0, 2.0, 3.0], 40.0, "box = { center = [0, 0, 0], size = [1, 1e-6, 1] }"),
         ),
         (15, false, small_ball(0.5)),
         (16, true, narrow_gap(1e-6)),
-        (17, true, seen([3.0, 2.0, 3.0], 1e-3, ball)),
-        // At the border of so wide a view neighbouring rays are next to parallel.
-        (17, true, seen([3.0, 2.0, 3.0], 179.9, ball)),
+        (17, true, scene_from([3.0, 2.0, 3.0], 1e-3, ball)),
+        // At the border of so wide a view neighbouring rays are nearly parallel.
+        (17, true, scene_from([3.0, 2.0, 3.0], 179.9, ball)),
     ];
-    let of_shipped = [
+    let shipped_scenes = [
         (7, "extents"),
         (8, "compound-nested"),
         (9, "compound-intersection"),
@@ -320,12 +331,13 @@ fn auto_takes_double_for_the_extremes_beyond_single() {
         (29, "light-groups"),
         (30, "slope-aa"),
     ];
-    let own = own.into_iter().map(|(number, double, text)| (number, double, parsed(&text)));
-    let of_shipped = of_shipped
+    let inline_scenes =
+        inline_scenes.into_iter().map(|(number, double, text)| (number, double, parsed(&text)));
+    let shipped_scenes = shipped_scenes
         .into_iter()
         .map(|(number, name)| (number, false, shipped(&format!("{name}.toml"))));
     let mut chosen: BTreeMap<usize, Vec<&str>> = BTreeMap::new();
-    for (number, double, scene) in own.chain(of_shipped) {
+    for (number, double, scene) in inline_scenes.chain(shipped_scenes) {
         assert_eq!(takes_single(&scene), !double, "extreme {number}");
         chosen.entry(number).or_default().push(if double { "double" } else { "single" });
     }
@@ -336,8 +348,8 @@ fn auto_takes_double_for_the_extremes_beyond_single() {
     }
 }
 
-/// Everything that is shipped is traced in single precision, and nothing of that shows.
-/// The box around a cylinder, a cone, an ellipsoid or a mesh holds points close to its surface and points far from it.
+/// The box around a cylinder, a cone, an ellipsoid or a mesh holds points close to its surface and
+/// points far from it.
 #[test]
 fn eye_inside_a_box_of_a_round_solid_decides_by_its_distance_from_the_surface() {
     let scene = |shape: &str, eye: [f64; 3]| {
@@ -362,24 +374,25 @@ fn eye_inside_a_box_of_a_round_solid_decides_by_its_distance_from_the_surface() 
     }
 }
 
+/// Shipped scenes are traced in single precision, without visible error.
 #[test]
 fn shipped_scenes_stay_in_single_precision() {
-    // In glass and between mirrors some paths end elsewhere after a rounding. That is noise, not error: in
-    // gallery-glass.toml single and double differ by 0.24, 0.13, 0.066 and 0.035 codes at 16, 64, 256 and
-    // 1024 samples a pixel (96x54).
+    // Rounding makes some paths in glass and between mirrors end elsewhere. That is noise, not
+    // error: in gallery-glass.toml single and double precision differ by 0.24, 0.13, 0.066 and
+    // 0.035 levels at 16, 64, 256 and 1024 samples a pixel (96x54).
     let mut wrong = Vec::new();
     let mut worst = (0.0, String::new());
     for (name, scene) in all_shipped() {
-        let codes = error(&sized(scene.clone(), SIZE));
+        let levels = error(&sized(scene.clone(), SIZE));
         if !takes_single(&scene) {
-            wrong.push(format!("{name}: double, {codes} codes"));
-        } else if codes > INVISIBLE {
-            wrong.push(format!("{name}: {codes} codes off"));
+            wrong.push(format!("{name}: double, {levels} levels"));
+        } else if levels > INVISIBLE {
+            wrong.push(format!("{name}: {levels} levels off"));
         }
-        if codes > worst.0 {
-            worst = (codes, name);
+        if levels > worst.0 {
+            worst = (levels, name);
         }
     }
-    println!("worst: {} codes off in {}", worst.0, worst.1);
+    println!("worst: {} levels off in {}", worst.0, worst.1);
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

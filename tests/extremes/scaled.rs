@@ -11,8 +11,8 @@ use zerkalo::world::Precision;
 const SIZE: [u32; 2] = [64, 48];
 const SAMPLES: u32 = 16;
 
-/// One scene of each family: cone lobes, Beckmann lobes with light that falls off, glass, compounds,
-/// meshes.
+/// One scene of each family: cone lobes, Beckmann lobes with light that falls off, glass,
+/// compounds, meshes.
 const SCENES: [&str; 5] = [
     "mirror-room.toml",
     "mirror-room-physical.toml",

@@ -1,4 +1,4 @@
-//! Shadows where surfaces meet themselves and each other.
+//! Shadows of surfaces on themselves and on each other.
 
 use crate::common::Numbers;
 use crate::rays::{Line, Traced, scene};
@@ -6,9 +6,9 @@ use crate::report::report;
 use glam::{DMat3, DVec3};
 use zerkalo::world::Precision;
 
-/// What a convex thing looks like for the test of its own shadow.
+/// Convex shapes for the test of self-shadowing.
 #[derive(Clone, Copy, Debug)]
-enum Thing {
+enum ConvexShape {
     Plane,
     HorizontalRectangle,
     Sphere,
@@ -18,9 +18,10 @@ enum Thing {
     Cone,
 }
 
-/// Half the size of the flat things and solids, in units of the scale; the sphere's radius is 1.
-impl Thing {
-    fn shape(self, scale: f64, place: DVec3) -> String {
+/// Scene text and surface points. Half the size of flat shapes and solids is 1 in units of the
+/// scale; so is the radius of the sphere.
+impl ConvexShape {
+    fn scene_text(self, scale: f64, place: DVec3) -> String {
         let [x, y, z] = place.to_array();
         match self {
             Self::Plane => {
@@ -65,7 +66,7 @@ impl Thing {
         }
     }
 
-    /// A random point of the surface and its outward normal, for the scale 1 at the origin.
+    /// Returns a random point of the surface and its outward normal, for the scale 1 at the origin.
     fn point(self, numbers: &mut Numbers) -> (DVec3, DVec3) {
         let square = |n: &mut Numbers| [n.between(-1.0, 1.0), n.between(-1.0, 1.0)];
         match self {
@@ -88,7 +89,7 @@ impl Thing {
                 (p, n)
             }
             Self::Pyramid => {
-                // A side: at height h it is 1 - h / 2 from the axis.
+                // Point of a side: at height h it is 1 - h / 2 from the axis.
                 let (h, along) = (numbers.unit(), numbers.between(-1.0, 1.0));
                 let reach = 1.0 - h / 2.0;
                 let turn = DMat3::from_rotation_y(
@@ -101,7 +102,7 @@ impl Thing {
                 let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();
                 let out = DVec3::new(cos, 0.0, sin);
                 if matches!(self, Self::Cone) {
-                    // At height h the side is 1 - h / 2 from the axis, as the pyramid's.
+                    // At height h the side is 1 - h / 2 from the axis, as for the pyramid.
                     let h = numbers.between(0.0, 1.9);
                     (out * (1.0 - h / 2.0) + DVec3::Y * h, (out + DVec3::Y / 2.0).normalize())
                 } else if numbers.below(3) == 0 {
@@ -114,9 +115,9 @@ impl Thing {
     }
 }
 
-/// Counts points of a convex thing whose light is hidden by the thing itself.
+/// Counts points of a convex shape that its own surface hides from the light.
 fn falsely_dark(
-    thing: Thing,
+    shape: ConvexShape,
     scale: f64,
     place: DVec3,
     towards: DVec3,
@@ -130,61 +131,61 @@ fn falsely_dark(
         "[camera]\neye = [{ex:?}, {ey:?}, {ez:?}]\ntarget = [{px:?}, {py:?}, {pz:?}]\n\
          [[light]]\ndirectional = {{ direction = [{x:?}, {y:?}, {z:?}] }}\n\
          [[object]]\nshape.{}\n",
-        thing.shape(scale, place)
+        shape.scene_text(scale, place)
     ));
     let traced = Traced::new(&scene, precision);
     let mut numbers = Numbers::new(15);
     let mut lines: Vec<Line> = Vec::new();
     let mut cosines = Vec::new();
     while lines.len() < points {
-        let (p, n) = thing.point(&mut numbers);
+        let (p, n) = shape.point(&mut numbers);
         let side = numbers.direction();
         let out = if side.dot(n) < 0.0 { -side } else { side };
-        // Seen so flatly that the ray itself cannot be told from one beside the thing: not asked.
+        // Grazing views are skipped: rounding cannot separate the ray from one beside the shape.
         if out.dot(n) < 0.05 {
             continue;
         }
-        let at = place - traced.origin() + p * scale;
-        lines.push((at + out * (3.0 * scale), -out));
+        let surface_point = place - traced.origin() + p * scale;
+        lines.push((surface_point + out * (3.0 * scale), -out));
         cosines.push(n.dot(towards));
     }
-    // What rounds the cosine: the direction of the light and the normal.
+    // Rounding of the cosine: by the direction of the light and the normal.
     let unsure = if precision == Precision::Single { 4e-7 } else { 1e-9 };
     let light = traced.centered(&lines);
     for (i, (l, c)) in light.iter().zip(&cosines).enumerate() {
-        assert!(*c > -unsure || l[0] == 0.0, "{thing:?} {:?}: lit from behind", lines[i]);
+        assert!(*c > -unsure || l[0] == 0.0, "{shape:?} {:?}: lit from behind", lines[i]);
     }
     light.iter().zip(cosines).filter(|(l, c)| *c > unsure && l[0] <= 0.0).count()
 }
 
 const SCALES: [f64; 7] = [1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4, 1e6];
-const THINGS: [Thing; 7] = [
-    Thing::Plane,
-    Thing::HorizontalRectangle,
-    Thing::Sphere,
-    Thing::Cube,
-    Thing::Pyramid,
-    Thing::Cylinder,
-    Thing::Cone,
+const SHAPES: [ConvexShape; 7] = [
+    ConvexShape::Plane,
+    ConvexShape::HorizontalRectangle,
+    ConvexShape::Sphere,
+    ConvexShape::Cube,
+    ConvexShape::Pyramid,
+    ConvexShape::Cylinder,
+    ConvexShape::Cone,
 ];
 
 fn check_self_shadow(precision: Precision, place: DVec3, scales: &[f64], points: usize) {
     let (sin, cos) = 0.01f64.to_radians().sin_cos();
     let pyramid_side = DVec3::new(1.0, 0.5, 0.0).normalize();
     let up_side = DVec3::new(-0.5, 1.0, 0.0).normalize();
-    for thing in THINGS {
+    for shape in SHAPES {
         for scale in scales {
             for towards in [
-                // 0.01 degrees above the ground, the cube's top, the pyramid's side.
+                // Light 0.01 degrees above the ground, the cube's top, the pyramid's side.
                 DVec3::new(cos, sin, 0.0),
                 DVec3::new(cos * 0.6, sin, cos * 0.8),
                 (up_side * cos + pyramid_side * sin).normalize(),
                 DVec3::new(0.3, 0.5, 0.2).normalize(),
             ] {
-                let dark = falsely_dark(thing, *scale, place, towards, precision, points);
+                let dark = falsely_dark(shape, *scale, place, towards, precision, points);
                 assert_eq!(
                     dark, 0,
-                    "{thing:?}, scale {scale:e}, at {place}, {precision:?}, light from {towards}: \
+                    "{shape:?}, scale {scale:e}, at {place}, {precision:?}, light from {towards}: \
                      falsely dark points of {points} (seed 15)"
                 );
             }
@@ -192,28 +193,28 @@ fn check_self_shadow(precision: Precision, place: DVec3, scales: &[f64], points:
     }
 }
 
-/// 392 settings of 8000 points in all.
+/// Traces 392 settings of 8000 points.
 #[test]
 fn extreme_15_self_shadow() {
     check_self_shadow(Precision::Double, DVec3::ZERO, &SCALES, 8000);
     check_self_shadow(Precision::Single, DVec3::ZERO, &SCALES, 8000);
-    let asked = THINGS.len() * SCALES.len() * 4 * 8000;
-    report(15, "both", &format!("0 falsely dark of {asked} points"));
+    let point_count = SHAPES.len() * SCALES.len() * 4 * 8000;
+    report(15, "both", &format!("0 falsely dark of {point_count} points"));
 }
 
-/// A million units from the origin the file's own numbers end at 1e-10: things are as small as 1e-4.
-/// Recentring keeps single precision as good there as at the origin.
+/// Numbers in a scene file a million units from the origin are rounded to 1e-10: shapes are as
+/// small as 1e-4. Recentring keeps single precision as good there as at the origin.
 #[test]
 fn extreme_15_self_shadow_far_from_the_origin() {
     let place = DVec3::new(1e6, -1e6, 1e6);
     check_self_shadow(Precision::Double, place, &SCALES[1..], 4000);
     check_self_shadow(Precision::Single, place, &SCALES[1..], 4000);
-    let asked = THINGS.len() * (SCALES.len() - 1) * 4 * 4000;
-    report(15, "both", &format!("a million units off 0 of {asked}"));
+    let point_count = SHAPES.len() * (SCALES.len() - 1) * 4 * 4000;
+    report(15, "both", &format!("a million units off 0 of {point_count}"));
 }
 
-/// A box that hovers a millionth of its size above the ground: under it the ground is dark but for
-/// the strip that slanting light reaches, as wide as the gap.
+/// Checks a box that hovers a millionth of its size above the ground: the ground under it is dark
+/// except for the strip that slanting light reaches, as wide as the gap.
 fn check_gap(scale: f64, precision: Precision) {
     let gap = 1e-6 * scale;
     let scene = scene(&format!(
@@ -254,8 +255,7 @@ fn check_gap(scale: f64, precision: Precision) {
     assert_eq!(lit(&shaded), 0, "scale {scale:e}, {precision:?}: light leaks into the shadow");
     assert_eq!(lit(&open), open.len(), "scale {scale:e}, {precision:?}: dark before the box");
     if precision == Precision::Double {
-        // The strip is the one thing that single precision, with coordinates known to 1e-6 of the
-        // scene, cannot show.
+        // Single precision, with coordinates rounded to 1e-6 of the scene, cannot show the strip.
         assert_eq!(lit(&strip), strip.len(), "scale {scale:e}: the strip under the edge");
     }
 }
@@ -267,5 +267,5 @@ fn extreme_16_thin_gap() {
         check_gap(scale, Precision::Single);
     }
     report(16, "double", "no leak, the strip under the edge is lit");
-    report(16, "single", "no leak, the strip is not to be seen");
+    report(16, "single", "no leak, the strip is not visible");
 }

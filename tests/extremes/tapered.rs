@@ -1,4 +1,4 @@
-//! Cylinders, cones and what lies between, at their extremes.
+//! Extremes of cylinders, cones and conical frusta.
 
 use crate::common::Numbers;
 use crate::rays::{Line, LineHit, closest};
@@ -12,17 +12,17 @@ fn canonical(s: f64) -> Form {
     Form::conical_frustum(DAffine3::IDENTITY, s)
 }
 
-fn meet<L: SimdFloat>(form: &Form, lines: &[Line]) -> Vec<Option<LineHit>> {
+fn closest_hits<L: SimdFloat>(form: &Form, lines: &[Line]) -> Vec<Option<LineHit>> {
     closest(&Aggregate::<L>::new(std::slice::from_ref(form)), lines)
 }
 
-/// Entry and exit, by a ray from each side.
+/// Returns the distances of entry and exit, from a ray from each side.
 fn ends(form: &Form, (p, d): Line, far: f64) -> Option<(f64, f64)> {
-    let met = meet::<Double>(form, &[(p - d * far, d), (p + d * far, -d)]);
-    Some((met[0]?.t - far, far - met[1]?.t))
+    let hits = closest_hits::<Double>(form, &[(p - d * far, d), (p + d * far, -d)]);
+    Some((hits[0]?.t - far, far - hits[1]?.t))
 }
 
-/// Lines through the canonical solids, from all sides.
+/// Returns lines through the canonical solids, from all sides.
 fn lines(seed: u64, count: usize) -> Vec<Line> {
     let mut numbers = Numbers::new(seed);
     (0..count)
@@ -38,9 +38,9 @@ fn lines(seed: u64, count: usize) -> Vec<Line> {
         .collect()
 }
 
-/// The span of a line in the canonical solid by the plain quadratic formula; `None`: it is met too
-/// flatly to be told that way, or not at all.
-fn plain(s: f64, (o, d): Line) -> Option<(f64, f64)> {
+/// Returns the span of a line in the canonical solid by the plain quadratic formula; `None` if the
+/// line misses or grazes too closely for the formula.
+fn quadratic_span(s: f64, (o, d): Line) -> Option<(f64, f64)> {
     let k = s - 1.0;
     let r = 1.0 + k * o.z;
     let a = d.x * d.x + d.y * d.y - k * k * d.z * d.z;
@@ -62,13 +62,13 @@ fn plain(s: f64, (o, d): Line) -> Option<(f64, f64)> {
 }
 
 #[test]
-fn spans_are_those_of_the_plain_formula() {
+fn frustum_spans_match_the_quadratic_formula() {
     for s in [0.0, 0.3, 1.0, 1.7, 20.0] {
         let mut counted = 0;
         for line in lines(11, 20_000) {
-            let Some((low, high)) = plain(s, line) else { continue };
+            let Some((low, high)) = quadratic_span(s, line) else { continue };
             let form = canonical(s);
-            // From far outside, on both sides: a wide solid reaches round the line's origin.
+            // Rays start far outside on both sides: a wide solid surrounds the line's origin.
             let (enter, leave) =
                 ends(&form, line, 60.0).unwrap_or_else(|| panic!("s = {s}: lost {line:?}"));
             let error = (enter - low).abs().max((leave - high).abs());
@@ -79,14 +79,14 @@ fn spans_are_those_of_the_plain_formula() {
     }
 }
 
-/// From cylinder to cone without a step, where the quadratic changes its degree.
+/// The transition from cylinder to cone has no step where the quadratic changes its degree.
 #[test]
 fn extreme_11_tapered_cylinders() {
     let mut worst = 0f64;
     let lines = lines(12, 50_000);
-    let straight = meet::<Double>(&canonical(1.0), &lines);
+    let straight = closest_hits::<Double>(&canonical(1.0), &lines);
     for hair in [1e-15, 1e-12, -1e-15, -1e-12] {
-        let tapered = meet::<Double>(&canonical(1.0 + hair), &lines);
+        let tapered = closest_hits::<Double>(&canonical(1.0 + hair), &lines);
         for ((line, a), b) in lines.iter().zip(&straight).zip(&tapered) {
             match (a, b) {
                 (Some(a), Some(b)) => {
@@ -107,9 +107,9 @@ fn extreme_11_tapered_cylinders() {
     report(11, "single", LEFT_TO_DOUBLE);
 }
 
-/// A tapered cylinder of equal radii is the cylinder, bit for bit, and one of radius 0 the cone.
+/// A tapered cylinder of equal radii is bit-equal to the cylinder, and one of radius 0 to the cone.
 #[test]
-fn extreme_11_without_taper_it_is_the_cylinder() {
+fn extreme_11_untapered_solid_is_bit_equal_to_cylinder() {
     let (base, end) = ([0.1, -0.2, 0.3], [0.5, 0.9, -0.4]);
     let tapered = |base_radius, top_radius| {
         TaperedCylinder { base, top: end, base_radius, top_radius }.form()
@@ -123,7 +123,7 @@ fn extreme_11_without_taper_it_is_the_cylinder() {
         ("canonical cylinder", canonical(1.0), unit),
     ] {
         let lines = lines(16, 50_000);
-        let (a, b) = (meet::<Double>(&a, &lines), meet::<Double>(&b, &lines));
+        let (a, b) = (closest_hits::<Double>(&a, &lines), closest_hits::<Double>(&b, &lines));
         assert!(a.iter().flatten().count() > 5_000, "{name}");
         for ((line, a), b) in lines.iter().zip(a).zip(b) {
             let bits = |m: LineHit| (m.t.to_bits(), m.normal.to_array().map(f64::to_bits));
@@ -140,7 +140,7 @@ fn extreme_11_flat_and_tall_solids() {
         for s in [0.0, 0.5, 1.0, 3.0] {
             let form = Form::conical_frustum(DAffine3::from_scale(DVec3::new(1.0, 1.0, height)), s);
             for n in 0..4000 {
-                // Through the axis somewhere, across it and aslant.
+                // Lines through a point of the axis, across it and aslant.
                 let at = DVec3::Z * (height * numbers.between(0.1, 0.7));
                 let d = match n % 2 {
                     0 => DVec3::new(numbers.between(-1.0, 1.0), 1.0, 0.0).normalize(),
@@ -148,11 +148,11 @@ fn extreme_11_flat_and_tall_solids() {
                 };
                 let far = 10.0f64;
                 let line = (at - d * far, d);
-                let met = meet::<Double>(&form, &[line])[0];
-                let told = || format!("height {height:e}, s = {s}: {line:?} {met:?}");
-                let met = met.unwrap_or_else(|| panic!("lost: {}", told()));
-                assert!(met.t.is_finite() && met.point.is_finite(), "{}", told());
-                assert!((met.normal.length() - 1.0).abs() < 1e-14, "{}", told());
+                let hit = closest_hits::<Double>(&form, &[line])[0];
+                let context = || format!("height {height:e}, s = {s}: {line:?} {hit:?}");
+                let hit = hit.unwrap_or_else(|| panic!("lost: {}", context()));
+                assert!(hit.t.is_finite() && hit.point.is_finite(), "{}", context());
+                assert!((hit.normal.length() - 1.0).abs() < 1e-14, "{}", context());
             }
         }
     }
@@ -166,25 +166,26 @@ fn extreme_12_along_a_generator() {
     for place in [DAffine3::IDENTITY, DAffine3::from_quat(turn)] {
         for s in [0.0, 0.25, 0.5, 1.0, 2.0] {
             let form = Form::conical_frustum(place, s);
-            let own = |p: DVec3| place.transform_point3(p);
+            let placed = |p: DVec3| place.transform_point3(p);
             // The axis.
-            let axis = (own(DVec3::new(0.0, 0.0, 0.5)), place.matrix3 * DVec3::Z);
+            let axis = (placed(DVec3::new(0.0, 0.0, 0.5)), place.matrix3 * DVec3::Z);
             let (enter, leave) = ends(&form, axis, 4.0).unwrap();
             assert!((enter + 0.5).abs() < 1e-13 && (leave - 0.5).abs() < 1e-13, "s = {s}");
             for _ in 0..2000 {
                 let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();
-                let low = own(DVec3::new(cos, sin, 0.0));
-                let high = own(DVec3::new(s * cos, s * sin, 1.0));
+                let low = placed(DVec3::new(cos, sin, 0.0));
+                let high = placed(DVec3::new(s * cos, s * sin, 1.0));
                 let d = (high - low).normalize();
                 let middle = (low + high) / 2.0;
-                // On the generator: inside or outside by rounding, but finite. A little inside: the
-                // length between the ends.
+                // A line on the generator is inside or outside by rounding, but its hits are
+                // finite. A line slightly inside has the length between the ends.
                 let along = [(low - d * 3.0, d)];
-                let single = meet::<Single>(&form, &along);
-                for met in meet::<Double>(&form, &along).into_iter().chain(single).flatten() {
-                    assert!(met.t.is_finite() && met.normal.is_finite(), "s = {s}: {met:?}");
+                let single = closest_hits::<Single>(&form, &along);
+                for hit in closest_hits::<Double>(&form, &along).into_iter().chain(single).flatten()
+                {
+                    assert!(hit.t.is_finite() && hit.normal.is_finite(), "s = {s}: {hit:?}");
                 }
-                let center = own(DVec3::Z * 0.5);
+                let center = placed(DVec3::Z * 0.5);
                 let inner = middle + (center - middle) * 1e-9;
                 let (enter, leave) = ends(&form, (inner, d), 4.0).unwrap();
                 let half = low.distance(high) / 2.0;
@@ -194,11 +195,11 @@ fn extreme_12_along_a_generator() {
                 let outer = middle - (center - middle) * 1e-9;
                 let found = ends(&form, (outer, d), 4.0).map_or(0.0, |(a, b)| b - a);
                 assert!(found < 1e-6, "s = {s}: {found}");
-                // From aside through the apex.
+                // A line from the side through the apex has finite hits.
                 if s == 0.0 {
                     let side = numbers.direction();
-                    let met = meet::<Double>(&form, &[(high - side * 3.0, side)])[0];
-                    assert!(met.is_none_or(|m| m.t.is_finite() && m.normal.is_finite()), "{met:?}");
+                    let hit = closest_hits::<Double>(&form, &[(high - side * 3.0, side)])[0];
+                    assert!(hit.is_none_or(|m| m.t.is_finite() && m.normal.is_finite()), "{hit:?}");
                 }
             }
         }
@@ -207,7 +208,7 @@ fn extreme_12_along_a_generator() {
     report(12, "single", "finite");
 }
 
-/// Lines that touch: no NaN, and no more than `limit` of their length inside.
+/// Checks tangents: hits are finite, and at most `limit` of a line is inside.
 fn check_tangents<L: SimdFloat>(limit: f64) {
     let mut longest = 0.0f64;
     let mut numbers = Numbers::new(15);
@@ -219,7 +220,8 @@ fn check_tangents<L: SimdFloat>(limit: f64) {
                 let (sin, cos) = numbers.between(0.0, std::f64::consts::TAU).sin_cos();
                 let z = numbers.between(0.01, 0.99);
                 let r = 1.0 + k * z;
-                // In the tangent plane, which holds the generator and the circle's tangent.
+                // Direction in the tangent plane, which holds the generator and the circle's
+                // tangent.
                 let along = DVec3::new(k * cos, k * sin, 1.0).normalize();
                 let around = DVec3::new(-sin, cos, 0.0);
                 let turn = numbers.between(0.2, 1.4);
@@ -227,18 +229,18 @@ fn check_tangents<L: SimdFloat>(limit: f64) {
                 (DVec3::new(r * cos, r * sin, z) - d * 3.0, d)
             })
             .collect();
-        let forward = meet::<L>(&form, &touching);
+        let forward = closest_hits::<L>(&form, &touching);
         let back: Vec<Line> = touching.iter().map(|(o, d)| (*o + *d * 6.0, -*d)).collect();
-        let backward = meet::<L>(&form, &back);
+        let backward = closest_hits::<L>(&form, &back);
         for ((line, a), b) in touching.iter().zip(forward).zip(backward) {
-            let told = || format!("{}, s = {s}: {line:?} {a:?} {b:?}", L::NAME);
-            for met in a.iter().chain(&b) {
-                assert!(met.t.is_finite() && met.normal.is_finite(), "{}", told());
+            let context = || format!("{}, s = {s}: {line:?} {a:?} {b:?}", L::NAME);
+            for hit in a.iter().chain(&b) {
+                assert!(hit.t.is_finite() && hit.normal.is_finite(), "{}", context());
             }
             if let (Some(a), Some(b)) = (a, b) {
-                // Inside by e of the radius the chord is about sqrt(8 e) / sin(turn).
+                // A line inside by e of the radius has a chord of about sqrt(8 e) / sin(turn).
                 longest = longest.max(6.0 - a.t - b.t);
-                assert!(6.0 - a.t - b.t <= limit, "{}", told());
+                assert!(6.0 - a.t - b.t <= limit, "{}", context());
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The width-1 instances and the packets give the same bits.
+//! Packets and the width-1 instances return equal bits.
 
 use crate::common::Numbers;
 use crate::rays::{Line, packets, surface};
@@ -24,7 +24,7 @@ fn same3<A: SimdFloat, B: SimdFloat>(a: Vec3<A>, b: Vec3<B>, lane: usize) -> boo
     (0..3).all(|i| same(a[i], b[i]))
 }
 
-/// Packets of `L` against rays of its scalar, in one geometry of all `forms`.
+/// Compares packets of `L` with rays of its scalar, in ray_hit aggregate of all `forms`.
 fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
     name: &str,
     forms: &[Form],
@@ -35,37 +35,40 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
     let narrow = Aggregate::<S>::with_tree(forms, tree);
     for (n, (packet, count)) in packets::<L>(lines).enumerate() {
         let hit = wide.closest(&packet, wide.all());
-        let met = hit.t.lt(L::from_f64(L::MAX));
-        let here = surface(&wide, &packet, &hit);
+        let hit_mask = hit.t.lt(L::from_f64(L::MAX));
+        let packet_surface = surface(&wide, &packet, &hit);
         let limit = 2.0;
         let blocked = wide.occluded(&packet, L::from_f64(limit), L::mask(true), wide.all());
         for i in 0..count {
             let ray =
                 Ray { origin: lane_of(packet.origin, i), direction: lane_of(packet.direction, i) };
-            let one = narrow.closest(&ray, narrow.all());
-            let told = || {
+            let ray_hit = narrow.closest(&ray, narrow.all());
+            let context = || {
                 format!(
                     "{name}, {} against {}, tree {tree}: ray {} of the seed: {ray:?}: {:?}, not {:?}",
                     L::NAME,
                     S::NAME,
                     n * L::WIDTH + i,
                     hit.t.lane(i),
-                    one.t
+                    ray_hit.t
                 )
             };
-            assert!(same(hit.t.lane(i).to_f64(), one.t.lane(0).to_f64()), "{}", told());
+            assert!(same(hit.t.lane(i).to_f64(), ray_hit.t.lane(0).to_f64()), "{}", context());
             let limit = <S as SimdFloat>::from_f64(limit);
             let b = narrow.occluded(&ray, limit, S::mask(true), narrow.all()).any();
-            assert!(blocked.lane(i) == b, "blocked: {}", told());
-            if !met.lane(i) {
+            assert!(blocked.lane(i) == b, "blocked: {}", context());
+            if !hit_mask.lane(i) {
                 continue;
             }
-            assert!(hit.item.id_lane(i) == one.item.id_lane(0), "item: {}", told());
-            let s = surface(&narrow, &ray, &one);
-            let equal = same3(here.point, s.point, i)
-                && same3(here.normal, s.normal, i)
-                && same(here.max_coordinate.lane(i).to_f64(), s.max_coordinate.lane(0).to_f64());
-            assert!(equal, "surface {here:?}, not {s:?}: {}", told());
+            assert!(hit.item.id_lane(i) == ray_hit.item.id_lane(0), "item: {}", context());
+            let s = surface(&narrow, &ray, &ray_hit);
+            let equal = same3(packet_surface.point, s.point, i)
+                && same3(packet_surface.normal, s.normal, i)
+                && same(
+                    packet_surface.max_coordinate.lane(i).to_f64(),
+                    s.max_coordinate.lane(0).to_f64(),
+                );
+            assert!(equal, "surface {packet_surface:?}, not {s:?}: {}", context());
         }
     }
 }
@@ -81,10 +84,10 @@ fn packets_and_single_rays_give_the_same_bits() {
     }
 }
 
-/// All kinds in one place, packets whose lanes meet different things, and ties where surfaces lie on
-/// each other: who wins may not depend on the company in the packet.
+/// All kinds in ray_hit place: lanes of a packet hit different primitives, and coincident surfaces tie.
+/// The winner does not depend on the other lanes.
 #[test]
-fn packets_and_single_rays_agree_in_a_crowd() {
+fn packets_and_single_rays_agree_among_all_kinds() {
     let mut all: Vec<Form> = forms().into_iter().map(|f| f.1).collect();
     let again: Vec<Form> = all.iter().filter(|f| f.bounds().is_some()).cloned().collect();
     all.extend(again);
@@ -96,7 +99,7 @@ fn packets_and_single_rays_agree_in_a_crowd() {
         })
         .collect();
     for tree in [false, true] {
-        compare::<Single, f32>("crowd", &all, tree, &lines);
-        compare::<Double, f64>("crowd", &all, tree, &lines);
+        compare::<Single, f32>("all kinds", &all, tree, &lines);
+        compare::<Double, f64>("all kinds", &all, tree, &lines);
     }
 }

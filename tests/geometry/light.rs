@@ -1,4 +1,4 @@
-//! A point light over a plane: irradiance, radiance, the edge of a shadow.
+//! Point light over a plane: irradiance, radiance, the edge of a shadow.
 
 use crate::common::Numbers;
 use crate::rays::{Line, Traced, scene};
@@ -18,7 +18,7 @@ fn ground(extra: &str, light: DVec3) -> String {
     )
 }
 
-/// A ray from above to a point of the ground, and that point.
+/// Returns a ray from above to a point of the ground, and that point.
 fn to_ground(numbers: &mut Numbers, half: f64) -> (Line, DVec3) {
     let p = DVec3::new(numbers.between(-half, half), 0.0, numbers.between(-half, half));
     let from = DVec3::new(numbers.between(-5.0, 5.0), 2.0, numbers.between(-5.0, 5.0));
@@ -32,8 +32,8 @@ fn closed_form_01_a_point_light_on_a_plane() {
     let mut numbers = Numbers::new(1);
     let (lines, points): (Vec<_>, Vec<_>) =
         (0..20_000).map(|_| to_ground(&mut numbers, 45.0)).unzip();
-    // Shadow rays start 8 roundings of the largest coordinate (50) above the ground, as much nearer to
-    // the lamp at height 3, whose light falls with the square.
+    // Shadow rays start 8 roundings of the largest coordinate (50) above the ground. They are
+    // nearer to the lamp at height 3 by as much, and its light falls off with the square.
     let lifted = |rounding: f64| 2.0 * 8.0 * rounding * 50.0 / 3.0;
     for (precision, rounding) in
         [(Precision::Double, f64::EPSILON), (Precision::Single, f64::from(f32::EPSILON))]
@@ -55,8 +55,8 @@ fn closed_form_01_a_point_light_on_a_plane() {
     }
 }
 
-/// A rectangle with the corners (+-1.5, 1, +-1) turned by 20 degrees: the ground is dark exactly where the
-/// segment to the light crosses it.
+/// Rectangle with the corners (+-1.5, 1, +-1) turned by 20 degrees: the ground is dark exactly
+/// where the segment to the light crosses it.
 #[test]
 fn closed_form_01_the_shadow_has_straight_edges() {
     let light = DVec3::new(0.5, 4.0, -0.7);
@@ -76,18 +76,18 @@ fn closed_form_01_the_shadow_has_straight_edges() {
     let mut expected = Vec::new();
     while lines.len() < 100_000 {
         let p = DVec3::new(numbers.between(-3.0, 3.0), 0.0, numbers.between(-3.0, 3.0));
-        // Where the segment to the light passes the height 1.
-        let at = p + (light - p) * 0.25 - DVec3::new(0.2, 1.0, 0.1);
-        let (a, b) = (at.dot(across).abs() - 1.5, at.dot(up).abs() - 1.0);
+        // Point of the segment to the light at the height 1.
+        let crossing = p + (light - p) * 0.25 - DVec3::new(0.2, 1.0, 0.1);
+        let (a, b) = (crossing.dot(across).abs() - 1.5, crossing.dot(up).abs() - 1.0);
         let beyond = a.max(b);
         if beyond.abs() < 1e-12 {
             continue;
         }
-        // Half of the points close to an edge.
+        // Half of the points are close to an edge.
         if numbers.bits() & 1 == 0 && beyond.abs() > 0.01 {
             continue;
         }
-        // Seen from below the rectangle.
+        // Camera rays start below the rectangle.
         lines.push((p + DVec3::Y * 0.5, DVec3::NEG_Y));
         expected.push(beyond > 0.0);
     }

@@ -1,4 +1,4 @@
-//! What rays meet, against closed forms and exact arithmetic.
+//! Ray intersection against closed forms and exact arithmetic.
 
 #[path = "../common/mod.rs"]
 mod common;

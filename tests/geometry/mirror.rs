@@ -1,4 +1,4 @@
-//! A perfect mirror shows what the mirrored camera sees: the image of P is P - 2 (n.P - d) n.
+//! Perfect mirrors show the view of the mirrored camera: the image of P is P - 2 (n.P - d) n.
 
 use crate::common::Numbers;
 use crate::rays::{Line, Traced, closest, scene};
@@ -7,7 +7,7 @@ use zerkalo::lanes::Double;
 use zerkalo::primitive::Aggregate;
 use zerkalo::world::Precision;
 
-const THINGS: &str = r#"
+const OBJECTS: &str = r#"
 [camera]
 eye = [0.6, 1.4, 4.5]
 target = [0.0, 0.8, -0.5]
@@ -44,7 +44,7 @@ shape.platform = { center = [0.0, 0.0, 1.5], size = [8.0, 6.0] }
 
 #[test]
 fn closed_form_02_a_mirror_shows_the_mirrored_view() {
-    // A tilted mirror behind everything, so that no thing lies behind its plane.
+    // The tilted mirror is behind everything, so that no object is behind its plane.
     let normal = DVec3::new(0.1, -0.15, 1.0).normalize();
     let center = DVec3::new(0.0, 1.5, -2.4);
     let mirror = format!(
@@ -54,12 +54,12 @@ fn closed_form_02_a_mirror_shows_the_mirrored_view() {
          normal = [{:?}, {:?}, {:?}] }}\n",
         center.x, center.y, center.z, normal.x, normal.y, normal.z
     );
-    let with = scene(&format!("{THINGS}{mirror}"));
-    let without = scene(THINGS);
-    let forms: Vec<_> = with.objects.iter().map(|o| o.shape.form()).collect();
+    let with_mirror = scene(&format!("{OBJECTS}{mirror}"));
+    let without_mirror = scene(OBJECTS);
+    let forms: Vec<_> = with_mirror.objects.iter().map(|o| o.shape.form()).collect();
     let geometry = Aggregate::<Double>::new(&forms);
     let mut numbers = Numbers::new(2);
-    let eye = DVec3::from(with.camera.eye);
+    let eye = DVec3::from(with_mirror.camera.eye);
     let lines: Vec<Line> = (0..100_000)
         .map(|_| {
             let target = center + numbers.in_cube(1.5);
@@ -67,14 +67,14 @@ fn closed_form_02_a_mirror_shows_the_mirrored_view() {
         })
         .collect();
     let last = forms.len() - 1;
-    let met = closest(&geometry, &lines);
+    let hits = closest(&geometry, &lines);
     let through: Vec<Line> = lines
         .iter()
-        .zip(&met)
-        .filter(|(_, met)| met.is_some_and(|m| m.form == last))
+        .zip(&hits)
+        .filter(|(_, hit)| hit.is_some_and(|m| m.form == last))
         .map(|(line, _)| *line)
         .collect();
-    assert!(through.len() > 20_000, "{} rays meet the mirror", through.len());
+    assert!(through.len() > 20_000, "{} rays hit the mirror", through.len());
     let d = normal.dot(center);
     let image = |p: DVec3| p - normal * (2.0 * (normal.dot(p) - d));
     let turned = |v: DVec3| v - normal * (2.0 * normal.dot(v));
@@ -82,13 +82,13 @@ fn closed_form_02_a_mirror_shows_the_mirrored_view() {
     for (precision, tolerance, share) in
         [(Precision::Double, 1e-11, 0.0), (Precision::Single, 2e-3, 1e-3)]
     {
-        let seen = Traced::new(&with, precision).radiance(&through);
-        let direct = Traced::new(&without, precision).radiance(&mirrored);
+        let seen = Traced::new(&with_mirror, precision).radiance(&through);
+        let direct = Traced::new(&without_mirror, precision).radiance(&mirrored);
         let mut wrong = 0;
-        let mut things = 0;
+        let mut object_hits = 0;
         for (i, (a, b)) in seen.iter().zip(&direct).enumerate() {
             let off = (0..3).map(|c| (a[c] - 0.75 * b[c]).abs()).fold(0.0, f64::max);
-            things += usize::from(b[2] != 0.3);
+            object_hits += usize::from(b[2] != 0.3);
             if off > tolerance {
                 wrong += 1;
                 assert!(
@@ -100,6 +100,6 @@ fn closed_form_02_a_mirror_shows_the_mirrored_view() {
         }
         // In single precision a ray may pass the other side of an edge or of a shadow.
         assert!(wrong as f64 <= share * seen.len() as f64, "{precision:?}: {wrong} rays differ");
-        assert!(things > 5_000 && things < seen.len(), "{things} of {}", seen.len());
+        assert!(object_hits > 5_000 && object_hits < seen.len(), "{object_hits} of {}", seen.len());
     }
 }

@@ -1,5 +1,5 @@
-//! Tori: rays against the roots of the quartic's coefficients in double precision, measures against closed
-//! forms, shadows that a torus casts on itself, and cuts.
+//! Tori: hits against the roots of the quartic's coefficients in double precision, measures against
+//! closed forms, self-shadowing, and compounds.
 
 use crate::common::Numbers;
 use crate::rays::{Line, blocked, closest};
@@ -21,13 +21,13 @@ fn geometry<L: SimdFloat>(form: &Form) -> Aggregate<L> {
     Aggregate::new(std::slice::from_ref(form))
 }
 
-/// Height of a point over the surface.
+/// Returns the height of a point above the surface.
 fn height(p: DVec3, tube: f64) -> f64 {
     (p.x.hypot(p.z) - 1.0).hypot(p.y) - tube
 }
 
-/// Real roots in ascending order of a polynomial, lowest coefficient first: bisection between the roots of
-/// its derivative.
+/// Returns the real roots in ascending order of a polynomial, lowest coefficient first: bisection
+/// between the roots of its derivative.
 fn roots(coefficients: &[f64]) -> Vec<f64> {
     let value = |x: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
     if coefficients.len() == 2 {
@@ -54,8 +54,8 @@ fn roots(coefficients: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Coefficients of (|p|^2 + 1 - tube^2)^2 - 4 (x^2 + z^2) along a line, by the distance from its point
-/// nearest to the origin, and the distance of that from the line's origin.
+/// Returns the coefficients of (|p|^2 + 1 - tube^2)^2 - 4 (x^2 + z^2) along a line, by the distance
+/// from its point nearest to the origin, and the distance of that point from the line's origin.
 fn quartic((origin, d): Line, tube: f64) -> ([f64; 5], f64) {
     let start = -origin.dot(d);
     let p = origin + d * start;
@@ -66,7 +66,8 @@ fn quartic((origin, d): Line, tube: f64) -> ([f64; 5], f64) {
     ([k * k - 4.0 * c, -8.0 * b, 2.0 * k - 4.0 * a, 0.0, 1.0], start)
 }
 
-/// A line near the torus: through its box, or along a tangent a little above or below the surface.
+/// Returns a line near the torus: through its box, or along a tangent slightly above or below the
+/// surface.
 fn line(numbers: &mut Numbers, tube: f64) -> Line {
     let angles = [numbers.between(0.0, 2.0 * PI), numbers.between(0.0, 2.0 * PI)];
     let outward = DVec3::new(angles[0].cos(), 0.0, angles[0].sin());
@@ -82,7 +83,8 @@ fn line(numbers: &mut Numbers, tube: f64) -> Line {
     (on_surface + normal * above - tangent * far, tangent)
 }
 
-/// Every hit lies on the surface, and is the first of the quartic's roots where rounding cannot decide.
+/// Checks that every hit lies on the surface, and is the first root of the quartic except where
+/// rounding decides.
 fn hits_are_roots<L: SimdFloat>(tube: f64, count: usize) {
     let geometry = geometry::<L>(&torus(tube));
     let mut numbers = Numbers::new(17);
@@ -94,10 +96,10 @@ fn hits_are_roots<L: SimdFloat>(tube: f64, count: usize) {
         .collect();
     let (mut compared, mut seen) = (0, 0);
     for (line, hit) in lines.iter().zip(closest(&geometry, &lines)) {
-        // The kernel takes directions to have unit length; the rest of the world rounds them so.
+        // The kernel expects directions of unit length; other code rounds them.
         let room = 64.0 * L::EPSILON * (1.0 + line.0.length());
         let (coefficients, start) = quartic((line.0, line.1.normalize()), tube);
-        let at = |s: f64| line.0 + line.1.normalize() * (start + s);
+        let point_at = |s: f64| line.0 + line.1.normalize() * (start + s);
         let derivative: Vec<f64> =
             coefficients.iter().enumerate().skip(1).map(|(i, c)| c * i as f64).collect();
         if let Some(hit) = hit {
@@ -109,8 +111,9 @@ fn hits_are_roots<L: SimdFloat>(tube: f64, count: usize) {
         }
         // Coefficients of thin tubes lose digits by 1 / tube.
         let margin = room + 1e-13 / tube;
-        let unsure = roots(&derivative).into_iter().any(|s| height(at(s), tube).abs() <= margin)
-            || height(line.0, tube).abs() <= margin;
+        let unsure =
+            roots(&derivative).into_iter().any(|s| height(point_at(s), tube).abs() <= margin)
+                || height(line.0, tube).abs() <= margin;
         if unsure {
             continue;
         }
@@ -137,9 +140,9 @@ fn torus_hits_are_roots_of_the_quartic() {
     }
 }
 
-/// Lanes do not depend on the other lanes of their packet, nor on its width.
+/// Hits in a lane depend neither on the other lanes of the packet nor on its width.
 #[test]
-fn torus_hits_do_not_depend_on_company() {
+fn torus_hits_do_not_depend_on_other_lanes() {
     let mut numbers = Numbers::new(3);
     let lines: Vec<Line> = (0..4000).map(|_| line(&mut numbers, 0.3)).collect();
     let bits = |all: Vec<Option<crate::rays::LineHit>>| -> Vec<Option<u64>> {
@@ -152,7 +155,7 @@ fn torus_hits_do_not_depend_on_company() {
     assert_eq!(double, bits(closest(&geometry::<f64>(&form), &lines)));
 }
 
-/// All hits along a line from outside, one after the other.
+/// Returns all hits along a line from outside, in order.
 fn all_hits<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<f64>> {
     let mut out = vec![Vec::new(); lines.len()];
     for (hits, (origin, d)) in out.iter_mut().zip(lines) {
@@ -166,7 +169,8 @@ fn all_hits<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<f6
     out
 }
 
-/// Lines along `d` through an even grid of `side` by `side` points of a square of half-width `half`.
+/// Returns lines along `d` through an even grid of `side` by `side` points of a square of
+/// half-width `half`.
 fn grid(d: DVec3, half: f64, side: usize) -> Vec<Line> {
     let (u, v) = d.any_orthonormal_pair();
     let place = |i: usize| half * (2.0 * (i as f64 + 0.5) / side as f64 - 1.0);
@@ -174,7 +178,7 @@ fn grid(d: DVec3, half: f64, side: usize) -> Vec<Line> {
 }
 
 #[test]
-fn torus_volume_and_projected_area_are_those_of_the_formulas() {
+fn torus_volume_and_projected_area_match_closed_forms() {
     for tube in [0.1, 0.4, 1.0] {
         let geometry = geometry::<Double>(&torus(tube));
         let (half, side) = (1.0 + tube, 300);
@@ -198,7 +202,7 @@ fn torus_volume_and_projected_area_are_those_of_the_formulas() {
     }
 }
 
-/// Points on the inner side of the hole see the other side; shadow rays across it are blocked.
+/// Shadow rays from the inner side of the hole to its other side are blocked.
 #[test]
 fn torus_casts_shadows_on_itself() {
     let form = torus(0.3);
@@ -210,7 +214,8 @@ fn torus_casts_shadows_on_itself() {
     assert_eq!(blocked(&geometry::<Double>(&form), &rays, 10.0), [true, false, false]);
 }
 
-/// Rays that leave the surface by the offset of their precision meet it again only from inside a bend.
+/// Rays that leave the surface by the offset of their precision hit it again only from inside a
+/// bend.
 #[test]
 fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
     fn check<L: SimdFloat>(tube: f64) {
@@ -220,7 +225,7 @@ fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
         for _ in 0..20_000 {
             let turn = numbers.between(0.0, 2.0 * PI);
             let outward = DVec3::new(turn.cos(), 0.0, turn.sin());
-            // On the outside of the ring, where the torus is convex.
+            // Start on the outside of the ring, where the torus is convex.
             let tilt = numbers.between(-0.5 * PI, 0.5 * PI);
             let normal = outward * tilt.cos() + DVec3::Y * tilt.sin();
             let tangent = numbers.direction().cross(normal).normalize();
@@ -240,8 +245,8 @@ fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
     }
 }
 
-/// Compounds of a torus with a ball and a half-space: between surfaces, each point is on the side that its
-/// parts say.
+/// Compounds of a torus with a ball and a half-space: each point between surfaces is on the side
+/// that its parts define.
 #[test]
 fn torus_in_compounds_has_two_intervals() {
     let contains = |part: usize, p: DVec3| match part {
@@ -285,16 +290,16 @@ fn torus_in_compounds_has_two_intervals() {
             let ends = [vec![0.0], hits, vec![12.0]].concat();
             for (n, gap) in ends.windows(2).enumerate().filter(|(_, gap)| gap[1] - gap[0] > 1e-6) {
                 let p = *origin + *d * (0.5 * (gap[0] + gap[1]));
-                let at = [0, 1, 2].map(|part| contains(part, p));
-                assert_eq!(inside(&at) && at[2], n % 2 == 1, "{origin} {d} {ends:?}");
+                let in_parts = [0, 1, 2].map(|part| contains(part, p));
+                assert_eq!(inside(&in_parts) && in_parts[2], n % 2 == 1, "{origin} {d} {ends:?}");
             }
         }
     }
     assert!(several > 30, "{several}");
 }
 
-/// Bounds touch the image of the surface under any map, clearance is no more than the distance of its points,
-/// and normals are there where rays hit.
+/// Bounds touch the image of the surface under any map, clearance is at most the distance of its
+/// points, and normals exist where rays hit.
 #[test]
 fn torus_bounds_clearance_and_normals_agree_with_its_points() {
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);

@@ -22,7 +22,7 @@ fn random_map(numbers: &mut Numbers) -> DAffine3 {
 }
 
 #[test]
-fn objects_under_affine_maps_are_met_where_their_originals_are() {
+fn transformed_objects_are_hit_at_images_of_original_hits() {
     for (i, (name, form)) in every_kind().into_iter().enumerate() {
         let mut numbers = Numbers::new(400 + i as u64);
         let flat = form.is_flat();
@@ -44,12 +44,14 @@ fn objects_under_affine_maps_are_met_where_their_originals_are() {
                 .iter()
                 .map(|(o, d)| (back.transform_point3(*o), back.transform_vector3(*d).normalize()))
                 .collect();
-            let met = closest(&geometry, &lines);
+            let image_hits = closest(&geometry, &lines);
             let mut hits = 0;
-            for (n, (got, truth)) in met.iter().zip(closest(&original, &originals)).enumerate() {
-                let told = || format!("{name}, map {round}, ray {n}: {:?}", lines[n]);
+            for (n, (got, truth)) in
+                image_hits.iter().zip(closest(&original, &originals)).enumerate()
+            {
+                let context = || format!("{name}, map {round}, ray {n}: {:?}", lines[n]);
                 let (Some(got), Some(truth)) = (got, truth) else {
-                    assert_eq!(got.is_some(), truth.is_some(), "{}", told());
+                    assert_eq!(got.is_some(), truth.is_some(), "{}", context());
                     continue;
                 };
                 hits += 1;
@@ -57,23 +59,27 @@ fn objects_under_affine_maps_are_met_where_their_originals_are() {
                 let point = map.transform_point3(truth.point);
                 let normals: DMat3 = map.matrix3.inverse().transpose();
                 let normal = (normals * truth.normal).normalize();
-                // Rounding over the cosine, of all lengths that take part.
+                // Rounding of all lengths involved, over the cosine.
                 let lengths = radius + center.length() + got.t;
                 let tolerance = 1e-12 * lengths / normal.dot(d).abs();
-                assert!((got.point - point).length() <= tolerance, "{}: {got:?} {point}", told());
-                assert!((got.normal - normal).length() <= 1e-9, "{}: {got:?} {normal}", told());
-                assert!(flat || got.normal.dot(d) < 0.0, "{}: {got:?}", told());
+                assert!(
+                    (got.point - point).length() <= tolerance,
+                    "{}: {got:?} {point}",
+                    context()
+                );
+                assert!((got.normal - normal).length() <= 1e-9, "{}: {got:?} {normal}", context());
+                assert!(flat || got.normal.dot(d) < 0.0, "{}: {got:?}", context());
             }
-            assert!(hits > 20, "{name}: only {hits} rays met it");
+            assert!(hits > 20, "{name}: only {hits} rays hit it");
         }
     }
 }
 
-/// The steps of a scene file, against the implicit equation of an ellipsoid worked out by hand:
-/// a unit sphere at the origin scaled by (2, 0.5, 1), turned 90 degrees about z, moved by (1, 2, 3),
-/// is (x - 1)^2 / 0.25 + (y - 2)^2 / 4 + (z - 3)^2 = 1.
+/// Transform steps of a scene file against the equation of an ellipsoid worked out by hand: a unit
+/// sphere at the origin scaled by (2, 0.5, 1), turned 90 degrees about z, moved by (1, 2, 3), is (x
+/// - 1)^2 / 0.25 + (y - 2)^2 / 4 + (z - 3)^2 = 1.
 #[test]
-fn a_stretched_sphere_solves_its_equation() {
+fn stretched_sphere_satisfies_its_equation() {
     let text = "[[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }\n\
                 transform = [ { scale = [2.0, 0.5, 1.0] }, { rotate_z = 90.0 }, \
                 { translate = [1.0, 2.0, 3.0] } ]\n";
@@ -91,23 +97,23 @@ fn a_stretched_sphere_solves_its_equation() {
         })
         .collect();
     let mut hits = 0;
-    for (line, met) in lines.iter().zip(closest(&geometry, &lines)) {
+    for (line, hit) in lines.iter().zip(closest(&geometry, &lines)) {
         let f = line.0 - center;
         let a = (line.1 * line.1).dot(weights);
         let b = (f * line.1).dot(weights);
         let c = (f * f).dot(weights) - 1.0;
         let root = b * b - a * c;
         if root.abs() > 1e-9 {
-            assert_eq!(met.is_some(), root > 0.0, "{line:?}");
+            assert_eq!(hit.is_some(), root > 0.0, "{line:?}");
         }
-        let Some(met) = met else { continue };
+        let Some(hit) = hit else { continue };
         hits += 1;
-        let p = met.point - center;
-        assert!(((p * p).dot(weights) - 1.0).abs() < 1e-13, "{line:?}: {met:?}");
-        assert!((met.normal - (p * weights).normalize()).length() < 1e-13, "{line:?}: {met:?}");
+        let p = hit.point - center;
+        assert!(((p * p).dot(weights) - 1.0).abs() < 1e-13, "{line:?}: {hit:?}");
+        assert!((hit.normal - (p * weights).normalize()).length() < 1e-13, "{line:?}: {hit:?}");
         if root > 1e-6 {
             let t = (-b - root.sqrt()) / a;
-            assert!((met.t - t).abs() < 1e-9, "{line:?}: {} not {t}", met.t);
+            assert!((hit.t - t).abs() < 1e-9, "{line:?}: {} not {t}", hit.t);
         }
     }
     assert!(hits > 2000, "{hits}");

@@ -1,4 +1,4 @@
-//! A tree, and boxes in either space, find what a list finds.
+//! BVHs, and boxes in object or scene space, return the hits of a linear list.
 
 use crate::bits::{any_line, forms};
 use crate::common::Numbers;
@@ -7,7 +7,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single};
 use zerkalo::primitive::{Acceleration, Aggregate, Form, SphereForm};
 
-/// A random scene of `count` items of every kind, crowded in the ball of radius 10 or lined up on a
+/// Returns a random scene of `count` items of every kind, crowded in the ball of radius 10 or on a
 /// lattice, where many faces lie in common planes.
 fn crowd(numbers: &mut Numbers, count: usize) -> Vec<Form> {
     let kinds = forms();
@@ -36,15 +36,15 @@ fn crowd(numbers: &mut Numbers, count: usize) -> Vec<Form> {
 
 fn compare<L: SimdFloat>(seed: u64, count: usize, forms: &[Form], lines: &[Line]) {
     let list = Aggregate::<L>::with_tree(forms, false);
-    for how in [Acceleration::Bvh, Acceleration::Obb, Acceleration::Aabb] {
-        let other = Aggregate::<L>::accelerated(forms, how);
-        compare_with(seed, (how.name(), count), (&list, &other), lines);
+    for acceleration in [Acceleration::Bvh, Acceleration::Obb, Acceleration::Aabb] {
+        let other = Aggregate::<L>::accelerated(forms, acceleration);
+        compare_with(seed, (acceleration.name(), count), (&list, &other), lines);
     }
 }
 
 fn compare_with<L: SimdFloat>(
     seed: u64,
-    (how, count): (&str, usize),
+    (acceleration, count): (&str, usize),
     (list, tree): (&Aggregate<L>, &Aggregate<L>),
     lines: &[Line],
 ) {
@@ -59,21 +59,26 @@ fn compare_with<L: SimdFloat>(
             tree.occluded(&packet, limit, wanted, tree.all()) & wanted,
         );
         for i in 0..lanes {
-            let told = || {
+            let context = || {
                 let (o, d) = (packet.origin.lane(i), packet.direction.lane(i));
-                format!("{} {how}, seed {seed}, {count} items, ray {o:?} {d:?}", L::NAME)
+                format!("{} {acceleration}, seed {seed}, {count} items, ray {o:?} {d:?}", L::NAME)
             };
             let (s, t) = (a.t.lane(i).to_f64(), b.t.lane(i).to_f64());
-            assert!(s == t, "{}: list {s}, here {t}", told());
+            assert!(s == t, "{}: list {s}, tree {t}", context());
             assert!(
                 s >= L::MAX || a.item.id_lane(i) == b.item.id_lane(i),
-                "{}: at {s} list meets {}, here {}",
-                told(),
+                "{}: at {s} list hits {}, tree {}",
+                context(),
                 a.item.id_lane(i),
                 b.item.id_lane(i)
             );
         }
-        assert_eq!(c.bits(), d.bits(), "{} {how}, seed {seed}, {count} items: blocked", L::NAME);
+        assert_eq!(
+            c.bits(),
+            d.bits(),
+            "{} {acceleration}, seed {seed}, {count} items: blocked",
+            L::NAME
+        );
     }
 }
 
@@ -101,7 +106,7 @@ fn trees_boxes_and_lists_give_identical_hits() {
     }
 }
 
-/// Rays past the outermost points of spheres, where the sphere's own rounding decides.
+/// Rays past the outermost points of spheres, where the rounding of the sphere test decides.
 #[test]
 fn tree_and_list_agree_at_limbs() {
     let mut numbers = Numbers::new(77);
@@ -124,8 +129,8 @@ fn tree_and_list_agree_at_limbs() {
         d[axis] = 0.0;
         d[(axis + along) % 3] = 1.0;
         let d = d.normalize();
-        let by = 1.0 + (numbers.below(9) as f64 - 4.0) * f64::from(f32::EPSILON) / 4.0;
-        (center + side * by - d * 30.0, d)
+        let factor = 1.0 + (numbers.below(9) as f64 - 4.0) * f64::from(f32::EPSILON) / 4.0;
+        (center + side * factor - d * 30.0, d)
     };
     let lines: Vec<Line> = (0..100_000).map(|_| line()).collect();
     compare::<Single>(77, 60, &forms, &lines);

@@ -1,4 +1,5 @@
-//! Collects the parts of a mesh from a reader, then checks and compacts them.
+//! Builder of meshes: collects vertices and triangles from the reader of a file format, then checks
+//! and compacts them.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
@@ -7,22 +8,26 @@ use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, TriangleMesh};
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Largest magnitude of a coordinate.
+/// Largest absolute value of a coordinate.
 const MAX_COORDINATE: f64 = 1e9;
 
-/// Smallest extent of a mesh: products of three single-precision coordinates are normal numbers.
+/// Smallest extent of a mesh. It is chosen so that products of three single-precision coordinates
+/// are normal numbers, not subnormal ones.
 const MIN_EXTENT: f64 = 1e-9;
 
-/// Largest coordinate, relative to the extent of the mesh, from which the mesh is moved to its origin.
+/// Largest absolute value of a coordinate, in multiples of the extent of the mesh, up to which
+/// positions are stored relative to the origin. Positions of meshes farther away are stored
+/// relative to the centre of the mesh.
 const MAX_OFFSET: f64 = 16.0;
 
 /// A mesh under construction.
 pub struct Builder<'a> {
     source: &'a FileContents,
     positions: Vec<[f64; 3]>,
-    /// Normals of the first vertices, at most as many as `positions`; zero if a vertex has none.
+    /// Normals of the first vertices. The list may be shorter than `positions`. A vertex without a
+    /// normal has the zero vector.
     normals: Vec<[f32; 3]>,
-    /// Texture coordinates of the first vertices, at most as many as `positions`.
+    /// Texture coordinates of the first vertices. The list may be shorter than `positions`.
     uvs: Vec<[f32; 2]>,
     triangles: Vec<[u32; 3]>,
     colors: Vec<[f32; 3]>,
@@ -47,8 +52,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Reserves memory for more vertices and triangles, whose numbers were checked against the length of
-    /// the file.
+    /// Reserves memory for this many more vertices and triangles. The caller has compared the
+    /// numbers with the length of the file.
     ///
     /// # Errors
     /// If the mesh would exceed a limit.
@@ -62,7 +67,7 @@ impl<'a> Builder<'a> {
     /// Checks that the mesh may have this many more vertices and triangles.
     ///
     /// # Errors
-    /// If it would exceed a limit.
+    /// If the mesh would exceed a limit.
     pub fn check_limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         let checks = [
             (self.positions.len().saturating_add(vertices), MAX_VERTICES, "vertices"),
@@ -78,7 +83,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Records an omission or a replacement.
+    /// Records a note for the user about an omission or a replacement.
     pub fn note(&mut self, note: String) {
         if !self.notes.contains(&note) {
             self.notes.push(note);
@@ -90,7 +95,8 @@ impl<'a> Builder<'a> {
         self.positions.len()
     }
 
-    /// Adds a vertex. [`Builder::finish`] rejects more than [`MAX_VERTICES`].
+    /// Adds a vertex. The number of vertices is checked by [`Builder::finish`], which rejects more
+    /// than [`MAX_VERTICES`].
     pub fn vertex(&mut self, position: [f64; 3]) {
         self.positions.push(position);
     }
@@ -116,7 +122,8 @@ impl<'a> Builder<'a> {
         !self.colors.is_empty()
     }
 
-    /// Sets the linear base colour of the triangles that follow; those before the first colour are white.
+    /// Sets the linear base colour of the triangles that follow. Triangles before the first call
+    /// are white.
     ///
     /// # Errors
     /// If there are more than 65536 colours.
@@ -136,10 +143,10 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Adds a triangle; `place` returns its place in the file.
+    /// Adds a triangle. `place` returns the location of the triangle in the file.
     ///
     /// # Errors
-    /// If it names a vertex that does not exist, or the mesh exceeds a limit.
+    /// If the triangle names a vertex that does not exist, or the mesh exceeds a limit.
     pub fn triangle(
         &mut self,
         corners: [u32; 3],
@@ -154,17 +161,17 @@ impl<'a> Builder<'a> {
         self.check_limits(0, 1)?;
         self.triangles.push(corners);
         if self.colors.len() > 1 {
-            // Triangles before the first change of colour.
+            // The triangles before the first change of colour have colour 0.
             self.color_of.resize(self.triangles.len() - 1, 0);
             self.color_of.push(self.color);
         }
         Ok(())
     }
 
-    /// Adds the triangles of a polygon: a fan around its first corner.
+    /// Adds a polygon as triangles: a fan around its first corner.
     ///
     /// # Errors
-    /// Those of [`Builder::triangle`].
+    /// The errors of [`Builder::triangle`].
     pub fn polygon(
         &mut self,
         corners: &[u32],
@@ -176,10 +183,10 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Checks and compacts the mesh.
+    /// Checks the mesh and converts it to its compact form.
     ///
     /// # Errors
-    /// If there is no triangle with an area, or a coordinate is not finite or out of range.
+    /// If no triangle has an area, or a coordinate is not finite or out of range.
     pub fn finish(mut self) -> Result<TriangleMesh, AssetError> {
         self.check_limits(0, 0)?;
         let source = self.source;
@@ -234,7 +241,7 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// All coordinates are finite and within range.
+    /// Checks that all coordinates are finite and within ±[`MAX_COORDINATE`].
     fn coordinates(&self) -> Result<(), AssetError> {
         let bad = |p: &[f64; 3]| p.iter().any(|x| !(-MAX_COORDINATE..=MAX_COORDINATE).contains(x));
         match self.positions.iter().position(bad) {
@@ -248,8 +255,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Returns the origin of the single-precision coordinates: the centre of a mesh far from the origin,
-    /// else zero.
+    /// Returns the point that is subtracted from all positions before they are converted to single
+    /// precision: the centre of a mesh far from the origin, otherwise zero.
     fn center(&self) -> Result<[f64; 3], AssetError> {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
@@ -265,7 +272,7 @@ impl<'a> Builder<'a> {
         Ok(if max_coordinate > MAX_OFFSET * extent { center } else { [0.0; 3] })
     }
 
-    /// Removes triangles without area.
+    /// Removes triangles without area. Adds a note with their number.
     ///
     /// # Errors
     /// If no triangle is left.
@@ -297,8 +304,8 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Returns unit normals, computed from the triangles where the file has none; `None` if it has none at
-    /// all.
+    /// Returns unit normals. If some vertices have no normal in the file, their normals are
+    /// computed from the triangles. Returns `None` if no vertex has a normal in the file.
     fn unit_normals(&mut self, positions: &[[f32; 3]]) -> Option<Vec<[f32; 3]>> {
         let mut normals = std::mem::take(&mut self.normals);
         if normals.is_empty() {
@@ -329,10 +336,11 @@ impl<'a> Builder<'a> {
         Some(normals)
     }
 
-    /// Returns the texture coordinates, zero where the file has none.
+    /// Returns the texture coordinates. Vertices without them have zero. Returns `None` if the file
+    /// has none at all.
     ///
     /// # Errors
-    /// If one is not finite.
+    /// If a texture coordinate is not finite.
     fn checked_uvs(&mut self, vertices: usize) -> Result<Option<Vec<[f32; 2]>>, AssetError> {
         let mut uvs = std::mem::take(&mut self.uvs);
         if uvs.is_empty() {
@@ -348,14 +356,15 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Welds vertices with equal positions, for files that repeat the vertices of each triangle.
+/// Merges vertices with equal positions, for file formats that repeat the vertices of each
+/// triangle.
 #[derive(Default)]
 pub struct Welder {
     known: HashMap<[u32; 3], u32>,
 }
 
 impl Welder {
-    /// Returns the index of the vertex at `position`, added if it is new.
+    /// Returns the index of the vertex at `position`. Adds the vertex to `builder` if it is new.
     pub fn index(&mut self, position: [f32; 3], builder: &mut Builder) -> u32 {
         // +0 and -0 are the same position.
         let key = position.map(|x| if x == 0.0 { 0 } else { x.to_bits() });

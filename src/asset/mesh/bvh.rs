@@ -1,6 +1,6 @@
 //! BVH over the triangles of a mesh, built once per mesh. A leaf has up to eight triangles in
-//! structure-of-arrays layout, so that a single ray intersects eight at once and a packet one after the
-//! other.
+//! structure-of-arrays layout. A single ray is intersected with all eight at once; a packet of rays
+//! is intersected with one triangle after the other.
 
 use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::normals::smooth;
@@ -9,7 +9,7 @@ use obvhs::BvhBuildParams;
 use std::fmt;
 use std::sync::OnceLock;
 
-/// Up to eight triangles; unused slots are NaN.
+/// Leaf of the BVH: up to eight triangles. The coordinates of unused slots are NaN.
 #[derive(Clone, Debug)]
 #[repr(align(32))]
 pub struct TriangleBlock {
@@ -17,18 +17,19 @@ pub struct TriangleBlock {
     pub corners: [[[f32; BVH_WIDTH]; 3]; 3],
 }
 
-/// A mesh with its BVH: about 58 bytes per triangle for the BVH, 12 for its indices, and 12 to 32 per
-/// vertex.
+/// A mesh with its BVH. Memory: about 58 bytes per triangle for the BVH, 12 per triangle for vertex
+/// indices, and 12 to 32 per vertex.
 pub struct Mesh {
     mesh: TriangleMesh,
     boxes: Bvh8,
     leaves: Vec<TriangleBlock>,
-    /// Index of the first triangle of each leaf; the others follow it.
+    /// Index of the first triangle of each leaf. The other triangles of the leaf have the following
+    /// indices.
     firsts: Vec<u32>,
     smooth: OnceLock<Vec<[f32; 3]>>,
 }
 
-/// Compares identity: a file that is read twice gives two different meshes.
+/// Compares identity: two meshes that were read from the same file are different.
 impl PartialEq for Mesh {
     fn eq(&self, other: &Self) -> bool {
         std::ptr::eq(self, other)
@@ -61,14 +62,15 @@ impl TriangleBlock {
 }
 
 impl Mesh {
-    /// Builds the BVH and reorders the triangles to the order of its leaves.
+    /// Builds the BVH. The triangles are reordered so that those of a leaf are consecutive.
     pub fn new(mut mesh: TriangleMesh) -> Self {
         let corners = |i: usize| {
             let [a, b, c] = mesh.triangles[i].map(|v| mesh.positions[v as usize]);
             let reduce = |f: fn(f32, f32) -> f32| std::array::from_fn(|k| f(f(a[k], b[k]), c[k]));
             [reduce(f32::min), reduce(f32::max)]
         };
-        // Large leaves: a ray intersects all triangles of a leaf at the cost of one.
+        // A high traversal cost gives large leaves. They are cheap, because a ray is intersected
+        // with all triangles of a leaf at the cost of one.
         let quality =
             BvhBuildParams { collapse_traversal_cost: 8.0, ..BvhBuildParams::fast_build() };
         let Bvh8Build { bvh: boxes, order, leaves } =
@@ -88,23 +90,24 @@ impl Mesh {
         &self.mesh
     }
 
-    /// Returns the BVH over the leaves.
+    /// Returns the nodes of the BVH.
     pub fn boxes(&self) -> &Bvh8 {
         &self.boxes
     }
 
-    /// Returns the leaves.
+    /// Returns the leaves of the BVH.
     pub fn leaves(&self) -> &[TriangleBlock] {
         &self.leaves
     }
 
-    /// Returns the index of the first triangle of a leaf; the others follow it.
+    /// Returns the index of the first triangle of a leaf. The other triangles of the leaf have the
+    /// following indices.
     pub fn first_triangle(&self, leaf: usize) -> u32 {
         self.firsts[leaf]
     }
 
-    /// Returns a unit normal per vertex: that of the file, or the mean of the adjacent triangles, computed
-    /// at the first call.
+    /// Returns a unit normal per vertex: the normals of the file, if it has them. Otherwise the
+    /// normals are means over the adjacent triangles, computed at the first call.
     pub fn smooth_normals(&self) -> &[[f32; 3]] {
         match &self.mesh.normals {
             Some(normals) => normals,
@@ -112,7 +115,8 @@ impl Mesh {
         }
     }
 
-    /// Returns the support function: the largest `direction . corner` of all triangles.
+    /// Returns the support function of the mesh: the largest dot product of `direction` with a
+    /// corner of a triangle.
     pub fn support(&self, direction: [f64; 3]) -> f64 {
         let along = |axis: usize, x: f32| direction[axis] * f64::from(x);
         let mut best = f64::NEG_INFINITY;
@@ -136,7 +140,7 @@ impl Mesh {
                 let leaf = &self.leaves[(node.child[i] & !LEAF_FLAG) as usize];
                 for [x, y, z] in &leaf.corners {
                     for ((x, y), z) in x.iter().zip(y).zip(z) {
-                        // `max` ignores the NaN of unused slots.
+                        // `max` ignores the NaNs of unused slots.
                         best = best.max(along(0, *x) + along(1, *y) + along(2, *z));
                     }
                 }
@@ -146,7 +150,7 @@ impl Mesh {
         best
     }
 
-    /// Returns the memory of mesh and BVH \[bytes\].
+    /// Returns the memory of the mesh and its BVH in bytes.
     pub fn bytes(&self) -> usize {
         self.mesh.bytes()
             + self.boxes.bytes()

@@ -1,9 +1,10 @@
-//! glTF 2.0, text and binary: positions, normals, texture coordinates and base colour factors, merged into
-//! one mesh with the transforms of the nodes applied. Cameras, lights, images, animations, skins and morph
-//! targets are ignored.
+//! glTF 2.0 files, text and binary. All primitives are merged into one mesh, with the transforms of
+//! their nodes applied. Positions, normals, texture coordinates and base colour factors are read.
+//! Cameras, lights, images, animations, skins and morph targets are ignored.
 //!
-//! The library parses and validates the JSON. The numbers are read here, because its iterators trust
-//! offsets and types: they panic or wrap if a file has wrong ones.
+//! The `gltf` library parses and validates the JSON. The numbers in the buffers are read by this
+//! module, because the iterators of the library trust the offsets and types in the file: they panic
+//! or wrap if these are wrong.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES};
@@ -51,7 +52,7 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
 
 /// Returns the validated JSON document and the binary chunk of a GLB file.
 fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), AssetError> {
-    // The library subtracts the header's size from this length without a check.
+    // The library subtracts the size of the header from this length without a check for underflow.
     let length = source.bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     if source.bytes.starts_with(b"glTF") && length.is_none_or(|length| length < 12) {
         return Err(source.error(
@@ -63,7 +64,7 @@ fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), Ass
     let gltf = Gltf::from_slice_without_validation(&source.bytes);
     let gltf = gltf.map_err(|error| library_error(source, &error))?;
     let json = gltf.document.into_json();
-    // The library's validation uses these indices before it checks them.
+    // The validation of the library uses these indices before it checks them.
     for (m, mesh) in json.meshes.iter().enumerate() {
         for index in mesh.primitives.iter().flat_map(|p| p.attributes.values()) {
             if index.value() >= json.accessors.len() {
@@ -78,8 +79,8 @@ fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), Ass
     Ok((document, gltf.blob))
 }
 
-/// Returns the root nodes: those of the default scene, else of the first scene, else those without a
-/// parent.
+/// Returns the root nodes: those of the default scene; if there is none, those of the first scene;
+/// if there are no scenes, all nodes without a parent.
 fn roots(document: &Document) -> Vec<Node<'_>> {
     if let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) {
         return scene.nodes().collect();
@@ -89,7 +90,7 @@ fn roots(document: &Document) -> Vec<Node<'_>> {
     document.nodes().filter(|n| !child[n.index()]).collect()
 }
 
-/// Converts an error of the library.
+/// Converts an error of the `gltf` library.
 fn library_error(source: &FileContents, error: &gltf::Error) -> AssetError {
     let (place, found) = match error {
         gltf::Error::Deserialize(json) => {
@@ -136,7 +137,7 @@ fn buffers<'a>(
                     }
                 }
                 None => {
-                    // Escaped spaces are the only escapes in common use.
+                    // Only escaped spaces are decoded. Other escapes are not in common use.
                     let Some(path) = source.resolve_relative(&uri.replace("%20", " ")) else {
                         return wrong(
                             format!("uri is \"{}\"", truncated(uri)),
@@ -159,7 +160,7 @@ fn buffers<'a>(
     Ok(all)
 }
 
-/// A primitive with the transform of its node.
+/// A glTF primitive with the transform of its node.
 struct Part<'a> {
     source: &'a FileContents,
     buffers: &'a [Cow<'a, [u8]>],
@@ -190,7 +191,8 @@ impl<'a> Part<'a> {
             let found = "a base colour is not a colour";
             return Err(self.source.error(FileLocation::Whole, found, "numbers of at least 0"));
         }
-        // White is also the colour of a file without colours.
+        // A white colour is not stored unless another colour was, because triangles without a
+        // colour are white.
         if color != [1.0; 3] || builder.has_colors() {
             builder.color(color)?;
         }
@@ -215,7 +217,7 @@ impl<'a> Part<'a> {
                 builder.normal(n.normalize_or_zero().as_vec3().to_array());
             }
             if let Some([u, v]) = uvs.as_mut().and_then(Iterator::next) {
-                // In glTF v points down, here it points up.
+                // In glTF v points downwards; in [`TriangleMesh::uvs`] it points upwards.
                 builder.uv([u, 1.0 - v]);
             }
         }
@@ -246,7 +248,7 @@ impl<'a> Part<'a> {
         Ok(())
     }
 
-    /// Returns the items of an accessor of single-precision vectors.
+    /// Returns the items of an accessor for single-precision vectors of `N` components.
     fn floats<const N: usize>(
         &self,
         accessor: Accessor<'a>,
@@ -256,7 +258,7 @@ impl<'a> Part<'a> {
         Ok((0..slice.count).map(move |i| slice.floats(i)))
     }
 
-    /// Returns texture coordinates, which may be normalised integers.
+    /// Returns the texture coordinates of an accessor. They may be stored as normalised integers.
     fn pairs(&self, accessor: Accessor<'a>) -> Result<impl Iterator<Item = [f32; 2]>, AssetError> {
         let kind = accessor.data_type();
         let slice = self.slice(&accessor, Dimensions::Vec2, kind)?;
@@ -270,8 +272,8 @@ impl<'a> Part<'a> {
         }))
     }
 
-    /// Returns the bytes of an accessor after checking that every item is inside its view and the view
-    /// inside its buffer.
+    /// Returns the items of an accessor. Checks that every item is inside its buffer view, and the
+    /// view inside its buffer.
     fn slice(
         &self,
         accessor: &Accessor<'a>,

@@ -19,34 +19,34 @@ pub const MAX_TRIANGLES: usize = 1 << 26;
 /// Largest number of vertices of a mesh: 128 Mi.
 pub const MAX_VERTICES: usize = 1 << 27;
 
-/// A checked triangle mesh: at least one triangle, all indices in range, all numbers finite, no triangle
-/// without area.
+/// A checked triangle mesh. It has at least one triangle, all indices are in range, all numbers are
+/// finite, and every triangle has an area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TriangleMesh {
     /// Vertex positions relative to `center`.
     pub positions: Vec<[f32; 3]>,
-    /// Offset subtracted from every vertex: zero unless the mesh is so far from the origin, relative to its
-    /// size, that single precision would lose its shape.
+    /// Offset that was subtracted from every vertex. It is zero unless the mesh is so far from the
+    /// origin, relative to its size, that single precision would lose its shape.
     pub center: [f64; 3],
     /// Vertex indices, three per triangle, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
-    /// Unit normal per vertex, if the file has normals; a vertex without one has the mean of its
-    /// triangles.
+    /// Unit normal per vertex. `None` if the file has no normals. If only some vertices have one,
+    /// the others have the mean normal of their triangles.
     pub normals: Option<Vec<[f32; 3]>>,
-    /// Texture coordinates per vertex, if the file has them: u to the right, v upwards.
+    /// Texture coordinates per vertex, u to the right and v upwards. `None` if the file has none.
     pub uvs: Option<Vec<[f32; 2]>>,
-    /// Distinct linear base colours; empty if the file has none.
+    /// Distinct linear base colours. Empty if the file has no colours.
     pub colors: Vec<[f32; 3]>,
-    /// Index into `colors` per triangle; empty if there are fewer than two colours.
+    /// Index into `colors` per triangle. Empty if there are fewer than two colours.
     pub color_of: Vec<u16>,
     /// Corners of the bounding box, relative to `center`.
     pub bounds: [[f32; 3]; 2],
-    /// Omissions and replacements, in sentences without a full stop.
+    /// Notes for the user about omissions and replacements: sentences without a full stop.
     pub notes: Vec<String>,
 }
 
 impl TriangleMesh {
-    /// Parses a file in memory; the extension of its name determines the format.
+    /// Parses a file in memory. The format is determined by the extension of the file name.
     ///
     /// # Errors
     /// Any error in the file.
@@ -68,7 +68,7 @@ impl TriangleMesh {
         }
     }
 
-    /// Returns the memory of the mesh \[bytes\].
+    /// Returns the memory of the mesh in bytes.
     pub fn bytes(&self) -> usize {
         12 * (self.positions.len() + self.triangles.len())
             + self.normals.as_ref().map_or(0, |n| 12 * n.len())
@@ -76,7 +76,7 @@ impl TriangleMesh {
             + 2 * self.color_of.len()
     }
 
-    /// Returns the base colour of a triangle, if the file has colours.
+    /// Returns the linear base colour of a triangle. Returns `None` if the file has no colours.
     pub fn color(&self, triangle: usize) -> Option<[f32; 3]> {
         let index = self.color_of.get(triangle).copied().unwrap_or(0);
         self.colors.get(usize::from(index)).copied()

@@ -1,4 +1,4 @@
-//! Vertex normals from the adjacent triangles.
+//! Vertex normals computed from the adjacent triangles.
 
 use glam::DVec3;
 use std::collections::HashMap;
@@ -6,8 +6,9 @@ use std::collections::HashMap;
 /// Returns the mean normal of the adjacent triangles for each vertex, weighted by their angles at the
 /// vertex (Thürmer and Wüthrich 1998, *Computing Vertex Normals from Polygonal Facets*).
 ///
-/// Vertices with equal positions count as one, so that seams of texture coordinates are invisible. Each
-/// normal is a unit vector, along z if there are no adjacent triangles or they cancel.
+/// Vertices with equal positions count as one, so that shading is smooth where a mesh is cut only
+/// for its texture coordinates. Each result is a unit vector. It is the z axis if there are no
+/// adjacent triangles or if their normals cancel.
 pub fn smooth(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[f32; 3]> {
     let mut first: HashMap<[u32; 3], u32> = HashMap::with_capacity(positions.len());
     let welded: Vec<u32> = positions
@@ -32,7 +33,7 @@ pub fn smooth(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[f32; 3]> {
     welded.iter().map(|i| unit(sums[*i as usize]).to_array().map(|x| x as f32)).collect()
 }
 
-/// Returns `v` scaled to length 1; the z axis if its length is 0.
+/// Returns `v` scaled to length 1, or the z axis if the length of `v` is 0.
 fn unit(v: DVec3) -> DVec3 {
     let length = v.length();
     if length > 0.0 { v / length } else { DVec3::Z }

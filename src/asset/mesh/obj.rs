@@ -1,7 +1,8 @@
-//! Wavefront OBJ with the diffuse colours of its MTL files.
+//! Wavefront OBJ files, with the diffuse colours of their MTL files.
 //!
-//! The library parses the file. A pass before it counts the vertices and checks the indices of faces,
-//! because the library reports no line numbers and computes with indices before it checks them.
+//! The `tobj` library parses the file. Before this, a first pass counts the vertices and checks the
+//! indices of faces, because the library reports no line numbers and computes with indices before
+//! it checks them.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
@@ -13,10 +14,10 @@ use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
 use tobj::{LoadError, LoadOptions, MTLLoadResult};
 
-/// Largest MTL file [bytes]: 16 MiB.
+/// Largest size of an MTL file in bytes: 16 MiB.
 const MAX_MTL_BYTES: u64 = 16 << 20;
 
-/// Largest number of MTL files of one OBJ.
+/// Largest number of MTL files of one OBJ file. Further ones are ignored.
 const MAX_MTL_FILES: usize = 64;
 
 /// Colour of triangles whose material has no diffuse colour, and of triangles without a material in a
@@ -59,8 +60,9 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
         let base = builder.vertices();
         let vertices = mesh.positions.len() / 3;
         builder.reserve(vertices, mesh.indices.len() / 3)?;
-        // Shorter lists belong to parts in which only some corners have normals or coordinates; the
-        // library drops the assignment.
+        // In a model in which only some corners have normals or texture coordinates, these lists
+        // are shorter, and the library does not report which corners they belong to. Such lists are
+        // ignored.
         let normals = (mesh.normals.len() == mesh.positions.len()).then_some(&mesh.normals);
         let uvs = (mesh.texcoords.len() == 2 * vertices).then_some(&mesh.texcoords);
         for (i, p) in mesh.positions.chunks_exact(3).enumerate() {
@@ -80,7 +82,7 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish().map_err(|error| locate_vertex(source, error))
 }
 
-/// Returns a phrase for an error of the library.
+/// Returns a phrase that describes an error of the library.
 fn describe(error: LoadError) -> &'static str {
     match error {
         LoadError::ReadError => "this is not UTF-8 text",
@@ -100,18 +102,18 @@ fn describe(error: LoadError) -> &'static str {
     }
 }
 
-/// Returns the lines of a text with their numbers.
+/// Returns the lines of a text with their numbers, counted from 1.
 fn numbered(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     bytes.split(|b| *b == b'\n').zip(1..).map(|(line, n)| (n, line))
 }
 
-/// Returns the words of a line.
+/// Returns the words of a line, separated by ASCII whitespace.
 fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty())
 }
 
-/// Counts vertices, texture coordinates and normals, and checks that every index of a face is valid and
-/// the number of triangles within the limit.
+/// Checks that every index of a face is valid and that the number of triangles is within the limit.
+/// Returns the numbers of vertices, texture coordinates and normals.
 fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
     let list = |line: &[u8]| match words(line).next() {
         Some(b"v") => Some(0),
@@ -141,7 +143,8 @@ fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
             corners += 1;
             for (list, index) in word.split(|b| *b == b'/').take(3).enumerate() {
                 let index = std::str::from_utf8(index).ok().and_then(|i| i.parse::<i128>().ok());
-                // The library reports words that are not numbers, and ignores indices into empty lists.
+                // Words that are not numbers are reported by the library. Indices into empty lists
+                // are ignored by it.
                 let Some(index) = index.filter(|_| list == 0 || totals[list] > 0) else { continue };
                 let (from, to) = (-(so_far[list] as i128), totals[list] as i128);
                 if index == 0 || index < from || index > to {
@@ -163,7 +166,7 @@ fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
     Ok(totals)
 }
 
-/// Returns an error about a vertex with the line of that vertex.
+/// Adds the line number to an error about the coordinates of a vertex.
 fn locate_vertex(source: &FileContents, error: AssetError) -> AssetError {
     let bad = |line: &[u8]| {
         let mut words = words(line);
@@ -180,8 +183,9 @@ fn locate_vertex(source: &FileContents, error: AssetError) -> AssetError {
     }
 }
 
-/// Reader that passes one line at a time to the library and counts the lines. Colours after a vertex are
-/// removed: the library requires that all vertices have colours, or none.
+/// Reader that passes one line at a time to the library and counts the lines. Vertex colours at the
+/// end of lines are removed, because the library requires that either all vertices have colours or
+/// none.
 struct Lines<'a> {
     rest: &'a [u8],
     line: usize,
@@ -203,8 +207,8 @@ impl BufRead for Lines<'_> {
             let (line, rest) = self.rest.split_at(end.map_or(self.rest.len(), |e| e + 1));
             self.rest = rest;
             self.line += 1;
-            // Colours at the end of the line are removed; the line end, which is removed with them, is
-            // passed as a line of its own.
+            // The colour at the end of the line is removed together with the newline. `consume`
+            // then passes the newline separately.
             let colored = words(line).next() == Some(b"v") && words(line).count() > 5;
             self.current = if colored { without_color(line) } else { line };
         }
@@ -220,14 +224,14 @@ impl BufRead for Lines<'_> {
     }
 }
 
-/// Returns a line up to its fourth word.
+/// Returns the first four words of a line: `v` and three coordinates.
 fn without_color(line: &[u8]) -> &[u8] {
     let fourth = words(line).nth(3).unwrap_or_default();
     let end = fourth.as_ptr() as usize - line.as_ptr() as usize + fourth.len();
     &line[..end]
 }
 
-/// Results of loading the MTL files.
+/// Results of loading MTL files.
 #[derive(Default)]
 struct Found {
     seen: Vec<PathBuf>,
@@ -235,7 +239,7 @@ struct Found {
     error: Option<AssetError>,
 }
 
-/// Loader of the MTL files that an OBJ names.
+/// Loader of the MTL files that an OBJ file names.
 struct Libraries<'a> {
     source: &'a FileContents,
     found: RefCell<Found>,
@@ -246,8 +250,8 @@ impl<'a> Libraries<'a> {
         Self { source, found: RefCell::default() }
     }
 
-    /// Loads the materials of one file, once. A missing file gives a note, a path out of the folder an
-    /// error.
+    /// Loads the materials of an MTL file. Returns no materials if the file was loaded before. For
+    /// a missing file a note is recorded, for a path that leads out of the folder an error.
     fn load(&self, name: &Path) -> MTLLoadResult {
         let nothing = || tobj::load_mtl_buf(&mut &b""[..]);
         let mut found = self.found.borrow_mut();
@@ -276,8 +280,8 @@ impl<'a> Libraries<'a> {
     }
 }
 
-/// Returns the names and diffuse colours of an MTL file, with three finite numbers per colour. The other
-/// lines are unused, and the library panics at some of them.
+/// Returns an MTL file that is reduced to the names and diffuse colours of materials, with three
+/// finite numbers per colour. The other lines are not used, and the library panics on some of them.
 fn diffuse_colors(bytes: &[u8]) -> String {
     let mut out = String::new();
     for (_, line) in numbered(bytes) {

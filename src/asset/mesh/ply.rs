@@ -1,4 +1,5 @@
-//! PLY, ASCII and binary of both byte orders: positions, normals, texture coordinates, polygons.
+//! PLY files: positions, normals, texture coordinates and polygons, in ASCII and in binary with
+//! both byte orders.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
@@ -10,10 +11,11 @@ use ply_rs_bw::ply::{
     ScalarType,
 };
 
-/// Number of elements that the library parses at a time, which bounds the memory for them.
+/// Number of elements that the library parses at a time. It bounds the memory for parsed elements.
 const PIECE: usize = 4096;
 
-/// Properties of a vertex that are used, by the names that programs give them.
+/// Names of the vertex properties that are used. Programs use different names for the same
+/// property.
 const NUMBERS: [&[&str]; 8] = [
     &["x"],
     &["y"],
@@ -25,10 +27,11 @@ const NUMBERS: [&[&str]; 8] = [
     &["v", "t", "texture_v"],
 ];
 
-/// Names of the list property with the corners of a face.
+/// Names of the list property that holds the vertex indices of a face.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
-/// One vertex or face, filled by the library.
+/// One vertex or face, filled by the library. `numbers` has the properties in the order of
+/// [`NUMBERS`].
 struct Record {
     numbers: [f64; 8],
     corners: Vec<u32>,
@@ -66,7 +69,7 @@ impl Record {
         if !CORNERS.contains(&name) {
             return PropertyAccessResult::Ignored;
         }
-        // Negative and non-integer indices become an index that no mesh has.
+        // Negative indices are replaced by an index that no mesh has.
         const NONE: u32 = u32::MAX;
         self.corners = match list {
             Property::ListUInt(list) => list,
@@ -140,7 +143,7 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// Converts an error of the library.
+/// Converts an error of the library. `byte` is the offset in a binary file; `None` for a text file.
 fn library_error(source: &FileContents, error: &ParseError, byte: Option<usize>) -> AssetError {
     let place = match (byte, error.line()) {
         (Some(byte), _) => FileLocation::Byte(byte),
@@ -148,14 +151,15 @@ fn library_error(source: &FileContents, error: &ParseError, byte: Option<usize>)
         (None, None) => FileLocation::Whole,
     };
     let message = error.to_string();
-    // The first line is the error, the others repeat the input.
+    // The first line of the message is the error. The others repeat the input.
     let first = message.lines().next().unwrap_or_default();
     let first =
         first.split_once(": ").filter(|(l, _)| l.starts_with("Line ")).map_or(first, |p| p.1);
     source.error(place, first.trim_end_matches(['.', ':']), "a PLY file")
 }
 
-/// Checks the element counts of the header against the remaining `left` bytes.
+/// Checks that the header declares the required elements and properties, and that the `left` bytes
+/// after it can hold the declared numbers of elements.
 fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(), AssetError> {
     let missing = |what: &str| {
         Err(source.error(FileLocation::Whole, format!("the header names no {what}"), "a mesh"))
@@ -194,7 +198,8 @@ fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(
     Ok(())
 }
 
-/// Returns the smallest size of an element in bytes; in text a property needs a digit and a separator.
+/// Returns the smallest size of an element in bytes. In an ASCII file each property needs at least
+/// a digit and a separator.
 fn least_bytes(element: &ElementDef, encoding: Encoding) -> usize {
     let size = |scalar: &ScalarType| match scalar {
         _ if encoding == Encoding::Ascii => 2,

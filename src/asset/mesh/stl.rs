@@ -1,5 +1,6 @@
-//! STL, ASCII and binary. Its triangles share no vertices: equal positions are welded here, so that
-//! normals can be smooth. The normals in the file are ignored, because they follow from the corners.
+//! STL files, ASCII and binary. In the format triangles share no vertices. This module merges
+//! vertices with equal positions, so that normals can be smooth. The normals in the file are
+//! ignored, because they follow from the corners.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
@@ -7,8 +8,9 @@ use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::{Builder, Welder};
 use std::io::{Cursor, Read, Seek, SeekFrom};
 
-/// Sizes of the header and of each triangle in a binary file, in bytes.
+/// Size of the header of a binary file, in bytes.
 const HEADER: usize = 84;
+/// Size of a triangle in a binary file, in bytes.
 const TRIANGLE: usize = 50;
 
 /// Parses an STL file.
@@ -24,7 +26,7 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     let zeros = bytes.iter().take(HEADER).any(|b| *b == 0);
     let text = bytes.starts_with(b"solid") && !exact && !zeros;
     if text {
-        // The library requires a name after the first word; the format does not.
+        // The library requires a space after `solid`; the format does not.
         if bytes.get(5) != Some(&b' ') {
             bytes.insert(5, b' ');
         }
@@ -40,7 +42,8 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
             let expected = format!("at most {}", (bytes.len() - HEADER) / TRIANGLE);
             return Err(source.error(FileLocation::Byte(80), found, &expected));
         }
-        // Some binary files begin like a text file.
+        // Some binary files start with `solid` like a text file. The library must not take them for
+        // one.
         bytes[0] = b' ';
     }
     let mut builder = Builder::new(&source);
@@ -85,7 +88,7 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// Reader that returns at most one line per read, so that lines can be counted.
+/// Reader that counts lines: for a text file each read returns at most one line.
 struct ByLine<'a> {
     cursor: Cursor<&'a Vec<u8>>,
     line: usize,

@@ -1,4 +1,4 @@
-//! A measurement as JSON and CSV. Scripts rely on the keys: they stay.
+//! A measurement as JSON and CSV. The keys must not change, because scripts rely on them.
 
 use crate::command::measure::table::About;
 use crate::measure::{Measured, Measurement, median, spread};
@@ -17,13 +17,13 @@ struct Document<'a> {
     reference_linear: f64,
     reference_seconds: f64,
     compared_at_codes: f64,
-    /// The largest share by which another reference could change the errors.
+    /// Largest relative change of the errors that another reference picture could cause.
     errors_spread: f64,
-    /// The largest spread of the times in the table.
+    /// Largest relative spread of the times in the table.
     times_spread: f64,
-    /// The largest share of the processors that other programs used.
+    /// Largest share of the processors' time that other programs used. Null if unknown.
     taken_by_others: Option<f64>,
-    /// Noise targets whose times are extrapolated.
+    /// Noise targets that were not reached, with extrapolated times.
     expected: Vec<Expected>,
     variations: Vec<Variation<'a>>,
 }
@@ -37,11 +37,11 @@ struct Variation<'a> {
     samples_per_second_spread: Option<f64>,
     slope: Option<f64>,
     slope_standard_error: Option<f64>,
-    /// 1 / (linear MSE x seconds).
+    /// Efficiency: 1 / (linear MSE x seconds).
     efficiency: Option<f64>,
     bias_z: Option<f64>,
     bias_codes: Option<f64>,
-    /// The least bias that can be distinguished from noise.
+    /// Least bias that can be distinguished from noise, in 8-bit levels.
     bias_least_codes: Option<f64>,
     crossings: Vec<TimeToTarget>,
     points: Vec<Point>,
@@ -63,7 +63,7 @@ struct Expected {
     seconds_high: f64,
 }
 
-/// One point of an error curve; a line of the CSV.
+/// One point of an error curve.
 #[derive(Serialize)]
 struct Point {
     samples: u64,
@@ -129,7 +129,7 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
         slope: slope.map(|s| s.value),
         slope_standard_error: slope.map(|s| s.standard_error),
         efficiency: measured.efficiency(),
-        // A difference without noise has no finite number of standard errors.
+        // The z-score of a difference without noise is infinite, which JSON cannot represent.
         bias_z: measured.bias.map(|b| b.z).filter(|z| z.is_finite()),
         bias_codes: measured.bias.map(|b| b.codes),
         bias_least_codes: measured.bias.map(|b| b.least_codes),
@@ -169,7 +169,7 @@ pub fn json(about: &About) -> Vec<u8> {
     bytes
 }
 
-/// Serialises the points of all error curves as CSV, a line each.
+/// Serialises the points of all error curves as CSV, one line per point.
 pub fn csv(measurement: &Measurement) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for measured in &measurement.measured {

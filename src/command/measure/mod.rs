@@ -1,4 +1,5 @@
-//! `zerkalo measure`: the cost of accuracy on a scene, as a table, as data, as a plot.
+//! `zerkalo measure`: measures the cost of accuracy on a scene. The result is a table, data files
+//! and a plot.
 
 mod data;
 mod table;
@@ -14,7 +15,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Experiments without `--only` and `--full`.
+/// Experiments that run without `--only` and `--full`.
 const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];
 
 pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
@@ -83,7 +84,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     }
 }
 
-/// File formats of plots.
+/// File format of a plot.
 enum Drawing {
     Svg,
     Png,
@@ -115,7 +116,7 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         .map_err(|e| Failure::Failed(format!("cannot write {}: {e}", path.display())))
 }
 
-/// Reads the reference from an EXR file.
+/// Reads the reference picture from an EXR file.
 fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Reference, Failure> {
     let failed = |reason: String| Failure::Failed(format!("{}: {reason}", path.display()));
     let read = film::read_exr(path).map_err(failed)?;

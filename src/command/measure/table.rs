@@ -1,27 +1,27 @@
-//! A measurement as a table of text.
+//! A measurement as a text table.
 
 use crate::measure::{Experiment, Measured, Measurement, Steadiness, TimeToTarget, median};
 use std::fmt;
 use std::path::Path;
 
-/// A measurement with its scene and machine.
+/// A measurement with the scene and the settings that the report names.
 pub struct About<'a> {
     pub scene: &'a Path,
     pub threads: usize,
     pub lanes: &'static str,
-    /// The scene is traced in single precision.
+    /// `true` if the scene is traced in single precision by default.
     pub single: bool,
     pub measurement: &'a Measurement,
 }
 
 impl About<'_> {
-    /// Title of a plot.
+    /// Returns the title of a plot.
     pub fn title(&self) -> String {
         let [width, height] = self.measurement.size;
         format!("{}, {width} x {height}, {} threads", self.scene.display(), self.threads)
     }
 
-    /// Model of the processor and number of cores.
+    /// Returns the model of the processor and the number of cores.
     pub fn machine(&self) -> String {
         let model = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
             let line = text.lines().find(|line| line.starts_with("model name"))?;
@@ -32,7 +32,7 @@ impl About<'_> {
     }
 }
 
-/// Formats a time with three digits: `1.23 s`, `35.1 ms`.
+/// Formats a time with three significant digits: `1.23 s`, `35.1 ms`.
 fn time(seconds: f64) -> String {
     match seconds {
         s if s < 0.9995 => format!("{:.*} ms", digits(1e3 * s), 1e3 * s),
@@ -41,7 +41,7 @@ fn time(seconds: f64) -> String {
     }
 }
 
-/// Number of decimals that makes three digits in all.
+/// Returns the number of decimals with which `value` has three significant digits.
 fn digits(value: f64) -> usize {
     if value >= 99.95 {
         0
@@ -61,7 +61,7 @@ fn reached(target: &TimeToTarget) -> String {
     format!("{bound}{} {}", time(target.seconds), percent(target.spread))
 }
 
-/// Formats two times, with one unit if they share it: `12 to 30 s`.
+/// Formats a range of times, such as `12.0 to 30.0 s`. A common unit is written once.
 fn between((low, high): (f64, f64)) -> String {
     let (low, high) = (time(low), time(high));
     match (low.split_once(' '), high.split_once(' ')) {
@@ -70,12 +70,13 @@ fn between((low, high): (f64, f64)) -> String {
     }
 }
 
-/// Relative spread beyond which times count as unsteady.
+/// Relative spread of repeated times beyond which they count as unsteady.
 const UNSTEADY: f64 = 0.1;
-/// Share of the processors beyond which the use by other programs is reported.
+/// Share of the processors' time beyond which its use by other programs is reported.
 const STOLEN: f64 = 0.03;
 
-/// Warning about unsteady times; `None` without a reason for one.
+/// Returns a warning about unsteady times or about other programs. Returns `None` if there is no
+/// reason for a warning.
 fn caution(steadiness: &Steadiness) -> Option<String> {
     let Steadiness { spread, stolen, .. } = steadiness;
     let others = stolen.filter(|share| *share > STOLEN).map(|share| {
@@ -132,8 +133,8 @@ impl fmt::Display for About<'_> {
             "Times are medians of {} runs or more, ± their spread.",
             steadiness.repetitions
         )?;
-        if let Some(words) = caution(&steadiness) {
-            writeln!(f, "{words}")?;
+        if let Some(warning) = caution(&steadiness) {
+            writeln!(f, "{warning}")?;
         }
         let Some(default) = m.measured.first() else { return Ok(()) };
         writeln!(f, "\nTime to a given noise (RMSE as displayed, 8-bit levels)")?;

@@ -1,4 +1,4 @@
-//! Autosave of unsaved edits to a recovery file, debounced.
+//! Autosave of unsaved edits to a recovery file, delayed until a pause in editing.
 
 use crate::dashboard::message::{Message, OrphanedEdits};
 use crate::scene::{Orphan, Recovery, RecoveryFile, Scene, SceneErrors, SceneFile, remove_stale};
@@ -7,31 +7,38 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Edits are written after this time without another one,
+/// Time without another edit after which edits are written.
 const DEBOUNCE: Duration = Duration::from_millis(400);
-/// or at the latest this time after the oldest unwritten one.
+/// Maximum time between an edit and its writing, also while edits continue.
 const MAX_DELAY: Duration = Duration::from_secs(1);
 
-/// Autosave of a scene, and the orphaned edits that were found at the start.
+/// Autosave of a scene, and storage of orphaned edits. Orphaned edits are the unsaved edits in the
+/// recovery files of crashed sessions, which are searched at the start.
 pub struct Autosave {
+    /// Recovery file of this session.
     recovery: Recovery,
+    /// User's state folder.
     state: Option<PathBuf>,
     pending: Option<Pending>,
-    /// Orphaned edits without a decision; the last is offered next.
+    /// Orphaned edits that the user has neither recovered nor discarded. The last is offered next.
     found: Vec<Orphan>,
-    /// A failure to write has already been reported.
+    /// The last write failed, and the failure has been reported.
     complained: bool,
 }
 
+/// Edits that have not been written to the recovery file.
 struct Pending {
     scene: Arc<Scene>,
+    /// Time of the oldest unwritten edit.
     first: Instant,
+    /// Time of the newest edit.
     last: Instant,
 }
 
 impl Autosave {
-    /// Creates the autosave of the scene at `path`, or of an untitled scene called `name`. `state`
-    /// is the user's state folder.
+    /// Creates the autosave of the scene at `path`, or of a scene called `name` if `path` is
+    /// `None`. `state` is the user's state folder, for recovery files that cannot be written beside
+    /// their scene file.
     pub fn new(path: Option<&Path>, name: &str, state: Option<PathBuf>) -> Self {
         Self {
             recovery: Recovery::new(path, name, state.as_deref()),
@@ -42,23 +49,24 @@ impl Autosave {
         }
     }
 
-    /// Prepares a save of `scene`: a recovery file must not be older than the scene file, or the
-    /// next start would offer outdated edits.
+    /// Prepares a save of `scene`: an existing recovery file is updated to `scene` first. If the
+    /// program is killed during the save, the next start then does not offer outdated edits.
     pub fn saving(&mut self, file: &SceneFile, scene: &Scene) {
         if self.recovery.path().is_some() {
-            // An error shows when the scene is saved.
+            // An error is ignored here because the save reports it.
             let _ = self.recovery.keep(&file.text_of(scene), file.fingerprint());
         }
     }
 
-    /// Records that `scene` was written to the file at `path`.
+    /// Records that `scene` was written to the scene file at `path`, and removes the recovery file.
     pub fn saved(&mut self, scene: &Arc<Scene>, path: &Path) {
         self.recovery.forget();
         self.recovery = Recovery::new(Some(path), "", self.state.as_deref());
         self.pending.take_if(|pending| *pending.scene == **scene);
     }
 
-    /// Schedules an autosave of `scene`; `None` removes the recovery file.
+    /// Schedules an autosave of `scene` at time `now`. If `scene` is `None`, cancels a scheduled
+    /// autosave and removes the recovery file.
     pub fn note(&mut self, scene: Option<Arc<Scene>>, now: Instant) {
         match scene {
             Some(scene) => {
@@ -72,12 +80,14 @@ impl Autosave {
         }
     }
 
-    /// Time of the next write, if one is pending.
+    /// Returns the time at which edits must be written. Returns `None` if no edits are
+    /// pending.
     pub fn due(&self) -> Option<Instant> {
         self.pending.as_ref().map(|p| (p.last + DEBOUNCE).min(p.first + MAX_DELAY))
     }
 
-    /// Writes the text of `file` with the edits. Returns a warning on the first failure.
+    /// Writes pending edits to the recovery file, as the text that saving would write to `file`.
+    /// Returns a warning on the first of several consecutive failures, otherwise `None`.
     pub fn write(&mut self, file: &SceneFile) -> Option<Message> {
         let scene = self.pending.take()?.scene;
         let text = file.text_of(&scene);
@@ -97,21 +107,23 @@ impl Autosave {
         }
     }
 
-    /// Path of the recovery file.
+    /// Returns the path of the recovery file, if it exists.
     pub fn path(&self) -> Option<&Path> {
         self.recovery.path()
     }
 
-    /// Searches for orphaned edits. `file` is the scene file, if it is readable.
+    /// Searches for orphaned edits and removes incomplete files of killed sessions. `file` is the
+    /// scene file, or the path of an unreadable one. Returns warnings and the first offer.
     pub fn search(&mut self, file: Result<&SceneFile, &Path>) -> Vec<Message> {
-        // Incomplete scene files are beside the scene, incomplete exports in the working directory.
+        // Incomplete scene files are in the folder of the scene file, incomplete exports in the
+        // working directory.
         let beside = file.map_or_else(Some, SceneFile::path).and_then(Path::parent);
         let beside = beside.filter(|folder| !folder.as_os_str().is_empty());
         [Some(Path::new(".")), beside, self.state.as_deref()]
             .into_iter()
             .flatten()
             .for_each(remove_stale);
-        let RecoveryFile { orphans: mut lost, unreadable, elsewhere } = self.recovery.find();
+        let RecoveryFile { mut orphans, unreadable, elsewhere } = self.recovery.find();
         let mut messages: Vec<_> = unreadable
             .iter()
             .map(|(path, why)| {
@@ -123,29 +135,29 @@ impl Autosave {
             let text = "this scene is open elsewhere, with unsaved edits";
             messages.push(Message::Warning(text.to_string()));
         }
-        lost.reverse();
-        self.found = lost;
+        orphans.reverse();
+        self.found = orphans;
         messages.extend(self.offer(file));
         messages
     }
 
-    /// Returns the next orphaned edits, or the reason why they are unusable. Edits that the file
-    /// contains already are discarded.
+    /// Returns the next orphaned edits, or a warning if they are unreadable. Discards edits that
+    /// `file` already contains. Returns `None` if no orphaned edits are left.
     pub fn offer(&mut self, file: Result<&SceneFile, &Path>) -> Option<Message> {
         loop {
-            let lost = self.found.last()?;
-            if file.is_ok_and(|file| file.holds(&lost.text)) {
+            let orphan = self.found.last()?;
+            if file.is_ok_and(|file| file.holds(&orphan.text)) {
                 self.found.pop()?.discard();
                 continue;
             }
-            return Some(match scene(lost, file) {
+            return Some(match scene(orphan, file) {
                 Ok(scene) => Message::OrphanedEdits(OrphanedEdits {
                     scene: Arc::new(scene),
-                    age: SystemTime::now().duration_since(lost.written).unwrap_or_default(),
-                    changed: file.map_or(true, |file| lost.base != file.fingerprint()),
+                    age: SystemTime::now().duration_since(orphan.written).unwrap_or_default(),
+                    changed: file.map_or(true, |file| orphan.base != file.fingerprint()),
                 }),
                 Err(errors) => {
-                    // The file stays for its user.
+                    // The recovery file is kept so that the user can repair it.
                     self.found.pop();
                     let first = errors.messages().first().map(ToString::to_string);
                     let first = first.unwrap_or_default();
@@ -156,29 +168,30 @@ impl Autosave {
         }
     }
 
-    /// Adopts the offered edits as unsaved edits. Returns their file, if that of the scene is
-    /// unreadable.
+    /// Adopts the offered edits as the unsaved edits of this session. `path` is the path of an
+    /// unreadable scene file; `None` if the scene file is readable. For an unreadable file, returns
+    /// a scene file with the recovered text. Returns `None` otherwise.
     pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
-        let lost = self.found.pop()?;
-        let file = path.and_then(|path| SceneFile::recovered(path, lost.text.clone()).ok());
-        self.recovery.take_up(lost);
+        let orphan = self.found.pop()?;
+        let file = path.and_then(|path| SceneFile::recovered(path, orphan.text.clone()).ok());
+        self.recovery.take_up(orphan);
         file
     }
 
-    /// Discards the offered edits.
+    /// Discards the offered edits and their recovery file.
     pub fn discard(&mut self) {
-        if let Some(lost) = self.found.pop() {
-            lost.discard();
+        if let Some(orphan) = self.found.pop() {
+            orphan.discard();
         }
     }
 }
 
-fn scene(lost: &Orphan, file: Result<&SceneFile, &Path>) -> Result<Scene, SceneErrors> {
-    let name = lost.path().display().to_string();
+fn scene(orphan: &Orphan, file: Result<&SceneFile, &Path>) -> Result<Scene, SceneErrors> {
+    let name = orphan.path().display().to_string();
     match file {
-        Ok(file) => file.parse(&lost.text, &name),
+        Ok(file) => file.parse(&orphan.text, &name),
         Err(path) => {
-            SceneFile::recovered(path, lost.text.clone()).map(|f| f.document().scene().clone())
+            SceneFile::recovered(path, orphan.text.clone()).map(|f| f.document().scene().clone())
         }
     }
 }
@@ -221,7 +234,7 @@ mod tests {
         first.note(Some(scene(3)), Instant::now());
         assert!(first.write(&file).is_none());
         assert_eq!(first.path(), Some(&*folder.path().join(".a.toml.unsaved")));
-        // Edits of a running session are reported but not offered.
+        // Edits of a session that is still running are reported but not offered.
         let mut second = Autosave::new(Some(&path), "", None);
         let messages = second.search(Ok(&file));
         assert!(

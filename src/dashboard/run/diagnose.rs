@@ -10,13 +10,14 @@ use rustix::termios::tcgetwinsize;
 use std::io;
 use std::time::{Duration, Instant};
 
-/// Timeout for replies of unknown support.
+/// Timeout for a reply that the terminal may not support.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Timeout for a terminal that has replied before.
+/// Timeout for a reply from a terminal that has replied before.
 const LONG_PATIENCE: Duration = Duration::from_secs(10);
-/// The rate is measured when a transfer exceeds the round trip by this time,
+/// Transfer time beyond the round trip from which a measured rate is precise enough.
 const MEASURED: Duration = Duration::from_millis(300);
-/// or with this many bytes.
+/// Size in bytes from which a transfer is not enlarged further, even if it is faster than
+/// [`MEASURED`].
 const MOST_BYTES: usize = 1 << 20;
 
 /// Capabilities of the terminal and its connection.
@@ -24,23 +25,24 @@ const MOST_BYTES: usize = 1 << 20;
 pub struct TerminalReport {
     /// Capabilities of the terminal.
     pub terminal: Capabilities,
-    /// Pacing mode of the dashboard.
+    /// Pacing mode that the dashboard would use to limit its output.
     pub mode: PacingMode,
-    /// Columns and rows.
+    /// Columns and rows of the terminal.
     pub cells: [u16; 2],
-    /// Width and height in pixels.
+    /// Width and height of the terminal in pixels; `None` if unknown.
     pub pixels: Option<[u16; 2]>,
-    /// Measured rate in bytes per second, if requested and possible.
+    /// Measured transfer rate in bytes per second; `None` if it was not requested or the connection
+    /// cannot be measured.
     pub rate: Option<f64>,
 }
 
-/// Probes the terminal of stdin and stdout, and restores it. `measure` is whether to measure the
-/// transfer rate, which takes a second or more.
+/// Probes the terminal of stdin and stdout, and restores its state. If `measure` is `true`, also
+/// measures the transfer rate, which takes a second or more.
 ///
 /// # Errors
-/// If there is no terminal, or it is lost.
+/// If there is no terminal, or the terminal is closed during the probe.
 pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<TerminalReport> {
-    // The alternate screen hides output of requests that a terminal does not support.
+    // The alternate screen hides text that a terminal prints for requests that it does not support.
     let signals = block()?;
     let screen = Screen::enter()?;
     let tty = screen.tty();
@@ -53,7 +55,9 @@ pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<Terminal
     }
     let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
     let mode = InitialLink::of(&terminal, queue.is_some(), None).mode;
-    // Replies of a multiplexer do not measure the connection.
+    // Requests must pass through a multiplexer: its own replies do not measure the connection to
+    // the terminal. The outer `Option` is `None` if no transfer can be measured. The inner one is
+    // the multiplexer that requests pass through.
     let through = match mode {
         PacingMode::Unlimited => Some(None),
         PacingMode::AckClocked(through) => Some(through),
@@ -78,8 +82,8 @@ pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<Terminal
     Ok(TerminalReport { terminal, mode, cells, pixels, rate })
 }
 
-/// Writes `before` and requests the cursor position. Returns the time until the reply, or `None`
-/// without one.
+/// Writes `before` and requests the cursor position, through the multiplexer `through` if there is
+/// one. Returns the time until the reply. Returns `None` if there is no reply within `patience`.
 fn answer(
     tty: &Tty,
     keyboard: &mut Keyboard,
@@ -87,21 +91,22 @@ fn answer(
     before: &[u8],
     patience: Duration,
 ) -> io::Result<Option<Duration>> {
-    let asked = Instant::now();
+    let requested_at = Instant::now();
     tty.write(&[before, cursor_request(through).as_bytes()].concat())?;
     loop {
-        let came = keyboard.wait(Some(asked + patience))?;
+        let events = keyboard.wait(Some(requested_at + patience))?;
         let is_answer = |event: &Event| matches!(event, Event::Reply(Reply::Cursor { .. }));
-        if let Some(answer) = came.iter().find(|came| is_answer(&came.event)) {
-            return Ok(Some(answer.at.saturating_duration_since(asked)));
+        if let Some(answer) = events.iter().find(|event| is_answer(&event.event)) {
+            return Ok(Some(answer.at.saturating_duration_since(requested_at)));
         }
-        if came.is_empty() {
+        if events.is_empty() {
             return Ok(None);
         }
     }
 }
 
-/// Measures bytes per second with growing transfers.
+/// Measures the transfer rate in bytes per second with transfers that grow by a factor of 4.
+/// `round_trip` is the time of a reply without transfer. Returns `None` if a reply does not arrive.
 fn rate(
     tty: &Tty,
     keyboard: &mut Keyboard,
@@ -123,7 +128,8 @@ fn rate(
     }
 }
 
-/// Returns `bytes` invisible letters that compress badly, all written to the same screen.
+/// Returns `bytes` pseudo-random characters in the attribute "hidden", which start at the upper
+/// left corner. Random text keeps SSH compression from distorting the measured rate.
 fn hidden_text(bytes: usize) -> Vec<u8> {
     let mut text = b"\x1b[8m\x1b[H".to_vec();
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;

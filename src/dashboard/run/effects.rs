@@ -1,4 +1,4 @@
-//! Executor of the effects that `update` returns.
+//! Execution of the effects that `update` returns.
 
 use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport, stem};
@@ -17,37 +17,38 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Niceness of tracing threads with low priority: they take only processor time that is idle.
+/// Niceness of tracing threads with low priority, the lowest of Linux. Such threads take little
+/// more than idle processor time.
 const LOW_PRIORITY: i32 = 19;
 
 /// Parameters of an [`EffectRunner`].
 pub struct EffectSetup {
-    /// The scene file, or its path while it cannot be read.
+    /// The scene file, or the path of an unreadable one.
     pub file: Result<SceneFile, PathBuf>,
-    /// Folder for recovery files that cannot be written beside their scene.
+    /// Folder for recovery files that cannot be written beside their scene file.
     pub state: Option<PathBuf>,
-    /// Tracing threads.
+    /// Number of tracing threads.
     pub threads: usize,
     /// Options of scene compilation and sampling.
     pub options: Options,
-    /// Sample allocation and stop criteria.
+    /// Settings of sample allocation, and stop criteria.
     pub settings: Settings,
 }
 
-/// Consequence of an effect for the event loop.
+/// Action that the event loop must take after an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// None; results come as messages.
+    /// None. Results of the effect, if any, come as messages.
     Done,
-    /// The renderer starts on the scene of this generation.
+    /// The renderer has started a new picture with this generation number.
     Rendering(u64),
-    /// The terminal goes to the shell.
+    /// Suspend the program and give the terminal back to the shell.
     Suspend,
-    /// The program ends.
+    /// End the program.
     Quit,
 }
 
-/// Renderer, scene file and exports: executes every effect.
+/// Executor of effects. It owns the renderer, the thread of the scene file and the exports.
 pub struct EffectRunner {
     session: Session,
     files: Files,
@@ -95,22 +96,25 @@ impl EffectRunner {
         })
     }
 
-    /// The renderer.
+    /// Returns the session of the renderer.
     pub fn session(&self) -> &Session {
         &self.session
     }
 
-    /// Results of effects, as messages; pass each to [`EffectRunner::observe`] before the model.
+    /// Returns the receiver of the results of effects, as messages. Each message must be passed to
+    /// [`EffectRunner::observe`] before it updates the model.
     pub fn done(&self) -> &Receiver<Message> {
         &self.done
     }
 
-    /// Starts rendering a scene. Returns its generation, which reports about it carry.
+    /// Starts rendering `scene`. Returns its generation number, which the reports about this scene
+    /// contain.
     pub fn show(&mut self, scene: Arc<Scene>) -> u64 {
         self.session.set_scene(scene)
     }
 
-    /// Executes an effect; results come as messages. `frames` and `terminal` are the output.
+    /// Executes `effect`, whose results come as messages. `frames` is the output to the terminal,
+    /// `terminal` its capabilities.
     pub fn run(
         &mut self,
         effect: Effect,
@@ -192,27 +196,28 @@ impl EffectRunner {
         Outcome::Done
     }
 
-    /// Follows the name of the scene file, after which exports are named.
+    /// Renames future exports when `message` reports that the scene was saved at another path.
     pub fn observe(&mut self, message: &Message) {
         if let Message::Saved(_, Ok(path)) = message {
             self.exporter.stem = stem(Some(path), "");
         }
     }
 
-    /// Writes unsaved edits to the recovery file now. Waits for that at most `patience`.
+    /// Writes unsaved edits to the recovery file without waiting for a pause. Blocks until the
+    /// edits are written, at most for `patience`.
     pub fn flush(&self, patience: Duration) {
         self.files.flush(patience);
     }
 
-    /// Ends the threads after pending writes. Returns the remaining results, and the path of the
-    /// recovery file if there are unsaved edits.
+    /// Completes pending writes and ends the threads. Returns the remaining results, and the path
+    /// of the recovery file if there are unsaved edits.
     pub fn finish(mut self) -> (Vec<Message>, Option<PathBuf>) {
         if let Some(resized) = self.resized.take() {
             resized.end();
         }
         let Self { session, files, results, done, .. } = self;
         let kept = files.finish();
-        // Tasks run in order: after this one, all requested exports are written.
+        // The session runs its tasks in order, so all requested exports are written after this one.
         session.with(|_, _| ());
         drop((session, results));
         (done.into_iter().collect(), kept)
@@ -230,7 +235,7 @@ impl EffectRunner {
     }
 
     fn set_threads(&self) {
-        // On failure the old threads stay; the renderer's reports carry their number.
+        // On failure the old threads stay. The renderer's reports contain their number.
         let _ = self.session.set_threads(self.threads, self.niceness);
     }
 

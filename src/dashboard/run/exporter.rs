@@ -1,4 +1,4 @@
-//! Exports: the current picture, or a render at another size.
+//! Exports to image files: the current picture, or a separate render at another size.
 
 use crate::dashboard::message::{Exported, Format, Message};
 use crate::dashboard::run::file_worker::SharedDocument;
@@ -21,18 +21,18 @@ use std::time::Duration;
 /// Polling interval of a render at another size.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Common properties of the exports of a scene.
+/// Writer of exports, with the properties that all exports of a scene share.
 #[derive(Clone)]
 pub struct Exporter {
-    /// Document of the scene.
+    /// Text of the scene file, for the metadata.
     pub document: SharedDocument,
-    /// Folder of the exports.
+    /// Folder that exports are written to.
     pub folder: PathBuf,
-    /// File name of the exports before the counter.
+    /// Part of the file name before the counter.
     pub stem: String,
     /// Sampler, for the metadata.
     pub sampler: SamplerKind,
-    /// Sample allocation is adaptive, for the metadata.
+    /// `true` if sample allocation is adaptive, for the metadata.
     pub adaptive: bool,
 }
 
@@ -68,7 +68,7 @@ impl Exporter {
         })
     }
 
-    /// Returns the name of the scene file, and its text updated to `scene`.
+    /// Returns the name of the scene file, and the text that it would have if `scene` were saved.
     fn source(&self, scene: &Scene) -> (String, String) {
         match self.document.get() {
             Some(document) => {
@@ -81,7 +81,7 @@ impl Exporter {
     }
 }
 
-/// A render at another size, in a thread of its own.
+/// A render at another size that runs in a separate thread.
 pub struct ResizedExport {
     cancelled: Arc<AtomicBool>,
     thread: JoinHandle<()>,
@@ -106,7 +106,8 @@ pub struct ExportRequest {
 }
 
 impl ResizedExport {
-    /// Starts the thread. It reports progress, and the result unless cancelled.
+    /// Starts the thread. It sends [`Message::ExportProgress`] and finally [`Message::Exported`] to
+    /// `results`. A cancelled render sends no result.
     pub fn start(
         request: ExportRequest,
         exporter: Exporter,
@@ -115,7 +116,7 @@ impl ResizedExport {
         let cancelled = Arc::new(AtomicBool::new(false));
         let cancel_flag = Arc::clone(&cancelled);
         let thread = thread::Builder::new().name("export".into()).spawn(move || {
-            // At the end of the program the receiver is gone.
+            // Sending fails only at the end of the program, when the receiver is gone.
             let result = render(request, &exporter, &cancel_flag, &|progress| {
                 let _ = results.send(Message::ExportProgress(progress));
             });
@@ -126,12 +127,12 @@ impl ResizedExport {
         Ok(Self { cancelled, thread })
     }
 
-    /// Cancels the render; a picture that is already being written is completed.
+    /// Cancels the render. A file that is already being written is completed.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Cancels, and waits for the thread.
+    /// Cancels the render and waits until the thread has ended.
     pub fn end(self) {
         self.cancel();
         if let Err(panic) = self.thread.join() {
@@ -140,7 +141,7 @@ impl ResizedExport {
     }
 }
 
-/// Renders and writes the picture; `None` if cancelled.
+/// Renders and writes the picture of `request`. Returns `None` if the render is cancelled.
 fn render(
     request: ExportRequest,
     exporter: &Exporter,
@@ -172,7 +173,8 @@ fn render(
     Some(written.unwrap_or_else(|| Err("the renderer has no picture".to_string())))
 }
 
-/// Returns the file name of exports of the scene at `path`, or called `name`.
+/// Returns the part of the exports' file names before the counter: the file stem of the scene's
+/// `path`, or of `name` for a scene without a file.
 pub fn stem(path: Option<&Path>, name: &str) -> String {
     let path = path.unwrap_or(Path::new(name));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());

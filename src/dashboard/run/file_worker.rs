@@ -1,5 +1,5 @@
-//! Thread that reads and writes the scene file, so that a slow disk does not block the dashboard,
-//! and watches for changes by other programs.
+//! Thread that reads and writes the scene file and watches it for changes by other programs. The
+//! thread keeps a slow disk from blocking the dashboard.
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::autosave::Autosave;
@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Interval between checks of the file.
+/// Interval between checks of the scene file for changes by other programs.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 
 enum Job {
@@ -24,12 +24,13 @@ enum Job {
     Discard,
 }
 
-/// The scene document as last read or written; `None` if it has never been readable.
+/// Shared handle of the scene document (the text of the scene file) as last read or written. It is
+/// empty if the file has never been readable.
 #[derive(Clone, Default)]
 pub struct SharedDocument(Arc<Mutex<Option<Arc<Document>>>>);
 
 impl SharedDocument {
-    /// Returns the document.
+    /// Returns the document. Returns `None` if the file has never been readable.
     pub fn get(&self) -> Option<Arc<Document>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -48,9 +49,9 @@ pub struct Files {
 }
 
 impl Files {
-    /// Starts the thread for an open file, or for the path of an unreadable one. Results go to
-    /// `results`. `state` is the folder for recovery files that cannot be written beside their
-    /// scene.
+    /// Starts the thread for `file`, an open scene file or the path of an unreadable one. The
+    /// thread sends its results to `results`. `state` is the folder for recovery files that cannot
+    /// be written beside their scene file.
     pub fn new(
         file: Result<SceneFile, PathBuf>,
         state: Option<PathBuf>,
@@ -62,8 +63,8 @@ impl Files {
             Ok(file) => (file.path().map(Path::to_path_buf), Some(file)),
             Err(path) => (Some(path), None),
         };
-        // A readable file is compared at the first check; the errors of an unreadable one are
-        // known.
+        // A readable file has no stamp yet, so the first check compares its contents. The errors of
+        // an unreadable file have been reported; its stamp avoids a second report.
         let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
         let name = file.as_ref().map_or("", |file| file.document().name());
         let autosave = Autosave::new(path.as_deref(), name, state);
@@ -72,30 +73,33 @@ impl Files {
         Ok(Self { jobs: Some(jobs), document, thread: Some(thread) })
     }
 
-    /// Writes the scene; the result is a [`Message::Saved`].
+    /// Writes `scene` to the scene file, or to `path`, which becomes the scene file. `overwrite`
+    /// allows the replacement of content from other programs. The result is a [`Message::Saved`].
     pub fn save(&self, scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool) {
         self.give(Job::Save { scene, path, overwrite });
     }
 
-    /// Reads the file; the result is a [`Message::Loaded`].
+    /// Reads the scene file. The result is a [`Message::Loaded`].
     pub fn load(&self) {
         self.give(Job::Load);
     }
 
-    /// Schedules an autosave of a scene with unsaved edits, written after a pause or at the end;
-    /// `None` removes the recovery file.
+    /// Schedules an autosave of a scene with unsaved edits. The recovery file is written after a
+    /// pause in editing, or when the program ends. `None` removes the recovery file.
     pub fn autosave(&self, scene: Option<Arc<Scene>>) {
         self.give(Job::Autosave(scene));
     }
 
-    /// Writes unsaved edits now. Waits for that at most `patience`.
+    /// Writes unsaved edits to the recovery file without waiting for a pause. Blocks until the
+    /// edits are written, at most for `patience`.
     pub fn flush(&self, patience: Duration) {
         let (done, completion) = bounded(1);
         self.give(Job::Flush(done));
         let _ = completion.recv_timeout(patience);
     }
 
-    /// The edits of the last [`Message::OrphanedEdits`] become the unsaved edits.
+    /// Adopts the edits of the last [`Message::OrphanedEdits`] as the unsaved edits of this
+    /// session.
     pub fn recover(&self) {
         self.give(Job::Recover);
     }
@@ -105,7 +109,7 @@ impl Files {
         self.give(Job::Discard);
     }
 
-    /// Waits for pending writes. Returns the recovery file, if there are unsaved edits.
+    /// Waits for pending writes. Returns the path of the recovery file if there are unsaved edits.
     pub fn finish(mut self) -> Option<PathBuf> {
         self.join()
     }
@@ -125,7 +129,7 @@ impl Files {
     }
 
     fn give(&self, job: Job) {
-        // The thread ends only with this sender, or by a panic, which `drop` propagates.
+        // Sending fails only after a panic of the thread, which `join` propagates.
         let _ = self.jobs.as_ref().map(|jobs| jobs.send(job));
     }
 }
@@ -137,7 +141,7 @@ impl Drop for Files {
     }
 }
 
-/// Modification time and length, to detect changes.
+/// Modification time and length of a file, to detect changes; `None` if the file has no metadata.
 type FileStamp = Option<(SystemTime, u64)>;
 
 fn stamp(path: &Path) -> FileStamp {
@@ -146,11 +150,11 @@ fn stamp(path: &Path) -> FileStamp {
 }
 
 struct FileWorker {
-    /// Path of the file, if it has one.
+    /// Path of the scene file; `None` for a scene without file.
     path: Option<PathBuf>,
-    /// The file, once it has been readable.
+    /// Scene file; `None` if it has never been readable.
     file: Option<SceneFile>,
-    /// Stamp of the file when last read, written or checked.
+    /// Stamp of the scene file when it was last read, written or checked.
     seen: FileStamp,
     autosave: Autosave,
     document: SharedDocument,
@@ -158,7 +162,8 @@ struct FileWorker {
 }
 
 impl FileWorker {
-    /// Runs until the senders are gone. Returns the recovery file, if there are unsaved edits.
+    /// Executes jobs until all senders are dropped. Returns the path of the recovery file if there
+    /// are unsaved edits.
     fn run(mut self, inbox: Receiver<Job>) -> Option<PathBuf> {
         self.publish();
         for message in self.autosave.search(file_or_path(&self.file, &self.path)) {
@@ -201,12 +206,12 @@ impl FileWorker {
             Job::Autosave(scene) => self.autosave.note(scene, Instant::now()),
             Job::Flush(done) => {
                 self.write_autosave();
-                // The receiver has given up after its timeout.
+                // Sending fails if the receiver has timed out and is gone.
                 let _ = done.try_send(());
             }
             Job::Recover => {
-                let spoilt = self.path.as_deref().filter(|_| self.file.is_none());
-                if let Some(file) = self.autosave.recover(spoilt) {
+                let unreadable_path = self.path.as_deref().filter(|_| self.file.is_none());
+                if let Some(file) = self.autosave.recover(unreadable_path) {
                     self.file = Some(file);
                     self.publish();
                 }
@@ -225,7 +230,7 @@ impl FileWorker {
     }
 
     fn send(&self, message: Message) {
-        // At the end of the program the receiver is gone.
+        // Sending fails only at the end of the program, when the receiver is gone.
         let _ = self.results.send(message);
     }
 
@@ -267,7 +272,7 @@ impl FileWorker {
     }
 
     fn load(&mut self) -> Result<Arc<Scene>, SceneErrors> {
-        // Before reading, so that a write during the read counts as a change.
+        // The stamp is taken before reading, so that a write during the read counts as a change.
         self.seen = self.path.as_deref().and_then(stamp);
         let file = match (self.file.take(), &self.path) {
             (Some(file), _) => {
@@ -290,7 +295,8 @@ impl FileWorker {
     }
 }
 
-/// Returns the file, or its path.
+/// Returns the scene file, or the path of an unreadable one, which is empty for a scene without
+/// file.
 fn file_or_path<'a>(
     file: &'a Option<SceneFile>,
     path: &'a Option<PathBuf>,
@@ -303,7 +309,7 @@ mod tests {
     use super::*;
     use crate::scene::starter;
 
-    /// Generous timeout; reached only on failure.
+    /// Timeout that only a failing test reaches.
     const PATIENCE: Duration = Duration::from_secs(60);
 
     fn opened(path: &Path) -> (Files, Receiver<Message>) {
@@ -336,7 +342,7 @@ mod tests {
         fs::write(&path, format!("{}\n# more\n", starter())).unwrap();
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL);
-        assert!(quiet.is_err(), "told once: {quiet:?}");
+        assert!(quiet.is_err(), "reported once: {quiet:?}");
         files.save(Arc::new(scene), None, false);
         let refused = inbox.recv_timeout(PATIENCE).unwrap();
         assert!(matches!(refused, Message::Saved(_, Err(SaveError::Changed(_)))), "{refused:?}");

@@ -1,4 +1,5 @@
-//! Frame pipeline: the model is drawn, diffed, encoded and sent.
+//! Frame pipeline: draws the model, compares the result with the screen, encodes the differences
+//! and sends them.
 
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
@@ -15,10 +16,11 @@ use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Begin and end of a synchronised update.
+/// Sequences that start and end a synchronised update, which the terminal shows at once.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
 
-/// Bytes of an acknowledgement request.
+/// Upper bound of the bytes of an acknowledgement request (a request of the cursor position, 14
+/// bytes inside tmux).
 const QUESTION_BYTES: usize = 16;
 
 /// Pipeline of frames to the terminal.
@@ -26,27 +28,30 @@ pub struct FramePipeline {
     view: View,
     diff: FrameDiff,
     flow: FlowControl,
+    /// Send queue of the SSH connection in the kernel, if it can be read.
     queue: Option<TcpSendQueue>,
+    /// The terminal supports synchronised updates.
     synchronised: bool,
     writer: Writer,
-    /// Bytes sent so far.
+    /// Bytes of frames sent so far.
     sent: u64,
+    /// The last drawn frame, of which parts may not have been sent yet.
     target: Buffer,
     /// Position of the text cursor, if visible.
     cursor: Option<Position>,
     meta: FrameMeta,
-    /// Clipboard sequence to send with the next frame.
+    /// Sequence that sets the clipboard, to be sent with the next frame; may be empty.
     clipboard: String,
     tty: Arc<Tty>,
-    /// Upload of the image in the viewer.
+    /// Upload of the image in the image viewer.
     upload: Option<ImageUpload>,
-    /// Sequence that removes the previous image; sent before the next frame.
+    /// Sequence that removes the previous image, to be sent before the next frame; may be empty.
     removal: Vec<u8>,
-    /// The removal has been sent.
+    /// The frame being written contains the removal of an image.
     removing: bool,
 }
 
-/// Values of the model when the frame was drawn.
+/// Values of the model at the time when `FramePipeline::target` was drawn.
 #[derive(Clone, Copy, Debug, Default)]
 struct FrameMeta {
     version: u64,
@@ -57,13 +62,13 @@ struct FrameMeta {
 /// Outcome of an attempt to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DrawOutcome {
-    /// The frame budget is empty; nothing was drawn.
+    /// The connection has no room for a frame. Nothing was drawn.
     Nothing,
-    /// Only the picture differs, and its transfer is deferred.
+    /// Only the picture differs visibly from the screen. The differences will be sent later.
     Deferred,
-    /// The screen is up to date in all visible differences.
+    /// The screen has no visible differences from the model.
     Same,
-    /// A slice of an image was sent; nothing was drawn.
+    /// A slice of a viewer image was sent. The model was not drawn.
     Slice,
     /// A frame without picture cells was sent.
     Text,
@@ -72,7 +77,8 @@ pub enum DrawOutcome {
 }
 
 impl FramePipeline {
-    /// Creates a pipeline for an empty screen. `bandwidth` is a fixed rate in bytes per second.
+    /// Creates a pipeline for an empty screen. `bandwidth` is a fixed rate in bytes per second;
+    /// `None` adapts the rate to the connection.
     pub fn new(tty: Arc<Tty>, terminal: &Capabilities, bandwidth: Option<f64>) -> io::Result<Self> {
         let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
         Ok(Self {
@@ -94,23 +100,26 @@ impl FramePipeline {
         })
     }
 
-    /// Copies `text` to the clipboard of the terminal, with the next frame.
+    /// Schedules a copy of `text` to the terminal's clipboard. The next frame contains the sequence
+    /// for it.
     pub fn copy(&mut self, text: &str) {
         self.clipboard = copied(text);
     }
 
-    /// Forgets the contents of the screen, so that the next frame redraws all of it.
+    /// Forgets the contents of the screen, so that the next frame redraws the whole screen.
     pub fn forget(&mut self) {
         self.diff = FrameDiff::new();
         self.give_up();
     }
 
-    /// Transferred share of the viewed image, 0..=1.
+    /// Returns the transferred fraction of the image in the viewer, 0..=1. Returns `None` if there
+    /// is no image.
     pub fn uploaded(&self) -> Option<f64> {
         self.upload.as_ref().map(ImageUpload::share)
     }
 
-    /// Follows the image in the model's viewer.
+    /// Starts an upload if the model's viewer has a new image. Stops the upload of an image that is
+    /// no longer in the viewer.
     pub fn follow(&mut self, model: &Model) {
         let image = match &model.overlay {
             Some(Overlay::ViewerImage(viewed)) => viewed.image.as_ref(),
@@ -123,7 +132,7 @@ impl FramePipeline {
         }
     }
 
-    /// Stops an upload and removes what was sent of it.
+    /// Stops the upload and schedules the removal of the part that was sent.
     fn give_up(&mut self) {
         if let Some(upload) = self.upload.take() {
             let (removal, destroys) = upload.removal();
@@ -134,13 +143,14 @@ impl FramePipeline {
         }
     }
 
-    /// Sends the next slice of an image.
+    /// Sends the next slice of the image upload, as large as `budget` allows.
     fn slice(&mut self, now: Duration, budget: FrameBudget) -> DrawOutcome {
         let Some(upload) = self.upload.as_mut().filter(|_| budget.picture) else {
             return DrawOutcome::Nothing;
         };
         if !upload.has_begun() {
-            // The image must be removed however the program ends.
+            // From here on the exit sequence must remove the image, so that the image does not stay
+            // on the terminal after a signal or panic.
             self.tty.set_exit_sequence(&upload.any_removal());
             self.removing = false;
         }
@@ -159,33 +169,34 @@ impl FramePipeline {
         DrawOutcome::Slice
     }
 
-    /// Returns `true` if the last frame has been written.
+    /// Returns `true` if the last frame has been written, so that another one can be sent.
     pub fn ready(&self) -> bool {
         self.writer.ready()
     }
 
-    /// Returns `true` if visible differences of the picture are pending, and the bytes of frames
-    /// sent so far.
+    /// Returns two values: `true` if visible differences of the picture are pending, and the bytes
+    /// of frames sent so far.
     pub fn load(&self) -> (bool, u64) {
         (self.diff.pending().visible, self.sent)
     }
 
-    /// Status of the connection, for display.
+    /// Returns the status of the connection for display. Returns `None` for a local terminal.
     pub fn reading(&self) -> Option<LinkStatus> {
         self.flow.reading()
     }
 
-    /// Records user input.
+    /// Records user input for flow control.
     pub fn act(&mut self, now: Duration) {
         self.flow.act(now);
     }
 
-    /// Records the acknowledgement of a frame.
+    /// Records that the terminal acknowledged a frame at time `at`.
     pub fn answered(&mut self, at: Duration) {
         self.flow.on_ack(at);
     }
 
-    /// Time to wait for acknowledgements at the end; `None` if none are outstanding.
+    /// Returns the longest time to wait for acknowledgements before the terminal is given back.
+    /// Returns `None` if none are outstanding.
     pub fn awaits(&self) -> Option<Duration> {
         self.flow.awaits()
     }
@@ -195,7 +206,7 @@ impl FramePipeline {
         self.flow.is_waiting()
     }
 
-    /// Updates flow control: expires acknowledgements and reads the send queue.
+    /// Updates flow control: gives up overdue acknowledgements and reads the kernel's send queue.
     pub fn look(&mut self, now: Duration) {
         self.flow.expire(now);
         if self.flow.asks_kernel(now) {
@@ -203,7 +214,8 @@ impl FramePipeline {
         }
     }
 
-    /// Time at which a new picture, or at least text, could be sent.
+    /// Returns the time from which a frame with new content could be sent. `answers` is `true` if
+    /// the frame would respond to user input.
     pub fn snapshot_due(&self, now: Duration, answers: bool) -> Duration {
         match self.flow.allowance(now, answers) {
             Some(_) => now,
@@ -211,8 +223,9 @@ impl FramePipeline {
         }
     }
 
-    /// Time of the next draw; `None` until an event. `changed` is whether the model differs from
-    /// the last frame, `answers` whether the frame responds to user input.
+    /// Returns the time of the next call of [`FramePipeline::draw`]. Returns `None` if there is
+    /// nothing to send until the next event. `changed` is `true` if the model has changed since the
+    /// last frame, `answers` if the frame would respond to user input.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
         let pending = self.diff.pending();
         let text = changed || pending.text || !self.removal.is_empty();
@@ -233,8 +246,9 @@ impl FramePipeline {
         }
     }
 
-    /// Draws the model if it has `changed` and sends as much as the connection has room for.
-    /// `image_epoch` increases when the picture is replaced by one that is not a refinement.
+    /// Draws the model if it has `changed`, and sends as many of the differences as the connection
+    /// has room for. `answers` is `true` if the frame responds to user input. `image_epoch` is a
+    /// counter that increases when the picture is replaced by a different one rather than refined.
     /// Requires [`FramePipeline::ready`].
     pub fn draw(
         &mut self,
@@ -250,7 +264,7 @@ impl FramePipeline {
             if upload.is_open() {
                 return self.slice(now, whole);
             }
-            // The image covers the picture, or is about to.
+            // Cells of the picture are not sent if the image covers them or soon will.
             budget.picture &= !upload.follows(true);
         }
         if changed {
@@ -307,12 +321,16 @@ impl FramePipeline {
         if frame.picture { DrawOutcome::Picture } else { DrawOutcome::Text }
     }
 
-    /// Receives the result of each written frame.
+    /// Returns the receiver of the results of writing frames. Each result must be passed to
+    /// [`FramePipeline::written_at`].
     pub fn written(&self) -> &Receiver<Written> {
         self.writer.written()
     }
 
-    /// Records that the frame was written; returns when.
+    /// Records that a frame was written. Returns the time at which the write was completed.
+    ///
+    /// # Errors
+    /// If the write failed.
     pub fn written_at(&mut self, frame: Written) -> io::Result<Instant> {
         if std::mem::take(&mut self.removing) {
             self.tty.set_exit_sequence(&[]);

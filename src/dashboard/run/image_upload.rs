@@ -1,41 +1,45 @@
-//! Upload of an image to the terminal in slices.
+//! Upload of a viewer image to the terminal in slices.
 
 use crate::terminal::image::ViewerImage;
 use std::sync::Arc;
 
-/// Maximum slice size in bytes, so that keys take effect soon on any connection.
+/// Maximum slice size in bytes. No frame can be sent while a slice is being written, so the size
+/// bounds the latency of keys.
 const SLICE: usize = 1 << 18;
-/// Terminator of an incomplete sequence.
+/// String terminator (ST), which ends an incomplete escape sequence.
 const END: &[u8] = b"\x1b\\";
 
 /// An image and the progress of its upload.
 #[derive(Debug)]
 pub struct ImageUpload {
     image: Arc<ViewerImage>,
+    /// Number of bytes sent.
     sent: usize,
-    /// A sequence is incomplete: only its remainder can be sent.
+    /// The bytes sent end inside an escape sequence, so only its remainder may be sent next.
     open: bool,
-    /// The image is visible in half blocks.
+    /// The image is already visible as half blocks.
     pub seen: bool,
 }
 
 impl ImageUpload {
-    /// Creates an upload with nothing sent.
+    /// Creates an upload of `image` of which nothing has been sent.
     pub fn new(image: Arc<ViewerImage>) -> Self {
         Self { image, sent: 0, open: false, seen: false }
     }
 
-    /// Returns `true` if `image` is the uploaded image.
+    /// Returns `true` if `image` is the image of this upload.
     pub fn is_of(&self, image: &Arc<ViewerImage>) -> bool {
         Arc::ptr_eq(&self.image, image)
     }
 
-    /// Returns `true` if a sequence is incomplete.
+    /// Returns `true` if the bytes sent end inside an escape sequence, so that no other output may
+    /// follow.
     pub fn is_open(&self) -> bool {
         self.open
     }
 
-    /// Returns `true` if the upload has started: the cells below must not be sent any more.
+    /// Returns `true` if the upload has started. From then on the half blocks below the image must
+    /// not be sent any more.
     pub fn has_begun(&self) -> bool {
         self.sent > 0
     }
@@ -45,19 +49,19 @@ impl ImageUpload {
         self.sent < self.image.transfer.bytes.len()
     }
 
-    /// Returns `true` if the image covers the half blocks, or is about to. `waits` is whether
-    /// visible differences of the half blocks are pending.
+    /// Returns `true` if the image covers its half blocks or is to be sent next. `waits` is `true`
+    /// if visible differences of the half blocks are pending.
     pub fn follows(&self, waits: bool) -> bool {
         self.has_begun() || self.is_unfinished() && (self.seen || !waits)
     }
 
-    /// Transferred share, 0..=1.
+    /// Returns the transferred fraction of the image, 0..=1.
     pub fn share(&self) -> f64 {
         let all = self.image.transfer.bytes.len().max(1);
         self.sent as f64 / all as f64
     }
 
-    /// Appends the next slice of about `room` bytes to `out`.
+    /// Appends the next slice, of about `room` bytes, to `out`.
     pub fn next(&mut self, room: usize, out: &mut Vec<u8>) {
         let transfer = &self.image.transfer;
         let (range, open) = transfer.slice(self.sent, room.min(SLICE));
@@ -65,7 +69,8 @@ impl ImageUpload {
         (self.sent, self.open) = (range.end, open);
     }
 
-    /// Sequence that removes the transferred part, and whether the cells below must be redrawn.
+    /// Returns the sequence that removes the transferred part of the image, and `true` if the cells
+    /// below must be redrawn after it.
     pub fn removal(&self) -> (Vec<u8>, bool) {
         let transfer = &self.image.transfer;
         if !self.has_begun() {
@@ -75,7 +80,7 @@ impl ImageUpload {
         ([end, &transfer.remove].concat(), transfer.destroys)
     }
 
-    /// Sequence that removes the image at any stage of the upload.
+    /// Returns a sequence that removes the image at any stage of the upload.
     pub fn any_removal(&self) -> Vec<u8> {
         let clear: &[u8] = if self.image.transfer.destroys { b"\x1b[2J" } else { b"" };
         [END, &self.image.transfer.remove, clear].concat()

@@ -12,30 +12,32 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-/// Longest time that the transfer of an image may take: slower connections get a smaller image.
+/// Maximum time for the transfer of an image. On slow connections the image is made smaller to
+/// comply with it.
 const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
 
-/// Returns the space for an image on a terminal of `screen` columns and rows, whose connection
-/// carries `line_rate` bytes per second; `None` is a local terminal.
+/// Returns the limits for an image: protocol, size and bytes. The terminal has `screen` columns and
+/// rows. `line_rate` is the rate of its connection in bytes per second; `None` is a local terminal.
 pub fn viewport(
     terminal: &Capabilities,
     screen: [u16; 2],
     line_rate: Option<f64>,
 ) -> ImageViewport {
-    // The font size may have changed since the start.
+    // The size of a cell may have changed since the start.
     let cell_px = cell_px().or(terminal.cell_px);
     let protocol = Protocol::of(&Capabilities { cell_px, ..terminal.clone() });
-    let most_bytes = line_rate.map(|rate| rate * MAX_TRANSFER_TIME.as_secs_f64());
-    ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, max_bytes: most_bytes }
+    let max_bytes = line_rate.map(|rate| rate * MAX_TRANSFER_TIME.as_secs_f64());
+    ImageViewport { protocol, screen, cell_px, sixel_px: terminal.sixel_px, max_bytes }
 }
 
-/// Reads the image at `path` and encodes it for `viewport`, in a thread of its own. Sends a
-/// [`Message::ViewerImage`] to `results`.
+/// Reads the image at `path` and encodes it for `viewport` in a separate thread. The result is a
+/// [`Message::ViewerImage`], sent to `results`. `display` is the display transform for linear
+/// images.
 pub fn prepare(path: PathBuf, display: Display, viewport: ImageViewport, results: Sender<Message>) {
     let (requested, failed) = (path.clone(), results.clone());
     let started = thread::Builder::new().name("image viewer".into()).spawn(move || {
         let image = ViewerImage::read(&path, &display, &viewport).map(Arc::new);
-        // At the end of the program the receiver is gone.
+        // Sending fails only at the end of the program, when the receiver is gone.
         let _ = results.send(Message::ViewerImage(path, image));
     });
     if let Err(error) = started {
@@ -44,7 +46,8 @@ pub fn prepare(path: PathBuf, display: Display, viewport: ImageViewport, results
 }
 
 impl Dashboard {
-    /// Reports the progress of an image transfer to the model, at most once per [`STATUS_INTERVAL`].
+    /// Reports the progress of an image transfer to the model, at most once per
+    /// [`STATUS_INTERVAL`]. The end of the transfer is reported at once.
     pub(super) fn report_upload(&mut self, now: Duration) {
         let Some(sent) = self.frames.uploaded() else { return };
         let known = match &self.model.overlay {

@@ -8,23 +8,24 @@ use std::io;
 use std::thread;
 use std::time::Instant;
 
-/// A user event with its time of reading.
+/// User input with the time at which it was read.
 #[derive(Debug)]
 pub struct Input {
-    /// Time of reading; of joined events, that of the first.
+    /// Time at which the event was read; for joined events, the time of the first event.
     pub at: Instant,
-    /// Message.
+    /// Message for the model.
     pub message: Message,
 }
 
-/// Starts a thread that reads the terminal until an error.
+/// Starts a thread that reads terminal events until a read fails. The receiver gets the events, and
+/// the error last.
 pub fn read(mut keyboard: Keyboard) -> io::Result<Receiver<io::Result<Timed>>> {
     let (sender, receiver) = unbounded();
     thread::Builder::new().name("reader".into()).spawn(move || {
         loop {
             match keyboard.wait(None) {
-                Ok(came) => {
-                    if came.into_iter().any(|event| sender.send(Ok(event)).is_err()) {
+                Ok(events) => {
+                    if events.into_iter().any(|event| sender.send(Ok(event)).is_err()) {
                         break;
                     }
                 }
@@ -38,8 +39,8 @@ pub fn read(mut keyboard: Keyboard) -> io::Result<Receiver<io::Result<Timed>>> {
     Ok(receiver)
 }
 
-/// Appends `input` to the pending events. Drags join to the newest position, resizes to the newest
-/// size; ticks of the wheel add up.
+/// Appends `input` to the pending inputs, or joins it with the last one of the same kind. A joined
+/// drag has the newest position, a joined resize the newest size. Wheel ticks are added up.
 pub fn join(queue: &mut Vec<Input>, input: Input) {
     if let Some(last) = queue.last_mut() {
         match (&mut last.message, &input.message) {

@@ -9,39 +9,39 @@ use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A resize takes effect after this time without another one,
+/// Time without another resize after which a resize takes effect.
 const SETTLED: Duration = Duration::from_millis(90);
-/// or at the latest this time after the first of a series.
+/// Maximum time between the first resize of a series and its effect.
 const LONGEST: Duration = Duration::from_millis(400);
-/// Longest wait for the autosave before suspending.
+/// Maximum wait for the autosave before the program is suspended.
 const SECURED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait for the stop signal to take effect.
+/// Maximum wait for the stop signal to take effect. After it the program resumes by itself.
 const STOPS_WITHIN: Duration = Duration::from_millis(500);
 
-/// Terminal and event sources.
+/// The terminal, and the receivers of its events.
 pub(super) struct TerminalIo {
     /// Terminal for output.
     pub tty: Arc<Tty>,
-    /// Input events.
+    /// Receiver of input events.
     pub input: Receiver<io::Result<Timed>>,
-    /// Signals.
+    /// Receiver of signals.
     pub signals: Receiver<SignalEvent>,
-    /// The terminal has been restored for good.
+    /// Receiver of a notification that the terminal has been restored for good, as by a panic.
     pub left: Receiver<()>,
 }
 
-/// Debounce of terminal sizes.
+/// Debounce of resize signals: the times of the first and last resize of a series.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ResizeDebounce(Option<(Duration, Duration)>);
 
 impl ResizeDebounce {
-    /// Records a resize.
+    /// Records a resize at time `now`.
     pub fn note(&mut self, now: Duration) {
         let first = self.0.map_or(now, |(first, _)| first);
         self.0 = Some((first, now));
     }
 
-    /// Time at which the new size takes effect, if one is pending.
+    /// Returns the time at which a pending resize takes effect. Returns `None` if none is pending.
     pub fn due(&self) -> Option<Duration> {
         self.0.map(|(first, last)| (last + SETTLED).min(first + LONGEST))
     }
@@ -61,15 +61,15 @@ impl Dashboard {
                 None
             }
             SignalEvent::Stop => self.suspend(StopTarget::Itself, terminal_io),
-            // Resumed after an unannounced SIGSTOP.
+            // A process cannot handle SIGSTOP, so the terminal is set up again after it.
             SignalEvent::Continue => self.resume(terminal_io),
         }
     }
 
-    /// Restores the terminal, stops, and resumes when continued. Returns the exit status if the
-    /// program is to end instead.
+    /// Restores the terminal and stops the processes of `target`. Resumes when the shell continues
+    /// them. Returns the exit status if the program is to end instead.
     pub(super) fn suspend(&mut self, target: StopTarget, terminal_io: &TerminalIo) -> Option<u8> {
-        // The program may never be resumed.
+        // Unsaved edits are written first, because the program may never be resumed.
         self.effects.flush(SECURED_WITHIN);
         self.await_answers(&terminal_io.input);
         terminal_io.tty.suspend();
@@ -89,7 +89,8 @@ impl Dashboard {
         end
     }
 
-    /// Takes the terminal again and redraws everything.
+    /// Sets up the terminal again and redraws the whole screen. Returns an exit status if the
+    /// terminal is gone.
     fn resume(&mut self, terminal_io: &TerminalIo) -> Option<u8> {
         if terminal_io.tty.resume().is_err() {
             return Some(HUNG_UP);
@@ -98,11 +99,11 @@ impl Dashboard {
         None
     }
 
-    /// Adopts the current terminal size and redraws everything.
+    /// Adopts the current terminal size and redraws the whole screen.
     pub(super) fn resize(&mut self) {
         self.resizing = ResizeDebounce::default();
         self.frames.forget();
-        // A missing terminal shows at the next frame.
+        // If the terminal is gone, writing the next frame fails.
         let screen = size().unwrap_or(self.model.screen);
         self.dispatch(Message::Resize(screen));
     }

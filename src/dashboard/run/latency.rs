@@ -1,57 +1,66 @@
-//! Input latency: from reading an event to handing the frame that responds to it to the terminal.
+//! Measurement of input latency: the time from reading an input event until the frame that responds
+//! to the event has been written to the terminal.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Response to an event.
+/// Frame that is the response to an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Answer {
-    /// The next frame.
+    /// The next frame of any kind.
     Screen,
-    /// The first frame with a picture of this generation or a later one.
+    /// The first frame with a picture of this scene generation or a later one.
     Picture(u64),
 }
 
-/// An event without response yet.
+/// An event that has no response yet.
 #[derive(Clone, Copy, Debug)]
 struct Awaiting {
     read: Instant,
     answer: Answer,
 }
 
-/// An event with its response time.
+/// An event that has been responded to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Answered {
-    /// Time of reading, since the start.
+    /// Time at which the event was read, since the start of the recorder.
     read: Duration,
+    /// The response needed a new picture.
     picture: bool,
+    /// Latency.
     after: Duration,
 }
 
-/// Recorder of response times. It is always active, because responses bypass the frame interval;
-/// results are stored only on request.
+/// Recorder of input latencies. It always tracks pending events, because frames that respond to an
+/// event are sent without waiting for the frame interval. It stores latencies only on request.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,
+    /// Events that no frame has responded to.
     awaiting: Vec<Awaiting>,
+    /// Events that the frame being written responds to.
     in_flight: Vec<Awaiting>,
+    /// Events with their latencies; `None` if latencies are not stored.
     answered: Option<Vec<Answered>>,
     load: Load,
 }
 
-/// Traffic while visible differences were pending.
+/// Traffic during the time in which visible differences between screen and picture were pending.
 #[derive(Clone, Copy, Debug, Default)]
 struct Load {
-    /// Last update: time, whether differences were pending, bytes sent.
+    /// Time of the last update, `true` if differences were pending then, and bytes sent until then.
     last: (Duration, bool, u64),
+    /// Total time during which differences were pending.
     waited: Duration,
+    /// Bytes sent during that time.
     bytes: u64,
 }
 
 impl LatencyRecorder {
-    /// Creates a recorder. `remember` is whether results are stored for [`LatencyRecorder::write`].
+    /// Creates a recorder. If `remember` is `true`, latencies are stored for
+    /// [`LatencyRecorder::write`] and [`LatencyRecorder::summary`].
     pub fn new(remember: bool) -> Self {
         Self {
             began: Instant::now(),
@@ -62,19 +71,20 @@ impl LatencyRecorder {
         }
     }
 
-    /// Records an event that was read at `read` and handled. `scene` is the generation that it
-    /// created, if any.
+    /// Records an event that was read at `read` and has been handled. `scene` is the scene
+    /// generation that the response must show; `None` if any frame is a response.
     pub fn event(&mut self, read: Instant, scene: Option<u64>) {
         let answer = scene.map_or(Answer::Screen, Answer::Picture);
         self.awaiting.push(Awaiting { read, answer });
     }
 
-    /// Returns `true` if a frame with the picture of `scene` would respond to an event.
+    /// Returns `true` if a frame with the picture of generation `scene` would respond to an event.
     pub fn replies(&self, scene: u64) -> bool {
         self.awaiting.iter().any(|waiting| waiting.answered_by(scene))
     }
 
-    /// Records that a frame with the picture of `scene` is in flight.
+    /// Records that a frame with the picture of generation `scene` is being written; 0 is a frame
+    /// without picture.
     pub fn sent(&mut self, scene: u64) {
         let in_flight = &mut self.in_flight;
         self.awaiting.retain(|waiting| {
@@ -86,7 +96,7 @@ impl LatencyRecorder {
         });
     }
 
-    /// Records that the frame in flight was written at `at`.
+    /// Records that the frame passed to [`LatencyRecorder::sent`] was completely written at `at`.
     pub fn written(&mut self, at: Instant) {
         for waiting in self.in_flight.drain(..) {
             if let Some(answered) = &mut self.answered {
@@ -99,22 +109,23 @@ impl LatencyRecorder {
         }
     }
 
-    /// Records the state after a frame: whether visible differences are pending, and the bytes sent
-    /// so far.
+    /// Records the state of the connection at time `now`, after a frame. `waits` is `true` if
+    /// visible differences are pending; `sent` is the number of bytes sent since the start.
     pub fn line(&mut self, now: Duration, waits: bool, sent: u64) {
         let Load { last: (before, waited, known), .. } = self.load;
         if waited {
             self.load.waited += now.saturating_sub(before);
         }
-        // Bytes of the frame that clears the last difference do not count.
+        // Bytes of a frame after which no difference is pending do not count.
         if waits {
             self.load.bytes += sent - known;
         }
         self.load.last = (now, waits, sent);
     }
 
-    /// Writes a CSV line per event: seconds from the start to its reading, kind of response, and
-    /// milliseconds of latency. Events without response are left out.
+    /// Writes a CSV file with one line per event. The columns are the seconds from the start until
+    /// the event was read, the kind of response, and the latency in milliseconds. Events without
+    /// response are left out.
     pub fn write(&self, path: &Path) -> io::Result<()> {
         let mut file = BufWriter::new(File::create(path)?);
         writeln!(file, "read_seconds,answer,milliseconds")?;
@@ -126,7 +137,7 @@ impl LatencyRecorder {
         file.flush()
     }
 
-    /// Summary: a line per kind of response, and the traffic.
+    /// Returns the lines of a summary: one for each kind of response, and one for the traffic.
     pub fn summary(&self) -> Vec<String> {
         let summary_of = |wanted: bool, name: &str| {
             let of_kind = self.answered.iter().flatten().filter(|a| a.picture == wanted);
@@ -165,8 +176,8 @@ impl Awaiting {
     }
 }
 
-/// Returns the smallest of the `sorted` values that at least `share` of them do not exceed; 0 if
-/// there are none.
+/// Returns the quantile `share` of `sorted`: the smallest element that is at least as large as this
+/// fraction (0 to 1) of all elements. Returns 0 if `sorted` is empty.
 fn quantile(sorted: &[Duration], share: f64) -> Duration {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied().unwrap_or_default()
@@ -192,7 +203,7 @@ mod tests {
         assert!(recorder.replies(1));
         recorder.sent(1);
         assert!(!recorder.replies(1), "it is on its way");
-        // Events read while the frame is in flight are not answered by it.
+        // A frame is no response to events that are read while it is being written.
         recorder.event(at(9), None);
         recorder.written(at(20));
         recorder.sent(7);

@@ -1,4 +1,5 @@
-//! Event loop of the dashboard. One thread updates and draws; blocking work has threads of its own.
+//! Event loop of the dashboard. One thread updates the model and draws it. Work that may block runs
+//! in other threads, whose results come back through channels.
 
 mod autosave;
 mod diagnose;
@@ -43,36 +44,37 @@ pub use diagnose::{TerminalReport, diagnose};
 
 /// Parameters of a dashboard.
 pub struct Setup {
-    /// The scene file, or its path and errors.
+    /// The scene file. An unreadable file is represented by its path and errors.
     pub file: Result<SceneFile, (PathBuf, SceneErrors)>,
-    /// Folder for recovery files that cannot be written beside their scene.
+    /// Folder for recovery files that cannot be written beside their scene file.
     pub state: Option<PathBuf>,
-    /// Tracing threads, at least 1.
+    /// Number of tracing threads, at least 1.
     pub threads: usize,
     /// Options of scene compilation and sampling.
     pub options: Options,
-    /// Sample allocation and initial stop criteria.
+    /// Settings of sample allocation, and the initial stop criteria.
     pub settings: Settings,
-    /// Colour depth of the terminal; `None` to detect it.
+    /// Colour depth of the terminal; `None` to use the detected one.
     pub colors: Option<Colors>,
     /// Terminal-related environment variables.
     pub surroundings: Environment,
     /// Fixed bandwidth in bytes per second; `None` to adapt to the connection.
     pub bandwidth: Option<f64>,
-    /// File for input latencies.
+    /// CSV file to write input latencies to; `None` to measure none.
     pub trace: Option<PathBuf>,
 }
 
-/// Result of a dashboard.
+/// Result of running a dashboard.
 #[derive(Debug, Default)]
 pub struct Ended {
-    /// Exit status, if a signal has ended it.
+    /// Exit status, if a signal has ended the dashboard.
     pub signalled: Option<u8>,
-    /// Exports that finished after the screen was restored.
+    /// Results of exports that finished after the screen was restored.
     pub exported: Vec<Result<Exported, String>>,
-    /// Recovery file with unsaved edits, which the next start offers.
+    /// Path of the recovery file, if there are unsaved edits. The next start offers to recover
+    /// them.
     pub kept: Option<PathBuf>,
-    /// Summary of input latencies, one line each; empty unless requested.
+    /// Lines of the summary of input latencies; empty unless [`Setup::trace`] is set.
     pub latencies: Vec<String>,
 }
 
@@ -126,7 +128,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         suspend: false,
         quit: false,
     };
-    // The renderer learns the raster size.
+    // The resize passes the raster size on to the renderer.
     dashboard.dispatch(Message::Resize(dashboard.model.screen));
     let input = input::read(keyboard)?;
     let terminal_io = TerminalIo {
@@ -136,12 +138,13 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         left: screen.left().clone(),
     };
     let result = dashboard.watch(&terminal_io);
-    // Before anything else is written.
+    // The file thread starts to write unsaved edits before anything here may block. A timeout of 0
+    // does not wait for that write.
     dashboard.effects.flush(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
         dashboard.await_answers(&terminal_io.input);
     }
-    // The remaining writes may take a while: the screen is restored first.
+    // The screen is restored before the remaining files are written, which may take a while.
     drop(screen);
     let (finished, kept) = dashboard.effects.finish();
     let exported = finished.into_iter().filter_map(|message| match message {
@@ -165,29 +168,33 @@ struct Dashboard {
     terminal: Capabilities,
     latency: LatencyRecorder,
     began: Instant,
-    /// Generation of the visible picture.
+    /// Generation number of the scene that the visible picture shows.
     shown: u64,
-    /// Increases when the picture is replaced by one that is not a refinement of it.
+    /// Counter that increases when the picture is replaced by a different one, and stays when more
+    /// samples refine the same picture.
     image_epoch: u64,
     /// Debounce of resize signals.
     resizing: ResizeDebounce,
-    /// Time of the last status update of the connection.
+    /// Time at which the model last received the connection's status or upload progress.
     status_sent_at: Duration,
     /// The model has changed since the last frame.
     changed: bool,
+    /// The program is to be suspended after the current messages.
     suspend: bool,
+    /// The program is to quit after the current messages.
     quit: bool,
 }
 
 impl Dashboard {
-    /// Runs until the end; returns the exit status of a signal.
+    /// Runs the event loop until the program is to end. Returns the exit status if a signal or the
+    /// loss of the terminal ends the program, and `None` if the user quits.
     fn watch(&mut self, terminal_io: &TerminalIo) -> io::Result<Option<u8>> {
         let wakeup = self.effects.session().wakeup().clone();
         let done = self.effects.done().clone();
         let written = self.frames.written().clone();
         let silence = never();
         let mut waiting = Vec::new();
-        // A signal during the probe ends the program before the first frame.
+        // Signals that arrived during the terminal probe are handled before the first frame.
         while let Ok(event) = terminal_io.signals.try_recv() {
             if let Some(status) = self.handle_signal(event, terminal_io) {
                 return Ok(Some(status));
@@ -195,7 +202,7 @@ impl Dashboard {
         }
         while !self.quit {
             let wait = self.draw();
-            // Snapshots are requested only when the terminal can take them.
+            // A snapshot is taken only when the terminal can receive another frame.
             let (wakeup, wants_snapshot) = match self.wants_snapshot() {
                 None => (&silence, None),
                 Some(Duration::ZERO) => (&wakeup, None),
@@ -213,7 +220,7 @@ impl Dashboard {
                 },
                 recv(wakeup) -> notified => match notified {
                     Ok(()) => self.take_snapshot(),
-                    // Its panic has been reported already.
+                    // The renderer's panic has been reported already.
                     Err(_) => return Err(io::Error::other("the renderer has ended")),
                 },
                 recv(done) -> message => message.into_iter().for_each(|m| self.take_done(m)),
@@ -253,7 +260,7 @@ impl Dashboard {
         Ok(None)
     }
 
-    /// Handles a terminal event: replies at once; user input joins `waiting`.
+    /// Handles a terminal reply at once. Appends user input to `waiting`.
     fn enqueue(&mut self, Timed { at, event }: Timed, waiting: &mut Vec<Input>) {
         let message = match event {
             Event::Key(key) => Message::Key(key),
@@ -264,7 +271,7 @@ impl Dashboard {
                 return;
             }
             Event::Reply(reply @ (Reply::Graphics(true) | Reply::Version(_))) => {
-                // Through a multiplexer, or late.
+                // Replies that pass through a multiplexer may arrive after the probe.
                 self.terminal.learn(&reply);
                 return;
             }
@@ -273,8 +280,8 @@ impl Dashboard {
         input::join(waiting, Input { at, message });
     }
 
-    /// Waits for outstanding replies of the terminal at the end, so that the shell does not read
-    /// them as input.
+    /// Waits for outstanding replies of the terminal before it is given back, so that the shell
+    /// does not read the replies as input.
     fn await_answers(&mut self, input: &Receiver<io::Result<Timed>>) {
         let end = self.frames.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
@@ -288,8 +295,8 @@ impl Dashboard {
         }
     }
 
-    /// Updates the model with a message and runs the effects. Returns the generation of the scene if
-    /// the response needs a new picture.
+    /// Updates the model with a message and executes the resulting effects. Returns the generation
+    /// number of the new scene if the response to the message needs a newly rendered picture.
     fn dispatch(&mut self, message: Message) -> Option<u64> {
         let mut awaited = None;
         let is_snapshot = matches!(message, Message::Snapshot(_));
@@ -302,7 +309,8 @@ impl Dashboard {
             match self.effects.run(effect, &mut self.frames, &self.terminal) {
                 Outcome::Done => {}
                 Outcome::Rendering(generation) => {
-                    // A change of lights is visible at once: the current picture is relit.
+                    // A change of lights needs no new picture: the light groups of the current
+                    // snapshot are mixed again.
                     let snapshot = self.model.snapshot.as_deref();
                     let relit =
                         scene.is_some_and(|s| snapshot.is_some_and(|n| n.mix_for(&s).is_some()));
@@ -332,31 +340,31 @@ impl Dashboard {
             let raster = |s: &Snapshot| s.picture.as_ref().map(|p| [p.cols, p.rows]);
             if snapshot.picture.is_some() || failed {
                 let old = self.model.snapshot.as_deref().and_then(raster);
-                let another = self.shown != snapshot.report.generation;
-                self.image_epoch += u64::from(another || old != raster(&snapshot));
+                let is_new_scene = self.shown != snapshot.report.generation;
+                self.image_epoch += u64::from(is_new_scene || old != raster(&snapshot));
                 self.shown = snapshot.report.generation;
             }
             self.dispatch(Message::Snapshot(Box::new(snapshot)));
         }
     }
 
-    /// Time until the next snapshot can be shown; `None` until the terminal has taken the last
-    /// frame.
+    /// Returns the time until a frame with a new snapshot may be sent. Returns `None` while the
+    /// last frame is still being written.
     fn wants_snapshot(&self) -> Option<Duration> {
         let now = self.began.elapsed();
         let due = self.frames.snapshot_due(now, self.latency.replies(u64::MAX));
         self.frames.ready().then(|| due.saturating_sub(now))
     }
 
-    /// Sends a tick to the model if it waits for this moment.
+    /// Sends [`Message::Tick`] to the model if the time of its next timeout has come.
     fn wake(&mut self) {
         if self.model.next_timeout().is_some_and(|at| at <= self.began.elapsed()) {
             self.dispatch(Message::Tick);
         }
     }
 
-    /// Draws if the model has changed and the terminal can take a frame. Returns the time until the
-    /// next frame or timeout, if any.
+    /// Draws a frame if differences are pending and the connection has room. Returns the time until
+    /// the next frame or timeout. Returns `None` if neither is due before the next event.
     fn draw(&mut self) -> Option<Duration> {
         let now = self.began.elapsed();
         if let Some(due) = self.resizing.due() {
@@ -367,9 +375,9 @@ impl Dashboard {
         }
         self.frames.look(now);
         let reading = self.frames.reading();
-        let mode = |line: &Option<LinkStatus>| line.as_ref().map(|line| line.mode);
-        let other = mode(&reading) != mode(&self.model.link);
-        if other || self.changed && self.status_sent_at + STATUS_INTERVAL <= now {
+        let mode = |link: &Option<LinkStatus>| link.as_ref().map(|link| link.mode);
+        let mode_changed = mode(&reading) != mode(&self.model.link);
+        if mode_changed || self.changed && self.status_sent_at + STATUS_INTERVAL <= now {
             self.status_sent_at = now;
             self.dispatch(Message::LinkStatus(reading));
         }
@@ -392,7 +400,7 @@ impl Dashboard {
                         self.latency.sent(self.shown);
                         self.latency.written(Instant::now());
                     }
-                    // No picture has generation 0.
+                    // No picture has generation 0, so it stands for a frame without picture.
                     DrawOutcome::Text => self.latency.sent(0),
                     DrawOutcome::Picture => self.latency.sent(self.shown),
                 }
@@ -409,9 +417,9 @@ impl Dashboard {
     }
 }
 
-/// Maximum age of the connection's status in the status line.
+/// Minimum interval between updates of the connection's status and upload progress on the screen.
 const STATUS_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Default stop criterion: half a level of an 8-bit file.
+/// Default stop criterion: a noise of 0.5 8-bit levels, half a quantisation step of the image file.
 pub const DEFAULT_STOP: Stop =
     Stop { spp: None, noise_codes: Some(0.5), rmse_linear: None, seconds: None };

@@ -1,15 +1,16 @@
-//! File names of exports that overwrite nothing, and paths for scp.
+//! Unused file names for exports, and paths for scp.
 
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Maximum number of exports of one scene and format in one folder.
+/// Largest counter in the name of an export, which limits the time of searching a free name.
 const MOST: u32 = 100_000;
 
 /// Writes to the first free path of `STEM-1.EXTENSION`, `STEM-2.EXTENSION` and so on in `folder`.
-/// `write` must create the file atomically and fail if it exists, so a name never refers to an
-/// incomplete file.
+/// `write` must create the file atomically and fail if the path exists, so that a name never refers
+/// to an incomplete file. Returns the path or the error of `write`. Returns `None` if no name is
+/// free.
 pub fn numbered<E>(
     folder: &Path,
     stem: &str,
@@ -25,7 +26,7 @@ pub fn numbered<E>(
         }
         match write(&path) {
             Ok(()) => return Some(Ok(path)),
-            // Another program has taken the name meanwhile.
+            // Another program has created a file of this name since the check.
             Err(_) if is_taken(&path) => {}
             Err(error) => return Some(Err(error)),
         }
@@ -33,22 +34,23 @@ pub fn numbered<E>(
     None
 }
 
-/// Returns the absolute path.
+/// Returns `path` as an absolute path.
 pub fn full(path: &Path) -> String {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     path.to_string_lossy().into_owned()
 }
 
-/// Returns the scp source of `path` on this machine: `user@host:/absolute/path`, preceded by `-P
-/// PORT ` for a non-standard port; quoted for a shell where necessary.
+/// Returns the argument of scp that copies `path` from this machine: `user@host:/absolute/path`. If
+/// the port is not 22, `-P PORT ` precedes the path. Path and port are quoted for a shell where
+/// necessary.
 pub fn scp(path: &Path) -> String {
     let variable = |name| env::var(name).unwrap_or_default();
     let user = Some(variable("USER")).filter(|u| !u.is_empty()).unwrap_or(variable("LOGNAME"));
     scp_from(&variable("SSH_CONNECTION"), &user, &host_name(), &full(path))
 }
 
-/// Implements [`scp`]. `connection` is `SSH_CONNECTION` as set by sshd, "client port server port",
-/// or empty.
+/// Implements [`scp`] without access to the environment. `connection` is the variable
+/// `SSH_CONNECTION` as sshd sets it, "client port server port", or empty.
 fn scp_from(connection: &str, user: &str, host_name: &str, path: &str) -> String {
     let fields: Vec<_> = connection.split_whitespace().collect();
     let (host, port) = match fields[..] {
@@ -61,7 +63,7 @@ fn scp_from(connection: &str, user: &str, host_name: &str, path: &str) -> String
     if port == "22" { place } else { format!("-P {} {place}", quoted(port)) }
 }
 
-/// Quotes `text` as one word of a shell.
+/// Quotes `text` as a single word of a POSIX shell, if it needs quoting.
 fn quoted(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "@:/._-+,=%".contains(c);
     if text.chars().all(plain) {
@@ -95,11 +97,11 @@ mod tests {
         assert_eq!(names, ["room-1.png", "room-3.png", "room-4.png"]);
         assert_eq!(fs::read(folder.path().join("room-2.png")).unwrap(), b"old");
         assert!(numbered(&folder.path().join("nowhere"), "room", "png", write).unwrap().is_err());
-        // A name that another program takes first is skipped.
+        // A name is skipped if another program creates a file of that name first.
         let late = |path: &Path| {
             let number = fs::read_dir(folder.path()).unwrap().count();
             if number < 6 {
-                fs::write(path, "somebody else's").unwrap();
+                fs::write(path, "from another program").unwrap();
             }
             write(path)
         };

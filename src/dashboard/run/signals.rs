@@ -1,5 +1,5 @@
-//! Signals that end the program, with a grace period for the dashboard, and signals for resizing,
-//! stopping and continuing.
+//! Handling of signals that end the program, and of signals for resizing, stopping and continuing.
+//! After a terminating signal the dashboard has a grace period to end by itself.
 
 use crate::terminal::Tty;
 use crossbeam_channel::{Receiver, unbounded};
@@ -12,31 +12,32 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-/// Grace period after a signal that ends the program.
+/// Grace period of the dashboard after a terminating signal.
 pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Offset between a signal's number and the exit status in shells.
+/// Difference between the exit status that shells report for a killed program and the number of the
+/// signal.
 const SIGNALLED: i32 = 128;
 
-/// Exit status after losing the terminal, as for SIGHUP.
+/// Exit status after the loss of the terminal, equal to that of SIGHUP.
 pub(super) const HUNG_UP: u8 = (SIGNALLED + SIGHUP) as u8;
 
-/// Meaning of a signal.
+/// Meaning of a signal for the event loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SignalEvent {
-    /// Terminate with this exit status: 129, 130 or 143.
+    /// The program is to end with this exit status: 129, 130 or 143.
     End(u8),
     /// The terminal may have a new size.
     Resized,
-    /// Stop until continued.
+    /// The program is to stop until it is continued (SIGTSTP).
     Stop,
-    /// Continue.
+    /// The program has been continued (SIGCONT).
     Continue,
 }
 
 /// Stream of signal events.
 pub(super) struct Signals {
-    /// Events in order.
+    /// Receiver of the events, in the order of the signals.
     pub events: Receiver<SignalEvent>,
     /// A terminating signal has arrived.
     ending: Arc<AtomicBool>,
@@ -58,14 +59,15 @@ pub(super) enum StopTarget {
     Group,
 }
 
-/// Registers handlers, which queue signals until [`watch`]. To be called before the terminal is
-/// taken, because a default handler would not restore it.
+/// Registers signal handlers, which queue signals until [`watch`] handles them. Must be called
+/// before the terminal enters raw mode, because the default handlers would end the program without
+/// restoring it.
 pub(super) fn block() -> io::Result<iterator::Signals> {
     iterator::Signals::new([SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])
 }
 
-/// Starts the thread that handles signals. If the program is still running `patience` after a
-/// terminating signal, the thread restores the terminal and exits.
+/// Starts the thread that handles signals. If the program is still running when `patience` has
+/// passed after a terminating signal, the thread restores the terminal and ends the program.
 pub(super) fn watch(
     mut signals: iterator::Signals,
     tty: Arc<Tty>,
@@ -82,7 +84,7 @@ pub(super) fn watch(
                 SIGCONT => SignalEvent::Continue,
                 _ => SignalEvent::End((SIGNALLED + signal) as u8),
             };
-            // At the end of the program the receiver is gone.
+            // Sending fails only at the end of the program, when the receiver is gone.
             let _ = sender.send(event);
             ending_flag.fetch_or(matches!(event, SignalEvent::End(_)), Ordering::Release);
             if let SignalEvent::End(status) = event {
@@ -95,9 +97,9 @@ pub(super) fn watch(
     Ok(Signals { events, ending })
 }
 
-/// Stops the processes; the stop may take effect with a delay. It has no effect without a shell
-/// that could continue them: the kernel ignores every stop signal but SIGSTOP for orphaned process
-/// groups. SIGTSTP has a handler here, so SIGTTIN is sent.
+/// Stops the processes of `target`, possibly with a delay. SIGTSTP has a handler in this program,
+/// so SIGTTIN is sent. Without a shell that could continue the processes nothing happens: the
+/// kernel ignores every stop signal but SIGSTOP for orphaned process groups.
 pub(super) fn stop(target: StopTarget) -> io::Result<()> {
     match target {
         StopTarget::Itself => kill_process(getpid(), Signal::TTIN)?,

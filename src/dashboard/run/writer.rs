@@ -1,4 +1,4 @@
-//! Thread that writes frames, so that a slow terminal does not block the dashboard.
+//! Thread that writes frames to the terminal, so that a slow terminal does not block the dashboard.
 
 use crate::terminal::Tty;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -9,25 +9,26 @@ use std::time::Instant;
 
 /// Result of writing a frame.
 pub struct Written {
-    /// Time of completion.
+    /// Time at which the write was completed.
     pub at: Instant,
     /// Result of the write.
     pub result: io::Result<()>,
-    /// Buffer for reuse.
+    /// Buffer of the frame, to be reused.
     buffer: Vec<u8>,
 }
 
-/// A thread that writes one frame at a time.
+/// Handle of the thread that writes one frame at a time.
 pub struct Writer {
     frames: Sender<Vec<u8>>,
     written: Receiver<Written>,
+    /// A frame is being written.
     in_flight: bool,
-    /// Empty buffer for the next frame.
+    /// Empty buffer, for reuse by the next frame.
     spare: Vec<u8>,
 }
 
 impl Writer {
-    /// Starts the thread.
+    /// Starts the thread, which writes to `tty`.
     pub fn new(tty: Arc<Tty>) -> io::Result<Self> {
         let (frames, inbox) = bounded::<Vec<u8>>(1);
         let (outbox, written) = bounded(1);
@@ -42,34 +43,38 @@ impl Writer {
         Ok(Self { frames, written, in_flight: false, spare: Vec::new() })
     }
 
-    /// Returns `true` if no frame is in flight.
+    /// Returns `true` if no frame is being written, so that another one can be sent.
     pub fn ready(&self) -> bool {
         !self.in_flight
     }
 
-    /// Returns an empty buffer.
+    /// Returns an empty buffer for the next frame.
     pub fn buffer(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.spare)
     }
 
-    /// Takes back an unused buffer.
+    /// Takes back an empty buffer that is not sent.
     pub fn keep(&mut self, buffer: Vec<u8>) {
         self.spare = buffer;
     }
 
-    /// Sends a frame. Requires [`Writer::ready`].
+    /// Passes a frame to the thread. Requires [`Writer::ready`].
     pub fn send(&mut self, frame: Vec<u8>) {
         debug_assert!(self.ready(), "one frame at a time");
-        // The thread ends only with this sender.
+        // Sending fails only after a panic of the thread.
         self.in_flight = self.frames.send(frame).is_ok();
     }
 
-    /// Receives the result of each frame; pass it to [`Writer::done`].
+    /// Returns the receiver of the results of writing frames. Each result must be passed to
+    /// [`Writer::done`].
     pub fn written(&self) -> &Receiver<Written> {
         &self.written
     }
 
-    /// Records that the frame was written; returns when.
+    /// Records that a frame was written. Returns the time at which the write was completed.
+    ///
+    /// # Errors
+    /// If the write failed.
     pub fn done(&mut self, written: Written) -> io::Result<Instant> {
         self.in_flight = false;
         self.spare = written.buffer;

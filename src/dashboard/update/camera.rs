@@ -1,4 +1,4 @@
-//! Camera movement by keys and mouse.
+//! Commands that move the camera, by keys and mouse.
 
 use crate::camera::Camera;
 use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
@@ -11,17 +11,19 @@ use crate::scene::edit::{
 const ORBIT_DEGREES: f64 = 5.0;
 /// Degrees per step of a look.
 const LOOK_DEGREES: f64 = 3.0;
-/// Step of a pan, as a fraction of the distance to the pivot.
+/// Step of a pan, as a fraction of the distance to the pivot, the point that the camera orbits.
 const PAN_SHARE: f64 = 0.05;
-/// Factors of the distance to the pivot per step of a dolly.
+/// Factor of the distance to the pivot for a coarse step of a dolly inwards.
 const DOLLY: f64 = 0.9;
+/// Factor of the distance to the pivot for a fine step of a dolly inwards.
 const DOLLY_FINE: f64 = 0.99;
-/// Factor of the view's width per step of the view angle.
+/// Factor of the visible width for a step to a narrower view angle.
 const ZOOM: f64 = 0.95;
 
-/// Returns the direction as components to the right and up.
-fn right_up(way: Direction) -> [f64; 2] {
-    match way {
+/// Returns the components of a direction: to the right and upwards. Both are 0 for the directions
+/// along the view.
+fn right_up(direction: Direction) -> [f64; 2] {
+    match direction {
         Direction::Left => [-1.0, 0.0],
         Direction::Right => [1.0, 0.0],
         Direction::Up => [0.0, 1.0],
@@ -31,7 +33,9 @@ fn right_up(way: Direction) -> [f64; 2] {
 }
 
 impl UpdateContext<'_> {
-    /// Replaces the camera. Consecutive moves of any kind are one undo step.
+    /// Replaces the camera by the result of `f`, whose arguments are the camera and the distance to
+    /// the pivot. Camera moves of all kinds have the same label, so consecutive ones can merge into
+    /// one undo step.
     pub(super) fn set_camera(&mut self, coalesce: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
         let scene = self.scene();
         let camera = f(&scene.camera, focus_distance(scene));
@@ -39,46 +43,46 @@ impl UpdateContext<'_> {
             return;
         }
         let next = Scene { camera, ..Scene::clone(scene) };
-        // A valid camera stays valid.
+        // Camera moves keep a valid camera valid, so the scene is not validated again.
         let edit =
             Edit { scene: next, subject: Target::Camera, label: "camera".to_string(), note: None };
         self.commit(Ok::<_, EditError>(edit), coalesce);
     }
 
-    pub(super) fn orbit(&mut self, way: Direction) {
-        let [right, up] = right_up(way).map(|x| x * ORBIT_DEGREES);
+    pub(super) fn orbit(&mut self, direction: Direction) {
+        let [right, up] = right_up(direction).map(|x| x * ORBIT_DEGREES);
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.orbit(right, up, distance));
     }
 
-    pub(super) fn pan(&mut self, way: Direction) {
-        let [right, up] = right_up(way).map(|x| x * PAN_SHARE);
+    pub(super) fn pan(&mut self, direction: Direction) {
+        let [right, up] = right_up(direction).map(|x| x * PAN_SHARE);
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.pan(right, up, distance));
     }
 
-    pub(super) fn dolly(&mut self, way: Direction, pace: StepSize) {
-        let nearer = match pace {
+    pub(super) fn dolly(&mut self, direction: Direction, step_size: StepSize) {
+        let nearer = match step_size {
             StepSize::Coarse => DOLLY,
             StepSize::Fine => DOLLY_FINE,
         };
-        let factor = if way == Direction::In { nearer } else { 1.0 / nearer };
+        let factor = if direction == Direction::In { nearer } else { 1.0 / nearer };
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
     }
 
-    /// Dollies by ticks of the wheel; positive ticks move in.
+    /// Dollies by `ticks` of the wheel. Positive ticks move nearer.
     pub(super) fn dolly_by_wheel(&mut self, ticks: i32) {
         let factor = DOLLY.powi(ticks.clamp(-50, 50));
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
     }
 
-    pub(super) fn look(&mut self, way: Direction) {
-        let [right, up] = right_up(way).map(|x| x * LOOK_DEGREES);
+    pub(super) fn look(&mut self, direction: Direction) {
+        let [right, up] = right_up(direction).map(|x| x * LOOK_DEGREES);
         self.set_camera(Coalesce::Repeat, |camera, _| camera.look(right, up));
     }
 
-    pub(super) fn fly(&mut self, way: Direction) {
+    pub(super) fn fly(&mut self, direction: Direction) {
         let step = 2.0 * step_length(self.scene());
-        let [right, up] = right_up(way).map(|x| x * step);
-        let ahead = match way {
+        let [right, up] = right_up(direction).map(|x| x * step);
+        let ahead = match direction {
             Direction::In => step,
             Direction::Out => -step,
             _ => 0.0,
@@ -86,24 +90,25 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Repeat, |camera, _| camera.fly([right, up, ahead]));
     }
 
-    pub(super) fn roll(&mut self, way: Direction) {
-        let degrees = right_up(way)[0] * ORBIT_DEGREES;
+    pub(super) fn roll(&mut self, direction: Direction) {
+        let degrees = right_up(direction)[0] * ORBIT_DEGREES;
         self.set_camera(Coalesce::Repeat, |camera, _| camera.roll(degrees));
     }
 
-    /// Widens the view angle by `steps`; negative steps narrow it.
+    /// Widens the view angle by `steps` steps. Negative steps narrow it.
     pub(super) fn view_angle(&mut self, steps: i32) {
         self.set_camera(Coalesce::Repeat, |camera, _| camera.zoom(ZOOM.powi(-steps)));
         let (key, degrees) = self.scene().camera.view_angle.key_degrees();
         self.say(format!("{key} view angle {degrees}°"));
     }
 
-    /// Frames the selection, or the scene if the selection has no extent.
+    /// Moves the camera such that the selection fills the picture, or the scene if the selection
+    /// has no bounds.
     pub(super) fn frame(&mut self) {
         let scene = self.scene();
         let ball = bounds(scene, &self.model.selection).unwrap_or_else(|| scene_bounds(scene));
         let [width, height] = scene.film.size.map(f64::from);
-        // A point light is framed with its surroundings.
+        // Bounds without extent get a radius that includes their surroundings.
         let radius = if ball.radius > 0.0 { ball.radius } else { 5.0 * step_length(scene) };
         self.set_camera(Coalesce::Single, |camera, _| {
             camera.framed(ball.center, radius, width / height)
@@ -128,8 +133,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Orbits by a drag of `right` and `down` half cells, such that the picture follows the mouse.
-    /// The picture's full width is half a turn.
+    /// Orbits by a drag of `right` and `down` half cells. The scene moves in the direction of the
+    /// drag. A drag across the full width of the picture is half a turn.
     pub(super) fn orbit_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(180.0);
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -137,8 +142,8 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Looks around by a drag of `right` and `down` half cells. The picture's full width is a
-    /// quarter turn.
+    /// Looks around by a drag of `right` and `down` half cells. A drag across the full width of the
+    /// picture is a quarter turn.
     pub(super) fn look_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(90.0);
         self.set_camera(Coalesce::Gesture, |camera, _| {
@@ -146,7 +151,8 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Pans by a drag, such that the point under the mouse follows it at the distance of the pivot.
+    /// Pans by a drag of `right` and `down` half cells. Points at the distance of the pivot stay
+    /// under the mouse.
     pub(super) fn pan_by_hand(&mut self, right: f64, down: f64) {
         let share = self.per_half_cell(2.0 * self.half_width());
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -154,14 +160,15 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Half the width of the picture at unit distance.
+    /// Returns half the visible width at distance 1.
     pub(super) fn half_width(&self) -> f64 {
         let scene = self.scene();
         let [width, height] = scene.film.size.map(f64::from);
         scene.camera.half_size(width / height)[0]
     }
 
-    /// Amount per half cell, if `across` is the amount for the picture's full width.
+    /// Returns the amount for a drag of one half cell, where `across` is the amount for a drag
+    /// across the full width of the picture.
     pub(super) fn per_half_cell(&self, across: f64) -> f64 {
         self.model.layout().map_or(0.0, |layout| across / layout.raster[0] as f64)
     }

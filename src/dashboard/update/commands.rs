@@ -1,6 +1,6 @@
-//! The command table: one row a command, with its keys, label, hints, availability and function.
+//! Command table: each row is a command with its keys, label, hints, availability and function.
 //!
-//! Key dispatch, hint line, help, palette and docs/keys.md read it.
+//! Key dispatch, hint line, help, palette and docs/keys.md are derived from the table.
 
 use crate::dashboard::key_context::KeyContext::{self, *};
 use crate::dashboard::message::{Effect, Format};
@@ -37,10 +37,10 @@ pub enum Chapter {
     Help,
 }
 
-/// Hint lines, of which the dashboard shows one at a time.
+/// State of the dashboard that selects the hints in the hint line, the last row of the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum HintLine {
-    /// Before the first key press.
+    /// No key has been pressed yet.
     First,
     /// The picture has the focus.
     Picture,
@@ -62,18 +62,19 @@ pub enum HintLine {
     Form,
     /// Text is being typed.
     Typing,
-    /// Help or inventory is open.
+    /// The help or the inventory is open.
     Reading,
 }
 
-/// A short description of a command and its neighbours in the table, for the hint line.
+/// Short description of a command for the hint line. It may stand for related commands as well,
+/// such as those of all arrow keys.
 #[derive(Clone, Copy, Debug)]
 pub struct Hint {
-    /// Hint lines that show it.
+    /// States in which the hint is shown.
     pub lines: &'static [HintLine],
-    /// Sorting key within a line.
+    /// Sorting key within the hint line.
     pub position: u8,
-    /// Keys as displayed: `PgUp PgDn`.
+    /// Keys as displayed, such as `PgUp PgDn`.
     pub keys: &'static str,
     /// Effect of the keys, in a word or two.
     pub text: &'static str,
@@ -86,17 +87,18 @@ pub struct Command {
     pub chapter: Chapter,
     /// Description in a few words, for help, palette and docs/keys.md. Unique.
     pub label: &'static str,
-    /// Names of keys, separated by spaces, per context. Empty: the palette alone runs the command.
+    /// Pairs of a context and the names of keys in it, separated by spaces. A command without keys
+    /// runs only from the palette.
     pub keys: &'static [(KeyContext, &'static str)],
-    /// Hints that stand for the command and its neighbours.
+    /// Hints for the command and related ones.
     pub hints: &'static [Hint],
-    /// The command does not need the value that is being typed to be applied first.
+    /// The command runs while a value is being typed. Before other commands the value is applied.
     pub(super) while_typing: bool,
-    /// The command also runs from the viewer of exported images, which any other key closes.
+    /// The command also runs in the viewer of exported images. Any other key closes the viewer.
     pub(super) over_image: bool,
-    /// Returns `true` if the model has what the command needs.
+    /// Returns `true` if the command can run on the model.
     pub(super) available: fn(&Model) -> bool,
-    /// Carries the command out.
+    /// Runs the command.
     pub(super) run: fn(&mut UpdateContext<'_>),
 }
 
@@ -127,11 +129,13 @@ const fn hint(
     Hint { lines, position, keys, text }
 }
 
+/// Returns `true` if there is a scene: the scene file is or was readable.
 fn with_scene(model: &Model) -> bool {
     !model.file.unreadable
 }
 
-/// Palettes and questions are answered even without a scene.
+/// Returns `true` if there is a scene, or if a palette or question is open, which are answered even
+/// without a scene.
 fn with_scene_or_choice(model: &Model) -> bool {
     with_scene(model) || matches!(model.overlay, Some(Overlay::Palette(_) | Overlay::Question(_)))
 }
@@ -141,7 +145,7 @@ fn always(_: &Model) -> bool {
 }
 
 /// Every command, in the order of the help.
-#[rustfmt::skip] // A table reads best with one row a line.
+#[rustfmt::skip] // One line per row keeps the table readable.
 pub static COMMANDS: &[Command] = &[
     command(C::Camera, "orbit left", &[(Picture, "Left")], |c| c.orbit(Left)).hints(&[hint(&[H::First], 1, "arrows", "turn"), hint(&[H::Picture], 1, "arrows", "orbit")]),
     command(C::Camera, "orbit right", &[(Picture, "Right")], |c| c.orbit(Right)),
@@ -321,12 +325,12 @@ impl Chapter {
         (Self::Help, "help"),
     ];
 
-    /// Heading of the chapter.
+    /// Returns the heading of the chapter.
     pub fn title(self) -> &'static str {
         Self::ALL[self as usize].1
     }
 
-    /// Commands of the chapter, in the order of the table.
+    /// Returns the commands of the chapter, in the order of the table.
     pub fn commands(self) -> impl Iterator<Item = &'static Command> {
         COMMANDS.iter().filter(move |command| command.chapter == self)
     }
@@ -349,8 +353,8 @@ impl Command {
         Self { over_image: true, ..self }
     }
 
-    /// All keys of the command with their contexts, each key formatted by `key`:
-    /// `Left in the picture`, `U Ctrl-r`.
+    /// Returns all keys of the command with their contexts, such as `Left in the picture` or
+    /// `U Ctrl-r`. `key` formats each key.
     pub fn all_keys(&self, key: impl Fn(&str) -> String) -> String {
         let in_context = |(context, names): &(KeyContext, &'static str)| {
             let keys: Vec<_> = names.split(' ').map(&key).collect();
@@ -360,14 +364,15 @@ impl Command {
     }
 }
 
-/// Returns the command that `key` runs in `context`.
+/// Returns the command that `key` runs in `context`. Returns `None` if the key has no command
+/// there.
 pub fn lookup(context: KeyContext, key: Key) -> Option<&'static Command> {
     static KEYMAP: OnceLock<HashMap<(KeyContext, Key), &'static Command>> = OnceLock::new();
     let keymap = KEYMAP.get_or_init(|| {
         let mut keymap = HashMap::new();
         for command in COMMANDS {
             for (context, names) in command.keys {
-                // A test of the table finds names that are not keys.
+                // Invalid names of keys are skipped here; a test of the table rejects them.
                 let keys = names.split(' ').filter_map(|name| name.parse().ok());
                 keymap.extend(keys.map(|key| ((*context, key), command)));
             }

@@ -1,4 +1,5 @@
-//! Display of the picture: exposure, tone curve, channel, probe, A/B comparison.
+//! Commands on the display of the picture: exposure, tone curve, channel, probe, comparison with a
+//! pinned picture.
 
 use crate::dashboard::message::{DisplayChannel, Effect};
 use crate::dashboard::model::{CompareView, Mode};
@@ -6,9 +7,9 @@ use crate::dashboard::update::{Direction, StepSize, UpdateContext, cycled};
 use crate::film::{LinearImage, Tone};
 use std::sync::Arc;
 
-/// Stops per step.
+/// Change of exposure per step, in stops.
 const EXPOSURE_STEP: f64 = 0.25;
-/// Limit of the exposure in stops; beyond it the picture is white or black.
+/// Limit of the exposure in stops, positive or negative. Beyond it any picture is white or black.
 const MOST_EXPOSURE: f64 = 20.0;
 
 impl UpdateContext<'_> {
@@ -64,20 +65,20 @@ impl UpdateContext<'_> {
         self.emit(Effect::Probe(pixel));
     }
 
-    /// Moves the probe by a cell of the picture (coarse) or a pixel of the film (fine).
-    pub(super) fn move_probe(&mut self, way: Direction, pace: StepSize) {
+    /// Moves the probe by about a cell of the picture (coarse) or a pixel of the film (fine).
+    pub(super) fn move_probe(&mut self, direction: Direction, step_size: StepSize) {
         let Some([x, y]) = self.model.probe else {
             self.toggle_probe();
             return;
         };
         let film = self.scene().film.size.map(|n| n as usize);
-        let step = match (pace, self.model.layout()) {
+        let step = match (step_size, self.model.layout()) {
             (StepSize::Coarse, Some(layout)) => {
                 [(film[0] / layout.raster[0]).max(1), (2 * film[1] / layout.raster[1]).max(1)]
             }
             _ => [1, 1],
         };
-        let to = match way {
+        let to = match direction {
             Direction::Left => [x.saturating_sub(step[0]), y],
             Direction::Right => [x + step[0], y],
             Direction::Up => [x, y.saturating_sub(step[1])],
@@ -96,7 +97,7 @@ impl UpdateContext<'_> {
         self.say(format!("pinned at {spp:.0} spp · c flips · C shows the difference"));
     }
 
-    /// Toggles between the live picture and `what`.
+    /// Toggles between the live picture and the view `what`.
     pub(super) fn compare(&mut self, what: CompareView) {
         if self.model.comparison.pinned.is_none() {
             self.say("No picture is pinned yet · k pins one");

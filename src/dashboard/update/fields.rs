@@ -1,4 +1,4 @@
-//! Fields of the inspector and of forms: moving, stepping, typing.
+//! Commands on the fields of inspector and forms: moving the cursor, stepping and typing values.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::Focus;
@@ -37,19 +37,21 @@ impl UpdateContext<'_> {
         self.set_cursor(walk_fields(&lines, self.cursor(), steps));
     }
 
-    /// Field under the cursor.
+    /// Returns the field under the cursor. Returns `None` if there is none.
     pub(super) fn field(&self) -> Option<FieldLine> {
         self.model.field_lines().get(self.cursor())?.field().cloned()
     }
 
-    /// Property of the field, with all of its words and numbers.
+    /// Returns the property of the scene that a field belongs to. A property that is a list of
+    /// numbers has one field for each number.
     fn row(&self, field: &FieldLine) -> Option<Property> {
         let rows = edit::rows(self.scene(), &field.subject).ok()?;
         rows.into_iter().find(|row| row.key == field.key)
     }
 
-    /// Opens the editor of the field under the cursor with its value, or with `typed` alone.
-    /// Toggles a switch; opens the list of a choice.
+    /// Opens a text editor for the field under the cursor. The editor contains `typed`, or the
+    /// field's value if `typed` is `None`. A switch is toggled instead, and a choice opens its
+    /// list.
     pub(super) fn open_field(&mut self, typed: Option<char>) {
         let Some(field) = self.field() else { return };
         let words = self.row(&field).map(|row| row.words).unwrap_or_default();
@@ -80,8 +82,8 @@ impl UpdateContext<'_> {
         matches!(self.model.overlay, Some(Overlay::Form(_)))
     }
 
-    /// Applies the typed value. Returns `true` if the editor has closed; on an error it stays open
-    /// and shows the reason.
+    /// Applies the typed value and closes the editor. Returns `true` if the editor is closed. If
+    /// the value is invalid, the editor stays open with the reason, and the result is `false`.
     pub(super) fn apply_field(&mut self) -> bool {
         let Some(field) = self.field() else {
             self.set_editor(None);
@@ -109,7 +111,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Sets a field. The text for a component may also be the whole list, or a colour in hex.
+    /// Returns the edit that sets a field to `text`. If the field is one number of a list, `text`
+    /// may also be the whole list, or a colour in hexadecimal digits.
     fn set_field(&self, field: &FieldLine, text: &str) -> Result<Edit, EditError> {
         let scene = self.scene();
         let whole = text.contains(['#', ',', ';', ' ', '[']);
@@ -143,7 +146,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Sets the value that was chosen from a list.
+    /// Sets `key` of `subject` to the value `word`, which was chosen from a list.
     pub(super) fn set_word(&mut self, subject: &edit::Target, key: &str, word: &str) {
         let edit = edit::set(self.scene(), subject, key, word);
         self.commit(edit, Coalesce::Single);

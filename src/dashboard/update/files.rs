@@ -1,4 +1,4 @@
-//! Undo, saving, reloading, quitting, and results of exports.
+//! Commands on undo, saving, reloading and quitting, and results of saves, loads and exports.
 
 use crate::dashboard::message::{Effect, Exported};
 use crate::dashboard::model::{Tone, short_name};
@@ -51,7 +51,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Requests that the scene is written.
+    /// Requests a write of the scene to the scene file, or to `path`, which becomes the scene file.
+    /// `overwrite` allows the replacement of content from other programs.
     pub(super) fn write(&mut self, path: Option<PathBuf>, overwrite: bool) {
         let scene = Arc::clone(self.model.history.scene());
         self.emit(Effect::Save { scene, path, overwrite });
@@ -67,7 +68,7 @@ impl UpdateContext<'_> {
                 self.model.history.mark_saved(scene);
                 self.model.last_edit = None;
                 self.notify(Tone::Good, format!("saved {}", self.model.file.name), Some(3.0));
-                // Edits made during the write keep the program running.
+                // The program does not quit if the scene was edited during the write.
                 if std::mem::take(&mut self.model.quit_when_saved) && !self.model.is_unsaved() {
                     self.emit(Effect::Quit);
                 }
@@ -120,7 +121,7 @@ impl UpdateContext<'_> {
     pub(super) fn loaded(&mut self, result: Result<Arc<Scene>, SceneErrors>) {
         match result {
             Ok(scene) => {
-                // Indices may have changed: the selection is found by name.
+                // Indices may have changed, so the selection is restored by name.
                 let title = self.model.selection.title(self.model.history.scene());
                 self.model.overlay = None;
                 self.end_mode();
@@ -172,7 +173,7 @@ impl UpdateContext<'_> {
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
             Ok(Exported { path, size: [width, height], spp, noise_codes, scp }) => {
-                // The export render of this size has finished.
+                // A finished export of this size is the one that was running.
                 if self.model.export.is_some_and(|e| e.size.map(|n| n as usize) == [width, height])
                 {
                     self.model.export = None;

@@ -1,11 +1,12 @@
-//! Focus and modes: which panel and which part of the scene the keys act on.
+//! Focus and modes, which determine the panel and the part of the scene that the keys act on.
 
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{CompareView, Inspector, Mode};
 use crate::dashboard::update::{UpdateContext, cycled};
 
 impl UpdateContext<'_> {
-    /// Enters a mode and gives the focus to the picture.
+    /// Enters a mode and gives the focus to the picture. Does nothing if the selection cannot be
+    /// moved or turned as the mode requires.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
         let movable = match mode {
             Mode::Move => self.check_movable(),
@@ -19,7 +20,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Leaves the innermost of: editor, overlay, mode, panel, full screen, comparison.
+    /// Leaves the first of these that is active: overlay, text editor, mode, panel, full screen,
+    /// comparison.
     pub(super) fn leave(&mut self) {
         if self.model.overlay.is_some() {
             self.close_overlay();
@@ -37,7 +39,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Ends the mode: the picture's keys control the camera again.
+    /// Returns to the default mode, in which the keys orbit the camera.
     pub(super) fn end_mode(&mut self) {
         self.end_gesture();
         if self.model.mode == Mode::Probe {

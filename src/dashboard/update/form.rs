@@ -1,4 +1,5 @@
-//! New objects and lights: a kind from a list, then a form with a preview in the picture.
+//! Creation of objects and lights: the user picks a kind from a list, then fills in a form. The
+//! picture previews the new object or light.
 
 use crate::dashboard::overlay::{Form, Overlay, Pick, PickFor};
 use crate::dashboard::update::{Coalesce, UpdateContext};
@@ -50,12 +51,12 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Adds the new object or light to the scene, as one undo step.
+    /// Adds the new object or light of the form to the scene, as one undo step.
     pub(super) fn confirm_form(&mut self) {
         let Some(Overlay::Form(form)) = self.model.overlay.take() else { return };
         let base = Arc::clone(self.model.history.scene());
         let mut scene = form.scene;
-        // Materials that were created for the form but are unused.
+        // Materials that were created for the form but that no object uses are not kept.
         let unused: Vec<_> = scene
             .materials
             .keys()
@@ -74,7 +75,7 @@ impl UpdateContext<'_> {
         self.say(format!("{label} added · m moves it · r turns it · u undoes"));
     }
 
-    /// Restores the scene and selection from before the form.
+    /// Closes the form and restores the scene and the selection from before it was opened.
     pub(super) fn cancel_form(&mut self) {
         if let Some(Overlay::Form(form)) = self.model.overlay.take() {
             self.select(form.before);

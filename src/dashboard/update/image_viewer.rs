@@ -1,4 +1,4 @@
-//! Viewer of exported images.
+//! Commands and messages of the viewer of exported images.
 
 use crate::dashboard::message::Effect;
 use crate::dashboard::model::short_name;
@@ -26,20 +26,21 @@ impl UpdateContext<'_> {
         self.repaint();
     }
 
-    /// Prepares the viewed image again for a new screen size.
+    /// Requests the viewed image again for a new screen size.
     pub(super) fn refit_image(&mut self) {
         if let Some(Overlay::ViewerImage(viewed)) = &self.model.overlay {
             self.view_image(viewed.path.clone());
         }
     }
 
-    /// Returns to the panels.
+    /// Closes the viewer and shows the panels again.
     pub(super) fn close_viewer(&mut self) {
         self.model.overlay = None;
         self.repaint();
     }
 
-    /// Shows an image that has been prepared, or reports why it has not.
+    /// Shows the image that was prepared for the viewer, or reports why it cannot be shown. Ignores
+    /// results for another path or screen size.
     pub(super) fn image_ready(&mut self, path: &Path, result: Result<Arc<ViewerImage>, String>) {
         let screen = self.model.screen;
         let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay else { return };
@@ -51,7 +52,7 @@ impl UpdateContext<'_> {
                 viewed.image = Some(image);
                 self.repaint();
             }
-            // Prepared for the previous screen size.
+            // The image was prepared for the previous screen size.
             Ok(_) => {}
             Err(why) => {
                 let name = short_name(path);

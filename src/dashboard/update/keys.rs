@@ -1,4 +1,4 @@
-//! Key dispatch: first to an open text editor, then through the command table.
+//! Key dispatch: an open text editor gets a key first, the command table second.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::key_context::KeyContext;
@@ -8,7 +8,7 @@ use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{Command, lookup};
 use crate::terminal::event::{Code, Key};
 
-/// Returns the character that a key types, if any.
+/// Returns the character that a key types. Returns `None` for other keys.
 fn typed(key: Key) -> Option<char> {
     match key {
         Key { code: Code::Char(c), ctrl: false, alt: false, .. } => Some(c),
@@ -17,7 +17,7 @@ fn typed(key: Key) -> Option<char> {
 }
 
 impl Model {
-    /// Text editor that takes the keys, if one is open.
+    /// Returns the text editor that receives the keys. Returns `None` if none is open.
     pub(super) fn editor_mut(&mut self) -> Option<&mut Editor> {
         match &mut self.overlay {
             Some(Overlay::Palette(palette)) => Some(&mut palette.editor),
@@ -59,7 +59,8 @@ impl UpdateContext<'_> {
             }
             return;
         };
-        // A value being typed is applied before another command runs; an invalid one blocks it.
+        // A value that is being typed is applied before another command runs. An invalid value
+        // prevents the command.
         if self.model.overlay.is_none()
             && self.model.inspector.editor.is_some()
             && !command.while_typing
@@ -71,7 +72,7 @@ impl UpdateContext<'_> {
         self.run(command);
     }
 
-    /// Carries out a command, or refuses it if the model does not have what it needs.
+    /// Runs a command, or reports that the command needs a scene if there is none.
     pub(super) fn run(&mut self, command: &Command) {
         if (command.available)(self.model) {
             (command.run)(self);
@@ -80,7 +81,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Inserts pasted text into the open text editor; elsewhere it would run commands.
+    /// Inserts pasted text into the open text editor. Without an editor the text is ignored,
+    /// because as keys it would run commands.
     pub(super) fn paste(&mut self, text: &str) {
         self.model.first_time = false;
         match self.model.editor_mut() {
@@ -92,14 +94,15 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Updates what depends on the text being typed.
+    /// Updates the results that depend on the text being typed: the commands in the palette.
     fn text_changed(&mut self) {
         if let Some(Overlay::Palette(_)) = self.model.overlay {
             self.search();
         }
     }
 
-    /// Applies a character to a list, form or question. Returns `true` if an overlay has taken it.
+    /// Applies a typed character to the open list, form or question. Returns `true` if an overlay
+    /// is open, so that the character runs no command.
     fn typed_in_overlay(&mut self, c: char) -> bool {
         match &self.model.overlay {
             Some(Overlay::Question(question)) => {

@@ -17,7 +17,8 @@ fn moved(cursor: usize, steps: isize, len: usize) -> usize {
 }
 
 impl UpdateContext<'_> {
-    /// Moves the active cursor by `steps` lines.
+    /// Moves the cursor of the open overlay by `steps` lines, or scrolls an overlay that has no
+    /// cursor. Without an overlay, moves the cursor of the focused panel.
     pub(super) fn move_cursor(&mut self, steps: isize) {
         let list = self.model.overlay_layout().map(|layout| layout.list);
         let (width, rows) = list.map_or((1, 1), |list| (list.width, usize::from(list.height)));
@@ -48,10 +49,10 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Moves the cursor by `pages`; a page is one line less than the visible rows.
+    /// Moves the cursor by `pages`. The height of a page is the number of visible rows less one.
     pub(super) fn page(&mut self, pages: isize) {
         let rows = match (self.model.overlay_layout(), self.model.focus) {
-            (Some(place), _) => place.list.height,
+            (Some(layout), _) => layout.list.height,
             (None, Focus::Outline) => self.model.outline_rows().map_or(1, |rows| rows.height),
             (None, _) => self.model.inspector_rows().map_or(1, |(rows, _)| rows.height),
         };
@@ -73,7 +74,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens or confirms the item under the cursor.
+    /// Opens or confirms the entry under the cursor.
     pub(super) fn open(&mut self) {
         match &self.model.overlay {
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
@@ -120,7 +121,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Cancels the editor of a form, or else the overlay.
+    /// Closes the text editor of a form if one is open, otherwise cancels the overlay.
     pub(super) fn close_overlay(&mut self) {
         match &mut self.model.overlay {
             Some(Overlay::Form(form)) if form.editor.is_some() => form.editor = None,
@@ -145,7 +146,7 @@ impl UpdateContext<'_> {
         }));
     }
 
-    /// Finds the commands that match the palette's text, best first.
+    /// Updates the palette's list to the commands that match its text, best match first.
     pub(super) fn search(&mut self) {
         let Some(Overlay::Palette(palette)) = &mut self.model.overlay else { return };
         let text = palette.editor.text();
@@ -161,14 +162,14 @@ impl UpdateContext<'_> {
                 Some((score, i))
             })
             .collect();
-        // Ties are in the order of the table.
+        // Commands with equal scores stay in the order of the table.
         found.sort_by_key(|(score, i)| (std::cmp::Reverse(*score), *i));
         palette.found = found.into_iter().map(|(_, i)| i).collect();
         palette.cursor = 0;
         palette.scroll = 0;
     }
 
-    /// Moves to the next entry of a list that begins with this letter.
+    /// Moves the cursor of a list to the next entry that starts with the letter `c`, cyclically.
     pub(super) fn jump_to(&mut self, c: char) {
         let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
         let begins = |i: &usize| {
@@ -181,7 +182,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Asks a question. `Esc` changes nothing.
+    /// Opens a question with `answers`: letter, text and effect of each. `Esc` closes the question
+    /// without an answer.
     pub(super) fn ask(&mut self, text: String, answers: &[(char, &str, Answer)]) {
         let answers =
             answers.iter().map(|(c, words, answer)| (*c, words.to_string(), answer.clone()));
@@ -189,6 +191,7 @@ impl UpdateContext<'_> {
         self.model.overlay = Some(Overlay::Question(question));
     }
 
+    /// Closes the question and carries out the answer with index `at`.
     pub(super) fn answer(&mut self, at: usize) {
         let Some(Overlay::Question(question)) = &self.model.overlay else { return };
         let Some((_, _, answer)) = question.answers.get(at).cloned() else { return };

@@ -1,4 +1,4 @@
-//! Commands on the mirror.
+//! Commands on the mirror: the reflecting material of the selection, otherwise of the scene.
 
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::edit::{self, Edit, EditError, Target};
@@ -20,7 +20,7 @@ impl UpdateContext<'_> {
         self.commit_mirror(edit, Coalesce::Single);
     }
 
-    /// Commits the edit and reports the mirror's new values.
+    /// Commits an edit of a mirror and reports the new values of its material.
     fn commit_mirror(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         self.commit(edit, coalesce);

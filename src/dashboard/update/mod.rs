@@ -1,5 +1,5 @@
-//! State transitions: a message changes the model and returns effects. No access to clock, files or
-//! terminal.
+//! State transitions: [`update`] changes the model by a message and returns effects. It has no
+//! access to clock, files or terminal.
 
 mod camera;
 pub mod commands;
@@ -34,8 +34,8 @@ use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Repeated keys within this time are one undo step. Longer than the delay before a held key
-/// repeats.
+/// Maximum time between edits by repeated keys that form one undo step. It is longer than the delay
+/// before a held key starts to repeat.
 const REPEAT_WINDOW: Duration = Duration::from_millis(700);
 
 /// Returns the initial effects of a new model.
@@ -49,8 +49,8 @@ pub fn begin(model: &mut Model) -> Vec<Effect> {
     context.effects
 }
 
-/// Updates the model with a message at time `now`, measured from any fixed origin, and returns the
-/// effects.
+/// Updates the model with a message and returns the effects. `now` is the current time since any
+/// fixed origin.
 pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
     let mut context = UpdateContext::new(model, now);
     context.expire_notice();
@@ -59,18 +59,19 @@ pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect>
     context.effects
 }
 
-/// Context of one update.
+/// Context of one call of [`update`].
 struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
-    /// Lists scroll to keep their cursor visible.
+    /// Outline and inspector scroll to keep their cursor visible. `false` after updates that must
+    /// not undo scrolling by the user.
     follow: bool,
-    /// The character that ran the current command, if one did.
+    /// Character of the key that ran the current command, if the key types one.
     typed: Option<char>,
 }
 
-/// A direction on the screen or along the view.
+/// Direction of a command on the screen or along the view direction.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Direction {
     Left,
@@ -83,21 +84,21 @@ enum Direction {
     Out,
 }
 
-/// Size of a step.
+/// Size of a step of a command.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum StepSize {
     Coarse,
     Fine,
 }
 
-/// Coalescing of an edit with the previous undo step.
+/// Rule for merging an edit with the previous one into one undo step.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Coalesce {
-    /// None.
+    /// The edit is a separate undo step.
     Single,
-    /// With recent edits of the same label.
+    /// The edit is merged with an edit of the same label at most [`REPEAT_WINDOW`] before.
     Repeat,
-    /// With edits of the same label until the gesture (a drag or mode) ends.
+    /// The edit is merged with edits of the same label until the gesture (a drag or mode) ends.
     Gesture,
 }
 
@@ -130,7 +131,7 @@ impl<'a> UpdateContext<'a> {
             Message::Saved(scene, result) => self.saved(scene, result),
             Message::Loaded(result) => self.loaded(*result),
             Message::ChangedOnDisk => self.changed_on_disk(),
-            Message::OrphanedEdits(left) => self.orphaned_edits(left),
+            Message::OrphanedEdits(edits) => self.orphaned_edits(edits),
             Message::Warning(text) => {
                 self.follow = false;
                 self.notify(Tone::Bad, capital(&text), None);
@@ -149,15 +150,16 @@ impl<'a> UpdateContext<'a> {
                     viewed.sent = sent;
                 }
             }
-            Message::LinkStatus(line) => {
+            Message::LinkStatus(link) => {
                 self.follow = false;
-                self.model.link = line;
+                self.model.link = link;
             }
             Message::Tick => self.follow = false,
         }
     }
 
-    /// Adds an effect. It replaces an earlier one of its kind, except for writes to files.
+    /// Adds an effect. The effect replaces an earlier one of the same kind, unless it saves or
+    /// exports.
     fn emit(&mut self, effect: Effect) {
         if !matches!(effect, Effect::Save { .. } | Effect::Export(_) | Effect::ExportSized { .. }) {
             self.effects.retain(|e| discriminant(e) != discriminant(&effect));
@@ -170,7 +172,7 @@ impl<'a> UpdateContext<'a> {
         self.model.picture_version += 1;
     }
 
-    /// Requests that the current scene is rendered.
+    /// Requests a render of the current scene.
     fn show(&mut self) {
         let scene = Arc::clone(self.model.scene());
         self.emit(Effect::Show(scene));
@@ -192,6 +194,8 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
+    /// Makes the scene of `edit` the current one, in the open form or else in the undo history.
+    /// Returns `true` if the scene has changed.
     fn record(&mut self, edit: Edit, coalesce: Coalesce) -> bool {
         if let Some(note) = &edit.note {
             self.say(note.clone());
@@ -224,13 +228,13 @@ impl<'a> UpdateContext<'a> {
         changed
     }
 
-    /// Ends coalescing: the next edit is an undo step of its own.
+    /// Ends the merging of edits, so that the next edit starts a new undo step.
     fn end_gesture(&mut self) {
         self.model.history.end_gesture();
         self.model.last_edit = None;
     }
 
-    /// Commits an edit and selects its target.
+    /// Commits an edit and selects its target. Returns `true` if the scene has changed.
     fn commit_and_select(&mut self, edit: Result<Edit, EditError>) -> bool {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         let changed = self.commit(edit, Coalesce::Single);
@@ -247,7 +251,8 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Shows a notice for at least `seconds`, longer for long texts; `None` until the next key.
+    /// Shows a notice for at least `seconds`, and for longer if the text is long. `None` shows
+    /// the notice until the next key.
     fn notify(&mut self, tone: Tone, text: impl Into<String>, seconds: Option<f64>) {
         let text = sanitized(&text.into());
         let until = seconds.map(|seconds| {
@@ -277,8 +282,8 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Restores the model's invariants: the selection exists, cursors are in range and visible, and
-    /// the renderer knows the raster.
+    /// Restores the model's invariants: the selection exists in the scene, cursors are in range and
+    /// visible, and the renderer has the current raster size.
     fn normalize(&mut self) {
         if !self.model.selection.exists(self.model.scene()) {
             let last = |len: usize, of: fn(usize) -> Target| len.checked_sub(1).map(of);
@@ -300,13 +305,14 @@ impl<'a> UpdateContext<'a> {
         self.autosave();
     }
 
+    /// Limits cursors and scroll positions of outline, inspector and form to the existing lines.
     fn normalize_panels(&mut self) {
         let lines = self.model.field_lines();
         let follow = self.follow;
-        let place = self.model.overlay_layout();
+        let overlay_layout = self.model.overlay_layout();
         let inspector_rows = self.model.inspector_rows();
         if let Some(Overlay::Form(form)) = &mut self.model.overlay {
-            let rows = place.map_or(0, |place| place.list.height);
+            let rows = overlay_layout.map_or(0, |layout| layout.list.height);
             normalize_cursor(&mut form.cursor, &mut form.scroll, &lines, rows, follow);
             return;
         }
@@ -324,13 +330,15 @@ impl<'a> UpdateContext<'a> {
     }
 }
 
-/// Returns the item `by` places after the current one, cyclically; the first item counts as current
-/// if none is.
+/// Returns the item `by` positions after the current one, cyclically. If no item is current, counts
+/// from the first.
 fn cycled<T>(items: &[T], is_current: impl Fn(&T) -> bool, by: isize) -> &T {
     let position = items.iter().position(is_current).unwrap_or(0) as isize;
     &items[(position + by).rem_euclid(items.len() as isize) as usize]
 }
 
+/// Moves `cursor` to the nearest field of `lines` and limits `scroll` to the list. If `follow` is
+/// `true`, scrolls to make the cursor visible in `rows` rows.
 fn normalize_cursor(
     cursor: &mut usize,
     scroll: &mut usize,

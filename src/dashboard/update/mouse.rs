@@ -1,4 +1,4 @@
-//! Mouse: clicks select, drags orbit or move, the wheel dollies.
+//! Mouse handling: clicks select, drags orbit or move, the wheel dollies or scrolls.
 
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{Drag, Mode};
@@ -14,7 +14,8 @@ use glam::DVec3;
 /// Lines per tick of the wheel.
 const WHEEL_LINES: i32 = 3;
 
-/// Returns the line of a list at a cell.
+/// Returns the index of the list line under the mouse. `rows` is the list's area, `scroll` its
+/// first visible line. Returns `None` if the mouse is outside the area.
 fn line_at(rows: Area, scroll: usize, mouse: Mouse) -> Option<usize> {
     let inside = rows.contains(mouse.column, mouse.row);
     inside.then(|| usize::from(mouse.row - rows.y) + scroll)
@@ -67,7 +68,7 @@ impl UpdateContext<'_> {
     }
 
     fn press_in_outline(&mut self, rows: Area, mouse: Mouse) {
-        // The rows are from before the focus change, which may unfold the panel.
+        // `rows` is the layout before the focus change, which may unfold the panel.
         let lines = outline(self.scene());
         let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
         let subject = line.and_then(|line| match line {
@@ -98,13 +99,14 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens the clicked line if the cursor is on it, otherwise moves the cursor there.
+    /// Opens the clicked line if the cursor is already on it, otherwise moves the cursor to the
+    /// line.
     fn press_in_overlay(&mut self, mouse: Mouse) {
-        let Some(place) = self.model.overlay_layout() else { return };
+        let Some(layout) = self.model.overlay_layout() else { return };
         match &self.model.overlay {
             Some(Overlay::Form(form)) => {
                 let (cursor, typing) = (form.cursor, form.editor.is_some());
-                let line = line_at(place.list, form.scroll, mouse);
+                let line = line_at(layout.list, form.scroll, mouse);
                 let lines = self.model.field_lines();
                 match line.filter(|i| lines.get(*i).and_then(PanelLine::field).is_some()) {
                     Some(line) if line == cursor && !typing => self.open_field(None),
@@ -119,7 +121,7 @@ impl UpdateContext<'_> {
         let list = self.model.overlay.as_mut().and_then(Overlay::list);
         let Some((&mut cursor, scroll, len)) = list else { return };
         let scroll = scroll.map_or(0, |scroll| *scroll);
-        if let Some(line) = line_at(place.list, scroll, mouse).filter(|line| *line < len) {
+        if let Some(line) = line_at(layout.list, scroll, mouse).filter(|line| *line < len) {
             match line == cursor {
                 true => self.open(),
                 false => self.move_cursor(line as isize - cursor as isize),
@@ -163,7 +165,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Returns `true` in modes whose edits form one undo step until the mode ends.
+    /// Returns `true` in the modes Move and Rotate. All edits of the same label in such a mode form
+    /// one undo step.
     fn moves_or_turns(&self) -> bool {
         matches!(self.model.mode, Mode::Move | Mode::Rotate)
     }
@@ -235,7 +238,8 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns the object at the centre of a film pixel.
+/// Returns the index of the object that is visible at the centre of a film pixel (column, row).
+/// Returns `None` if the camera ray hits no object.
 fn seen_at(scene: &Scene, [x, y]: [usize; 2]) -> Option<usize> {
     let camera = &scene.camera;
     let [width, height] = scene.film.size.map(f64::from);

@@ -5,10 +5,11 @@ use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
 use crate::scene::edit::{self, bounds, step_length};
 use glam::{DVec2, DVec3};
 
-/// Degrees per step.
+/// Degrees per step of a rotation.
 const TURN_DEGREES: f64 = 15.0;
 const TURN_DEGREES_FINE: f64 = 1.0;
-/// Limit of the distance of a drag in depth relative to one across, at grazing view angles.
+/// Maximum of the factor that lengthens the depth component of a drag because the ground plane is
+/// foreshortened. At grazing view angles the exact factor, 1 / sin of the angle, has no bound.
 const MOST_STRETCH: f64 = 4.0;
 
 /// Returns the coordinate axis in the ground plane that is nearest to `v`.
@@ -17,12 +18,12 @@ fn nearest_axis(v: DVec3) -> DVec3 {
 }
 
 impl UpdateContext<'_> {
-    /// Ground axes that point right and away in the picture. They are coordinate axes, so
-    /// coordinates stay round.
+    /// Returns the coordinate axes in the ground plane that point most nearly right and away in the
+    /// picture. Steps along coordinate axes keep round coordinates round.
     fn ground_axes(&self) -> [DVec3; 2] {
         let [right, _, _] = self.scene().camera.frame();
         let right = nearest_axis(right);
-        // Direction of view of an upright observer with `right` on the right.
+        // View direction of an upright observer whose right-hand side is `right`.
         [right, DVec3::Y.cross(right)]
     }
 
@@ -36,12 +37,12 @@ impl UpdateContext<'_> {
         tried.map_err(|error| self.refuse(&error.to_string())).is_ok()
     }
 
-    pub(super) fn move_selection(&mut self, way: Direction, pace: StepSize) {
+    pub(super) fn move_selection(&mut self, direction: Direction, step_size: StepSize) {
         let coarse = step_length(self.scene());
-        let step = if pace == StepSize::Fine { 0.1 * coarse } else { coarse };
+        let step = if step_size == StepSize::Fine { 0.1 * coarse } else { coarse };
         let [right, away] = self.ground_axes();
         let by = step
-            * match way {
+            * match direction {
                 Direction::Left => -right,
                 Direction::Right => right,
                 Direction::In => away,
@@ -57,14 +58,16 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    /// Coalescing of a step: the whole gesture in a mode or drag, otherwise recent steps.
+    /// Returns the rule for merging a step into an undo step: with the whole gesture in a mode or
+    /// drag, otherwise with recent steps.
     fn gesture(&self) -> Coalesce {
         let in_mode = matches!(self.model.mode, Mode::Move | Mode::Rotate);
         if in_mode || self.model.drag.is_some() { Coalesce::Gesture } else { Coalesce::Repeat }
     }
 
-    /// Moves the selection by a drag of `right` and `down` half cells in the ground plane, or
-    /// vertically if `upright`. The selection follows the mouse where possible.
+    /// Moves the selection by a drag of `right` and `down` half cells. It moves vertically if
+    /// `upright` is `true`, otherwise in the ground plane. The selection stays under the mouse as
+    /// far as [`MOST_STRETCH`] allows.
     pub(super) fn move_by_hand(&mut self, right: f64, down: f64, upright: bool) {
         let scene = self.scene();
         let [x, _, forward] = scene.camera.frame();
@@ -88,10 +91,10 @@ impl UpdateContext<'_> {
         self.move_by(by);
     }
 
-    pub(super) fn turn_selection(&mut self, way: Direction, pace: StepSize) {
-        let degrees = if pace == StepSize::Fine { TURN_DEGREES_FINE } else { TURN_DEGREES };
-        // Counter-clockwise from above: the near side moves right.
-        self.turn_by(if way == Direction::Right { degrees } else { -degrees });
+    pub(super) fn turn_selection(&mut self, direction: Direction, step_size: StepSize) {
+        let degrees = if step_size == StepSize::Fine { TURN_DEGREES_FINE } else { TURN_DEGREES };
+        // Positive angles are counter-clockwise from above, which moves the near side to the right.
+        self.turn_by(if direction == Direction::Right { degrees } else { -degrees });
     }
 
     pub(super) fn turn_by(&mut self, degrees: f64) {

@@ -80,7 +80,8 @@ impl UpdateContext<'_> {
         self.prompt(PromptFor::ExportSized, "render at another size", help, text);
     }
 
-    /// Applies the answer of a prompt.
+    /// Applies the text of the open prompt and closes it. If the text is invalid, the prompt stays
+    /// open and shows the reason.
     pub(super) fn answer_prompt(&mut self) {
         let Some(Overlay::Prompt(prompt)) = &self.model.overlay else { return };
         let (purpose, text) = (prompt.purpose.clone(), prompt.editor.text().trim().to_string());
@@ -107,7 +108,8 @@ impl UpdateContext<'_> {
         if path.extension().is_none() {
             path.set_extension("toml");
         }
-        // The scene's own file gets the usual check for changes by other programs.
+        // The path of the scene's own file is an ordinary save, which checks for changes by other
+        // programs.
         let is_own_file = self.model.file.path.as_ref() == Some(&path);
         self.write((!is_own_file).then_some(path), false);
         Ok(())
@@ -151,7 +153,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Formats stop criteria: `noise 0.5 time 60`; `none`.
+/// Formats stop criteria, such as `noise 0.5 time 60`; without criteria, `none`.
 pub(super) fn stop_text(stop: &Stop) -> String {
     let targets = [
         ("noise", stop.noise_codes),
@@ -164,7 +166,8 @@ pub(super) fn stop_text(stop: &Stop) -> String {
     if text.is_empty() { "none".to_string() } else { text }
 }
 
-/// Parses the output of `stop_text`; commas may separate the items.
+/// Parses stop criteria in the format of [`stop_text`]. Commas and equals signs may separate words
+/// too.
 fn parse_stop(text: &str) -> Result<Stop, String> {
     let mut stop = Stop::default();
     let mut words = text.split([' ', ',', '=']).filter(|word| !word.is_empty());

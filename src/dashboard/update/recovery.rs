@@ -1,4 +1,4 @@
-//! Recovery of unsaved edits after a crash, and autosave.
+//! Recovery of unsaved edits after a crash, and requests for autosaves.
 
 use crate::dashboard::message::{Effect, OrphanedEdits};
 use crate::dashboard::model::Tone;
@@ -8,10 +8,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 impl UpdateContext<'_> {
-    /// Offers the orphaned edits of a crashed session.
-    pub(super) fn orphaned_edits(&mut self, left: OrphanedEdits) {
+    /// Offers orphaned edits, the unsaved edits of a crashed session.
+    pub(super) fn orphaned_edits(&mut self, edits: OrphanedEdits) {
         self.follow = false;
-        self.model.orphaned_edits = Some(left);
+        self.model.orphaned_edits = Some(edits);
         if self.model.is_busy() {
             let text = "Unsaved edits of a crashed session were found · : recover restores them";
             self.notify(Tone::Plain, text, None);
@@ -21,18 +21,18 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn ask_recovery(&mut self) {
-        let Some(left) = &self.model.orphaned_edits else {
+        let Some(edits) = &self.model.orphaned_edits else {
             self.say("No session with this scene has crashed");
             return;
         };
         let mut text = format!(
             "A session with {} ended unexpectedly {} with unsaved edits.",
             self.model.file.name,
-            ago(left.age)
+            ago(edits.age)
         );
         if self.model.file.unreadable {
             text += " The file has become unreadable since.";
-        } else if left.changed {
+        } else if edits.changed {
             text += " The file has been changed since.";
         }
         self.ask(
@@ -46,12 +46,12 @@ impl UpdateContext<'_> {
     }
 
     pub(super) fn recover(&mut self) {
-        let Some(left) = self.model.orphaned_edits.take() else { return };
-        let scene = left.scene;
+        let Some(edits) = self.model.orphaned_edits.take() else { return };
+        let scene = edits.scene;
         self.end_gesture();
         if std::mem::take(&mut self.model.file.unreadable) {
             self.model.history.restart(Arc::clone(&scene));
-            // The contents of the file are not a scene, so the recovered scene is unsaved.
+            // The contents of the file are not a scene, so the recovered scene counts as unsaved.
             self.model.history.mark_saved(Arc::default());
             self.model.file.saved = scene;
         } else if !self.model.history.record(scene, "recovered edits", false) {
@@ -71,8 +71,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Requests an autosave of unsaved edits, or the removal of the recovery file. Edits discarded
-    /// on quitting are removed.
+    /// Requests an autosave if there are new unsaved edits. Requests the removal of the recovery
+    /// file if all edits are saved, or if the user quits and thereby discards them.
     pub(super) fn autosave(&mut self) {
         let quit = self.effects.iter().position(|effect| *effect == Effect::Quit);
         let unsaved = quit.is_none() && !self.model.file.unreadable && self.model.is_unsaved();
@@ -89,7 +89,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Formats an age: `12 minutes ago`.
+/// Formats an age, such as `12 minutes ago`.
 fn ago(age: Duration) -> String {
     let minutes = age.as_secs() / 60;
     let (count, unit) = match minutes {

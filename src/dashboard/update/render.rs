@@ -1,5 +1,5 @@
-//! Commands on the render: pause, restart, stop criteria, threads, exports; colours of the
-//! terminal.
+//! Commands on rendering (pause, restart, stop criteria, threads, exports) and on the colour depth
+//! of the terminal.
 
 use crate::dashboard::message::{Effect, Format};
 use crate::dashboard::model::Colors;
@@ -28,7 +28,7 @@ impl UpdateContext<'_> {
         self.say(format!("stops {when}"));
     }
 
-    /// Opens the noise targets with the cursor on the current one.
+    /// Opens the list of noise targets with the cursor on the current target.
     pub(super) fn open_noise_targets(&mut self) {
         let wanted = self.model.stop.noise_codes.unwrap_or(0.5);
         let cursor = QUALITIES.iter().position(|codes| *codes <= wanted);

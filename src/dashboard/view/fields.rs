@@ -1,4 +1,4 @@
-//! Fields with their values, in the inspector and in forms.
+//! Drawing of fields and their values, in the inspector and in forms.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::{Focus, Layout};
@@ -18,30 +18,31 @@ use ratatui::layout::Position;
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
 
-/// Unit of lengths, shown under the cursor only.
+/// Unit of lengths. Nearly every number has it, so it is shown only for the field under the cursor.
 const LENGTH: &str = "scene units";
 
-/// Fields in their area.
+/// A list of fields and the areas that it is drawn in.
 pub struct Fields<'a> {
-    /// Lines.
+    /// Headings and fields.
     pub lines: &'a [PanelLine],
-    /// Rows of the lines.
+    /// Area of the lines.
     pub list: Area,
-    /// Rows for help on the field under the cursor.
+    /// Area of the help on the field under the cursor.
     pub help: Area,
-    /// Line of the cursor.
+    /// Index of the line under the cursor.
     pub cursor: usize,
-    /// First visible line.
+    /// Index of the first visible line.
     pub scroll: usize,
-    /// Editor of the field under the cursor.
+    /// Text editor of the field under the cursor, if one is open.
     pub editor: Option<&'a Editor>,
-    /// Problem other than with the text being typed.
+    /// Problem of the last step of a field, shown unless the editor has a problem.
     pub problem: Option<&'a str>,
-    /// The fields take the keys.
+    /// The fields receive the keys.
     pub active: bool,
 }
 
-/// Draws the inspector, unless it is folded. Returns the position of the text cursor, if any.
+/// Draws the inspector. Draws nothing if the panel is folded. Returns the position of the text
+/// cursor. Returns `None` if the cursor is hidden.
 pub fn inspector(
     model: &Model,
     layout: &Layout,
@@ -67,7 +68,8 @@ pub fn inspector(
 }
 
 impl Fields<'_> {
-    /// Draws the fields. Returns the position of the text cursor, if any.
+    /// Draws the fields. Returns the position of the text cursor. Returns `None` if the cursor is
+    /// hidden.
     pub fn draw(&self, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
         let rows = usize::from(self.list.height);
         let first = self.scroll.min(self.lines.len().saturating_sub(rows));
@@ -129,29 +131,29 @@ impl Fields<'_> {
             }
             given => to.put(&brief(given), value),
         };
-        // A unit that nearly every number has would be noise.
-        let telling = chosen || field.unit != LENGTH;
+        let shows_unit = chosen || field.unit != LENGTH;
         let fits = to.left() >= columns(field.unit) + 2;
-        if telling && fits && !field.unit.is_empty() && !field.value.is_empty() {
+        if shows_unit && fits && !field.unit.is_empty() && !field.value.is_empty() {
             let unit = if chosen { name } else { theme.dim() };
             to.put(" ", unit).put(field.unit, unit);
         }
         None
     }
 
-    /// Draws help on the field under the cursor: its problem, or its description and valid input.
+    /// Draws help on the field under the cursor: the problem if there is one, otherwise the field's
+    /// description and valid input.
     fn say(&self, theme: &Theme, buffer: &mut Buffer) {
         let Some(field) = self.lines.get(self.cursor).and_then(PanelLine::field) else { return };
         let width = self.help.width.saturating_sub(2);
         let problem = self.editor.and_then(|e| e.problem.as_deref()).or(self.problem);
-        let said = match problem {
+        let texts = match problem {
             Some(problem) => vec![(problem.to_string(), theme.bad())],
             None => vec![
                 (field.doc.to_string(), theme.dim()),
                 (expected(field), theme.dim().add_modifier(Modifier::ITALIC)),
             ],
         };
-        let lines = said.iter().flat_map(|(text, style)| {
+        let lines = texts.iter().flat_map(|(text, style)| {
             let lines = if text.is_empty() { Vec::new() } else { wrapped(text, width) };
             lines.into_iter().map(move |line| (line, *style))
         });
@@ -161,7 +163,8 @@ impl Fields<'_> {
     }
 }
 
-/// Returns the valid input and default of a field.
+/// Returns a description of a field's valid input, and of its default value if the field has
+/// another one.
 fn expected(field: &FieldLine) -> String {
     match &field.default {
         Some(default) if !default.is_empty() && !field.is_default => {
@@ -177,7 +180,8 @@ fn heading(mut to: Row, title: &str, theme: &Theme) {
     to.put(&"─".repeat(left), theme.border(false));
 }
 
-/// Draws a text editor in the rest of the row. Returns the position of its cursor.
+/// Draws a text editor in the free columns of the row `to`. Returns the position of the text
+/// cursor. Returns `None` if there is no room.
 pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     let width = to.left().saturating_sub(1);
     if width == 0 {
@@ -194,9 +198,9 @@ pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     Some(Position { x: x + column, y })
 }
 
-/// Rounds a number to six significant digits for display; the editor shows all of them.
+/// Rounds a long number to six significant digits for display. The text editor shows all digits.
 fn brief(value: &str) -> Cow<'_, str> {
-    /// Longest number shown with all its digits, in characters.
+    /// Maximum length of a number that is shown with all its digits, in characters.
     const SHORT: usize = 9;
     match value.parse::<f64>() {
         Ok(x) if value.len() > SHORT && x.is_finite() => number(round_significant(x, 6)).into(),

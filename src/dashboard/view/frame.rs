@@ -1,4 +1,4 @@
-//! Borders and titles of panels, and the picture's panel.
+//! Borders, titles and scroll bars of panels, and the border of the picture's panel.
 
 use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::message::DisplayChannel;
@@ -28,13 +28,14 @@ pub fn panel(area: Area, title: &str, focused: bool, theme: &Theme, buffer: &mut
     }
 }
 
-/// Draws an opaque box over the panels.
+/// Draws an empty box with a border and a title over the panels.
 pub fn overlay(area: Area, title: &str, theme: &Theme, buffer: &mut Buffer) {
     Clear.render(rect(area).intersection(buffer.area), buffer);
     panel(area, title, true, theme, buffer);
 }
 
-/// Draws the scroll bar of a list on its right border.
+/// Draws the scroll bar of a list on the border to the right of `area`. The list has `all` lines,
+/// of which `shown` are visible from line `first` on. Draws nothing if all lines are visible.
 pub fn scroll_mark(
     area: Area,
     (first, shown, all): (usize, usize, usize),
@@ -54,7 +55,7 @@ pub fn scroll_mark(
     }
 }
 
-/// Draws the border of the picture's panel: file name, mode, channel and display.
+/// Draws the border of the picture's panel, with file name, mode, channel, display and legend.
 pub fn draw(
     model: &Model,
     layout: &Layout,
@@ -102,8 +103,9 @@ pub fn draw(
     }
 }
 
-/// Returns texts about the visible channel, which are emphasised unless it is the beauty, and about
-/// the display.
+/// Returns short texts about the picture, and `true` for those to emphasise. Emphasised texts
+/// describe the visible channel or comparison, unless it is the rendered picture. The others
+/// describe exposure and tone curve.
 fn chips(model: &Model) -> Vec<(String, bool)> {
     let mut chips = Vec::new();
     match (model.comparison.shown, model.channel) {
@@ -126,7 +128,8 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
     chips
 }
 
-/// Returns the mode, if the arrows do not control the camera.
+/// Returns a description of the mode. Returns `None` in the default mode, in which the arrow keys
+/// orbit.
 fn mode(model: &Model) -> Option<String> {
     let selected = || model.selection.title(model.scene());
     Some(match model.mode {

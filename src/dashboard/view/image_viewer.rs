@@ -1,4 +1,4 @@
-//! Viewer of an exported image on the whole screen.
+//! Drawing of the viewer of exported images, which has the whole screen.
 
 use crate::dashboard::model::{Model, short_name};
 use crate::dashboard::overlay::ViewedImage;
@@ -11,8 +11,8 @@ use crate::terminal::image::{Protocol, ViewerImage};
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Style};
 
-/// Draws the image in half blocks, which the terminal's image protocol replaces where supported.
-/// Returns the cells of the image, or `None` if only text is visible.
+/// Draws the image in half blocks. If the terminal supports an image protocol, the upload replaces
+/// the half blocks later. Returns the cells of the image. Returns `None` if only text is visible.
 pub fn draw(
     model: &Model,
     viewed: &ViewedImage,
@@ -48,7 +48,8 @@ pub fn draw(
     Some(cells)
 }
 
-/// Returns a description of the image, and the reason for a reduced quality.
+/// Returns a description of the image (size and progress of the upload), and a hint if the terminal
+/// shows it in half blocks.
 fn description(viewed: &ViewedImage, image: &ViewerImage) -> (String, &'static str) {
     let [width, height] = image.size;
     let whole = format!("{width}×{height}");

@@ -1,4 +1,4 @@
-//! Legend of false colours.
+//! Legend of pictures in false colour.
 
 use crate::dashboard::view::picture::paint;
 use crate::dashboard::view::text::{Row, columns, number};
@@ -8,10 +8,10 @@ use crate::terminal::cells::{PictureCells, Raster, Scale, difference, magnitude}
 use ratatui::buffer::Buffer;
 use ratatui::style::Style;
 
-/// Columns of the colour bar.
+/// Width of the colour bar in columns.
 const BAR: usize = 12;
 
-/// Scale of false colours with its unit.
+/// Legend of a false-colour scale: the values at both ends, the unit and a colour bar.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Legend {
     low: String,
@@ -21,14 +21,15 @@ pub struct Legend {
 }
 
 impl Legend {
-    /// Creates the legend of magnitudes on `scale` in `unit`.
+    /// Creates the legend of values on `scale`, in `unit`.
     pub fn magnitude(scale: Scale, unit: &str) -> Self {
         let bar = bar(magnitude);
         let [low, high] = [scale.value(0.0), scale.value(1.0)].map(number);
         Self { low, high, unit: unit.to_string(), bar }
     }
 
-    /// Creates the legend of differences from `-end` to `end` in 8-bit levels, with their `rms`.
+    /// Creates the legend of differences from `-end` to `end` in 8-bit levels. `rms` is the root
+    /// mean square of the differences.
     pub fn difference(end: f64, rms: f64) -> Self {
         Self {
             low: format!("-{end}"),
@@ -38,13 +39,13 @@ impl Legend {
         }
     }
 
-    /// Maximum width in columns.
+    /// Returns the width of the whole legend in columns.
     fn columns(&self) -> usize {
         columns(&self.low) + columns(&self.high) + columns(&self.unit) + BAR + 5
     }
 
-    /// Draws the legend at the right end of `row` of `area`: whole, without the unit, or not at
-    /// all.
+    /// Draws the legend at the right end of `row` of `area`. Omits the unit, or draws nothing, if
+    /// there is no room.
     pub fn draw(&self, area: Area, row: u16, theme: &Theme, buffer: &mut Buffer) {
         let mut line = Row::new(buffer, area, row);
         let words = columns(&self.unit) + 1;
@@ -65,7 +66,8 @@ impl Legend {
     }
 }
 
-/// Returns a row of cells with the colours of 0 to 1.
+/// Returns a colour bar: a row of cells with the colours that `color` assigns to values from 0 to
+/// 1.
 fn bar(color: impl Fn(f64) -> [u8; 3]) -> Raster {
     Raster::from_fn(BAR, 2, |i| color((i % BAR) as f64 / (BAR - 1) as f64))
 }

@@ -1,4 +1,5 @@
-//! Messages in place of the picture: unreadable file, scene that cannot be rendered.
+//! Messages in the picture's panel: errors of the scene file, and the reason why a scene cannot be
+//! rendered.
 
 use crate::dashboard::layout::Layout;
 use crate::dashboard::model::Model;
@@ -14,7 +15,7 @@ use ratatui::style::{Modifier, Style};
 
 type Lines = Vec<(String, Style)>;
 
-/// Draws lines of text in the picture's panel, with a margin if there is room.
+/// Draws `lines` in the picture's panel, with a margin if there is room.
 fn write(lines: &Lines, layout: &Layout, buffer: &mut Buffer) {
     let area = text_area(layout);
     for (row, (line, style)) in (0..area.height).zip(lines) {
@@ -49,7 +50,7 @@ pub fn broken(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer
     write(&lines, layout, buffer);
 }
 
-/// Formats a diagnostic: location, problem, help.
+/// Formats a diagnostic as lines of at most `width` columns: location, problem, help.
 fn formatted(message: &Diagnostic, width: u16, theme: &Theme) -> Lines {
     let mut lines = Vec::new();
     if let Some((line, column)) = message.line_column {
@@ -68,8 +69,8 @@ fn formatted(message: &Diagnostic, width: u16, theme: &Theme) -> Lines {
     lines
 }
 
-/// Draws the reason why the current scene cannot be rendered or the file has become unreadable,
-/// over the last picture.
+/// Draws the reason why the current scene cannot be rendered, over the last picture. Draws the
+/// first error of a file that has become unreadable on the lower border.
 pub fn failure(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let failed = model.snapshot.as_ref().and_then(|s| match &s.report.state {
         State::Failed(why) => Some(why),

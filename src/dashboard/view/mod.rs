@@ -1,7 +1,7 @@
 //! Drawing of the model into a buffer of cells.
 //!
-//! The picture is computed separately ([`View::picture`]) and cached until one of its inputs
-//! changes.
+//! The cells of the picture are computed separately by [`View::picture`] and cached until one of
+//! their inputs changes.
 
 mod fields;
 mod frame;
@@ -30,23 +30,24 @@ use ratatui::layout::{Position, Rect};
 use text::{Row, rect};
 use theme::Theme;
 
-/// View of a model, with the cached picture.
+/// View of a model, with the cached cells of its picture.
 #[derive(Debug, Default)]
 pub struct View {
     imager: PictureView,
-    /// Inputs of the cached picture.
+    /// Inputs of the cached picture; `None` before the first one.
     made_for: Option<Version>,
     picture: PictureCells,
-    /// Rectangle of the last drawn picture, and mask of its visible cells.
+    /// Rectangle of the last drawn picture on the screen.
     place: Rect,
+    /// Row-major mask of the cells of `place` that no overlay or mark covers.
     uncovered: Vec<bool>,
 }
 
-/// Inputs of the picture's cells: version, raster size, colour depth.
+/// Inputs of the picture's cells: the model's picture version, raster size and colour depth.
 type Version = (u64, [usize; 2], Colors);
 
 impl View {
-    /// Cells of the picture.
+    /// Returns the cells of the picture. Recomputes the cells if their inputs have changed.
     pub fn picture(&mut self, model: &Model, layout: &Layout) -> &PictureCells {
         let version = (model.picture_version, layout.raster, model.colors);
         if self.made_for != Some(version) {
@@ -58,13 +59,14 @@ impl View {
         &self.picture
     }
 
-    /// Rectangle of the last drawn picture, and row-major mask of its visible cells.
+    /// Returns the rectangle of the last drawn picture, and the row-major mask of its cells that
+    /// nothing covers.
     pub fn place(&self) -> (Rect, &[bool]) {
         (self.place, &self.uncovered)
     }
 
-    /// Draws `model` into `buffer`, which is empty and has the size of the model's screen. Returns
-    /// the position of the text cursor, if any.
+    /// Draws `model` into `buffer`, which must be empty and have the size of the model's screen.
+    /// Returns the position of the text cursor. Returns `None` if the cursor is hidden.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme::new(model.colors);
         if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {
@@ -109,7 +111,7 @@ impl View {
     }
 }
 
-/// Returns `true` if the panel `focus` takes the keys.
+/// Returns `true` if the panel `focus` receives the keys.
 fn is_active(model: &Model, focus: Focus) -> bool {
     model.focus == focus && model.overlay.is_none()
 }

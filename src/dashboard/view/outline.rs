@@ -1,4 +1,4 @@
-//! The outline: everything in the scene.
+//! Panel of the outline, a list of everything in the scene that can be selected and edited.
 
 use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::message::DisplayChannel;
@@ -12,7 +12,7 @@ use crate::scene::edit::Target;
 use crate::terminal::cells::object_color;
 use ratatui::buffer::Buffer;
 
-/// Draws the outline, unless it is folded.
+/// Draws the outline. Draws nothing if the panel is folded.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some(area) = layout.outline else { return };
     let active = is_active(model, Focus::Outline);
@@ -21,7 +21,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     let lines = outline(model.scene());
     let rows = usize::from(inner.height);
     let first = model.outline_scroll.min(lines.len().saturating_sub(rows));
-    // The channel of object ids needs a key to its colours.
+    // With the channel of object ids, the outline shows the colour of each object.
     let with_ids =
         model.channel == DisplayChannel::Objects && model.comparison.shown == CompareView::Live;
     for (row, line) in (0..).zip(lines.iter().skip(first).take(rows)) {
@@ -47,7 +47,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
                     Some(style) => to.put(" ", name).put("■", style).put(" ", name),
                     None => to.put(if selected { " ▸ " } else { "   " }, name),
                 };
-                // The name takes precedence over the note.
+                // The note is omitted if it would shorten the name.
                 to.put_right(" ", 0, name).put_right(note, 2 + columns(label), noted);
                 to.put(label, name);
             }

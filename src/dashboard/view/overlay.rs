@@ -1,4 +1,4 @@
-//! Overlays: help, lists, forms, prompts, questions.
+//! Drawing of overlays: help, lists, forms, prompts, questions.
 
 use crate::dashboard::hints::{HelpLine, help};
 use crate::dashboard::model::Model;
@@ -14,7 +14,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::Style;
 
-/// Draws the overlay. Returns the position of the text cursor, if any.
+/// Draws the overlay. Returns the position of the text cursor. Returns `None` if the cursor is
+/// hidden.
 pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
     let mut painter = Painter { place: model.overlay_layout()?, theme, buffer };
     match model.overlay.as_ref()? {
@@ -25,14 +26,14 @@ pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Positio
         Overlay::Pick(pick) => painter.pick(pick),
         Overlay::Form(form) => return painter.form(model, form),
         Overlay::Prompt(prompt) => return painter.prompt(prompt),
-        // Drawn separately: it has the whole screen.
+        // The image viewer has the whole screen and is drawn by `View::draw`.
         Overlay::ViewerImage(_) => {}
         Overlay::Question(question) => painter.question(question),
     }
     None
 }
 
-/// Areas of the overlay, and where and how it is drawn.
+/// Areas, theme and target buffer of the overlay that is drawn.
 struct Painter<'a> {
     place: OverlayLayout,
     theme: &'a Theme,
@@ -44,8 +45,8 @@ impl Painter<'_> {
         overlay(self.place.frame, title, self.theme, self.buffer);
     }
 
-    /// Returns the visible part of a list from line `scroll` on: pairs of row and index. Draws its
-    /// scroll bar.
+    /// Draws the scroll bar of a list of `len` lines whose first visible one is `scroll`. Returns
+    /// the visible lines as pairs of row on the screen and index.
     fn window(&mut self, scroll: usize, len: usize) -> impl Iterator<Item = (u16, usize)> + use<> {
         let rows = usize::from(self.place.list.height);
         let first = scroll.min(len.saturating_sub(rows));
@@ -63,8 +64,8 @@ impl Painter<'_> {
         }
     }
 
-    /// Begins a row of a list with a cursor. Returns the row, and the styles of name, remainder and
-    /// keys.
+    /// Starts row `row` of a list with a cursor. Returns the row and three styles: for names, other
+    /// text and keys.
     fn choice(&mut self, row: u16, is_chosen: bool) -> (Row<'_>, [Style; 3]) {
         let theme = self.theme;
         let mut to = Row::new(self.buffer, self.place.list, row);
@@ -91,7 +92,7 @@ impl Painter<'_> {
                     to.put(&"─".repeat(left), theme.border(false));
                 }
                 HelpLine::Keys(keys, label) => {
-                    // The label takes precedence over long lists of keys.
+                    // A long list of keys is truncated so that it does not shorten the label.
                     let room = to.left().saturating_sub(3 + columns(label) + 2 + 1);
                     to.put_right(" ", 0, theme.text());
                     to.put_right(&cut(keys, room), 0, theme.accent());

@@ -1,4 +1,4 @@
-//! Rasters of half cells from snapshots.
+//! Conversion of snapshots to rasters of half cells, and drawing of the picture's cells.
 
 use crate::dashboard::message::DisplayChannel;
 use crate::dashboard::model::{CompareView, Model};
@@ -15,22 +15,26 @@ use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use std::sync::Arc;
 
-/// Creates rasters of models; caches the pinned picture.
+/// Converter of models to rasters. It caches the resampled pinned picture.
 #[derive(Debug, Default)]
 pub struct PictureView {
     legend: Option<Legend>,
     pinned: Option<PinnedCache>,
 }
 
-/// The pinned picture, resampled to the screen.
+/// The pinned picture, resampled to the size of the raster.
 #[derive(Debug)]
 struct PinnedCache {
+    /// Picture at its own resolution.
     picture: Arc<LinearImage>,
+    /// Width and height of the raster.
     size: [usize; 2],
+    /// Linear radiance of each half cell, row-major.
     radiance: Vec<[f32; 3]>,
 }
 
-/// Returns `true` if the picture changes only by user input.
+/// Returns `true` if the picture changes only by user input, because rendering has ended or is
+/// paused, or because the pinned picture or an exported image is visible.
 pub fn is_settled(model: &Model) -> bool {
     if let Some(Overlay::ViewerImage(_)) = model.overlay {
         return true;
@@ -41,22 +45,24 @@ pub fn is_settled(model: &Model) -> bool {
 }
 
 impl PictureView {
-    /// Legend of the last raster, if its colours stand for numbers.
+    /// Returns the legend of the last raster. Returns `None` if its colours do not represent
+    /// numbers.
     pub fn legend(&self) -> Option<&Legend> {
         self.legend.as_ref()
     }
 
-    /// Returns the raster of the visible channel or comparison; empty if there is nothing to show.
+    /// Returns a raster of `size` (width and height in half cells) that shows the selected channel
+    /// or comparison. The raster is empty if the data is missing.
     pub fn raster(&mut self, model: &Model, size: [usize; 2]) -> Raster {
         self.legend = None;
-        let made = match (model.comparison.shown, model.channel) {
+        let raster = match (model.comparison.shown, model.channel) {
             (CompareView::Pinned, _) => {
                 self.pinned(model, size).map(|pinned| displayed(pinned, &model.display, size))
             }
             (CompareView::Difference, _) => self.difference(model, size),
             (CompareView::Live, channel) => self.live(model, channel, size),
         };
-        made.unwrap_or_default()
+        raster.unwrap_or_default()
     }
 
     fn live(&mut self, model: &Model, channel: DisplayChannel, size: [usize; 2]) -> Option<Raster> {
@@ -80,8 +86,8 @@ impl PictureView {
             }
             DisplayChannel::Objects | DisplayChannel::Normals | DisplayChannel::Depth => {
                 let guide = snapshot.guide.as_deref()?;
-                let (columns, rows, sights) = (guide.columns, guide.rows, guide.texels());
-                let hit = |i: usize| sights.get(i).filter(|s| s.object.is_some());
+                let (columns, rows, texels) = (guide.columns, guide.rows, guide.texels());
+                let hit = |i: usize| texels.get(i).filter(|s| s.object.is_some());
                 let all = columns * rows;
                 let raster = match channel {
                     DisplayChannel::Objects => {
@@ -104,7 +110,8 @@ impl PictureView {
         }
     }
 
-    /// Returns a raster of tile values on a logarithmic scale.
+    /// Returns a raster that shows one value per tile in false colour, on a logarithmic scale.
+    /// `value` returns the value of the tile with a given index.
     fn tiles(
         &mut self,
         model: &Model,
@@ -144,8 +151,8 @@ impl PictureView {
         self.pinned.as_ref().map(|cached| &*cached.radiance)
     }
 
-    /// Returns live minus pinned luma in 8-bit levels, on a scale that ends at the largest
-    /// difference.
+    /// Returns a false-colour raster of the difference in luma, live minus pinned, in 8-bit levels.
+    /// The scale ends at the largest absolute difference, rounded up.
     fn difference(&mut self, model: &Model, size: [usize; 2]) -> Option<Raster> {
         let snapshot = model.snapshot.as_deref()?;
         let (live, from) = live_radiance(model, snapshot)?;
@@ -169,13 +176,14 @@ impl PictureView {
     }
 }
 
-/// Rounds up to one of 1, 2, 5, 10, 20, 50, …
+/// Rounds `value` up to one of 1, 2, 5, 10, 20, 50, …
 fn round_up(value: f64) -> f64 {
     let decade = 10f64.powf(value.log10().floor());
     [1.0, 2.0, 5.0].into_iter().map(|m| m * decade).find(|v| *v >= value).unwrap_or(10.0 * decade)
 }
 
-/// Returns the snapshot's picture with the current lights, and its size.
+/// Returns the linear radiance of the snapshot's picture, mixed from its light groups with the
+/// current lights, and the width and height of the picture.
 fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [usize; 2])> {
     let picture = snapshot.picture.as_ref()?;
     let newest = snapshot.mix_for(model.scene());
@@ -183,13 +191,14 @@ fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [
     Some((mixed, [picture.cols, picture.rows]))
 }
 
-/// Applies the display transform.
+/// Applies the display transform to linear radiance.
 fn displayed(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 2]) -> Raster {
     let to_8 = display.to_8();
     Raster::from_fn(width, height, |i| to_8(radiance[i].map(f64::from)))
 }
 
-/// Stretches a raster, for the time between a resize and the next snapshot.
+/// Scales a raster to the given size without interpolation. After a resize the old picture is shown
+/// in this way until the next snapshot.
 fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
     if [raster.width, raster.height] == [width, height] || raster.pixels.is_empty() {
         return raster;
@@ -200,7 +209,7 @@ fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
     })
 }
 
-/// Draws cells into `area` from its upper left corner, clipped.
+/// Draws `cells` into `area` from its upper left corner. Cells outside of `area` are omitted.
 pub fn paint(cells: &PictureCells, area: Area, buffer: &mut Buffer) {
     for row in 0..area.height.min(cells.rows) {
         for column in 0..area.width.min(cells.columns) {
@@ -214,7 +223,9 @@ pub fn paint(cells: &PictureCells, area: Area, buffer: &mut Buffer) {
     }
 }
 
-/// Returns the rectangle of cells drawn into `area`, and a mask of those that are not covered.
+/// Returns the rectangle of the screen that [`paint`] drew `cells` into, and a row-major mask. The
+/// mask is `true` for cells of the rectangle that still show the picture, because nothing was drawn
+/// over them.
 pub fn visible_mask(cells: &PictureCells, area: Area, buffer: &Buffer) -> (Rect, Vec<bool>) {
     let Area { x, y, width, height } = area;
     let (width, height) = (width.min(cells.columns), height.min(cells.rows));

@@ -1,4 +1,5 @@
-//! Convergence plot: noise against seconds on logarithmic axes, with the target and the estimate.
+//! Convergence plot: noise over seconds of tracing on logarithmic axes, with the noise target and
+//! the estimated time at which the target is reached.
 
 use crate::dashboard::layout::Layout;
 use crate::dashboard::model::Model;
@@ -12,7 +13,7 @@ use ratatui::symbols::Marker;
 use ratatui::widgets::Widget;
 use ratatui::widgets::canvas::{Canvas, Line};
 
-/// Natural logarithms of the ends of an axis, the lower one first.
+/// Values at the ends of a logarithmic axis, both greater than 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Axis {
     low: f64,
@@ -20,27 +21,29 @@ struct Axis {
 }
 
 impl Axis {
-    /// Creates an axis that includes all of `values`, which are greater than 0, with a margin.
+    /// Creates an axis that includes all positive finite `values`, with a margin of a tenth at both
+    /// ends. Returns `None` if there are no such values.
     fn around(values: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
         for value in values.filter(|v| *v > 0.0 && v.is_finite()) {
             low = low.min(value);
             high = high.max(value);
         }
-        // At least a factor of 2, and a margin of a tenth.
+        // The axis spans at least a factor of 2, besides the margins.
         (low <= high).then(|| {
             let stretch = (2.0 * low / high).max(1.0).sqrt() * 1.1;
             Self { low: low / stretch, high: high * stretch }
         })
     }
 
-    /// Position of a value: 0 at the lower end, 1 at the upper; values outside of the axis are not
-    /// clamped.
+    /// Returns the position of `value` on the axis: 0 at the lower end, 1 at the upper end.
+    /// Positions beyond the ends are not clamped.
     fn part(&self, value: f64) -> f64 {
         (value / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Values of ticks: powers of ten, with their multiples by 2 and 5 if those are few.
+    /// Returns the values of the ticks: powers of ten, and on an axis that spans less than a factor
+    /// of 50 also their multiples by 2 and 5.
     fn ticks(&self) -> Vec<f64> {
         let steps: &[f64] = if self.high / self.low < 50.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let first = self.low.log10().floor() as i32;
@@ -50,17 +53,17 @@ impl Axis {
     }
 }
 
-/// Formats a tick without trailing zeros: `0.5`, `20`.
+/// Formats the value of a tick without trailing zeros, such as `0.5` or `20`.
 fn label(value: f64) -> String {
     if (1e-3..1e6).contains(&value) {
-        // Sums of powers of ten are not exact.
+        // Products with negative powers of ten are not exact.
         format!("{}", (value * 1e6).round() / 1e6)
     } else {
         format!("{value:.0e}")
     }
 }
 
-/// Draws the plot, if there is room.
+/// Draws the plot. Draws nothing if the layout has no area for it.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some(area) = layout.plot else { return };
     panel(area, "convergence", false, theme, buffer);
@@ -78,7 +81,8 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     title.skip(14).put_right(&format!(" {} levels ", number(last.noise_codes)), 0, theme.text());
     let target = model.stop.noise_codes.filter(|t| *t > 0.0);
     let eta = model.snapshot.as_ref().and_then(|s| s.report.eta_seconds);
-    // Point at which the target is reached by the mean estimate.
+    // Point at which the target is reached, at the mean of the lower and upper estimate of the
+    // time.
     let reached = match (target, eta) {
         (Some(target), Some((from, to))) if target < last.noise_codes => {
             Some((last.seconds + 0.5 * (from + to), target))
@@ -90,7 +94,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     let (Some(x), Some(y)) = (Axis::around(seconds), Axis::around(noise)) else { return };
     let Some(plot) = axes(inner, &x, &y, theme, buffer) else { return };
     let place = |seconds: f64, noise: f64| (x.part(seconds), y.part(noise));
-    // A canvas supports colours only.
+    // A ratatui canvas supports colours, but no other style.
     let color = |style: Style| style.fg.unwrap_or(Color::Reset);
     let line = |(x1, y1): (f64, f64), (x2, y2): (f64, f64), style| Line {
         x1,
@@ -132,10 +136,11 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
         .render(crate::dashboard::view::rect(plot), buffer);
 }
 
-/// Dashes of a dashed line across the plot.
+/// Number of dashes of a dashed line.
 const DASHES: usize = 16;
 
-/// Draws both axes inside `area`. Returns the remaining area of the plot.
+/// Draws both axes inside `area`. Returns the area between them for the plot. Returns `None` if
+/// there is no room.
 fn axes(area: Area, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> Option<Area> {
     let ticks: Vec<_> = y.ticks().into_iter().map(|t| (t, label(t))).collect();
     let labels = ticks.iter().map(|(_, l)| columns(l)).max().unwrap_or(0) as u16;
@@ -154,7 +159,7 @@ fn axes(area: Area, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
     let mut free = plot.height;
     for (tick, text) in &ticks {
         let row = ((1.0 - y.part(*tick)) * f64::from(plot.height)) as u16;
-        // At most one label per row.
+        // Ticks come in ascending order, so rows decrease. A row gets at most one label.
         if row < free {
             let indent = usize::from(labels) - columns(text);
             Row::new(buffer, area, row).skip(indent).put(text, theme.dim());

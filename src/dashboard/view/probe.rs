@@ -1,4 +1,4 @@
-//! The probe: a mark on the picture and its values.
+//! Drawing of the probe: a mark on the picture, and a box with the values of the probed pixel.
 
 use crate::dashboard::layout::Layout;
 use crate::dashboard::model::Model;
@@ -11,10 +11,10 @@ use crate::terminal::Area;
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier, Style};
 
-/// Width of the box with its border.
+/// Width in columns of the box with its border.
 const WIDTH: u16 = 36;
 
-/// Draws mark and values, if a pixel is probed.
+/// Draws the mark and the box with values. Draws nothing if no pixel is probed.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some([x, y]) = model.probe else { return };
     let film = model.scene().film.size;
@@ -36,7 +36,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
         }
         return;
     }
-    // In the corner farthest from the mark.
+    // The box is in the corner farthest from the mark.
     let left = area.x + 2;
     let right = area.x + area.width - WIDTH - 2;
     let x_box = if column < area.x + area.width / 2 { right } else { left };
@@ -59,7 +59,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     }
 }
 
-/// Labels and values.
+/// Returns the labels and values in the box.
 fn readout(model: &Model) -> Vec<(&'static str, String)> {
     let Some(probe) = model.probed() else {
         return vec![("samples", "none yet".to_string())];
@@ -83,7 +83,8 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
     lines
 }
 
-/// Returns the object at a film pixel.
+/// Returns the label of the object that is visible at a film pixel (column, row). Returns `None` if
+/// there is none, or if the snapshot has no object ids.
 fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
     let guide = model.snapshot.as_ref()?.guide.as_deref()?;
     let [width, height] = model.scene().film.size.map(|n| n.max(1) as usize);
@@ -92,14 +93,14 @@ fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
     subject.exists(model.scene()).then(|| subject.label(model.scene()))
 }
 
-/// Draws a cross in a contrasting colour.
+/// Draws a cross in a cell, in a colour that contrasts with the cell.
 fn mark(column: u16, row: u16, theme: &Theme, buffer: &mut Buffer) {
     let Some(cell) = buffer.cell_mut((column, row)) else { return };
     let light = |color: Color| match color {
         Color::Rgb(r, g, b) => u32::from(r) * 2 + u32::from(g) * 7 + u32::from(b) > 1400,
         _ => false,
     };
-    // The cross covers both half cells.
+    // The cross covers both half cells, so its colour must contrast with both.
     let style = match (cell.bg, cell.fg) {
         (Color::Rgb(..), fg) if cell.symbol() != " " && light(fg) != light(cell.bg) => {
             theme.accent()

@@ -1,4 +1,4 @@
-//! Status line and hint line.
+//! Drawing of the status line and the hint line, the last two rows of the screen.
 
 use crate::dashboard::hints::hints;
 use crate::dashboard::model::{Model, Tone};
@@ -15,12 +15,13 @@ use ratatui::style::{Modifier, Style};
 
 /// A part of the status line.
 struct Part {
-    /// Parts with larger values are dropped first.
+    /// Rank of omission if the line is too long: parts with larger values are omitted first.
     expendable: u8,
+    /// Pieces of text, each with a style.
     text: Vec<(String, Style)>,
 }
 
-/// Draws the status line with as many whole parts as fit.
+/// Draws the status line. Omits whole parts until the others fit.
 pub fn draw(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
     let mut parts = parts(model, theme);
     let width = |parts: &[Part]| -> usize {
@@ -79,8 +80,8 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     for warning in report.warnings() {
         parts.push(part(3, vec![(warning, theme.warn())]));
     }
-    if let Some(line) = &model.link {
-        parts.push(part(6, vec![plain(rate(line.rate)), dim(" "), dim(mode(line.mode))]));
+    if let Some(link) = &model.link {
+        parts.push(part(6, vec![plain(rate(link.rate)), dim(" "), dim(mode(link.mode))]));
     }
     let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
     parts.push(part(7, vec![dim(precision)]));
@@ -93,7 +94,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     parts
 }
 
-/// Formats a rate to two or three digits, which do not flicker: `118 KB/s`.
+/// Formats a rate with two or three digits, such as `118 KB/s`. More digits would flicker.
 fn rate(bytes_per_second: f64) -> String {
     let kilobytes = bytes_per_second / 1e3;
     match kilobytes {
@@ -103,7 +104,7 @@ fn rate(bytes_per_second: f64) -> String {
     }
 }
 
-/// Name of a pacing mode.
+/// Returns the name of a pacing mode.
 fn mode(mode: PacingMode) -> &'static str {
     match mode {
         PacingMode::Unlimited => "local",
@@ -146,7 +147,7 @@ fn spp(model: &Model, report: &Report, theme: &Theme) -> Vec<(String, Style)> {
     text
 }
 
-/// Formats the noise: `noise 0.84 → 0.5 levels in 3–5 s`.
+/// Formats the noise with its target and the estimated time: `noise 0.84 → 0.5 levels in 3–5 s`.
 fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<(String, Style)> {
     let dim = |text: &str| (text.to_string(), theme.dim());
     let mut text = vec![dim("noise "), (number(codes), theme.text())];
@@ -164,7 +165,7 @@ fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<
     text
 }
 
-/// Draws the notice, or else the hints.
+/// Draws the notice if there is one, otherwise the hints.
 pub fn hints_line(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
     let mut row = Row::new(buffer, area, 0);
     row.skip(1);
@@ -183,8 +184,8 @@ pub fn hints_line(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer)
     }
 }
 
-/// Removes hints until the others fit whole in `width` columns. The first one and the last two, which
-/// lead to all commands, are removed last.
+/// Removes hints until the others fit whole in `width` columns. The last two hints lead to all
+/// commands; they and the first hint are removed last.
 fn fitting(mut hints: Vec<&Hint>, width: usize) -> Vec<&Hint> {
     let width_of = |hints: &[&Hint]| -> usize {
         let columns_of = |hint: &&Hint| columns(hint.keys) + 1 + columns(hint.text) + 3;

@@ -1,4 +1,5 @@
-//! Text in cells: measured in columns, truncated with an ellipsis, clipped to its area.
+//! Text in rows of cells. Its width is measured in columns; text that is too long is truncated with
+//! an ellipsis.
 
 use crate::terminal::Area;
 use crate::value::sanitized;
@@ -13,7 +14,7 @@ pub fn columns(text: &str) -> usize {
     text.width()
 }
 
-/// Truncates `text` to `width` columns, with an ellipsis if it is longer.
+/// Truncates `text` to `width` columns. The last column of truncated text is an ellipsis.
 pub fn cut(text: &str, width: usize) -> Cow<'_, str> {
     if columns(text) <= width {
         return Cow::Borrowed(text);
@@ -49,16 +50,19 @@ pub fn rect(area: Area) -> Rect {
     Rect { x: area.x, y: area.y, width: area.width, height: area.height }
 }
 
-/// A row of cells that is filled from left to right.
+/// Writer of a row of cells, which is filled from left to right.
 pub struct Row<'a> {
     buffer: &'a mut Buffer,
+    /// Column of the next text.
     x: u16,
+    /// Column after the last free one.
     end: u16,
     y: u16,
 }
 
 impl<'a> Row<'a> {
-    /// Creates a writer for row `row` of `area`, from 0; outside of it, nothing is drawn.
+    /// Creates a writer for row `row` of `area`, counted from 0. Nothing is drawn outside of
+    /// `area`.
     pub fn new(buffer: &'a mut Buffer, area: Area, row: u16) -> Self {
         let bounds = rect(area).intersection(buffer.area);
         let y = area.y.saturating_add(row);
@@ -67,22 +71,22 @@ impl<'a> Row<'a> {
         Self { buffer, x, end, y }
     }
 
-    /// Remaining columns.
+    /// Returns the number of free columns.
     pub fn left(&self) -> usize {
         usize::from(self.end.saturating_sub(self.x))
     }
 
-    /// Column of the next text.
+    /// Returns the column of the next text on the screen.
     pub fn x(&self) -> u16 {
         self.x
     }
 
-    /// Row on the screen.
+    /// Returns the row on the screen.
     pub fn y(&self) -> u16 {
         self.y
     }
 
-    /// Draws `text`, truncated to the remaining columns.
+    /// Draws `text`, truncated to the free columns.
     pub fn put(&mut self, text: &str, style: Style) -> &mut Self {
         let left = self.left();
         if left > 0 {
@@ -93,7 +97,8 @@ impl<'a> Row<'a> {
         self
     }
 
-    /// Draws `text` in exactly `width` columns, or in the remaining ones.
+    /// Draws `text`, truncated or padded to `width` columns, or to the free columns if those are
+    /// fewer.
     pub fn put_wide(&mut self, text: &str, width: usize, style: Style) -> &mut Self {
         let width = width.min(self.left());
         let text = safe(text);
@@ -102,8 +107,8 @@ impl<'a> Row<'a> {
         self.put(&visible, style).skip(gap)
     }
 
-    /// Draws `text` at the right end, if it fits there with `gap` columns before it, and removes
-    /// its columns from the remaining ones.
+    /// Draws `text` at the right end of the free columns. Draws nothing if `text` and `gap` free
+    /// columns before it do not fit.
     pub fn put_right(&mut self, text: &str, gap: usize, style: Style) -> &mut Self {
         let text = safe(text);
         let width = columns(&text);
@@ -114,13 +119,13 @@ impl<'a> Row<'a> {
         self
     }
 
-    /// Skips columns.
+    /// Leaves `columns` columns unchanged.
     pub fn skip(&mut self, columns: usize) -> &mut Self {
         self.x += columns.min(self.left()) as u16;
         self
     }
 
-    /// Sets the style of the remaining columns.
+    /// Sets the style of the free columns.
     pub fn fill(&mut self, style: Style) -> &mut Self {
         let area = Rect { x: self.x, y: self.y, width: self.end - self.x, height: 1 };
         if area.width > 0 {
@@ -150,19 +155,19 @@ pub fn number(value: f64) -> String {
     }
 }
 
-/// Formats a duration: `0.4 s`, `35 s`, `12 min`, `3.5 h`.
+/// Formats a duration, such as `0.4 s`, `35 s`, `12 min` or `3.5 h`.
 pub fn duration(seconds: f64) -> String {
     let (value, unit) = in_unit(seconds, seconds);
     format!("{value} {unit}")
 }
 
-/// Formats a range of durations: `3–5 s`.
+/// Formats a range of durations, such as `3–5 s`.
 pub fn durations(from: f64, to: f64) -> String {
     let ((from, _), (to, unit)) = (in_unit(from, to), in_unit(to, to));
     if from == to { format!("{to} {unit}") } else { format!("{from}–{to} {unit}") }
 }
 
-/// Formats `seconds` in the unit that suits `reference` seconds.
+/// Returns the number and the unit of `seconds`, in the unit that suits `reference` seconds.
 fn in_unit(seconds: f64, reference: f64) -> (String, &'static str) {
     let (value, unit) = match reference {
         r if r < 99.5 => (seconds, "s"),

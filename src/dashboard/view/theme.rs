@@ -1,19 +1,19 @@
 //! Colours and text attributes of the user interface, at each colour depth.
 //!
-//! The tones are readable on dark and light backgrounds. The most important text has the terminal's
-//! default colour.
+//! The tones are readable on both dark and light backgrounds. The most important text has the
+//! terminal's default colour.
 
 use crate::terminal::cells::{Colors, nearest_indexed};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::BorderType;
 
-/// Styles by meaning.
+/// Styles of a colour depth, with one method for each meaning.
 #[derive(Clone, Copy, Debug)]
 pub struct Theme {
     colors: Colors,
 }
 
-/// A tone in 24 bits, in the 256-colour palette and in 16 colours.
+/// A colour at each colour depth: 24 bits, index in the 256-colour palette, and one of 16 colours.
 type Tone = ([u8; 3], u8, Color);
 
 const ACCENT: Tone = ([98, 160, 242], 75, Color::Cyan);
@@ -40,7 +40,8 @@ impl Theme {
         }
     }
 
-    /// Returns the style of a tone, with the attributes `plain` on terminals without colours.
+    /// Returns the style with the colour `tone`. On terminals without colours the style has the
+    /// text attributes `plain` instead.
     fn toned(&self, tone: Tone, plain: Modifier) -> Style {
         match self.color(tone) {
             Some(color) => Style::new().fg(color),
@@ -48,42 +49,43 @@ impl Theme {
         }
     }
 
-    /// Values, names and titles.
+    /// Returns the style of values, names and titles.
     pub fn text(&self) -> Style {
         Style::new().fg(Color::Reset).remove_modifier(Modifier::DIM)
     }
 
-    /// Secondary text: labels, units, defaults.
+    /// Returns the style of secondary text: labels, units, defaults.
     pub fn dim(&self) -> Style {
         self.toned(DIM, Modifier::DIM)
     }
 
-    /// Headings.
+    /// Returns the style of headings.
     pub fn heading(&self) -> Style {
         self.dim().remove_modifier(Modifier::DIM).add_modifier(Modifier::BOLD)
     }
 
-    /// Active elements and keys.
+    /// Returns the style of active elements and keys.
     pub fn accent(&self) -> Style {
         self.toned(ACCENT, Modifier::BOLD)
     }
 
-    /// Success.
+    /// Returns the style of success.
     pub fn good(&self) -> Style {
         self.toned(GOOD, Modifier::BOLD)
     }
 
-    /// Warnings.
+    /// Returns the style of warnings.
     pub fn warn(&self) -> Style {
         self.toned(WARN, Modifier::BOLD)
     }
 
-    /// Refusals and failures.
+    /// Returns the style of refusals and failures.
     pub fn bad(&self) -> Style {
         self.toned(BAD, Modifier::BOLD)
     }
 
-    /// Row under the cursor; `active` is whether it takes the keys.
+    /// Returns the style of the row under the cursor. `active` is `true` if the list with the row
+    /// receives the keys.
     pub fn selected(&self, active: bool) -> Style {
         match (active, self.colors) {
             (false, _) => self.accent().add_modifier(Modifier::BOLD),
@@ -95,12 +97,13 @@ impl Theme {
         }
     }
 
-    /// Borders of panels.
+    /// Returns the style of the border of a panel. `focused` is `true` if the panel has the focus.
     pub fn border(&self, focused: bool) -> Style {
         if focused { self.accent() } else { self.toned(BORDER, Modifier::DIM) }
     }
 
-    /// Border type: on terminals with few or no colours it marks the panel with the focus.
+    /// Returns the border type of a panel. On terminals with few or no colours a thick border marks
+    /// the panel with the focus.
     pub fn border_type(&self, focused: bool) -> BorderType {
         match (focused, self.colors) {
             (true, Colors::Sixteen | Colors::Mono) => BorderType::Thick,
@@ -108,12 +111,13 @@ impl Theme {
         }
     }
 
-    /// Colour depth.
+    /// Returns the colour depth.
     pub fn colors(&self) -> Colors {
         self.colors
     }
 
-    /// Style of a colour swatch, if the terminal can show the colour.
+    /// Returns the style of a sample of the 8-bit colour. Returns `None` if the terminal cannot
+    /// show the colour.
     pub fn swatch(&self, [r, g, b]: [u8; 3]) -> Option<Style> {
         match self.colors {
             Colors::True => Some(Style::new().fg(Color::Rgb(r, g, b))),

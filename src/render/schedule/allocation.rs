@@ -1,10 +1,16 @@
-//! Adaptive sampling: allocates the next samples where they lower the picture's error most per ray.
+//! Adaptive sampling: allocates the next samples to the tiles in which they reduce the picture's
+//! error most per ray.
 //!
-//! A tile's expected error is calibrated by similar tiles. Tiles with similar allocation estimates and sample counts
-//! form a class. The error of a class is the mean of its validation estimates, which come from other pixels and take
-//! part in no decision (cross-fitting, Chernozhukov et al. 2018). An estimate that is low by chance therefore starves
-//! no tile: a feature in validation pixels alone raises the error of all tiles that look as empty as its own. An
-//! estimate that is high by chance draws few samples from other tiles.
+//! Each tile has two estimates of its error, from disjoint sets of its pixels. The *allocation
+//! estimate* selects and ranks tiles. The *validation estimate* is reported to the user; allocation
+//! uses it only in means over many tiles. The error of tiles is thereby measured on pixels that
+//! did not select them (cross-fitting, Chernozhukov et al. 2018).
+//!
+//! The expected error of a tile is calibrated by similar tiles. Tiles with similar allocation
+//! estimates and sample counts form a *class*. The error of a class is the mean of the validation
+//! estimates of its tiles. An allocation estimate that is low by chance therefore starves no tile:
+//! a feature that only validation pixels contain raises the expected error of all tiles of the
+//! class. An allocation estimate that is high by chance draws few samples from other tiles.
 
 use crate::render::schedule::tile::Tile;
 use crate::render::schedule::{Criterion, MAX_SAMPLES, SAMPLE_ALIGNMENT, Schedule, to_packet};
@@ -12,27 +18,33 @@ use crate::render::wave::Job;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Rays of one decision, as a share of the rays so far: small enough for corrections, large enough for few barriers.
+/// Rays of one decision, as a share of the rays traced so far. It is small enough that later
+/// estimates can correct a decision, and large enough that threads rarely wait for each other
+/// between waves.
 const DECISION_SHARE: f64 = 0.1;
-/// Share of a decision's rays for the tiles with the fewest samples, whatever their estimates are. A feature that no
-/// sample has hit is missing in every estimate; this share finds it. Measured on 30 sparse pictures (stars and balls of a
-/// pixel, `tests/honesty`): the true error is 18 % above the reported one in the mean with a sixteenth, 16 % with an
-/// eighth, 13 % with a quarter. The physical mirror room takes 60.7 million rays to an RMSE of 0.00068 with a 32nd, 61.7
-/// with a sixteenth, 64.8 with an eighth.
+/// Share of a decision's rays that goes to the tiles with the fewest samples, whatever their
+/// estimates are. No estimate contains a feature that no sample has hit; this share finds such
+/// features. Measured on 30 sparse pictures (stars and balls of the size of a pixel,
+/// `tests/honesty`): the true error exceeds the reported one by 18 % in the mean with a share of
+/// 1/16, by 16 % with 1/8, by 13 % with 1/4. The physical mirror room takes 60.7 million rays to an
+/// RMSE of 0.00068 with 1/32, 61.7 million with 1/16, 64.8 million with 1/8.
 pub(super) const EXPLORATION: f64 = 0.0625;
-/// Least number of blocks of a decision (or all tiles, if there are fewer): every thread has work between two barriers.
+/// Smallest number of sample blocks in a decision, unless there are fewer tiles. It gives every
+/// thread work until the end of the wave.
 const MIN_BLOCKS: usize = 64;
-/// Least gain of further tiles, as a share of the gain of those that have doubled their count and are set aside: an
-/// estimate holds for one doubling.
+/// Smallest gain of further tiles in a decision, as a share of the gain of the tiles that have
+/// already doubled their sample count in it. Those tiles get no more samples in the decision,
+/// because an estimate is reliable for one doubling only.
 const WORTHWHILE: f64 = 0.25;
-/// Weight of a tile's own estimate against one validation estimate of its class.
+/// Weight of a tile's own allocation estimate, relative to the validation estimate of one tile of
+/// its class.
 const OWN_WEIGHT: f64 = 0.25;
 
-/// Candidate block of samples for a tile.
+/// A block of samples that a decision may allocate to a tile.
 struct Candidate {
-    /// Expected fall of the summed squared error per ray.
+    /// Expected decrease of the summed squared error, per ray.
     gain: f64,
-    /// Samples per replicate that the tile would have before the block.
+    /// Samples per replicate of the tile before the block.
     count: u32,
     tile: usize,
 }
@@ -49,7 +61,8 @@ impl PartialOrd for Candidate {
     }
 }
 impl Ord for Candidate {
-    /// Orders by gain; among equals the tile with fewer samples, then the lower tile number, comes first.
+    /// Orders candidates by gain. If gains are equal, the tile with fewer samples is preferred,
+    /// then the tile with the lower number.
     fn cmp(&self, other: &Self) -> Ordering {
         let fewer = other.count.cmp(&self.count).then(other.tile.cmp(&self.tile));
         self.gain.total_cmp(&other.gain).then(fewer)
@@ -68,25 +81,26 @@ impl ErrorModel {
         self.scale * f64::from(count).powf(-2.0 * self.slope)
     }
 
-    /// Model of the same slope through `mse` at `count`.
+    /// Returns the model with the same slope that has the error `mse` at `count` samples.
     fn through(&self, count: u32, mse: f64) -> Self {
         Self { scale: mse * f64::from(count).powf(2.0 * self.slope), ..*self }
     }
 }
 
-/// Error models of one tile from its two sets of pixels.
+/// Error models of one tile, fitted to its allocation estimates and to its validation estimates.
 struct TileModels {
     allocation: ErrorModel,
     validation: ErrorModel,
 }
 
-/// Class of similar tiles: octave of the sample count, half octave of the allocation estimate per sample
-/// (`None`: the estimate is 0).
+/// Class of similar tiles: octave of the sample count, and half octave of the allocation estimate
+/// of the variance per sample. The second is `None` if the estimate is 0.
 type Class = (u32, Option<i32>);
 
-/// Size of the next block of a tile with `count` samples per replicate. Below one packet it is the difference to the
-/// next power of two; at an unaligned count the difference to the next packet; otherwise about a quarter of `count`, a
-/// power of two and at least a packet, so that blocks stay aligned to the evenly spread blocks of the sequence.
+/// Returns the size of the next block of a tile with `count` samples per replicate. Below one
+/// packet the block ends at the next power of two, and from an unaligned count at the next packet
+/// boundary. Otherwise it has about a quarter of `count`: a power of two and at least a packet, so
+/// that blocks stay aligned to the well distributed blocks of the sample sequence.
 fn block(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT {
         return (count + 1).next_power_of_two() - count;
@@ -97,18 +111,19 @@ fn block(count: u32) -> u32 {
     }
 }
 
-/// Sample counts of a decision in progress.
+/// Sample counts that a decision in progress has allocated.
 struct Allocation<'a> {
     schedule: &'a Schedule,
     counts: Vec<u32>,
-    /// Expected rays of the allocated blocks.
+    /// Expected number of rays of the allocated blocks.
     spent: f64,
     blocks: usize,
     samples_left: u64,
 }
 
 impl Allocation<'_> {
-    /// Number of samples of the next block of `tile`; 0 if a cap or the mean count leaves none.
+    /// Returns the number of samples of the next block of `tile`. Returns 0 if the tile has reached
+    /// its cap, or the picture its mean sample count.
     fn next_block(&self, tile: usize) -> u32 {
         let (t, count) = (&self.schedule.tiles[tile], self.counts[tile]);
         let affordable =
@@ -128,7 +143,7 @@ impl Allocation<'_> {
         self.counts[tile] += samples;
     }
 
-    /// Allocates one block each to the tiles with the fewest samples, for about `rays` rays.
+    /// Allocates one block to each of the tiles with the fewest samples, up to about `rays` rays.
     fn explore(&mut self, rays: f64) {
         let mut order: Vec<usize> = (0..self.counts.len()).collect();
         order.sort_by_key(|tile| self.counts[*tile]);
@@ -160,7 +175,8 @@ impl Allocation<'_> {
 }
 
 impl Schedule {
-    /// Jobs of the next decision after [`Schedule::min_samples`].
+    /// Returns the jobs of the next decision in the adaptive phase, which follows
+    /// [`Schedule::min_samples`].
     pub(super) fn highest_gain(&self) -> Vec<Job> {
         let criterion = self.settings.criterion;
         let pooled = [self.pooled_slope(false), self.pooled_slope(true)];
@@ -209,8 +225,11 @@ impl Schedule {
         allocation.into_jobs()
     }
 
-    /// Expected error of each tile: the mean of its class's validation estimates, and of its own allocation estimate
-    /// with a small weight. That estimate decides for a class of one tile whose validation estimate is 0.
+    /// Returns the expected error of each tile. It is a weighted mean of the validation estimates
+    /// of all tiles of its class and of the tile's own allocation estimate. The weights are numbers
+    /// of pixels; that of the own estimate is multiplied by [`OWN_WEIGHT`]. The own estimate keeps
+    /// the expected error above 0 if the tile is alone in its class and its validation estimate is
+    /// 0.
     fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
         let variance =
             |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);
@@ -235,8 +254,8 @@ impl Schedule {
     }
 }
 
-/// Fits models through a tile's estimates, weighted by their counts. Estimates at lower counts reduce the influence of
-/// chance in the latest one.
+/// Fits error models to the estimates of a tile. Each estimate is weighted by its sample count.
+/// Estimates at lower counts reduce the influence of chance in the latest one.
 fn tile_models(tile: &Tile, criterion: Criterion, pooled: [f64; 2]) -> TileModels {
     let slope = tile.slope(criterion, pooled[usize::from(tile.glossy)]);
     let (mut sums, mut weights) = ([0.0; 2], 0.0);

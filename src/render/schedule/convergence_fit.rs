@@ -1,19 +1,21 @@
-//! Convergence fit: noise of the whole picture against rays, and its extrapolation to a target.
+//! Convergence fit: the noise of the whole picture as a function of the number of rays,
+//! extrapolated to a target.
 
 use crate::render::schedule::tile::{FLATTEST, STEEPEST, clamp_slope};
 
-/// Number of points: one at every half doubling of the rays, over three doublings.
+/// Number of recorded points: one for every factor sqrt(2) in rays, over three doublings.
 const POINTS: usize = 7;
 
-/// Relative uncertainty of an extrapolated time with a well fitted slope. The slope falls a little during the work:
-/// the rays of exploration are a smaller share of all rays at the start than at the end. At slope 0.75 that
-/// lengthens an extrapolation over two doublings by 4 to 10 %.
+/// Relative uncertainty of an extrapolated time if the slope is well fitted. The slope decreases a
+/// little during the render, because the rays of exploration are a smaller share of all rays at the
+/// start than at the end. At slope 0.75 this lengthens an extrapolation over two doublings by 4 to
+/// 10 %.
 const SPREAD: f64 = 0.15;
 
-/// Noise against rays, over the latest three doublings of the rays.
+/// Noise as a function of rays, over the latest three doublings of the rays.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConvergenceFit {
-    /// Rays and RMSE, oldest first.
+    /// Number of rays and RMSE, oldest first.
     points: Vec<(f64, f64)>,
 }
 
@@ -23,7 +25,8 @@ impl ConvergenceFit {
         if !(rays > 0.0 && noise > 0.0) {
             return;
         }
-        // The latest point moves until it is half a doubling away from the one before it.
+        // The latest point is replaced until its rays exceed those of the point before by a factor
+        // of sqrt(2).
         if let [.., (before, _), (latest, _)] = self.points.as_slice()
             && *latest < before * std::f64::consts::SQRT_2
         {
@@ -35,9 +38,10 @@ impl ConvergenceFit {
         }
     }
 
-    /// Lower and upper estimate of the total number of rays at which the noise falls to `target`, from the steepest
-    /// and the flattest of the slopes over the latest one, two and three doublings; before the first doubling from the
-    /// limits of all slopes. `None` without any noise.
+    /// Lower and upper estimate of the total number of rays at which the noise falls to `target`.
+    /// They follow from the steepest and the flattest of the slopes over the latest one, two and
+    /// three doublings. Before the first doubling they follow from the largest and the smallest
+    /// plausible slope. Returns `None` before the first record.
     pub fn rays_needed(&self, target: f64) -> Option<(f64, f64)> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {
@@ -55,7 +59,8 @@ impl ConvergenceFit {
         Some((rays + additional(steep) * (1.0 - SPREAD), rays + additional(flat) * (1.0 + SPREAD)))
     }
 
-    /// Slope over the latest doublings, at most three; 0.5 before there are two points.
+    /// Slope over all recorded points, at most three doublings; 0.5 if there are fewer than two
+    /// points.
     pub fn slope(&self) -> f64 {
         match (self.points.first(), self.points.last()) {
             (Some((r0, n0)), Some((r1, n1))) if r1 > r0 => {

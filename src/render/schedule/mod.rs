@@ -1,9 +1,11 @@
-//! Sample allocation: the next tiles, their numbers of samples, and the end of the work. The schedule is
-//! pure logic: the clock is an argument, and the film is known through the reports of finished jobs.
+//! Schedule: chooses the next tiles and their numbers of samples, and ends the render. The schedule
+//! is pure logic. It gets the time as an argument, and learns about the film from the reports of
+//! finished jobs.
 //!
-//! A decision gives each chosen tile the same sample indices in replicate A and then in replicate B. At
-//! every decision a tile holds equally many samples of both, and its error is known. Decisions depend on
-//! estimated errors and ray counts, never on time or threads; time only ends the work.
+//! A decision gives each chosen tile the same sample indices in replicate A and then in replicate
+//! B. At every decision, a tile therefore holds equally many samples of both, and an estimate of
+//! its error. Decisions depend on estimated errors and ray counts, never on time or threads. Time
+//! can only end the render.
 
 mod allocation;
 mod convergence_fit;
@@ -20,44 +22,49 @@ use convergence_fit::ConvergenceFit;
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
 
-/// Samples per replicate that every tile gets before adaptive sampling and estimates begin. Estimates from
-/// fewer samples are unreliable and cost as much as the samples. A value of 16 would spend a third of the
-/// mirror room's samples, and two thirds of the reflecting tracks', on tiles without noise.
+/// Samples per replicate that every tile gets before adaptive sampling and noise estimates start.
+/// Estimates from fewer samples are unreliable and take as long as the samples. With a value of 16,
+/// tiles without noise would get a third of all samples of the mirror room scene, and two thirds of
+/// those of the reflecting tracks scene.
 const MIN_SAMPLES: u32 = 4;
-/// [`MIN_SAMPLES`] of a picture whose estimated error has fewer than [`FEW_PIXELS`] effective pixels: it is sparse or
-/// clean, and its features are found by samples, not by estimates.
+/// Replacement of [`MIN_SAMPLES`] for pictures whose estimated error is concentrated in fewer than
+/// [`FEW_PIXELS`] effective pixels (see [`Noise::effective_pixels`]). Such a picture is sparse or
+/// clean: more samples find its features, estimates from few samples do not.
 const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
-/// Number of effective pixels below which an estimate is unreliable: with 16 its RMSE is uncertain by 18 % (1 / sqrt(2 k)).
+/// Number of effective pixels below which an estimate is unreliable. With k effective pixels the
+/// relative uncertainty of the RMSE is 1 / sqrt(2 k): 18 % for 16.
 const FEW_PIXELS: f64 = 16.0;
-/// Alignment of sample counts from this count on: the width of the widest packets. A tile's last block may be shorter.
-/// Narrower packets use the same alignment, because the samples of a picture must not depend on the processor.
+/// Alignment of sample counts, for counts of at least this value. It is the width of the widest
+/// packets. Narrower packets use the same alignment, because the samples of a picture must not
+/// depend on the processor. The last block of a tile may be shorter.
 pub const SAMPLE_ALIGNMENT: u32 = 16;
-/// Samples per replicate at which a tile is full: the largest aligned count whose double, for both replicates, fits 32 bits.
+/// Samples per replicate at which a tile is full: the largest aligned count for which the sum over
+/// both replicates fits 32 bits.
 const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
 
-/// Number of samples that aligns `count`, if it is at least one packet: an earlier stop criterion may have ended
-/// inside a packet.
+/// Returns the number of samples from `count` to the next packet boundary; 0 for counts below one
+/// packet. A count is unaligned if an earlier stop criterion ended inside a packet.
 fn to_packet(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT { 0 } else { count.next_multiple_of(SAMPLE_ALIGNMENT) - count }
 }
 
-/// Next step of the work.
+/// Next step of a render.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
     /// Trace this wave.
     Trace(Wave),
-    /// The work is done.
+    /// The render is finished, for this reason.
     Finished(StoppedBy),
 }
 
-/// Samples per pixel over the picture, A and B together.
+/// Numbers of samples per pixel in the picture, A and B together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spp {
-    /// The fewest.
+    /// Smallest number in any pixel.
     pub min: u32,
-    /// The mean over pixels.
+    /// Mean over all pixels.
     pub mean: f64,
-    /// The most.
+    /// Largest number in any pixel.
     pub max: u32,
 }
 
@@ -77,12 +84,14 @@ pub struct Schedule {
     samples: u64,
     rays: u64,
     noise: Option<Noise>,
-    /// Samples per replicate when the noise was last estimated, in uniform phases.
+    /// Samples per replicate at the latest noise estimate, in phases with equal counts in all
+    /// tiles.
     estimated_at: u32,
 }
 
 impl Schedule {
-    /// Creates a schedule. `pixels` holds the number of pixels of each tile, row by row.
+    /// Creates a schedule. `pixels` holds the number of pixels of each tile; tiles are in row
+    /// order.
     pub fn new(pixels: &[u32], settings: Settings) -> Self {
         Self {
             settings,
@@ -99,8 +108,8 @@ impl Schedule {
         }
     }
 
-    /// Returns the next step, `seconds` after the start of the work. [`Schedule::complete`] takes the wave's
-    /// report before the next call.
+    /// Returns the next step. `seconds` is the time since the start of the render. The caller
+    /// reports the result of a wave to [`Schedule::complete`] before the next call.
     pub fn next(&mut self, seconds: f64) -> Step {
         if self.remaining.is_empty() {
             if self.replicate == 0 {
@@ -124,8 +133,8 @@ impl Schedule {
         })
     }
 
-    /// Records the result of the wave of [`Schedule::next`], or of the part that [`Wave::cut`] left of it.
-    /// Jobs that were cut off or cancelled are returned again.
+    /// Records the report of the wave that [`Schedule::next`] returned, or of the part that
+    /// [`Wave::cut`] left of it. Jobs that were cut off or cancelled are part of a later wave.
     pub fn complete(&mut self, wave: &Wave, report: &WaveReport) {
         let mut reports = wave.jobs.iter().zip(&report.reports).peekable();
         let mut partial = Vec::new();
@@ -163,12 +172,13 @@ impl Schedule {
         }
     }
 
-    /// Latest estimate of the whole picture's error.
+    /// Latest estimate of the error of the whole picture.
     pub fn noise(&self) -> Option<Noise> {
         self.noise
     }
 
-    /// Latest estimate of each tile's RMSE in 8-bit levels, row by row; 0 before the first.
+    /// Latest estimate of each tile's RMSE in 8-bit levels, in row order; 0 before the first
+    /// estimate.
     pub fn tile_noise_codes(&self) -> Vec<f32> {
         let codes = |t: &Tile| t.error.map_or(0.0, |(_, e)| e.of_all().codes.sqrt() as f32);
         self.tiles.iter().map(codes).collect()
@@ -201,7 +211,7 @@ impl Schedule {
         self.tiles.iter().map(|t| u64::from(t.pixels)).sum()
     }
 
-    /// Largest number of samples per replicate of `tile`.
+    /// Largest number of samples per replicate that `tile` may get.
     fn cap(&self, tile: &Tile) -> u32 {
         match self.settings.rays_per_pixel {
             0 => MAX_SAMPLES,
@@ -210,7 +220,7 @@ impl Schedule {
         }
     }
 
-    /// Root of the mean squared error over the pixels of the tiles that `selects` selects.
+    /// Returns the root mean square error over the pixels of the tiles for which `selects` is true.
     fn pooled(&self, criterion: Criterion, selects: impl Fn(&Tile) -> bool) -> f64 {
         let (sum, pixels) =
             self.tiles.iter().filter(|t| selects(t)).fold((0.0, 0u64), |(s, n), t| {
@@ -219,14 +229,15 @@ impl Schedule {
         (sum / pixels.max(1) as f64).sqrt()
     }
 
-    /// Number of samples per replicate, over all pixels, until the mean count is reached.
+    /// Returns the number of samples per replicate, over all pixels, that are left until the
+    /// requested mean count.
     fn samples_left(&self) -> u64 {
         let Some(spp) = self.settings.stop.spp else { return u64::MAX };
         let done: u64 = self.tiles.iter().map(|t| u64::from(t.done) * u64::from(t.pixels)).sum();
         (u64::from(spp.div_ceil(2)) * self.pixels()).saturating_sub(done)
     }
 
-    /// Decides the next jobs, none if nothing is left to do, and sets `estimate`.
+    /// Decides on the next jobs and sets `estimate`. Returns no jobs if nothing is left to trace.
     fn decide(&mut self) -> Vec<Job> {
         self.estimate = true;
         let common = self.common_count();
@@ -237,22 +248,24 @@ impl Schedule {
         }
     }
 
-    /// Samples per replicate that every tile gets before estimates count.
+    /// Samples per replicate that every tile gets before estimates are used.
     fn min_samples(&self) -> u32 {
         let sparse = |noise: Noise| self.settings.criterion.effective_pixels(noise) < FEW_PIXELS;
         if self.noise.is_some_and(sparse) { SPARSE_MIN_SAMPLES } else { MIN_SAMPLES }
     }
 
-    /// Least number of samples per replicate among the tiles below their cap; [`MAX_SAMPLES`] if there is none.
+    /// Smallest number of samples per replicate among the tiles below their cap; [`MAX_SAMPLES`] if
+    /// all tiles have reached it.
     fn common_count(&self) -> u32 {
         let open = self.tiles.iter().filter(|t| t.done < self.cap(t));
         open.map(|t| t.done).min().unwrap_or(MAX_SAMPLES)
     }
 
-    /// Jobs with the same sample indices for every tile below its cap.
+    /// Returns jobs with the same sample indices for every tile below its cap.
     fn uniform(&mut self, common: u32) -> Vec<Job> {
         let grown = match common {
-            // To the next power of two; an earlier stop criterion may have ended between two of them.
+            // To the next power of two. An earlier stop criterion may have ended between two
+            // powers.
             n if n < SAMPLE_ALIGNMENT => (n + 1).next_power_of_two() - n,
             n => {
                 (self.uniform_growth(n) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT).max(SAMPLE_ALIGNMENT)
@@ -275,9 +288,10 @@ impl Schedule {
         self.jobs(samples)
     }
 
-    /// Number of samples by which a uniform picture with `done` samples per replicate grows: half of the way to
-    /// the error target, at most `done`; an eighth of `done` without such a target, and at most an eighth with a
-    /// time limit, which a larger wave would overshoot.
+    /// Returns the number of samples by which a picture with `done` samples per replicate in all
+    /// tiles grows. With an error target it is half of the estimated remaining samples, at most
+    /// `done`. Without an error target it is `done / 8`. With a time limit it is at most
+    /// `done / 8`, because a larger wave would exceed the limit.
     fn uniform_growth(&self, done: u32) -> u32 {
         let eighth = done / 8;
         let Some((criterion, target)) = self.target() else { return eighth };
@@ -295,7 +309,8 @@ impl Schedule {
             .collect()
     }
 
-    /// Slope of the error over all glossy (or all other) tiles, from their latest doublings.
+    /// Returns the slope of the error over all glossy tiles (or over all other tiles), from their
+    /// latest doublings.
     fn pooled_slope(&self, glossy: bool) -> f64 {
         let criterion = self.settings.criterion;
         let selected = self.tiles.iter().filter(|t| t.glossy == glossy);

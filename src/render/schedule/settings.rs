@@ -1,13 +1,13 @@
-//! Settings of the schedule, stop criteria, and reasons for its end.
+//! Settings of the schedule: stop criteria, and the reasons for which a render ends.
 
 use crate::film::{Mse, Noise};
 
-/// Error that adaptive sampling minimises.
+/// Measure of the error that adaptive sampling minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Criterion {
-    /// The error as displayed, in 8-bit levels.
+    /// Error of the displayed picture, in 8-bit levels.
     Codes,
-    /// The error in linear radiance.
+    /// Error in linear radiance.
     Linear,
 }
 
@@ -34,33 +34,35 @@ impl Criterion {
     }
 }
 
-/// Stop criteria; the first one that is reached ends the work. Without any it does not end.
+/// Stop criteria. The first one that is reached ends the render. A render without stop criteria
+/// does not end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stop {
-    /// Mean samples per pixel, A and B together; rounds up to even.
+    /// Mean number of samples per pixel, A and B together; rounded up to an even number.
     pub spp: Option<u32>,
     /// Estimated RMSE of the whole picture as displayed, in 8-bit levels.
     pub noise_codes: Option<f64>,
     /// Estimated linear RMSE of the whole picture.
     pub rmse_linear: Option<f64>,
-    /// Seconds of rendering, tested between waves.
+    /// Seconds of rendering. The limit is tested between waves.
     pub seconds: Option<f64>,
 }
 
-/// Reason for the end of the work.
+/// Reason for which a render has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoppedBy {
-    /// The sample count was reached.
+    /// The mean number of samples per pixel was reached.
     Spp,
-    /// The noise as displayed was reached.
+    /// The displayed noise fell to its target.
     Noise,
-    /// The linear RMSE was reached.
+    /// The linear RMSE fell to its target.
     Rmse,
-    /// The time was over.
+    /// The time limit was reached.
     Time,
-    /// Every glossy tile has reached its cap of samples per pixel, and the others have reached the target.
+    /// All glossy tiles have reached their cap on samples per pixel, and the error of the other
+    /// tiles is at the target.
     RaysPerPixel,
-    /// Every tile holds the largest number of samples.
+    /// All tiles hold the largest number of samples.
     Full,
 }
 
@@ -81,12 +83,13 @@ impl StoppedBy {
 /// Settings of the schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Adaptive sampling: tiles may get different counts. Otherwise counts differ only by the cap.
+    /// `true` if tiles may get different numbers of samples. Otherwise numbers differ only by the
+    /// cap.
     pub adaptive: bool,
-    /// The error that adaptive sampling minimises.
+    /// Measure of the error that adaptive sampling minimises.
     pub criterion: Criterion,
-    /// Largest number of samples per pixel, A and B together, of tiles with a glossy lobe (rounds down to even,
-    /// at least 2); 0 for no cap.
+    /// Largest number of samples per pixel, A and B together, in tiles with a glossy lobe. It is
+    /// rounded down to an even number, at least 2. 0 means no cap.
     pub rays_per_pixel: u32,
     /// Stop criteria.
     pub stop: Stop,

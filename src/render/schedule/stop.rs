@@ -1,11 +1,12 @@
-//! End of the work, and the estimated time until then.
+//! End of a render, and the estimated time until the end.
 
 use crate::render::schedule::tile::Tile;
 use crate::render::schedule::{Criterion, MAX_SAMPLES, Schedule, StoppedBy};
 
 impl Schedule {
-    /// Lower and upper estimate of the seconds left until the first stop criterion, `seconds` after the start
-    /// of the work.
+    /// Lower and upper estimate of the seconds left until the first stop criterion is reached.
+    /// `seconds` is the time since the start of the render. Returns `None` if the time cannot be
+    /// estimated.
     pub fn eta_seconds(&self, seconds: f64) -> Option<(f64, f64)> {
         let by_noise = self.target().and_then(|(_, target)| self.seconds_to_error(target, seconds));
         let by_spp = self.settings.stop.spp.filter(|_| self.samples > 0).map(|spp| {
@@ -21,8 +22,9 @@ impl Schedule {
             .reduce(|(low, high), (l, h)| (low.min(l), high.min(h)))
     }
 
-    /// Lower and upper estimate of the seconds left until the displayed noise falls to `codes` 8-bit levels,
-    /// whatever the stop criteria are, `seconds` after the start of the work. `None` before an error is known.
+    /// Lower and upper estimate of the seconds left until the displayed noise falls to `codes`
+    /// 8-bit levels, whatever the stop criteria are. `seconds` is the time since the start of the
+    /// render. Returns `None` before the first estimate of the noise.
     pub fn seconds_to_noise(&self, codes: f64, seconds: f64) -> Option<(f64, f64)> {
         let noise = self.noise?;
         if noise.rmse_codes <= codes {
@@ -35,7 +37,8 @@ impl Schedule {
         self.seconds_to_error(target, seconds)
     }
 
-    /// Lower and upper estimate of the seconds left until the error of the criterion falls to `target`.
+    /// Lower and upper estimate of the seconds left until the error of the current criterion falls
+    /// to `target`.
     fn seconds_to_error(&self, target: f64, seconds: f64) -> Option<(f64, f64)> {
         let (low, high) = self.convergence.rays_needed(target)?;
         let per_ray = seconds / self.rays.max(1) as f64;
@@ -43,14 +46,16 @@ impl Schedule {
         Some((seconds_until(low), seconds_until(high)))
     }
 
-    /// Estimated share of the work that is done, 0..=1, until the nearest stop criterion.
+    /// Estimated share of the render that is done, 0..=1, measured by the nearest stop criterion.
+    /// `seconds` is the time since the start of the render.
     pub fn progress(&self, seconds: f64) -> Option<f64> {
         let (low, high) = self.eta_seconds(seconds)?;
         let seconds_left = 0.5 * (low + high);
         Some(if seconds > 0.0 { seconds / (seconds + seconds_left) } else { 0.0 })
     }
 
-    /// Target error and its kind. With both kinds set it is that of the criterion.
+    /// Returns the target error and the measure of the error to which it applies. If both measures
+    /// have a target, that of the adaptive criterion is used.
     pub(super) fn target(&self) -> Option<(Criterion, f64)> {
         let codes = self.settings.stop.noise_codes.map(|t| (Criterion::Codes, t));
         let linear = self.settings.stop.rmse_linear.map(|t| (Criterion::Linear, t));
@@ -73,19 +78,20 @@ impl Schedule {
                 return Some(StoppedBy::RaysPerPixel);
             }
         }
-        // The first samples are always traced: a picture has at least one of each replicate.
+        // The first samples are always traced, so that a picture has at least one sample of each
+        // replicate.
         let started = self.samples > 0;
         stop.seconds.filter(|limit| started && seconds >= *limit).map(|_| StoppedBy::Time)
     }
 
-    /// Returns `true` if only the cap on glossy tiles keeps the picture from its target.
+    /// Returns `true` if the picture misses its target only because of the cap on glossy tiles.
     fn capped_at_target(&self) -> bool {
         let Some((criterion, target)) = self.target() else { return false };
         let is_open = |t: &Tile| t.done < self.cap(t);
         self.tiles.iter().any(|t| !is_open(t)) && self.pooled(criterion, is_open) <= target
     }
 
-    /// Reason why no job is left.
+    /// Returns the reason for which no job is left.
     pub(super) fn reason_without_work(&self) -> StoppedBy {
         let open = || self.tiles.iter().filter(|t| t.done < self.cap(t));
         if self.tiles.iter().all(|t| t.done == MAX_SAMPLES) {
@@ -97,7 +103,8 @@ impl Schedule {
         }
     }
 
-    /// Returns `true` if every tile has its least number of samples, so that the pooled error is reliable.
+    /// Returns `true` if every tile has the minimum number of samples, so that the pooled error is
+    /// reliable.
     fn min_samples_reached(&self) -> bool {
         let min_samples = self.min_samples();
         self.tiles.iter().all(|t| t.done >= min_samples.min(self.cap(t)))

@@ -7,20 +7,21 @@ use crate::render::wave::JobReport;
 /// Largest number of doublings of the sample count over which a slope is fitted.
 const DOUBLINGS: u32 = 3;
 
-/// Sample counts and error estimates of one tile.
+/// Sample counts and noise estimates of one tile.
 #[derive(Clone, Debug)]
 pub(super) struct Tile {
-    /// Number of pixels (fewer in the tiles at the right and lower edge).
+    /// Number of pixels inside the picture. Tiles at the right and lower edge have fewer pixels.
     pub pixels: u32,
-    /// Samples per pixel of each replicate; equal for A and B at every decision.
+    /// Samples per pixel in each replicate. At every decision the number is equal for A and B.
     pub done: u32,
     /// Number of rays so far.
     pub rays: u64,
-    /// A path has hit a glossy lobe.
+    /// `true` if a path has hit a glossy lobe.
     pub glossy: bool,
-    /// Latest estimate of the error, with the samples per replicate for which it holds.
+    /// Latest noise estimate, with the number of samples per replicate from which it was made.
     pub error: Option<(u32, TileNoise)>,
-    /// Estimates at counts that at least doubled from one to the next, oldest first.
+    /// Earlier noise estimates with their sample counts, oldest first. From one entry to the next
+    /// the count at least doubles.
     history: Vec<(u32, TileNoise)>,
 }
 
@@ -29,7 +30,7 @@ impl Tile {
         Self { pixels, done: 0, rays: 0, glossy: false, error: None, history: Vec::new() }
     }
 
-    /// Records a report at `count` samples per pixel of each replicate.
+    /// Records the report of a job after which each replicate has `count` samples per pixel.
     pub fn record(&mut self, report: &JobReport, count: u32) {
         self.rays += report.rays;
         self.glossy |= report.glossy;
@@ -44,7 +45,7 @@ impl Tile {
         self.history.clear();
     }
 
-    /// Replaces all estimates by `estimate`.
+    /// Replaces all estimates by `estimate`; `None` for too few samples.
     pub fn set_estimate(&mut self, estimate: Option<(u32, TileNoise)>) {
         self.forget_estimates();
         if let Some((count, error)) = estimate {
@@ -62,18 +63,20 @@ impl Tile {
         }
     }
 
-    /// Mean number of rays per sample; at least 1, the camera ray.
+    /// Mean number of rays per sample; at least 1, for the camera ray.
     pub fn rays_per_sample(&self) -> f64 {
         let samples = 2.0 * f64::from(self.done) * f64::from(self.pixels);
         (self.rays as f64 / samples.max(1.0)).max(1.0)
     }
 
-    /// Latest reported mean squared error; 0 before the first estimate.
+    /// Latest validation estimate of the mean squared error, which is the reported one; 0 before
+    /// the first estimate.
     pub fn mse(&self, criterion: Criterion) -> f64 {
         self.error.map_or(0.0, |(_, e)| criterion.of(e.reported))
     }
 
-    /// All estimates: sample counts with the mean squared errors of the allocation and of the validation pixels.
+    /// Iterates over all estimates: the sample count, and the mean squared errors of the allocation
+    /// pixels and of the validation pixels.
     pub fn estimates(&self, criterion: Criterion) -> impl Iterator<Item = (f64, [f64; 2])> {
         let latest = self.error.filter(|e| self.history.last() != Some(e));
         let all = self.history.iter().copied().chain(latest);
@@ -82,17 +85,18 @@ impl Tile {
         })
     }
 
-    /// Latest doubling of the sample count: counts and errors before and after.
+    /// Returns the latest doubling of the sample count: count and error before and after it.
+    /// Returns `None` before the first doubling.
     pub fn last_doubling(&self, criterion: Criterion) -> Option<[(f64, f64); 2]> {
         let [.., before, after] = self.history.as_slice() else { return None };
         Some([before, after].map(|(n, e)| (f64::from(*n), criterion.of(e.allocation))))
     }
 
-    /// Slope p of RMSE ~ n^-p.
+    /// Returns the slope p with which the RMSE falls with the sample count n: RMSE ~ n^-p.
     ///
-    /// The fit through the first and the last estimate is drawn towards `pooled`, the slope of all similar
-    /// tiles, with the weight of two doublings: the estimate of one tile is uncertain by 5 to 35 per cent, and
-    /// therefore a slope over one doubling by 0.05 to 0.4.
+    /// The fit through the first and the last estimate is drawn towards `pooled`, the slope over
+    /// all similar tiles, with the weight of two doublings. The estimate of one tile is uncertain
+    /// by 5 to 35 per cent; a slope over one doubling is therefore uncertain by 0.05 to 0.4.
     pub fn slope(&self, criterion: Criterion, pooled: f64) -> f64 {
         const PRIOR_DOUBLINGS: f64 = 2.0;
         let [(n0, first), .., (n1, last)] = self.history.as_slice() else { return pooled };
@@ -106,9 +110,9 @@ impl Tile {
     }
 }
 
-/// Slope of independent samples; a flatter one is due to chance.
+/// Slope of independent samples. A smaller fitted slope is regarded as chance.
 pub(super) const FLATTEST: f64 = 0.5;
-/// Largest plausible slope; a steeper one is due to chance.
+/// Largest plausible slope. A larger fitted slope is regarded as chance.
 pub(super) const STEEPEST: f64 = 1.0;
 
 /// Clamps a slope to the plausible range; NaN becomes [`FLATTEST`].

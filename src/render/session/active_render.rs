@@ -1,4 +1,4 @@
-//! The render of one scene: traces it piece by piece, estimates its noise, publishes snapshots.
+//! Active render: traces one scene piece by piece, estimates its noise, and publishes snapshots.
 
 use crate::film::{Film, IncrementalDownsample, TileNoise};
 use crate::render::feature_buffer::FeatureBuffer;
@@ -16,18 +16,20 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Target duration of a piece of a wave, in seconds: with a view, and without one.
+/// Target duration of a piece of a wave, in seconds. The first value applies if the client displays
+/// the picture, the second if it does not.
 const PIECE_SECONDS: [f64; 2] = [0.05, 0.25];
-/// Target duration of one job, in seconds: a running job cannot be cancelled.
+/// Target duration of one job, in seconds. It is short because a running job cannot be cancelled.
 const JOB_SECONDS: f64 = 0.005;
-/// Pixels of a tile.
+/// Number of pixels of a tile.
 const TILE_PIXELS: f64 = crate::film::TILE_PIXELS as f64;
-/// Longest duration of a feature buffer that is made before the first picture.
+/// Longest expected duration of a feature buffer (first hits) that is traced before the first
+/// picture, in seconds.
 const FIRST_FEATURES_SECONDS: f64 = 0.002;
-/// Assumed seconds per ray of the first feature buffer: those of a small scene.
+/// Assumed seconds per ray of the first feature buffer: the value of a small scene.
 const FEATURE_RAY_SECONDS: f64 = 5e-8;
 
-/// Resources of the work, and the destination of snapshots.
+/// Resources of a render, and the destination of its snapshots.
 pub(super) struct WorkContext<'a> {
     pub pool: &'a rayon::ThreadPool,
     pub shared: &'a Shared,
@@ -37,8 +39,9 @@ pub(super) struct WorkContext<'a> {
 }
 
 impl WorkContext<'_> {
-    /// Returns `true` if a snapshot is to be made. Between waves (`is_final` is `false`) the client has
-    /// to take the previous picture first: an untaken one would be replaced unseen, and costs time.
+    /// Returns `true` if a snapshot is to be published. Between waves (`is_final` is `false`) that
+    /// is only the case if the client has taken the previous picture. Otherwise the new snapshot
+    /// would replace it unseen, and it costs time to make.
     fn snapshot_wanted(&self, is_final: bool) -> bool {
         is_final || self.view == View::default() || self.shared.slot.is_empty()
     }
@@ -62,21 +65,22 @@ pub(super) struct ActiveRender {
     traced_for: Duration,
     /// Time from `started` to the first complete picture.
     pub first_picture_after: Option<Duration>,
-    /// The tiles' errors have to be estimated again.
+    /// `true` if the errors of the tiles have to be estimated again, because light weights or
+    /// display transform have changed.
     pub estimates_stale: bool,
     throughput: Throughput,
     inventory: Arc<str>,
     downsample: Option<IncrementalDownsample>,
     features: Option<Arc<FeatureBuffer>>,
-    /// Seconds per ray of the latest feature buffer.
+    /// Measured seconds per ray of the latest feature buffer.
     feature_ray_seconds: f64,
 }
 
 impl ActiveRender {
-    /// Compiles `scene` and starts its render after the `previous` one.
+    /// Compiles `scene` and starts its render. The film of `previous` is reused.
     ///
     /// # Errors
-    /// Returns the first fault of the scene.
+    /// Returns the first validation error of the scene.
     pub fn start(
         scene: &Arc<Scene>,
         options: &Options,
@@ -109,7 +113,8 @@ impl ActiveRender {
         self.traced_for.as_secs_f64()
     }
 
-    /// Continues with `scene` and returns `true` if the samples serve it as well.
+    /// Shows `scene` from now on and returns `true` if the samples at hand are valid for it.
+    /// Otherwise returns `false`.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let weights = self.state.mix.clone();
         if !self.state.try_reuse(scene) {
@@ -122,18 +127,18 @@ impl ActiveRender {
         true
     }
 
-    /// Discards the estimates: the samples are displayed in another way now.
+    /// Discards the noise estimates, because the samples are displayed in another way from now on.
     pub fn invalidate_estimates(&mut self) {
         self.schedule.forget_estimates();
         self.estimates_stale = true;
     }
 
-    /// Discards the measured speed, which no longer applies.
+    /// Discards the measured speed, for example after a change of the number of threads.
     pub fn reset_throughput(&mut self) {
         self.throughput = Throughput::default();
     }
 
-    /// Estimates the errors of all tiles. Returns `false` if it was cancelled; nothing has changed then.
+    /// Estimates the errors of all tiles. If it is cancelled, returns `false` and changes nothing.
     pub fn reestimate(&mut self, pool: &rayon::ThreadPool, cancel_wave: &AtomicBool) -> bool {
         let (film, estimator) = (&self.state.film, self.state.estimator());
         let estimate = |tile: usize| -> Option<(u32, TileNoise)> {
@@ -154,7 +159,7 @@ impl ActiveRender {
         estimates.is_some()
     }
 
-    /// Traces `wave` or a piece of it.
+    /// Traces `wave`, or only a piece of it.
     pub fn trace(&mut self, wave: Wave, context: &WorkContext) {
         let flags = context.shared;
         if self.first_picture_after.is_some() {
@@ -191,12 +196,14 @@ impl ActiveRender {
                 self.throughput.record(self.seconds(), self.schedule.samples());
                 self.first_picture_after.get_or_insert_with(|| self.started.elapsed());
             }
-            // Cancelled for a newer scene, or by a flag that was raised late for this very scene.
+            // The first pass was cancelled for a newer scene, or by the flag of this very scene if
+            // it was raised after the worker had lowered the flags.
             None => self.state.film.restart(),
         }
     }
 
-    /// Cuts `wave` to a piece of [`PIECE_SECONDS`] with jobs of [`JOB_SECONDS`].
+    /// Cuts `wave` to a piece that takes about [`PIECE_SECONDS`], with jobs that take about
+    /// [`JOB_SECONDS`].
     fn piece(&self, wave: Wave, context: &WorkContext) -> Wave {
         let seconds = PIECE_SECONDS[usize::from(context.view == View::default())];
         let Some(speed) = self.throughput.samples_per_second().or_else(|| self.mean_speed()) else {
@@ -214,8 +221,8 @@ impl ActiveRender {
         (seconds > 0.0).then(|| self.schedule.samples() as f64 / seconds)
     }
 
-    /// Makes the feature buffer of the view if there is none yet and it will take at most `limit`
-    /// seconds.
+    /// Traces the feature buffer for the view, unless there is one already or it would take longer
+    /// than `limit` seconds.
     fn update_features(&mut self, context: &WorkContext, limit: f64) {
         let Some([columns, rows]) = context.view.raster else { return };
         if self.features.as_ref().is_some_and(|f| [f.columns, f.rows] == [columns, rows]) {
@@ -247,7 +254,8 @@ impl ActiveRender {
 
     /// Publishes a snapshot if one is wanted; see [`WorkContext::snapshot_wanted`].
     pub fn publish(&mut self, context: &WorkContext, state: State, is_final: bool) {
-        // A film that was cleared for a restart is empty; its coarse picture was published.
+        // A film that was cleared for a restart is empty. Its coarse picture has been published
+        // already.
         if !context.snapshot_wanted(is_final) || self.first_picture_after.is_none() {
             return;
         }
@@ -261,7 +269,7 @@ impl ActiveRender {
         context.put(frame.snapshot(&self.state.film, noise, report, downsample, context.pool));
     }
 
-    /// Report on the progress in `state`.
+    /// Report on the progress of the render; `state` is the state of the session.
     pub fn report(&self, context: &WorkContext, state: State) -> Report {
         let seconds = self.seconds();
         Report {

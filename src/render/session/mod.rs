@@ -1,13 +1,14 @@
-//! Background rendering: a thread that receives scenes, fills films and publishes snapshots.
+//! Background rendering: a thread that receives scenes, traces them and publishes snapshots.
 //!
-//! A client sends the command first and raises the cancel flag of the running wave afterwards; the
-//! worker lowers the flag first and takes in all commands afterwards. In the other order a command
-//! could slip in between and wait for a wave that nothing cancels. Of several scenes only the newest
-//! is compiled. A cancelled wave loses nothing: its remaining jobs run when the work resumes.
+//! A client first sends a command and then raises the cancel flag of the running wave. The worker
+//! first lowers the flag and then receives all commands. In any other order a command could arrive
+//! between the two steps, and wait for the end of a wave that nothing cancels. If several scenes
+//! are waiting, only the newest is compiled. A cancelled wave loses no samples: its remaining jobs
+//! are traced when the render resumes.
 //!
-//! A scene that differs from the active one only in light weights ([`Relighting`]) keeps the film,
-//! its samples and the schedule; only the noise is estimated again. Long waves are traced in pieces,
-//! so that clients see the film grow. The samples do not depend on the cuts.
+//! A scene that differs from the active one only in light weights (see [`Relighting`]) keeps the
+//! film, its samples and the schedule; only the noise is estimated again. Long waves are traced in
+//! pieces, so that clients see the picture improve. The samples do not depend on the pieces.
 //!
 //! No call blocks, except [`Session::with`] and [`Session::wait`].
 //!
@@ -37,7 +38,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 use worker::Worker;
 
-/// Work on the film; its argument is `None` without a film.
+/// Function that runs on the rendering thread. Its argument is `None` if there is no film.
 type Task = Box<dyn FnOnce(Option<(&RenderState, &Report)>) + Send>;
 
 enum Command {
@@ -52,20 +53,21 @@ enum Command {
     Quit,
 }
 
-/// State that session and worker share besides the channel.
+/// State that session and worker share in addition to the channel.
 #[derive(Default)]
 struct Shared {
-    /// Ends the running wave, because there are commands.
+    /// Cancels the running wave, because commands are waiting.
     cancel_wave: AtomicBool,
-    /// Ends the first pass, because there is a newer scene.
+    /// Cancels the first pass, because a newer scene is waiting.
     cancel_first_pass: AtomicBool,
     slot: Slot,
-    /// Number of compilations: skipped scenes leave no other trace outside the worker.
+    /// Number of compilations, for tests: skipped scenes are visible nowhere else outside of the
+    /// worker.
     #[cfg(test)]
     compilations: std::sync::atomic::AtomicUsize,
 }
 
-/// Rendering thread with its own thread pool. Dropping it ends the work.
+/// Handle of a rendering thread with its own thread pool. Dropping the session ends the thread.
 pub struct Session {
     commands: Sender<Command>,
     shared: Arc<Shared>,
@@ -78,7 +80,7 @@ impl Session {
     /// Starts a session that traces with `threads` threads.
     ///
     /// # Errors
-    /// Returns the error of the system that refuses to start a thread.
+    /// Returns the operating system's error if a thread cannot be started.
     pub fn new(threads: usize, options: Options, settings: Settings) -> io::Result<Self> {
         let pool = threads::pool(threads, 0)?;
         let (commands, inbox) = unbounded();
@@ -90,9 +92,9 @@ impl Session {
         Ok(Self { commands, shared, wakeup, generations: 0, thread: Some(thread) })
     }
 
-    /// Renders `scene` from now on. Returns its generation, which its reports quote; later scenes
-    /// have larger generations. Samples that serve the new scene as well are kept (see
-    /// [`Relighting::mix`]).
+    /// Renders `scene` from now on. Returns the generation of the scene, a number that its reports
+    /// contain; later scenes have larger generations. Samples at hand are kept if they are valid
+    /// for the new scene (see [`Relighting::mix`]).
     ///
     /// [`Relighting::mix`]: crate::render::Relighting::mix
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> u64 {
@@ -102,7 +104,7 @@ impl Session {
         self.generations
     }
 
-    /// Compiles the newest scene again and starts with an empty film. Returns the new generation, as
+    /// Compiles the newest scene again and starts with an empty film. Returns a new generation, as
     /// [`Session::set_scene`] does.
     pub fn restart(&mut self) -> u64 {
         self.generations += 1;
@@ -111,21 +113,22 @@ impl Session {
         self.generations
     }
 
-    /// Sets the stop criteria. A finished session resumes if they are not reached yet.
+    /// Sets the stop criteria. A finished render resumes if the new criteria are not reached yet.
     pub fn set_stop(&self, stop: Stop) {
         self.send(Command::Stop(stop));
     }
 
-    /// Estimates the noise for `display` from now on. Samples are kept.
+    /// Sets the display transform under which the noise is estimated. Samples are kept.
     pub fn set_display(&self, display: Display) {
         self.send(Command::Display(display));
     }
 
-    /// Traces with `threads` threads (0: one per processor) from now on. `niceness` is 0 for the
-    /// priority of the calling thread, or 1 to 19 for a lower one (on Linux).
+    /// Sets the number of threads that trace (0: one per processor) and their priority. `niceness`
+    /// 0 is the priority of the calling thread; 1 to 19 are lower priorities (on Linux).
     ///
     /// # Errors
-    /// Returns the error of the system that refuses to start a thread; the old threads stay.
+    /// Returns the operating system's error if a thread cannot be started. The old threads are then
+    /// kept.
     pub fn set_threads(&self, threads: usize, niceness: i32) -> io::Result<()> {
         self.send(Command::Pool(threads::pool(threads, niceness)?));
         Ok(())
@@ -141,19 +144,20 @@ impl Session {
         self.send(Command::Pause(false));
     }
 
-    /// Sets the contents of snapshots; initially neither picture nor probe.
+    /// Sets the contents of snapshots. Initially they contain neither picture nor probe.
     pub fn set_view(&self, view: View) {
         self.send(Command::View(view));
     }
 
-    /// Queues `task` to run on the rendering thread between two pieces of work, and returns at once.
-    /// Its argument is `None` if there is no film: no scene yet, or one that cannot be rendered. A
-    /// task that has not run when the session ends is dropped.
+    /// Queues `task` and returns at once. The task runs on the rendering thread between two pieces
+    /// of work. Its argument is `None` if there is no film: no scene has been set yet, or the scene
+    /// cannot be rendered. A task that has not run when the session ends is dropped.
     pub fn submit(&self, task: impl FnOnce(Option<(&RenderState, &Report)>) + Send + 'static) {
         self.send(Command::Task(Box::new(task)));
     }
 
-    /// Runs `task` as [`Session::submit`] does and waits for its result; `None` without a film.
+    /// Runs `task` as [`Session::submit`] does and waits for its result. Returns `None` if there is
+    /// no film.
     pub fn with<R: Send + 'static>(
         &self,
         task: impl FnOnce(&RenderState, &Report) -> R + Send + 'static,
@@ -168,12 +172,13 @@ impl Session {
         receiver.recv().ok()
     }
 
-    /// Channel that receives a message whenever there is a new snapshot.
+    /// Channel that receives a message whenever a new snapshot is published.
     pub fn wakeup(&self) -> &Receiver<()> {
         &self.wakeup
     }
 
-    /// Waits for the next wake-up, for at most `limit`, and takes the snapshot.
+    /// Waits for the next wake-up, for at most `limit`, and takes the snapshot. Returns `None`
+    /// after `limit`.
     ///
     /// # Panics
     /// If the rendering thread has panicked.
@@ -185,14 +190,15 @@ impl Session {
         }
     }
 
-    /// Takes the latest snapshot; `None` if it has been taken already.
+    /// Takes the latest snapshot. Returns `None` if it has been taken already.
     pub fn take(&self) -> Option<Snapshot> {
         self.shared.slot.take()
     }
 
-    /// Sends the command first, then raises the flag: see the module's description.
+    /// Sends the command first, then raises the cancel flag. The module's documentation explains
+    /// the order.
     fn send(&self, command: Command) {
-        // The worker ends only on `Quit`, or by a panic that `drop` passes on.
+        // The worker ends only by `Quit`, or by a panic, which `drop` propagates.
         let _ = self.commands.send(command);
         self.shared.cancel_wave.store(true, Ordering::Release);
     }

@@ -4,21 +4,21 @@ use crate::film::Noise;
 use crate::render::schedule::{Spp, StoppedBy};
 use std::sync::Arc;
 
-/// Noise targets that a user chooses from, in 8-bit levels; each is half of the one before.
+/// Noise targets among which a user chooses, in 8-bit levels. Each is half of the previous one.
 pub const QUALITIES: [f64; 6] = [4.0, 2.0, 1.0, 0.5, 0.25, 0.125];
 
 /// State of a session.
 #[derive(Clone, Debug, PartialEq)]
 pub enum State {
-    /// No scene yet.
+    /// No scene has been set yet.
     Idle,
-    /// Samples are being added.
+    /// Samples are being traced.
     Tracing,
     /// A stop criterion is reached.
     Finished(StoppedBy),
-    /// Paused by the client.
+    /// The client has paused the render.
     Paused,
-    /// The newest scene cannot be rendered, for this reason.
+    /// The newest scene cannot be rendered; the text is the reason.
     Failed(String),
 }
 
@@ -31,45 +31,47 @@ pub struct Report {
     pub generation: u64,
     /// State of the session.
     pub state: State,
-    /// Samples per pixel that both replicates have.
+    /// Numbers of samples per pixel in the picture, A and B together.
     pub spp: Spp,
-    /// Samples over all pixels.
+    /// Number of samples traced, over all pixels.
     pub samples: u64,
-    /// Rays of every kind.
+    /// Number of rays traced, of every kind.
     pub rays: u64,
-    /// Seconds spent on tracing this scene, without compilation and pauses.
+    /// Seconds spent on tracing this scene. Compilation and pauses are not included.
     pub seconds: f64,
-    /// Duration of the scene's compilation.
+    /// Duration of the scene's compilation in seconds.
     pub compile_seconds: f64,
-    /// Seconds from the start of the compilation to the first complete picture.
+    /// Seconds from the start of the compilation to the first complete picture. `None` before that
+    /// picture.
     pub first_picture_seconds: Option<f64>,
-    /// Estimated error.
+    /// Estimated error of the picture. `None` before the first estimate.
     pub noise: Option<Noise>,
-    /// Lower and upper estimate of the seconds left.
+    /// Lower and upper estimate of the seconds left until the render ends. `None` if the time
+    /// cannot be estimated.
     pub eta_seconds: Option<(f64, f64)>,
-    /// Lower and upper estimate of the seconds left until each of the [`QUALITIES`] is reached,
-    /// whatever the stop criteria are.
+    /// Lower and upper estimate of the seconds left until the noise falls to each of the
+    /// [`QUALITIES`], whatever the stop criteria are. `None` before the first estimate.
     pub quality_seconds: [Option<(f64, f64)>; QUALITIES.len()],
-    /// Share of the work that is done, 0..=1.
+    /// Share of the render that is done, 0..=1. `None` if it cannot be estimated.
     pub progress: Option<f64>,
-    /// Samples left out because they were NaN or negative.
+    /// Number of samples that were NaN or negative and were replaced by black.
     pub bad_samples: u64,
-    /// Samples brighter than the film can hold; they are stored with its largest value.
+    /// Number of samples above the film's limit, which were stored with the limit.
     pub saturated_samples: u64,
-    /// Pixels whose sum of samples has reached its limit and is too low.
+    /// Number of pixels with a sum that has reached its limit, which makes them too dark.
     pub saturated_pixels: u64,
-    /// Speed of the last second of tracing, samples per second; 0 before it is known.
+    /// Samples per second during the last second of tracing; 0 before it is known.
     pub recent_samples_per_second: f64,
-    /// Threads that trace.
+    /// Number of threads that trace.
     pub threads: usize,
     /// Name of the lane type, such as `f32x8`; empty without a scene.
     pub lanes: &'static str,
-    /// Contents of the compiled scene, in one line; empty without a scene.
+    /// Features of the compiled scene, in one line; empty without a scene.
     pub inventory: Arc<str>,
 }
 
 impl Report {
-    /// Report without a scene.
+    /// Creates the report of a session without a scene.
     pub(super) fn idle(threads: usize) -> Self {
         Self {
             generation: 0,
@@ -94,7 +96,7 @@ impl Report {
         }
     }
 
-    /// One phrase for each kind of sample that was left out or clamped.
+    /// Returns one phrase for each kind of sample that was replaced or limited.
     pub fn warnings(&self) -> Vec<String> {
         let plural = |n: u64, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
         let mut out = Vec::new();
@@ -110,7 +112,7 @@ impl Report {
         out
     }
 
-    /// Mean speed of tracing, samples per second.
+    /// Mean number of samples per second of tracing.
     pub fn samples_per_second(&self) -> f64 {
         if self.seconds > 0.0 { self.samples as f64 / self.seconds } else { 0.0 }
     }

@@ -1,4 +1,4 @@
-//! Snapshots: the picture and progress that a session publishes.
+//! Snapshots: picture and progress of a render at one moment, published by the session.
 
 use crate::film::{
     DirtyTile, Display, Film, IncrementalDownsample, LightWeights, Probe, Thumbnail,
@@ -10,13 +10,13 @@ use crate::scene::Scene;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Requested contents of snapshots.
+/// Contents of snapshots that a client requests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct View {
-    /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::guide`]; `None`: no picture, no
-    /// feature buffer, no tile maps.
+    /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::guide`]. `None` requests neither
+    /// picture nor feature buffer nor tile maps.
     pub raster: Option<[usize; 2]>,
-    /// Column and row of the film's pixel to probe.
+    /// Column and row of the pixel to probe. `None` requests no probe.
     pub probe: Option<[usize; 2]>,
 }
 
@@ -25,24 +25,25 @@ pub struct View {
 pub struct Snapshot {
     /// Progress of the render.
     pub report: Report,
-    /// Means per light group over the cells of [`View::raster`], to be weighted by the client; `None`
-    /// if not requested, or without a film.
+    /// Mean of each light group over each cell of [`View::raster`]; the client applies the light
+    /// weights. `None` if no picture is requested, or without a film.
     pub picture: Option<Thumbnail>,
-    /// Light weights of the scene; empty without a film.
+    /// Light weights of the scene in the report; empty without a film.
     pub mix: LightWeights,
-    /// Light weights for other scenes; `None` without a film.
+    /// Relighting that computes the light weights of other scenes. `None` without a film.
     pub lighting: Option<Arc<Relighting>>,
-    /// First hit in each cell of [`View::raster`]. A slow one comes a snapshot later than the first
-    /// picture.
+    /// First hit in each cell of [`View::raster`]. If it takes long to trace, it is part of the
+    /// snapshot after the first picture.
     pub guide: Option<Arc<FeatureBuffer>>,
-    /// Error and samples of each tile.
+    /// Error and number of samples of each tile.
     pub tiles: Arc<TileMaps>,
-    /// The requested pixel; `None` if it lies outside of the film.
+    /// Probe of the requested pixel. `None` if the pixel is outside of the film or no probe is
+    /// requested.
     pub probe: Option<Probe>,
 }
 
 impl Snapshot {
-    /// Snapshot of a report without a film.
+    /// Creates a snapshot with `report` and without a film.
     pub(super) fn without_film(report: Report) -> Self {
         Self {
             report,
@@ -55,24 +56,25 @@ impl Snapshot {
         }
     }
 
-    /// Light weights with which this picture shows `scene`, which may be newer than the snapshot.
-    /// `None` if the scene needs samples of its own; the picture then fits only [`Snapshot::mix`].
+    /// Returns the light weights with which this picture shows `scene`, which may be newer than the
+    /// snapshot. Returns `None` if `scene` needs samples of its own; the picture can then be shown
+    /// only with [`Snapshot::mix`].
     pub fn mix_for(&self, scene: &Scene) -> Option<LightWeights> {
         self.lighting.as_ref()?.mix(scene)
     }
 }
 
-/// Values of the film's tiles, row by row. A tile covers
-/// [`TILE`](crate::film::TILE) x [`TILE`](crate::film::TILE) pixels, less at the right and lower edge.
+/// Values of the film's tiles, in row order. A tile covers [`TILE`](crate::film::TILE) x
+/// [`TILE`](crate::film::TILE) pixels, fewer at the right and lower edge.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TileMaps {
-    /// Tiles in a row.
+    /// Number of tiles in a row.
     pub columns: usize,
-    /// Rows of tiles.
+    /// Number of rows of tiles.
     pub rows: usize,
-    /// Estimated RMSE in 8-bit levels; empty before the first estimate.
+    /// Estimated RMSE of each tile in 8-bit levels; empty before the first estimate.
     pub noise_codes: Vec<f32>,
-    /// Samples per pixel, A and B together.
+    /// Samples per pixel of each tile, A and B together.
     pub spp: Vec<u32>,
 }
 
@@ -87,7 +89,7 @@ impl TileMaps {
     }
 }
 
-/// Fields that all snapshots of one film share.
+/// Fields with equal values in all snapshots of one film.
 pub(super) struct Frame {
     pub view: View,
     pub mix: LightWeights,
@@ -97,7 +99,8 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Snapshot of the current film. `downsample` caches the tiles that it has read.
+    /// Creates a snapshot of the current film. `downsample` caches the contributions of tiles, so
+    /// that only changed tiles are read.
     pub fn snapshot(
         &self,
         film: &Film,
@@ -134,7 +137,7 @@ impl Frame {
     }
 }
 
-/// Slot for one snapshot; a newer one replaces an untaken one.
+/// Slot that holds the latest snapshot. A new snapshot replaces one that has not been taken.
 #[derive(Debug, Default)]
 pub(super) struct Slot(Mutex<Option<Snapshot>>);
 
@@ -151,7 +154,8 @@ impl Slot {
         self.lock().is_none()
     }
 
-    /// Ignores poisoning: a client that panicked while it held the lock leaves a whole snapshot.
+    /// Locks the slot also if it is poisoned: a client that panicked while it held the lock has
+    /// left a complete snapshot.
     fn lock(&self) -> std::sync::MutexGuard<'_, Option<Snapshot>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

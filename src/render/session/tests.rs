@@ -1,4 +1,5 @@
-//! Sessions that render small scenes, some of them expensive: a camera inside a mirroring sphere.
+//! Tests of sessions with small scenes. The expensive scene is a camera inside of a mirroring
+//! sphere.
 
 use crate::film::Noise;
 use crate::render::schedule::{Criterion, Spp, Stop, StoppedBy};
@@ -8,7 +9,7 @@ use crate::scene::built_in;
 use crate::world;
 use std::time::{Duration, Instant};
 
-/// Long enough for any machine; reached only on failure.
+/// Time limit that every machine meets; reached only if a test fails.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn endless() -> Stop {
@@ -32,8 +33,8 @@ fn scene(width: u32) -> Arc<Scene> {
     Arc::new(scene)
 }
 
-/// A scene whose paths all have 500 reflections: its first pass takes 64 times as long as its coarse
-/// picture, which is complete within a fraction of a second.
+/// Returns a scene in which every path has 500 reflections. Its first pass takes 64 times as long
+/// as its coarse picture, which is complete within a fraction of a second.
 fn expensive_scene() -> Arc<Scene> {
     const TEXT: &str = r#"
         [film]
@@ -55,7 +56,7 @@ fn expensive_scene() -> Arc<Scene> {
     Arc::new(Scene::parse(TEXT, "test").unwrap())
 }
 
-/// Returns the first snapshot that `accepts` accepts.
+/// Returns the first snapshot for which `accepts` is true.
 fn wait_for(session: &Session, accepts: impl Fn(&Snapshot) -> bool) -> Snapshot {
     let end = Instant::now() + PATIENCE;
     loop {
@@ -83,7 +84,7 @@ fn of_several_scenes_only_the_newest_is_compiled() {
     let newest = (0..50).map(|_| session.set_scene(scene(64))).last().unwrap();
     release.send(()).unwrap();
     wait_for(&session, |s| s.report.generation == newest && s.report.samples > 0);
-    // The worker may have taken in some of the scenes before the task that blocks it.
+    // The worker may have received some of the scenes before the task that blocks it.
     let compilations = session.shared.compilations.load(Ordering::SeqCst);
     assert!(compilations <= 2, "{compilations} of 50 scenes compiled");
 }
@@ -95,7 +96,7 @@ fn newest_scene_is_never_lost() {
         let mut newest = 0;
         for edit in 0..=round % 4 {
             newest = session.set_scene(scene(64 + 16 * (edit as u32 % 2)));
-            // The scene reaches the worker in all of its states.
+            // The delay varies, so that scenes reach the worker in all of its states.
             std::thread::sleep(Duration::from_micros(round * 37 % 500));
         }
         wait_for(&session, |s| s.report.generation == newest && s.report.samples > 0);
@@ -131,7 +132,7 @@ fn pause_stops_tracing_and_loses_no_sample() {
     session.pause();
     let paused = wait_for(&session, |s| s.report.state == State::Paused);
     std::thread::sleep(Duration::from_millis(30));
-    // A task on the film is possible in a pause.
+    // A task on the film runs during a pause.
     assert_eq!(session.with(|_, report| report.samples), Some(paused.report.samples));
     session.resume();
     let end = wait_for(&session, |s| matches!(s.report.state, State::Finished(_)));

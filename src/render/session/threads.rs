@@ -1,13 +1,14 @@
-//! Pool of the tracing threads.
+//! Thread pool for tracing.
 
 use std::io;
 
-/// Creates a pool of `threads` threads. A `niceness` above 0 lowers their priority; 19 leaves them
-/// the idle time of the processor. It takes effect on Linux, where threads have priorities of their
-/// own, unless the system refuses it (a priority cannot rise above that of the process).
+/// Creates a pool of `threads` threads. A `niceness` above 0 lowers their priority; with 19 they
+/// run only when the processor is idle otherwise. The priority takes effect on Linux, where it is
+/// set for each thread, unless the system refuses it (a priority cannot be raised above that of the
+/// process).
 ///
 /// # Errors
-/// Returns the error of the system that refuses to start a thread.
+/// Returns the operating system's error if a thread cannot be started.
 pub(super) fn pool(threads: usize, niceness: i32) -> io::Result<rayon::ThreadPool> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -20,7 +21,7 @@ pub(super) fn pool(threads: usize, niceness: i32) -> io::Result<rayon::ThreadPoo
 #[cfg(target_os = "linux")]
 fn lower_priority(niceness: i32) {
     if niceness > 0 {
-        // Without the right to do so the threads stay as they are.
+        // Without the necessary permission the threads keep their priority.
         let _ = rustix::process::setpriority_process(None, niceness.min(19));
     }
 }

@@ -1,14 +1,14 @@
-//! Throughput meter: samples per second over the latest second of tracing.
+//! Throughput: samples per second over the latest second of tracing.
 
 use std::collections::VecDeque;
 
-/// Length of the measured window, in seconds of tracing.
+/// Length of the measured time window, in seconds of tracing.
 const WINDOW_SECONDS: f64 = 1.0;
 
-/// Sample counts at the moments of the latest [`WINDOW_SECONDS`].
+/// Sample counts at several times within the latest [`WINDOW_SECONDS`].
 #[derive(Debug, Default)]
 pub(super) struct Throughput {
-    /// Seconds and samples since the start, oldest first.
+    /// Pairs of time and sample count since the start of the render, oldest first.
     marks: VecDeque<(f64, u64)>,
 }
 
@@ -21,7 +21,7 @@ impl Throughput {
         }
     }
 
-    /// Samples per second; `None` before there are two marks.
+    /// Samples per second in the window. Returns `None` before there are two marks.
     pub fn samples_per_second(&self) -> Option<f64> {
         let (&(from, first), &(to, last)) = (self.marks.front()?, self.marks.back()?);
         (to > from).then(|| (last - first) as f64 / (to - from))
@@ -40,7 +40,7 @@ mod tests {
         assert_eq!(throughput.samples_per_second(), None);
         throughput.record(0.25, 100);
         assert_eq!(throughput.samples_per_second(), Some(400.0));
-        // Ten times as fast from here on.
+        // From here on, tracing is ten times as fast.
         (1..=20).for_each(|i| throughput.record(0.25 + 0.25 * f64::from(i), 100 + 1000 * i as u64));
         assert_eq!(throughput.samples_per_second(), Some(4000.0));
         assert!(throughput.marks.len() < 10);

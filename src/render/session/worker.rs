@@ -1,4 +1,4 @@
-//! The session's thread: takes in commands and chooses the next piece of work.
+//! Worker: the session's thread, which receives commands and chooses the next piece of work.
 
 use crate::film::Display;
 use crate::render::Options;
@@ -20,20 +20,20 @@ pub(super) struct Worker {
     pool: rayon::ThreadPool,
     options: Options,
     settings: Settings,
-    /// The newest scene and its generation.
+    /// Newest scene, with its generation.
     newest: Option<(u64, Arc<Scene>)>,
-    /// The newest scene has not been started yet.
+    /// `true` if the render of the newest scene has not been started yet.
     pending: bool,
-    /// The newest scene starts with an empty film.
+    /// `true` if the newest scene starts with an empty film, even if samples could be reused.
     restart: bool,
     tasks: Vec<Task>,
     paused: bool,
     view: View,
-    /// The active render; `Err` holds the reason why the newest scene cannot be rendered.
+    /// Active render, or the reason for which the newest scene cannot be rendered.
     work: Result<Option<ActiveRender>, String>,
-    /// State after the latest step.
+    /// State of the session after the latest piece of work.
     state: State,
-    /// Nothing is left to do before the next command.
+    /// `true` if nothing is left to do before the next command.
     idle: bool,
 }
 
@@ -75,9 +75,10 @@ impl Worker {
         }
     }
 
-    /// Takes in all commands; waits for one if there is nothing left to do.
+    /// Receives all waiting commands. Waits for one if nothing is left to do.
     fn listen(&mut self) -> ControlFlow<()> {
-        // The flags first, then the inbox: see the module's description.
+        // The flags are lowered before commands are received. The module's documentation explains
+        // the order.
         self.shared.cancel_wave.swap(false, Ordering::AcqRel);
         self.shared.cancel_first_pass.swap(false, Ordering::AcqRel);
         if self.idle {
@@ -180,7 +181,7 @@ impl Worker {
         }
     }
 
-    /// Does one piece of work, or none if nothing is left to do.
+    /// Does one piece of work, or nothing if nothing is left to do.
     fn advance(&mut self) {
         let generation = self.generation();
         let context = WorkContext {
@@ -202,10 +203,10 @@ impl Worker {
                 return;
             }
         };
-        // The first picture of a scene is shown even in a pause.
+        // The first picture of a scene is traced even during a pause.
         let paused = self.paused && work.first_picture_after.is_some();
         if work.estimates_stale {
-            // The picture is published at once, its noise as soon as it is estimated.
+            // The picture is published at once. Its noise follows as soon as it is estimated.
             self.state = if paused { State::Paused } else { State::Tracing };
             work.publish(&context, self.state.clone(), true);
             if !work.reestimate(&self.pool, &self.shared.cancel_wave) {

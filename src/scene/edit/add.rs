@@ -37,7 +37,8 @@ const PALETTE: [[f64; 3]; 6] = [
     [0.1, 0.6, 0.65],
 ];
 
-/// Returns a material with a palette colour that no material of the scene has, if one is left.
+/// Returns a material with the first palette colour that no material of the scene has. If all
+/// colours are used, they are reused in turn.
 fn fresh_material(scene: &Scene) -> Material {
     let used = |color: &[f64; 3]| scene.materials.values().any(|m| m.color.0 == *color);
     let free = PALETTE.iter().find(|color| !used(color));
@@ -46,12 +47,12 @@ fn fresh_material(scene: &Scene) -> Material {
     Material { color: Color(color), diffuse, specular, exponent, ..Material::default() }
 }
 
-/// Adds an object of the kind `kind`. It rests on the surface in the middle of the camera's view
-/// and is about as large as the objects around it. `material` is a material to share; `None`
-/// creates a new one.
+/// Adds an object of the kind `kind`. The object rests on the surface in the middle of the camera's
+/// view and is about as large as the objects around it. `material` is the name of an existing
+/// material for the object; `None` creates a new material.
 ///
 /// # Errors
-/// If there is no such kind or material.
+/// If there is no such kind of object, or the scene has no such material.
 pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<Edit, EditError> {
     let size = usual_size(scene);
     let room = DVec3::splat(size);
@@ -63,7 +64,7 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     };
     face_camera(&mut shape, scene);
     if let Form::Plane(_) = shape.form() {
-        // Below everything, so that it does not coincide with an existing ground.
+        // A plane is put below all objects, so that it does not coincide with an existing ground.
         let lows = scene.objects.iter().filter_map(|o| Some(o.form().bounds()?.0.y));
         if let Some(lowest) = lows.reduce(f64::min) {
             let under = round_nice(lowest - 0.1 * size, size);
@@ -90,9 +91,10 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     Edit::checked(next, subject, format!("add {kind}"))
 }
 
-/// Returns steps that put a shape without a position of its own upright on `base`, `size` large.
+/// Returns transform steps for a shape that has no position key of its own. The steps stand the
+/// shape upright on the point `base` and scale its longest side to `size`.
 fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
-    // The canonical cylinder has its axis along z; meshes and compounds have y up, as scenes do.
+    // The axis of the canonical cylinder is z; meshes and compounds have y up, as scenes do.
     let mut steps = match shape {
         Shape::UnitFrustum(_) => vec![TransformOp::RotateX(-90.0)],
         _ => Vec::new(),
@@ -107,8 +109,9 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     steps
 }
 
-/// Returns the length of a new object: somewhat less than the median length of the solids and than
-/// half of the scene's; 1 in an empty scene.
+/// Returns the length of a new object, rounded to one digit: 0.6 times the median length of the
+/// solids, which is limited to the scene's bounding radius. Without solids it is 0.15 times that
+/// radius; in an empty scene it is 0.6.
 fn usual_size(scene: &Scene) -> f64 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let solid = |object: &Object| {
@@ -138,8 +141,9 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
     shape.rotate_y(rounded_to((heading(toward) - heading(front)) / 5.0, 0) * 5.0);
 }
 
-/// Adds a light of the kind `kind` above the scene, on the side of the camera that has no light
-/// yet, about as bright as a scene's only light should be.
+/// Adds a light of the kind `kind` above the scene, to the right or left of the camera: on the side
+/// with fewer lights. The intensity is that of a scene's only light, or half of that if another
+/// light is on.
 ///
 /// # Errors
 /// If there is no such kind.
@@ -181,7 +185,8 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let physical = scene.lights.iter().all(|l| l.falloff == Falloff::InverseSquare);
     let mut note = None;
     if physical && !scene.lights.is_empty() && kind == "point" {
-        // Falloff as the other lights: with the inverse square the same brightness in the middle.
+        // With the inverse square, as the other lights have, the brightness in the middle stays
+        // that of a light without falloff.
         let squared = (from * (1.5 * radius)).length_squared();
         light.falloff = Falloff::InverseSquare;
         light.intensity = round_significant(light.intensity * std::f64::consts::PI * squared, 2);
@@ -202,7 +207,8 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
 /// Adds a material that no object uses yet.
 ///
 /// # Errors
-/// None is known: the result is validated as that of every edit.
+/// None in practice: the edited scene is validated like that of every edit, and the new material is
+/// valid.
 pub fn add_material(scene: &Scene) -> Result<Edit, EditError> {
     let mut next = scene.clone();
     let name = free_material(scene, "material");

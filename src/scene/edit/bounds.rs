@@ -15,11 +15,13 @@ pub struct BoundingSphere {
     pub radius: f64,
 }
 
-/// Lowest and highest corner of an axis-parallel box.
+/// Lowest and highest corner of an axis-aligned box.
 pub(super) type Extent = (DVec3, DVec3);
 
-/// Returns the bounding sphere of an object (for a plane: around the point that places it), a point
-/// light, or the region that a camera looks at; `None` for targets without a position.
+/// Returns a bounding sphere for `subject`: of an object, of a point light, or of all finite
+/// objects with a material. The sphere of a plane has the scene's radius around the point that
+/// places the plane; that of a point light has a tenth of the scene's radius. Returns `None` for
+/// any other target.
 pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     match subject {
         Target::Object(i) => {
@@ -45,13 +47,14 @@ pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     }
 }
 
-/// Returns the bounding sphere of the scene's solids; without solids, of all finite objects; in an
-/// empty scene, the unit sphere about the origin.
+/// Returns the bounding sphere of all solids in the scene. Without solids it is that of all finite
+/// objects; in an empty scene it is the unit sphere about the origin.
 pub fn scene_bounds(scene: &Scene) -> BoundingSphere {
     middle(scene).map_or(BoundingSphere { center: [0.0; 3], radius: 1.0 }, ball)
 }
 
-/// Returns the box around the solids, or else around all finite objects.
+/// Returns the bounding box of all solids, or without solids that of all finite objects. Returns
+/// `None` if there are none of either.
 fn middle(scene: &Scene) -> Option<Extent> {
     let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
     let solids = forms.iter().filter(|form| form.is_solid()).filter_map(Form::bounds);
@@ -71,14 +74,15 @@ fn ball((low, high): Extent) -> BoundingSphere {
 
 /// Returns the coarse step of a coordinate: a power of ten between a hundredth and a tenth of the
 /// diameter of the scene's solids (0.1 in a room with objects a few units apart). A fine step is a
-/// tenth of it.
+/// tenth of the coarse one.
 pub fn step_length(scene: &Scene) -> f64 {
     let exponent = floor_log10(2.0 * scene_bounds(scene).radius) - 1;
     format!("1e{}", exponent.clamp(-12, 8)).parse().unwrap_or(0.1)
 }
 
-/// Returns the distance from the eye to the camera's pivot: its target, or, if it has only a
-/// direction, the point of the view axis nearest to the middle of the scene. Greater than 0.
+/// Returns the distance from the eye to the pivot of camera movements, greater than 0. The pivot is
+/// the camera's target. A camera that has only a direction has as pivot the point of the view axis
+/// nearest to the centre of the scene.
 pub fn focus_distance(scene: &Scene) -> f64 {
     let eye = DVec3::from_array(scene.camera.eye);
     if let Some(target) = scene.camera.target {

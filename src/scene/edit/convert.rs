@@ -1,4 +1,5 @@
-//! Conversion between kinds; position, size, direction and brightness are kept where possible.
+//! Conversion of shapes, lights, textures and cameras between kinds; position, size, direction and
+//! brightness are kept where possible.
 
 use crate::camera::{Camera, ViewAngle};
 use crate::light::{Directional, Falloff, Light, Point};
@@ -15,7 +16,8 @@ use crate::value::{
 use glam::DVec3;
 use toml::{Table, Value};
 
-/// The choice between a light's kinds, a row of the inspector that files do not have.
+/// Field for the choice between `point` and `directional` of a light. It is a row of the inspector;
+/// scene files have no such key.
 pub(super) const KIND: Field = Field::required(
     "kind",
     ValueType::OneOf(&[
@@ -26,8 +28,8 @@ pub(super) const KIND: Field = Field::required(
     "Kind of light source.",
 );
 
-/// The choice between a camera's target and direction, a row of the inspector that files do not
-/// have.
+/// Field for the choice between `target` and `direction` of a camera. It is a row of the inspector;
+/// scene files have no such key.
 pub(super) const AIM: Field = Field::required(
     "aim",
     ValueType::OneOf(&[
@@ -38,7 +40,8 @@ pub(super) const AIM: Field = Field::required(
     "Target point or fixed direction of the camera.",
 );
 
-/// Returns which of the two exclusive kinds a light or a camera has.
+/// Returns the one of the mutually exclusive keys of `subject` that `values` has. Returns `None` if
+/// it has neither, or if `subject` has no exclusive keys.
 pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
     crate::scene::edit::toml_view::exclusive_keys(subject)
         .iter()
@@ -88,13 +91,14 @@ pub(super) fn switch(
     })
 }
 
-/// Returns a shape of the kind `name` with position, size and rotation of `shape`.
+/// Returns a shape of the kind `name` with position, size and rotation of `shape`; `None` if there
+/// is no such kind.
 fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let form = shape.form();
     let (base, size) = match form.bounds() {
         Some((low, high)) => {
-            // The box of a rotated shape is larger than the shape; the box of the unrotated one is
-            // measured.
+            // The bounding box of a rotated shape is larger than the shape: the size is that of the
+            // unrotated shape.
             let mut straight = shape.clone();
             straight.rotate_y(-rotation(shape));
             let (l, h) = straight.form().bounds().unwrap_or((low, high));
@@ -115,7 +119,8 @@ fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     Some(next)
 }
 
-/// Returns the angle of a shape that has one.
+/// Returns the rotation of a shape about the vertical [degrees]; 0 for a kind without the key
+/// `rotation`.
 fn rotation(shape: &Shape) -> f64 {
     match shape {
         Shape::Cube(cube) => cube.rotation,
@@ -125,7 +130,7 @@ fn rotation(shape: &Shape) -> f64 {
     }
 }
 
-/// Converts a light; its brightness in the middle of the scene and its direction there are kept.
+/// Converts a light. Its brightness and its direction at the centre of the scene are kept.
 fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> {
     let ball = scene_bounds(scene);
     let center = DVec3::from_array(ball.center);
@@ -154,7 +159,7 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     }
 }
 
-/// Changes the falloff of a point light; its brightness in the middle of the scene is kept.
+/// Changes the falloff of a point light. Its brightness at the centre of the scene is kept.
 pub(super) fn switch_falloff(
     scene: &Scene,
     index: usize,
@@ -168,7 +173,8 @@ pub(super) fn switch_falloff(
     if let Some(point) = light.point.filter(|_| light.falloff != old.falloff) {
         let center = DVec3::from_array(scene_bounds(scene).center);
         let squared = (DVec3::from_array(point.position) - center).length_squared();
-        // I / d^2 against pi times the intensity.
+        // The irradiance at the distance d is I / d^2 with the inverse square, pi I without
+        // falloff.
         let factor = std::f64::consts::PI * squared;
         let factor = if light.falloff == Falloff::None { factor.recip() } else { factor };
         edit.note = Some(refit(light, factor));
@@ -176,7 +182,8 @@ pub(super) fn switch_falloff(
     Ok(edit)
 }
 
-/// Multiplies the intensity and returns a note about it.
+/// Multiplies the intensity of `light` by `factor`, unless the product is out of range. Returns a
+/// note that states the old and the new intensity.
 fn refit(light: &mut Light, factor: f64) -> String {
     let fitted = round_significant(light.intensity * factor, 3);
     let old = light.intensity;
@@ -187,7 +194,7 @@ fn refit(light: &mut Light, factor: f64) -> String {
     format!("Intensity {old} became {new}: as bright as before in the middle of the scene.")
 }
 
-/// Converts a texture; its placement is kept.
+/// Converts a texture and keeps its placement on the shape.
 fn switch_texture(material: &mut Material, key: &str, name: &str) {
     match (key, &material.texture, &material.bump) {
         ("texture", None, _) => material.texture = Texture::new(name),
@@ -238,12 +245,13 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     }
 }
 
-/// Rounds `x` to about a millionth of `scale`, which keeps the aim of a direction.
+/// Rounds `x` to about a millionth of `scale`: fine enough for a rounded direction to keep its aim.
 fn rounded(x: f64, scale: f64) -> f64 {
     rounded_to(x, crate::value::floor_log10(scale) - 6)
 }
 
-/// Appends the step `name` with its neutral value to the list `key`.
+/// Appends a transform step of the kind `name` to the list `key`, with the value that changes
+/// nothing: the vector 0, the angle 0 or the factor 1.
 pub(super) fn append_step(object: &mut Table, key: &str, name: &str) {
     let zero = || Value::Array(vec![Value::Float(0.0); 3]);
     let value = match name {

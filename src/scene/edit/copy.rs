@@ -10,8 +10,10 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::truncated;
 use glam::DVec3;
 
-/// Appends a copy with a unique name (`cube 2`) to its list. The copy of an object is placed beside
-/// it, where there is room and the camera sees it; that of a light beside the light.
+/// Duplicates an object, a light, a material or a stored camera. The copy is appended to the list
+/// of the original with a unique name (`cube 2`). The copy of an object is placed beside the
+/// original, where there is room and the camera sees it; the copy of a light is placed beside the
+/// light.
 ///
 /// # Errors
 /// For targets that every scene has exactly once.
@@ -31,7 +33,7 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
                 let usual = size.max_element();
                 let base = place_for(scene, size.map(|s| s.max(1e-3 * usual)));
                 let from = DVec3::new((low.x + high.x) / 2.0, low.y, (low.z + high.z) / 2.0);
-                // At the same height above the ground as the original.
+                // The copy is at the same height above the ground as the original.
                 let by = DVec3::new(base.x - from.x, 0.0, base.z - from.z);
                 let digits = crate::value::floor_log10(usual) - 3;
                 let by = by.map(|x| crate::value::rounded_to(x, digits));
@@ -74,8 +76,9 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     Edit::checked(next, copy, format!("duplicate {}", subject.label(scene)))
 }
 
-/// Deletes an object, a light, a stored camera or a material. Objects that lose their material get
-/// the default one, parts that of the whole; the note names them.
+/// Deletes an object, a light, a stored camera or a material. Objects with a deleted material get
+/// the default material, parts of compounds that of the whole compound. The note of the edit names
+/// these objects and parts.
 ///
 /// # Errors
 /// For targets that every scene has.
@@ -86,7 +89,8 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let label = format!("delete {}", subject.label(scene));
     let mut next = scene.clone();
     let mut note = None;
-    // Position of the next entry, else of the previous one.
+    // Index to select after the deletion of entry `i`: that of the next entry, else of the previous
+    // one. `left` is the number of entries that remain.
     let neighbour = |i: usize, left: usize| if i < left { Some(i) } else { left.checked_sub(1) };
     let select = match subject {
         Target::Object(i) => {
@@ -118,13 +122,15 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     })
 }
 
-/// Returns the name after `gone` in a sorted list, else the last one.
+/// Returns the first of the sorted `names` after `gone`, else the last name. Returns `None` if
+/// `names` is empty.
 fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) -> Option<String> {
     names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
 }
 
-/// Gives every object of the material `name` the default material, and every part that of the
-/// whole. Returns a note that names them.
+/// Removes the material `name` from all objects and parts of compounds. The objects get the default
+/// material, the parts that of the whole compound. Returns a note that names these objects and
+/// parts; `None` if nothing used the material.
 fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     let (mut whole, mut parts) = (Vec::new(), Vec::new());
     for i in 0..scene.objects.len() {
@@ -157,8 +163,8 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     (!notes.is_empty()).then(|| notes.join(" "))
 }
 
-/// Renames a target. Objects and parts follow the name of their material; an object or a light may
-/// have an empty name.
+/// Renames a target. A renamed material is renamed in all objects and parts that use it. The name
+/// of an object or a light may be empty.
 ///
 /// # Errors
 /// For targets without a name, and for a name that is taken or not printable.
@@ -205,7 +211,7 @@ pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditEr
     Edit::checked(next, select, format!("rename {}", subject.label(scene)))
 }
 
-/// Gives an object a copy of its material that no other object has.
+/// Gives an object its own copy of its material, which no other object uses.
 ///
 /// # Errors
 /// For targets other than objects.

@@ -12,12 +12,17 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, floor_log10, rounded_to};
 use toml::Value;
 
-/// Changes the numbers of `key` by `steps`: a whole number of coarse steps, or otherwise of fine
-/// ones (0.1 is one, -0.3 three back). `component` selects one number, from 0; `None` changes all
-/// together, and of a colour the brightness. Sizes, intensities and roughness change by about a
-/// tenth (fine: a hundredth), coordinates by [`step_length`], angles by 5 degrees, shares by 0.05.
-/// At the end of a range, and where other keys forbid the value (stated by the note), the scene
-/// stays unchanged. A key without numbers changes to the next or previous choice ([`toggle`]).
+/// Changes the numbers of `key` by `steps` arrow steps. A whole number counts coarse steps; any
+/// other number counts fine steps in tenths: 0.1 is one fine step, -0.3 is three fine steps back.
+/// `component` selects one number, counted from 0. `None` changes all numbers together, and of a
+/// colour the brightness.
+///
+/// A coarse step changes sizes, intensities and roughness by about a tenth (a fine step by a
+/// hundredth), coordinates by [`step_length`], angles by 5 degrees, shares by 0.05. A key without
+/// numbers changes to the next or previous choice ([`toggle`]).
+///
+/// The scene stays unchanged at the end of a range. It also stays unchanged if other keys forbid
+/// the new value; the note of the edit then states the reason.
 ///
 /// # Errors
 /// If there is no such key or number, or no value to start from.
@@ -70,8 +75,9 @@ pub fn step(
     })
 }
 
-/// Changes `key` to the next (or previous) choice, cyclically: an enumeration, a switch, a kind, an
-/// object's material. A key without a value counts as one more choice.
+/// Changes `key` to the next choice, or to the previous one, cyclically. `key` is an enumeration, a
+/// switch, a kind or the material of an object. For a key that may have no value, no value is one
+/// more choice.
 ///
 /// # Errors
 /// If there is no such key, or it has no choices.
@@ -93,12 +99,12 @@ pub fn toggle(
             return crate::scene::edit::set(scene, subject, key, if on { "false" } else { "true" });
         }
         ValueType::OneOf(kinds) => {
-            let now = match get(&values, key).and_then(Value::as_table) {
+            let present = match get(&values, key).and_then(Value::as_table) {
                 Some(inner) => kinds.iter().find(|k| inner.contains_key(k.name)).map(|k| k.name),
                 None => chosen(subject, &values),
             };
             let words: Vec<_> = kinds.iter().map(|k| k.name).collect();
-            let index = words.iter().position(|w| Some(*w) == now);
+            let index = words.iter().position(|w| Some(*w) == present);
             return match next(index, words.len(), forward, optional) {
                 Some(index) => convert::switch(scene, subject, key, words[index]),
                 None => crate::scene::edit::set(scene, subject, key, ""),
@@ -106,14 +112,14 @@ pub fn toggle(
         }
         ValueType::Choice(choices) => {
             let words: Vec<_> = choices.iter().map(|c| c.name).collect();
-            let now = value.and_then(Value::as_str);
-            let index = words.iter().position(|w| Some(*w) == now);
+            let present = value.and_then(Value::as_str);
+            let index = words.iter().position(|w| Some(*w) == present);
             (words, index)
         }
         _ if is_material(subject, field) => {
             let words: Vec<_> = scene.materials.keys().map(String::as_str).collect();
-            let now = value.and_then(Value::as_str);
-            let index = words.iter().position(|w| Some(*w) == now);
+            let present = value.and_then(Value::as_str);
+            let index = words.iter().position(|w| Some(*w) == present);
             (words, index)
         }
         _ => {
@@ -125,8 +131,8 @@ pub fn toggle(
     crate::scene::edit::set(scene, subject, key, text)
 }
 
-/// Returns the index after (or before) `index` in a cycle of `n` choices; `optional` adds the choice
-/// `None`.
+/// Returns the index after `index` (before it, if `forward` is `false`) in a cycle of `n` choices.
+/// If `optional` is `true`, the cycle also contains `None`. Returns `None` if `n` is 0.
 fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option<usize> {
     match (index, forward) {
         _ if n == 0 => None,
@@ -140,7 +146,8 @@ fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option
     }
 }
 
-/// Returns the value from which a key that is left out takes its first step.
+/// Returns the number that is in effect for a key that is left out, at which its first step starts:
+/// for `alpha` and `f0` of a material. Returns `None` for any other key.
 fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<Value> {
     let material = match subject {
         Target::Material(name) => scene.materials.get(name),
@@ -155,7 +162,7 @@ fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<Value> {
     }
 }
 
-/// Number of steps, and their width.
+/// Signed number of steps; `fine` is `true` for fine steps.
 #[derive(Clone, Copy)]
 struct StepCount {
     steps: i64,
@@ -176,19 +183,20 @@ impl StepCount {
 /// Rule by which a number is incremented.
 #[derive(Clone, Copy)]
 enum StepRule {
-    /// By rungs of about a tenth. Below `floor` the next rung is 0, and from 0 it is `floor`.
+    /// To the next round number (rung), about a tenth larger or smaller. The rung below `floor` is
+    /// 0, and the rung above 0 is `floor`.
     Rungs { floor: f64, range: NumberRange },
-    /// By `unit` (fine: a tenth of it).
+    /// By `unit` (fine: a tenth of `unit`).
     Units { unit: f64, range: NumberRange },
     /// By 5 degrees (fine: 0.5).
     Degrees { range: NumberRange },
     /// By a twentieth of the largest number of the direction.
     Direction,
-    /// By rungs, the sign kept.
+    /// To the next rung of the magnitude; the sign is kept.
     Factor,
     /// By tens (fine: ones).
     Tens { range: NumberRange },
-    /// By doubling and halving (fine: ones). From 0 to 1.
+    /// By doubling and halving (fine: by ones). The step up from 0 gives 1.
     Doubles { range: NumberRange },
 }
 
@@ -204,15 +212,16 @@ impl StepRule {
                 } else if range == NumberRange::COORDINATE {
                     Self::Units { unit: step_length(scene), range }
                 } else if field.name == "scale" {
-                    // Of a texture.
+                    // Scale of a texture.
                     Self::Rungs { floor: 0.0, range }
                 } else if field.name == "offset" {
                     Self::Units { unit: 0.05, range }
                 } else if field.name == "height" {
-                    // Of a bump: at most a hundredth of the size of its surface.
+                    // Height of a bump map: at most a hundredth of the size of the surface.
                     Self::Units { unit: 0.005, range }
                 } else if matches!(field.name, "roughness" | "alpha") {
-                    // From 0 to the smallest value that is visible at the far end of a room.
+                    // The step from 0 gives the smallest value that is visible at the far end of a
+                    // room.
                     Self::Rungs { floor: 0.001, range }
                 } else if range == NumberRange::SHARE || range == NumberRange::COEFFICIENT {
                     Self::Units { unit: 0.05, range }
@@ -221,7 +230,7 @@ impl StepRule {
                 } else if range == NumberRange::LIGHT {
                     Self::Rungs { floor: 0.01, range }
                 } else {
-                    // An exponent.
+                    // Phong exponent, or another number without a unit.
                     Self::Rungs { floor: 1.0, range }
                 }
             }
@@ -235,7 +244,7 @@ impl StepRule {
         })
     }
 
-    /// Returns `x` after `count` steps; `all` holds the other numbers of the value.
+    /// Returns `x` after `count` steps; `all` holds all numbers of the value, including `x`.
     fn stepped(self, x: f64, all: &[f64], count: StepCount) -> f64 {
         let StepCount { steps, fine } = count;
         match self {
@@ -246,7 +255,8 @@ impl StepRule {
             Self::Units { unit, range } => within(added(x, unit, count), range, x),
             Self::Degrees { range } => {
                 let moved = added(x, 5.0, count);
-                // An opening angle ends before its last 5 degrees.
+                // An opening angle cannot have the ends of its range: steps stop 0.5 degrees before
+                // them.
                 let ends = NumberRange::closed(range.low + 0.5, range.high - 0.5);
                 if range.low.is_finite() { within(moved, ends, x) } else { moved }
             }
@@ -268,13 +278,14 @@ impl StepRule {
     }
 }
 
-/// Returns x + unit * steps, rounded to a hundredth of a fine step.
+/// Returns `x` plus `steps` times `unit` (fine: a tenth of `unit`), rounded to a hundredth of a
+/// fine step.
 fn added(x: f64, unit: f64, StepCount { steps, fine }: StepCount) -> f64 {
     let width = if fine { unit / 10.0 } else { unit };
     rounded_to(x + width * steps as f64, floor_log10(unit) - 3)
 }
 
-/// Returns `x` clamped to the range; at an open end of the range, `old`.
+/// Returns `x` clamped to `range`. Returns `old` if `x` is beyond an end that `range` excludes.
 fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     if range.holds(x) {
         x
@@ -287,7 +298,7 @@ fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     }
 }
 
-/// Doubles or halves per coarse step; adds or subtracts one per fine step.
+/// Doubles or halves `x` per coarse step; adds or subtracts 1 per fine step.
 fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let moved = match steps {
         _ if fine => x + steps as f64,
@@ -297,14 +308,15 @@ fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> 
     within(moved, range, x)
 }
 
-/// Rungs of a decade in hundredths, about a tenth apart, with every digit among them.
+/// Mantissas of the rungs of coarse steps, in hundredths: about a tenth apart, with every digit
+/// from 1.00 to 9.00 among them.
 const RUNGS: [i64; 23] = [
     100, 110, 120, 130, 140, 160, 180, 200, 220, 250, 280, 300, 330, 360, 400, 450, 500, 550, 600,
     650, 700, 800, 900,
 ];
 
-/// Returns the distance to the next rung of the fine ladder above `hundredths`: 1.00, 1.01 ...
-/// 2.00, 2.02 ... 5.00, 5.05 ...
+/// Returns the distance between the rungs of fine steps at the mantissa `hundredths`, in
+/// hundredths. The rungs are 1.00, 1.01 ... 2.00, 2.02 ... 5.00, 5.05 ... 9.95.
 fn fine_width(hundredths: i64) -> i64 {
     match hundredths {
         ..200 => 1,
@@ -313,19 +325,19 @@ fn fine_width(hundredths: i64) -> i64 {
     }
 }
 
-/// Returns `x` > 0 (or 0) after `steps` rungs. The result is always on the ladder, so that up and
-/// down are inverse.
+/// Returns the number that is `steps` rungs above `x`, which is at least 0. The result is always a
+/// rung, so that steps up and down are inverse.
 fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let up = steps > 0;
     let mut x = x;
     for _ in 0..steps.unsigned_abs() {
         let next = if x == 0.0 { if up { floor } else { 0.0 } } else { nice_step(x, up, fine) };
         let next = if next < floor && !up { 0.0 } else { next };
-        let held = within(next, range, x);
-        if held == x {
+        let limited = within(next, range, x);
+        if limited == x {
             break;
         }
-        x = held;
+        x = limited;
     }
     x
 }
@@ -335,19 +347,19 @@ fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     let e = floor_log10(x);
     let scale = format!("1e{}", 2 - e).parse().unwrap_or(1.0);
     let mantissa = x * scale;
-    // A number on a rung has been rounded on its way there.
+    // Scaling rounds a number on a rung to slightly beside that rung.
     let nearest = mantissa.round();
-    let on = (mantissa - nearest).abs() < 1e-6;
-    let below = if on { nearest as i64 } else { mantissa.floor() as i64 };
+    let on_rung = (mantissa - nearest).abs() < 1e-6;
+    let below = if on_rung { nearest as i64 } else { mantissa.floor() as i64 };
     let hundredths = match (up, fine) {
         (true, true) => {
             let width = fine_width(below);
             (below / width + 1) * width
         }
         (false, true) => {
-            let reach = if on { below - 1 } else { below };
+            let reach = if on_rung { below - 1 } else { below };
             let width = fine_width(reach.max(100));
-            // Below 1.00 follows 9.95 of the next lower decade.
+            // The rung below 1.00 is 9.95 of the next lower decade.
             if reach < 100 {
                 return rounded_to(9.95 * 10f64.powi(e - 1), e - 3);
             } else {
@@ -356,7 +368,7 @@ fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
         }
         (true, false) => RUNGS.iter().copied().find(|r| *r > below).unwrap_or(1000),
         (false, false) => {
-            let under = |r: &i64| if on { *r < below } else { *r <= below };
+            let under = |r: &i64| if on_rung { *r < below } else { *r <= below };
             RUNGS.iter().rev().copied().find(under).unwrap_or(90)
         }
     };
@@ -374,7 +386,7 @@ fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64
     if largest == 0.0 {
         return vec![next; channels.len()];
     }
-    // Black has no hue to come back to: the darkest step stays above it.
+    // Black would lose the hue: the darkest step stays above it.
     let next = if next <= 0.0 { largest.min(0.005) } else { next };
     channels.iter().map(|x| rounded_to(x * next / largest, floor_log10(next) - 3)).collect()
 }

@@ -125,7 +125,7 @@ fn text_to(text: &str) -> f64 {
 fn arrow_step_of_missing_key_starts_from_default() {
     let red = Target::Material("red".into());
     let scene = with(&red, "roughness", "0.2");
-    // 0.2 / (2 sqrt 2) is 0.0707.
+    // The step starts at the default, roughness / (2 sqrt 2) = 0.2 / (2 sqrt 2) = 0.0707.
     assert_eq!(after(&scene, &red, "alpha", 1.0), "0.08");
     assert_eq!(after(&scene, &red, "f0", -1.0), "0.95, 0.95, 0.95");
 }

@@ -1,14 +1,17 @@
-//! Commands that act on the scene's mirror.
+//! Commands that change the material of the scene's mirror.
 
 use crate::primitive::Form;
 use crate::scene::Scene;
 use crate::scene::edit::target::mirror_of;
 use crate::scene::edit::{Edit, EditError, Target, step, toggle};
 
-/// Returns the material that the mirror commands act on: that of the selected object, or the
-/// selected material, if it reflects; else that of the first reflecting rectangle; else the most
-/// reflecting one of all objects and parts. If no material reflects, the selected one, else that of
-/// the first rectangle, so that the reflection can be turned up from 0 again.
+/// Returns the name of the material that the mirror commands change. The first of these that
+/// reflects is chosen: the material of the selected object or the selected material, a material of
+/// a part of the selected object, that of the first reflecting rectangle, the most reflecting
+/// material of all objects and parts.
+///
+/// If no material reflects, the selected material is chosen, else that of the first rectangle, so
+/// that the reflection can be turned up from 0 again. Returns `None` if there is neither.
 pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
     let chosen = selected.and_then(|subject| match subject.material(scene) {
@@ -25,7 +28,7 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     {
         return Some(part);
     }
-    // A rectangle of any orientation; the ground (`platform`) does not count.
+    // Rectangles of any orientation count; the ground (`platform`) does not.
     let rectangle = |i: &usize| {
         let object = &scene.objects[*i];
         object.shape.key() == "rectangle" && matches!(object.form(), Form::Parallelogram(_))

@@ -45,12 +45,13 @@ use std::fmt;
 pub struct Edit {
     /// The edited scene, which is valid.
     pub scene: Scene,
-    /// Target to select next: the edited or added one, or the neighbour of a deleted one.
+    /// Target to select after the edit: the edited or added target, or the neighbour of a deleted
+    /// one.
     pub subject: Target,
     /// Short description for the undo history: `move cube`, `radius of ball`. The steps of one
     /// gesture have the same label.
     pub label: String,
-    /// Side effect, as a sentence, if there is one to report.
+    /// Sentence about a side effect of the edit; `None` if there is nothing to report.
     pub note: Option<String>,
 }
 
@@ -90,7 +91,7 @@ impl EditError {
 }
 
 impl Edit {
-    /// Creates the edit if `scene` is valid; otherwise returns its first error.
+    /// Creates the edit if `scene` is valid; otherwise returns the first validation error.
     fn checked(mut scene: Scene, subject: Target, label: String) -> Result<Self, EditError> {
         scene.resolve();
         match scene.faults().into_iter().next() {

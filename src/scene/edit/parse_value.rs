@@ -5,8 +5,8 @@ use crate::scene::format::suggest::nearest;
 use crate::value::{Color, Field, ValueType, number, sanitized, truncated};
 use toml::Value;
 
-/// Parses `text` as a value of `field`. Ranges are left to validation, except where the type cannot
-/// hold the number.
+/// Parses `text` as a value of `field`. Ranges are checked by the validation of the edited scene,
+/// except where the type of the value cannot hold the number.
 pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
     let text = text.trim();
     let wrong = || {
@@ -63,7 +63,8 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
     }
 }
 
-/// Returns the position of `text` in `words`, or of the only word that begins with it.
+/// Returns the index in `words` of `text`, or of the only word that starts with `text`. Returns
+/// `None` if no word or more than one matches.
 pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     let text = text.to_lowercase();
     if let Some(at) = words.iter().position(|word| word.to_lowercase() == text) {
@@ -77,7 +78,8 @@ pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     }
 }
 
-/// Does the same as [`choose`], with the reason if no word or more than one matches.
+/// Returns the result of [`choose`], or the error that states the accepted words if no word or more
+/// than one matches.
 pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, EditError> {
     choose(text, words).ok_or_else(|| {
         let quote = |word: &str| format!("\"{}\"", truncated(word));
@@ -91,7 +93,8 @@ pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, E
     })
 }
 
-/// Validates `text` as a name that files, outline and terminals can show.
+/// Validates `text` as a name that files, the outline and terminals can show. `what` is the key in
+/// the error.
 pub(super) fn name(what: &str, text: &str) -> Result<String, EditError> {
     let text = text.trim();
     let help = "Expected at most 60 characters, none of them a control character.";
@@ -106,7 +109,7 @@ fn unquoted(text: &str) -> &str {
 }
 
 /// Parses numbers between commas, semicolons or spaces (or the `x` of `640x480` and `640 x 480`),
-/// with or without brackets.
+/// with or without brackets. Returns `None` if one of them is no number.
 fn numbers(text: &str) -> Option<Vec<f64>> {
     let inner = match text.strip_prefix('[') {
         Some(rest) => rest.strip_suffix(']')?,
@@ -123,14 +126,15 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
     parts.map(|part| digits(part).then(|| part.parse().ok())?).collect()
 }
 
-/// Returns `true` if a word is a number in digits; `inf` and `nan` are words that no field takes.
+/// Returns `true` if `part` has only digits, signs, points and `e`. The words `inf` and `nan` are
+/// excluded, because no field accepts them.
 fn digits(part: &str) -> bool {
     part.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b))
         && part.bytes().any(|b| b.is_ascii_digit())
 }
 
-/// Prints a value: shortest digits, lists without brackets, colours as `#rrggbb` where that is
-/// exact and shorter.
+/// Prints a value with the shortest digits and lists without brackets. A colour is printed as
+/// `#rrggbb` where that is exact and shorter.
 pub(super) fn show(takes: ValueType, value: &Value) -> String {
     if let (ValueType::Color(_), Some(color)) = (takes, color(value)) {
         let channels = join(&color.0.map(number));
@@ -152,7 +156,8 @@ fn join(parts: &[String]) -> String {
     parts.join(", ")
 }
 
-/// Returns the numbers of a value: one, or those of a list.
+/// Returns the numbers of a value: one number, or those of a list. Returns `None` for any other
+/// value.
 pub(super) fn floats(value: &Value) -> Option<Vec<f64>> {
     let one = |value: &Value| match value {
         Value::Float(x) => Some(*x),
@@ -165,7 +170,7 @@ pub(super) fn floats(value: &Value) -> Option<Vec<f64>> {
     }
 }
 
-/// Returns a value that is a colour.
+/// Returns a value of three numbers as a colour; `None` for any other value.
 pub(super) fn color(value: &Value) -> Option<Color> {
     floats(value)?.try_into().ok().map(Color)
 }

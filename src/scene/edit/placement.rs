@@ -8,13 +8,13 @@ use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{floor_log10, round_significant, rounded_to};
 use glam::{DVec2, DVec3};
 
-/// Lowers (or lifts) an object until its lowest point rests on the highest surface below it, or, if
-/// there is none, on the lowest surface above. Surfaces are searched below its middle and below its
-/// lowest corners.
+/// Lowers (or lifts) an object until its lowest point rests on the highest surface below it. If
+/// there is none below, the object rests on the lowest surface above. Surfaces are searched on
+/// vertical lines through the centre and the lowest corners of the object.
 ///
 /// # Errors
-/// For targets other than objects, for objects without a lowest point, and without a surface below
-/// or above.
+/// For targets other than objects, for a plane, which has no lowest point, and if there is no
+/// surface below or above the object.
 pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {
         return Err(EditError::new("only objects can be snapped to ground", "Select an object."));
@@ -39,7 +39,7 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
             let direction = if down { DVec3::NEG_Y } else { DVec3::Y };
             others.iter().filter_map(move |form| {
                 let t = form.cast(from, direction)?;
-                // Removes the rounding error of a difference of two heights, which would leave a
+                // Rounding removes the error of a difference of two heights, which would leave a
                 // gap.
                 Some(round_significant(from.y + direction.y * t, 13))
             })
@@ -47,23 +47,23 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
         found.collect::<Vec<_>>()
     };
     let below = heights(true).into_iter().reduce(f64::max);
-    let rest = below.or_else(|| heights(false).into_iter().reduce(f64::min));
-    let Some(rest) = rest else {
+    let support_height = below.or_else(|| heights(false).into_iter().reduce(f64::min));
+    let Some(support_height) = support_height else {
         let help = "Add a platform or a plane first.";
         return Err(EditError::new("there is no surface below or above it", help));
     };
     let mut next = scene.clone();
     let dropped = &mut next.objects[*index];
-    // Repeated to remove what rounding left over.
+    // Further passes remove the gap that rounding leaves in the first one.
     for _ in 0..3 {
-        let lowest = dropped.form().bounds().map_or(rest, |(low, _)| low.y);
-        lift(dropped, rest - lowest);
+        let lowest = dropped.form().bounds().map_or(support_height, |(low, _)| low.y);
+        lift(dropped, support_height - lowest);
     }
     let label = format!("drop {}", subject.label(scene));
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Moves an object up by exactly `by`.
+/// Moves an object up by `by`, without rounding the new coordinate to a short decimal.
 fn lift(object: &mut Object, by: f64) {
     if by == 0.0 {
         return;
@@ -77,7 +77,8 @@ fn lift(object: &mut Object, by: f64) {
     }
 }
 
-/// Returns the points (x, z) that support an object: its middle and its lowest corners.
+/// Returns the points (x, z) at which an object can be supported: its centre and its lowest
+/// corners.
 fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let flat = |p: DVec3| DVec2::new(p.x, p.z);
     let middle = flat(low + (high - low) / 2.0);
@@ -85,13 +86,14 @@ fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let corners = form.corners();
     let near = 1e-9 * (high - low).max_element();
     let lowest = corners.iter().filter(|c| c.y - low.y <= near).map(|c| flat(*c));
-    // Slightly inside, so that neighbours that only touch give no support.
+    // Corners are moved slightly inwards, so that neighbours that only touch the object give no
+    // support.
     support_points.extend(lowest.map(|c| middle + (c - middle) * (1.0 - 1e-6)));
     support_points
 }
 
-/// Returns the middle of the underside for a new object with the lengths `size`: near the middle of
-/// the camera's view, on a surface, and clear of other objects.
+/// Returns a position for a new object with the lengths `size`, as the centre of its underside. The
+/// position is near the middle of the camera's view, on a surface, and clear of other objects.
 pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let eye = DVec3::from_array(scene.camera.eye);
@@ -122,7 +124,7 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
         !walls.iter().any(|wall| intersects(wall, room))
             && !solids.iter().any(|solid| overlap(*solid, room))
     });
-    // In full view, else hidden but inside the picture, else anywhere.
+    // A visible position is best, then a hidden one inside the picture, then one outside.
     let (mut hidden, mut outside) = (None, None);
     for base in free {
         let middle = base + DVec3::Y * (size.y / 2.0);
@@ -137,12 +139,14 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     hidden.or(outside).unwrap_or_else(|| candidate(DVec2::ZERO))
 }
 
-/// Returns `true` if a flat form is level within 60 degrees and can carry objects.
+/// Returns `true` if `form` is flat and its slope is less than 60 degrees, so that it can carry
+/// objects.
 fn is_level(form: &Form) -> bool {
     form.plane().is_some_and(|plane| plane.normal.y.abs() > 0.5)
 }
 
-/// Returns the height of the highest of `floors` below `at`, else of the lowest above it.
+/// Returns the height of the highest of `floors` below the point `at`, else of the lowest above
+/// `at`. Returns `None` if there is neither.
 fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     let heights = |direction: DVec3| {
         floors.iter().filter_map(move |form| Some(at.y + direction.y * form.cast(at, direction)?))
@@ -150,7 +154,7 @@ fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     heights(DVec3::NEG_Y).reduce(f64::max).or_else(|| heights(DVec3::Y).reduce(f64::min))
 }
 
-/// Returns `true` if a flat form (a wall) intersects the inside of a box.
+/// Returns `true` if the flat `form` (a wall) intersects the inside of a box.
 fn intersects(form: &Form, (low, high): Extent) -> bool {
     let shrink = (high - low) * 1e-6;
     let (low, high) = (low + shrink, high - shrink);
@@ -168,7 +172,8 @@ fn overlap(a: Extent, b: Extent) -> bool {
     a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()
 }
 
-/// Returns `true` if a point is well inside the picture.
+/// Returns `true` if `point` is inside the picture, at least 15 % of the half size away from its
+/// edges.
 fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
     let [right, up, forward] = camera.frame();
     let to = point - DVec3::from_array(camera.eye);
@@ -179,7 +184,7 @@ fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
         && to.dot(up).abs() < 0.85 * half_height * depth
 }
 
-/// Returns `true` if no form occludes a point from the eye.
+/// Returns `true` if no form occludes `point` from the eye.
 fn is_visible(forms: &[Form], eye: DVec3, point: DVec3) -> bool {
     !forms.iter().any(|form| form.cast(eye, point - eye).is_some_and(|t| t < 1.0))
 }

@@ -8,7 +8,7 @@ use crate::scene::edit::{EditError, Target};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, number};
 use toml::{Table, Value};
 
-/// A choice of a property.
+/// One of the values that a property can have.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
     /// Name; a material's name may contain any character that files allow.
@@ -17,7 +17,7 @@ pub struct Word {
     pub doc: String,
 }
 
-/// Kind of value of a property.
+/// Kind of value of a property, from which an inspector chooses the input element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Widget {
     /// Any text: a name.
@@ -26,9 +26,9 @@ pub enum Widget {
     Switch,
     /// One of [`Property::words`].
     Choice,
-    /// One of [`Property::words`], on which other rows depend: the kind of a shape or a light.
+    /// One of [`Property::words`], the kind of a shape or a light. The kind determines other rows.
     Kind,
-    /// A list of steps; each of [`Property::words`], typed here, appends one.
+    /// A list of transform steps. Typing one of [`Property::words`] appends a step of that kind.
     List,
     /// One or more numbers.
     Numbers,
@@ -48,10 +48,10 @@ pub struct Property {
     pub depth: usize,
     /// Kind of value.
     pub entry: Widget,
-    /// Value as it can be typed, printable; empty if none is given.
+    /// Value as text that can be typed and printed; empty if the key has no value.
     pub value: String,
-    /// Numbers of the value as text; empty unless it holds numbers or a colour. A colour always has
-    /// three.
+    /// Each number of the value as text. Empty unless the value consists of numbers or is a colour;
+    /// a colour always has three.
     pub components: Vec<String>,
     /// Value of a colour: linear red, green, blue.
     pub color: Option<[f64; 3]>,
@@ -59,7 +59,7 @@ pub struct Property {
     pub unit: &'static str,
     /// Accepted values, as a phrase: `a number from 0 to 1`.
     pub expected: String,
-    /// Accepted words; empty unless it is a choice.
+    /// Accepted words of a choice, a kind or a list; otherwise empty.
     pub words: Vec<Word>,
     /// Description, as a sentence.
     pub doc: &'static str,
@@ -69,8 +69,8 @@ pub struct Property {
     pub default: Option<String>,
 }
 
-/// Returns the rows of `subject` in the order of its field table. An object's material has rows of
-/// its own ([`Target::material`]).
+/// Returns the rows of `subject` in the order of its field table. The rows of an object's material
+/// are those of another target, [`Target::material`].
 ///
 /// # Errors
 /// If the scene has no such target.
@@ -86,7 +86,8 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
         if let Some(kind) = virtual_kind
             && exclusive_keys(subject).contains(&field.name)
         {
-            // One row chooses between the two; only the given one follows.
+            // One row chooses between the two exclusive keys; the row of the key that is given
+            // follows.
             if exclusive_keys(subject)[0] == field.name {
                 walk.kind(kind, chosen(subject, &values), kind.name.to_string(), 0);
             }
@@ -229,7 +230,7 @@ pub(super) fn is_material(subject: &Target, field: &Field) -> bool {
     matches!(subject, Target::Object(_)) && field.name == "material"
 }
 
-/// Parses the text of a default.
+/// Parses the default value `text`, which is TOML.
 pub(super) fn preset(text: &str) -> Option<Value> {
     format!("value = {text}").parse::<Table>().ok()?.remove("value")
 }
@@ -238,7 +239,8 @@ fn words(kinds: &[Field]) -> Vec<Word> {
     kinds.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
 }
 
-/// Returns the accepted values as the reference states them, without the notation of files.
+/// Returns a phrase for the accepted values as in the reference of the scene format, without the
+/// notation of files.
 fn expected(takes: ValueType) -> String {
     match takes {
         ValueType::Text => "text".to_string(),

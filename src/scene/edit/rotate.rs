@@ -6,10 +6,12 @@ use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{floor_log10, rounded_to, sin_cos_degrees, turned};
 use glam::DVec3;
 
-/// Rotates by `degrees` about the vertical, counter-clockwise seen from above: an object about its
-/// own middle, a light about the scene's. An object without a transform is rotated by its shape's
-/// own keys, if it has any; otherwise by two steps at the end of its transform, a rotation and a
-/// translation, which later rotations change.
+/// Rotates `subject` by `degrees` about the vertical, counter-clockwise seen from above: an object
+/// about its own centre, a light about the centre of the scene.
+///
+/// An object without a transform is rotated by the keys of its shape, if the shape has such keys.
+/// Any other object gets two steps at the end of its transform, a rotation and a translation. Later
+/// rotations change these two steps.
 ///
 /// # Errors
 /// For targets that cannot be rotated.
@@ -32,11 +34,11 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
             }
             if let Some(point) = &mut light.point {
                 let pivot = scene_bounds(scene).center;
-                let arm = std::array::from_fn(|i| point.position[i] - pivot[i]);
-                let arm = turned(arm, degrees);
-                let digits = floor_log10(arm[0].hypot(arm[2])) - 6;
-                let place = |i| rounded_to(pivot[i] + arm[i], digits);
-                point.position = [place(0), point.position[1], place(2)];
+                let offset = std::array::from_fn(|i| point.position[i] - pivot[i]);
+                let offset = turned(offset, degrees);
+                let digits = floor_log10(offset[0].hypot(offset[2])) - 6;
+                let coordinate = |i| rounded_to(pivot[i] + offset[i], digits);
+                point.position = [coordinate(0), point.position[1], coordinate(2)];
             }
         }
         _ => {
@@ -48,8 +50,9 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Makes `rotate_y` and `translate` (unless neutral) the last steps of the object, so that it is
-/// rotated about the vertical through its middle.
+/// Rotates the object about the vertical through its centre by the steps `rotate_y` and `translate`
+/// at the end of its transform. Steps of these kinds at the end are replaced; a step without effect
+/// is left out.
 fn turn_by_steps(object: &mut Object, degrees: f64) {
     let (angle, shift, own_len) = match object.transform[..] {
         [.., TransformOp::RotateY(angle), TransformOp::Translate(shift)] => (angle, shift, 2),
@@ -70,10 +73,10 @@ fn turn_by_steps(object: &mut Object, degrees: f64) {
         let (sin, cos) = sin_cos_degrees(angle);
         DVec3::new(middle.x * cos + middle.z * sin, middle.y, middle.z * cos - middle.x * sin)
     };
-    let stands = after(angle) + DVec3::from_array(shift);
-    let wound = rounded_to((angle + degrees).rem_euclid(360.0), -6);
-    let angle = if wound > 180.0 { rounded_to(wound - 360.0, -6) } else { wound };
-    let shift = stands - after(angle);
+    let position = after(angle) + DVec3::from_array(shift);
+    let wrapped = rounded_to((angle + degrees).rem_euclid(360.0), -6);
+    let angle = if wrapped > 180.0 { rounded_to(wrapped - 360.0, -6) } else { wrapped };
+    let shift = position - after(angle);
     let digits = floor_log10(scale.max(middle.x.hypot(middle.z))) - 6;
     let shift = shift.map(|x| rounded_to(x, digits)).to_array();
     if angle != 0.0 {
@@ -106,8 +109,8 @@ mod tests {
         assert_eq!(mirror.normal, [1.0, 0.0, 0.0]);
     }
 
-    /// Every kind, with and without a transform, keeps its position, and a full turn in small steps
-    /// is the identity.
+    /// Rotations keep the position of objects of every kind, with and without a transform. Small
+    /// rotations that add up to a full turn are the identity.
     #[test]
     fn turn_keeps_the_middle_and_full_turn_is_identity() {
         for kind in KINDS {
@@ -134,7 +137,7 @@ mod tests {
                     assert!((a - b).length() < 1e-5, "{}: {a} {b}", kind.name);
                     let half = turn(&start, &Target::Object(0), 180.0).unwrap().scene;
                     let c = middle(&half.objects[0]);
-                    // The box around an irregular object does not rotate with it.
+                    // The bounding box of an irregular object does not rotate with the object.
                     let uneven = ["prism", "union", "intersection", "difference"];
                     let slack = if uneven.contains(&kind.name) { 0.5 } else { 1e-5 };
                     assert!((a - c).length() < slack, "{}: {a} {c}", kind.name);

@@ -13,10 +13,11 @@ use crate::value::{DefaultValue, Field, ValueType};
 use toml::{Table, Value};
 
 /// Sets `key` (of a [`Property`](crate::scene::edit::Property)) to the value in `text`. Empty text
-/// removes an optional key, so that its default applies, or a step of a transform.
+/// removes `key`: an optional key then has its default, and a transform loses the step.
 ///
 /// # Errors
-/// Finding and expectation, if `text` cannot be parsed or the scene would be invalid.
+/// The reason and the accepted values, if `text` cannot be parsed or the edited scene would be
+/// invalid.
 pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edit, EditError> {
     let text = text.trim();
     let values = read(scene, subject)?;
@@ -76,7 +77,7 @@ pub fn set_component(
         return Err(EditError::new(&format!("{key} has no number {}", component + 1), ""));
     }
     let text = text.trim();
-    // Parsed with the same rules and errors as the whole list.
+    // The whole list is parsed again, so that its rules and errors apply to the number.
     let parts: Vec<_> = list
         .iter()
         .enumerate()
@@ -89,7 +90,8 @@ pub fn set_component(
     set(scene, subject, key, &parts.join(" "))
 }
 
-/// Returns the field of `key`, including the keys that only an inspector has.
+/// Returns the field of `key`, also for `kind` of a light and `aim` of a camera, which only the
+/// inspector has. Returns `None` if `subject` has no such key.
 pub(super) fn lookup(subject: &Target, key: &str) -> Option<&'static Field> {
     match (subject, key) {
         (Target::Light(_), "kind") => Some(&KIND),
@@ -98,7 +100,7 @@ pub(super) fn lookup(subject: &Target, key: &str) -> Option<&'static Field> {
     }
 }
 
-/// Sets `key` to `value`, removes exclusive keys and validates.
+/// Sets `key` to `value`, removes the keys that exclude `key`, and validates the edited scene.
 pub(super) fn replace(
     scene: &Scene,
     subject: &Target,
@@ -147,7 +149,8 @@ fn clear(
     finish(scene, subject, key, values)
 }
 
-/// Returns the edit with these values, validated.
+/// Creates the edit that replaces the values of `subject` by `values`, and validates the edited
+/// scene.
 pub(super) fn finish(
     scene: &Scene,
     subject: &Target,

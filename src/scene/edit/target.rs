@@ -14,9 +14,9 @@ pub enum Target {
     Ambient,
     /// Radiance of rays that hit no surface.
     Background,
-    /// A light, by its position in the scene from 0.
+    /// A light, by its index in the scene's lights, counted from 0.
     Light(usize),
-    /// An object, by its position in the scene from 0.
+    /// An object, by its index in the scene's objects, counted from 0.
     Object(usize),
     /// A material, by name.
     Material(String),
@@ -29,13 +29,13 @@ pub enum Target {
 /// A section of the outline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Section {
-    /// The camera and the stored ones.
+    /// The camera of the picture and the stored cameras.
     Camera,
     /// Ambient light and background.
     Surroundings,
     /// Lights.
     Lights,
-    /// Objects with a reflecting material, on the whole or on a part.
+    /// Objects with a reflecting material, also if only a part has one.
     Mirrors,
     /// All other objects.
     Objects,
@@ -83,8 +83,8 @@ pub(super) fn reflects(scene: &Scene, index: usize) -> bool {
     mirror_of(scene, index).is_some()
 }
 
-/// Returns the most reflecting material of the object at `index` and its parts, with its
-/// coefficient; `None` if none reflects.
+/// Returns the most reflecting material of the object at `index` and its parts, with the reflection
+/// coefficient of that material. Returns `None` if none of its materials reflects.
 pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
     let names = scene.objects.get(index).map(Object::materials).unwrap_or_default();
     let known =
@@ -108,7 +108,7 @@ impl Target {
         }
     }
 
-    /// Returns the path to the target in the file.
+    /// Returns the path of keys and indices that leads to the target in a scene file.
     pub(super) fn path(&self) -> Vec<String> {
         let keys: &[&str] = match self {
             Self::Camera => &["camera"],
@@ -124,7 +124,8 @@ impl Target {
         keys.iter().map(|key| key.to_string()).collect()
     }
 
-    /// Returns the target at a path (of a [`Problem`]); `None` means the scene as a whole.
+    /// Returns the target at `path`, which is the path of a [`Problem`]. Returns `None` if the path
+    /// leads to no target, as that of the whole scene.
     pub fn of_path(path: &[String]) -> Option<Self> {
         let index = || path.get(1)?.parse().ok();
         match path.first()?.as_str() {
@@ -141,21 +142,23 @@ impl Target {
         }
     }
 
-    /// Returns the target of a problem and the key in it, which may be empty.
+    /// Returns the target that `problem` is about, and the key inside this target. The key is empty
+    /// if the problem is about the target as a whole.
     pub fn of_finding(problem: &Problem) -> Option<(Self, String)> {
         let subject = Self::of_path(&problem.path)?;
-        let rest = problem.path.get(subject.path().len()..).unwrap_or_default();
-        Some((subject, rest.join(".")))
+        let key = problem.path.get(subject.path().len()..).unwrap_or_default();
+        Some((subject, key.join(".")))
     }
 
-    /// Returns the target of a diagnostic.
+    /// Returns the target that `message` is about; `None` if it is about none.
     pub fn of_message(scene: &Scene, message: &Diagnostic) -> Option<Self> {
         let subjects = outline(scene).into_iter().map(|(_, subject)| subject);
         subjects.into_iter().find(|subject| subject.title(scene) == message.subject)
     }
 
-    /// Returns the name in the outline: `lamp`, `light 2`, `sphere 3` (the third object, without a
-    /// name). Names from a file are made printable and cut after 40 characters.
+    /// Returns the name of the target in the outline: `lamp`, `light 2`. An object without a name
+    /// is called after its kind and index: `sphere 3` is the third object. Names from a file are
+    /// made printable and cut after 40 characters.
     pub fn label(&self, scene: &Scene) -> String {
         let named = |name: Option<&String>| name.filter(|n| !n.is_empty()).map(|n| truncated(n));
         match self {
@@ -175,12 +178,13 @@ impl Target {
         }
     }
 
-    /// Returns the name in diagnostics: `object "queen"`, `light 2`, `camera`.
+    /// Returns the name of the target in diagnostics: `object "queen"`, `light 2`, `camera`.
     pub fn title(&self, scene: &Scene) -> String {
         scene.subject(&self.path())
     }
 
-    /// Returns the material of an object; for a material, itself.
+    /// Returns the target that is the material of an object. A material is its own material; any
+    /// other target has none.
     pub fn material(&self, scene: &Scene) -> Option<Self> {
         match self {
             Self::Material(_) => self.exists(scene).then(|| self.clone()),

@@ -24,7 +24,8 @@ pub(super) fn fields(subject: &Target) -> &'static [Field] {
     }
 }
 
-/// Returns the keys of which at most one is given.
+/// Returns the mutually exclusive keys of `subject`, of which at most one is given; empty if it has
+/// none.
 pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],
@@ -58,8 +59,8 @@ pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Sc
     fn fill<T: DeserializeOwned>(part: Option<&mut T>, values: Table) -> Result<(), EditError> {
         let wrong = |e: toml::de::Error| EditError::new(e.message(), "The scene is unchanged.");
         if let Some(part) = part {
-            // By way of text, so that the deserialiser of files is used and no second one is
-            // compiled.
+            // The values are passed as text, so that the deserialiser of scene files is used and no
+            // second deserialiser is compiled.
             *part = toml::from_str(&values.to_string()).map_err(wrong)?;
         }
         Ok(())
@@ -90,7 +91,7 @@ pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Sc
     Ok(next)
 }
 
-/// Returns the field of the dotted `key`.
+/// Returns the field of the dotted `key`; `None` if there is no such key.
 pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Field> {
     let (first, rest) = match key.split_once('.') {
         Some((first, rest)) => (first, Some(rest)),
@@ -109,7 +110,7 @@ pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Fiel
     }
 }
 
-/// Returns the value of the dotted `key`.
+/// Returns the value of the dotted `key`; `None` if the key is not given.
 pub(super) fn get<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     let mut keys = key.split('.');
     let first = table.get(keys.next()?)?;
@@ -120,8 +121,8 @@ pub(super) fn get<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     })
 }
 
-/// Sets the dotted `key`, whose tables exist, to `value`, or removes it if that is `None`. Returns
-/// `false` if a table is missing.
+/// Sets the dotted `key` to `value`, or removes `key` if `value` is `None`. Returns `false` if a
+/// table that should contain `key` is missing.
 pub(super) fn insert_value(table: &mut Table, key: &str, value: Option<Value>) -> bool {
     let (outer, last) = match key.rsplit_once('.') {
         Some((outer, last)) => (Some(outer), last),

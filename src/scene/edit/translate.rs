@@ -8,12 +8,12 @@ use crate::value::{floor_log10, rounded_to, unit};
 use glam::DVec3;
 
 /// Moves an object, a light, the camera or a stored camera by the vector `by`, in scene units. An
-/// object without a transform is moved by its shape's own key, another one by a translation after
-/// its last step. A directional light rotates as a lamp would that stays directed at the middle of
-/// the scene.
+/// object without a transform is moved by the position keys of its shape, any other object by a
+/// translation after its last step. The direction of a directional light changes as if the light
+/// were a lamp that moves by `by` and stays aimed at the centre of the scene.
 ///
 /// # Errors
-/// For targets that cannot be moved, and beyond the largest coordinate.
+/// For targets that cannot be moved, and for new coordinates beyond the largest valid one.
 pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, EditError> {
     if by.iter().any(|x| !x.is_finite()) {
         return Err(EditError::new("the distance is not a finite number", ""));
@@ -46,7 +46,8 @@ pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, Ed
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Returns `at + by`; a changed coordinate is rounded to a thousandth of the digits of the change.
+/// Returns `at + by`. A changed coordinate is rounded to a thousandth of the power of ten at or
+/// below the change.
 pub(super) fn moved(at: [f64; 3], by: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| match by[i] {
         0.0 => at[i],
@@ -80,7 +81,7 @@ fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
         let reach = 3.0 * scene_bounds(scene).radius;
         let lamp = -unit(*direction).unwrap_or(DVec3::NEG_Y) * reach;
         let lamp = lamp + DVec3::from_array(by);
-        // At the middle there is no direction: it stays unchanged.
+        // A lamp at the centre has no direction towards it: the light stays unchanged.
         if let Some(aimed) = unit(-lamp) {
             *direction = aimed.map(|x| rounded_to(x, -4)).to_array();
         }

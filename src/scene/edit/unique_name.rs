@@ -12,7 +12,7 @@ pub(super) fn free_name(wanted: &str, taken: impl Fn(&str) -> bool) -> String {
         Some((stem, number)) if number.parse::<u32>().is_ok() => stem,
         _ => wanted,
     };
-    // Names have at most 60 characters: leaves room for the number.
+    // Names have at most 60 characters: 54 of them leave room for the number.
     let stem: String = stem.chars().take(54).collect();
     (2u32..).map(|n| format!("{stem} {n}")).find(|name| !taken(name)).unwrap_or(stem)
 }

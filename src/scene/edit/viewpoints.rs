@@ -5,8 +5,8 @@ use crate::scene::edit::parse_value::name;
 use crate::scene::edit::unique_name::free_view;
 use crate::scene::edit::{Edit, EditError, Target};
 
-/// Stores the camera under the given name and replaces one with that name; without a name as
-/// `view`, `view 2` and so on.
+/// Stores the camera of the picture under the name `given` and replaces a stored camera of that
+/// name. `None` means the first free name of `view`, `view 2` and so on.
 ///
 /// # Errors
 /// If the name is not printable.
@@ -29,7 +29,7 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
 /// Makes the stored camera `name` the camera of the picture.
 ///
 /// # Errors
-/// If there is none with that name.
+/// If there is no stored camera of that name.
 pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
     let subject = Target::View(name.to_string());
     let view = scene.cameras.get(name).ok_or_else(|| EditError::gone(&subject))?;

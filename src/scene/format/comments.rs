@@ -2,15 +2,17 @@
 
 use toml_edit::{DocumentMut, Item, Table};
 
-/// Keeps comments of removed tables that an empty line separates from the table.
+/// Keeper of the comments above removed tables. A comment that an empty line separates from its
+/// table belongs to the file, and stays when the table is removed.
 #[derive(Default)]
 pub(crate) struct CommentKeeper {
-    /// Position of the removed table, and the comment.
+    /// Position of each removed table in the file, and the separate comment above it.
     comments: Vec<(isize, String)>,
 }
 
 impl CommentKeeper {
-    /// Records the separate comments above the tables of a removed item.
+    /// Records the comments above the tables of the removed `item` that an empty line separates
+    /// from their table.
     pub(crate) fn removed(&mut self, item: &Item) {
         match item {
             Item::Table(table) => {
@@ -31,7 +33,7 @@ impl CommentKeeper {
         }
     }
 
-    /// Restores the comments above the next remaining table, or at the end of the file.
+    /// Restores each recorded comment above the next remaining table, or at the end of the file.
     pub(crate) fn put_back(self, document: &mut DocumentMut) {
         let mut comments = self.comments;
         comments.sort_by_key(|(position, _)| -position);
@@ -85,8 +87,8 @@ fn prefix(table: &Table) -> &str {
     table.decor().prefix().and_then(|p| p.as_str()).unwrap_or_default()
 }
 
-/// Splits the text above a table after its last empty line: the separate comment, and that of the
-/// table.
+/// Splits `above`, the text above a table, after its last empty line. The first part is the
+/// separate comment, which belongs to the file; the second is the comment of the table.
 fn split(above: &str) -> (&str, &str) {
     let mut cut = 0;
     let mut end = 0;
@@ -106,8 +108,9 @@ fn put_above(table: &mut Table, comment: &str) {
     table.decor_mut().set_prefix(joined);
 }
 
-/// Gives `tables`, which come from the old entries `from` or are new, positions in the file that
-/// follow their order. Nothing changes if the old ones kept their order and the new ones come last.
+/// Gives `tables` positions in the file that follow their order in the slice. `from` has the index
+/// of the old entry from which each table comes; `None` for a new table. Nothing changes if the old
+/// tables keep their order and the new tables come last.
 pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     let old: Vec<usize> = from.iter().flatten().copied().collect();
     let tail_only = from.iter().skip_while(|i| i.is_some()).all(Option::is_none);
@@ -118,7 +121,7 @@ pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     let Some(top) = tables.iter().position(|t| t.position() == first && first.is_some()) else {
         return;
     };
-    // The comment that opens the file stays on top.
+    // The comment at the top of the file stays there.
     let (separate, table_comment) = split(prefix(&tables[top]));
     let (separate, table_comment) = (separate.to_string(), table_comment.to_string());
     if top > 0 && separate.contains('#') {
@@ -131,7 +134,8 @@ pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     tables[0].set_position(first);
 }
 
-/// Removes the position of a table, which then follows the one before it.
+/// Removes the positions of `table` and its inner tables in the file. A table without a position is
+/// written after the table before it.
 fn forget_place(table: &mut Table) {
     table.set_position(None);
     for_each_table(table, &mut |inner| inner.set_position(None));

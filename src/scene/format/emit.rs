@@ -1,11 +1,12 @@
-//! New parts of a scene file: only values that differ from the defaults, in the layout of the
-//! reference.
+//! Writing of new parts of a scene file. Only values that differ from the defaults are written, in
+//! the layout of the reference.
 
 use crate::value::{Color, DefaultValue, Field, ValueType};
 use toml::Value;
 use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table};
 
-/// Returns the item for `value`. `headers` is `true` if tables may have `[headers]`.
+/// Returns the TOML item for `value`. `headers` is `true` if tables may be written with `[headers]`
+/// instead of inline.
 pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
     match (takes, value) {
         (ValueType::Table(fields), Value::Table(table)) if headers => {
@@ -57,13 +58,14 @@ fn color_leaf(value: &Value) -> toml_edit::Value {
     code.and_then(Color::to_hex).map_or_else(|| leaf(value), toml_edit::Value::from)
 }
 
-/// Returns a value of three numbers as a colour.
+/// Returns a value of three numbers as a colour; `None` for any other value.
 pub(crate) fn color(value: &Value) -> Option<Color> {
     let channels: Vec<f64> = value.as_array()?.iter().filter_map(Value::as_float).collect();
     channels.try_into().ok().map(Color)
 }
 
-/// Returns an entry of a list of the type `list` as a table that can become an inline one.
+/// Returns `value`, an entry of a list of the type `list`, as a table that can be converted to an
+/// inline table.
 pub(crate) fn fresh_entry(list: ValueType, value: &Value) -> Table {
     match (list, value) {
         (ValueType::Tables(fields) | ValueType::ListOf(fields), Value::Table(table)) => {
@@ -73,8 +75,8 @@ pub(crate) fn fresh_entry(list: ValueType, value: &Value) -> Table {
     }
 }
 
-/// Returns a table with the keys of `values` that differ from their defaults. Kinds (`shape`,
-/// `view_angle`) become dotted keys, all other tables inline ones.
+/// Returns a table with the keys of `values` that differ from their defaults. Tables with exactly
+/// one key (`shape`, `view_angle`) are written as dotted keys, all other tables as inline tables.
 pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Table {
     let mut table = Table::new();
     for field in fields {
@@ -98,7 +100,7 @@ fn is_default(field: &Field, value: &Value) -> bool {
     }
 }
 
-/// Returns a value that is no table, in the layout `[1.0, 2.0]`.
+/// Returns `value`, which is no table, as a TOML value; lists have the layout `[1.0, 2.0]`.
 pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
     match value {
         Value::String(text) => text.as_str().into(),

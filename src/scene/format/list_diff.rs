@@ -2,9 +2,9 @@
 
 use toml::{Table, Value};
 
-/// Returns for each entry of `new` the position of its origin in `old`; no position occurs twice.
-/// Entries match if they have the same name, else if they are equal, else if they lie between the
-/// same neighbours and are alike.
+/// Returns for each entry of `new` the index of its origin in `old`, or `None` if it has none; no
+/// index occurs twice. Entries match if they have the same name. Otherwise they match if they are
+/// equal, or if they are between the same neighbours and one may be an edit of the other (`alike`).
 pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     let mut free = vec![true; old.len()];
     let mut from = vec![None; new.len()];
@@ -39,7 +39,8 @@ fn name(entry: &Value) -> Option<&str> {
     entry.get("name").and_then(Value::as_str)
 }
 
-/// Returns `true` if one entry may be an edit of the other: both without a name, or only renamed.
+/// Returns `true` if one entry may be an edit of the other: neither has a name, or only the names
+/// differ.
 fn alike(a: &Value, b: &Value) -> bool {
     let without_name = |entry: &Value| {
         let mut table: Table = entry.as_table().cloned().unwrap_or_default();

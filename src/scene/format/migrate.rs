@@ -1,5 +1,5 @@
-//! Words of earlier versions in scene files: reading takes them for the present ones, saving writes
-//! the present ones.
+//! Migration of scene files: keys and values that were renamed since earlier versions. Reading
+//! accepts a former word as the present one; saving writes the present word.
 
 use crate::primitive::Acceleration;
 use crate::scene::diagnostic::Diagnostic;
@@ -9,7 +9,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use toml_edit::{DocumentMut, InlineTable, Item, Key, Table};
 
-/// A former word and the present one.
+/// A former word and the present word that replaces it.
 type Pair = (&'static str, &'static str);
 
 const SCENE: &[Pair] = &[("views", "cameras")];
@@ -22,7 +22,7 @@ const TRACE: &[Pair] = &[
 const MATERIAL: &[Pair] = &[("index", "ior"), ("reflectance", "f0")];
 const SHAPE: &[Pair] = &[("unit_cylinder", "unit_frustum")];
 
-/// Renamed keys of the table at `path`.
+/// Returns the renamed keys of the table at `path`.
 fn keys_at(path: &[String]) -> &'static [Pair] {
     match path {
         [] => SCENE,
@@ -33,7 +33,8 @@ fn keys_at(path: &[String]) -> &'static [Pair] {
     }
 }
 
-/// The key whose values were renamed in the table at `path`, and these values.
+/// Returns the key whose values were renamed in the table at `path`, and these values. Returns
+/// `None` if the table has no such key.
 fn values_at(path: &[String]) -> Option<(&'static str, Vec<Pair>)> {
     match path {
         [film] if film == "film" => Some(("filter", vec![("center", "point")])),
@@ -45,28 +46,29 @@ fn values_at(path: &[String]) -> Option<(&'static str, Vec<Pair>)> {
     }
 }
 
-/// A former word in a scene file.
+/// A former word that was found in a scene file.
 #[derive(Clone, Debug)]
 pub(crate) struct FormerWord {
-    /// Its first byte in the file.
+    /// Byte offset of the word in the file.
     start: usize,
-    /// Keys that lead to the table that holds it, in present words.
+    /// Path of keys to the table that contains the word, in present words.
     table: Vec<String>,
-    /// The key whose value it is; `None` if it is a key itself.
+    /// Key that has the word as its value; `None` if the word is itself a key.
     key: Option<&'static str>,
     former: &'static str,
     present: &'static str,
 }
 
-/// A former key and the present one in one table.
+/// A table that has a key under both its former and its present name.
 struct Conflict {
     table: Vec<String>,
     former: (&'static str, Range<usize>),
     present: (&'static str, Range<usize>),
 }
 
-/// Replaces the former words in a parsed file, whose spans stay. Returns them, and an error for each
-/// table that has a key under both names.
+/// Replaces the former words in the parsed file `root` by the present ones; the spans of keys and
+/// values stay. Returns the replaced words, and an error for each table that has a key under both
+/// names.
 pub(crate) fn migrate(
     file: &str,
     text: &str,
@@ -162,7 +164,8 @@ impl Migration {
     }
 }
 
-/// The warning about the former words of a file: the first of them, and their number.
+/// Returns the warning about the former words of a file, which states the first of them and their
+/// number. Returns `None` if there are none.
 pub(crate) fn warning(
     file: &str,
     text: &str,
@@ -188,7 +191,7 @@ pub(crate) fn warning(
     })
 }
 
-/// Writes the present words in place of `words`; order, layout and comments stay.
+/// Replaces the former `words` in `document` by the present ones; order, layout and comments stay.
 pub(crate) fn write_present(document: &mut DocumentMut, words: &[FormerWord]) {
     for word in words {
         let table = word.table.iter().try_fold(document.as_item_mut(), |item, key| {
@@ -245,7 +248,7 @@ fn rename_key(table: &mut Item, former: &str, present: &str) {
 mod tests {
     use crate::scene::{Document, Scene};
 
-    /// Every word that was renamed, in every layout.
+    /// Scene file with every word that was renamed, in every layout.
     const FORMER: &str = r##"# A scene of an earlier version.
 film = { filter = "center", size = [64, 48] } # small
 ambient.color = [0.5, 0.5, 0.5]

@@ -14,13 +14,13 @@ use crate::value::{Color, Field, ValueType};
 use toml::Value;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, TableLike};
 
-/// Makes `document`, which describes the scene `old`, describe `new`.
+/// Changes `document`, which describes the scene `old`, to describe the scene `new`.
 pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml::Table) {
     let mut rewriter = Rewriter { keeper: CommentKeeper::default() };
     rewriter.table(document.as_table_mut(), true, old, new, &Keys::Fixed(schema::FIELDS));
     rewriter.keeper.put_back(document);
     if document.as_table().iter().all(|(_, item)| is_nothing(item)) {
-        // A file without any key is not a scene.
+        // A file without any key is not a scene: the size of the picture is written.
         if let Some(size) = new.get("film").and_then(|film| film.get("size")) {
             let mut film = toml_edit::Table::new();
             film.insert("size", Item::Value(leaf(size)));
@@ -29,7 +29,8 @@ pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml:
     }
 }
 
-/// Returns `true` if an item leaves no trace in the text.
+/// Returns `true` if nothing is written for `item`: it is missing, an empty list of tables, or a
+/// table without a header and without values.
 fn is_nothing(item: &Item) -> bool {
     match item {
         Item::None => true,
@@ -43,12 +44,13 @@ fn is_nothing(item: &Item) -> bool {
 enum Keys {
     /// Keys of these fields.
     Fixed(&'static [Field]),
-    /// Any keys; each holds a table with these fields.
+    /// Any keys; the value of each key is a table with these fields.
     Named(&'static [Field]),
 }
 
 impl Keys {
-    /// Returns the keys of `old` and `new` in the order in which new ones are written.
+    /// Returns the keys of `old` and `new` with the types of their values, in the order in which
+    /// new keys are written.
     fn of(&self, old: &toml::Table, new: &toml::Table) -> Vec<(String, ValueType)> {
         match self {
             Self::Fixed(fields) => fields.iter().map(|f| (f.name.to_string(), f.takes)).collect(),
@@ -65,7 +67,8 @@ struct Rewriter {
 }
 
 impl Rewriter {
-    /// Patches one table. `headers` is `true` if tables inside may have `[headers]` of their own.
+    /// Changes `table`, which describes `old`, to describe `new`. `headers` is `true` if inner
+    /// tables may have `[headers]` of their own.
     fn table(
         &mut self,
         table: &mut dyn TableLike,
@@ -94,8 +97,8 @@ impl Rewriter {
                 _ => {}
             }
         }
-        // A key that replaces another one (a shape of another kind, a direction instead of a
-        // target) takes over its comments.
+        // A new key takes over the comments of the only removed key: a shape of another kind
+        // replaces a shape, a direction replaces a target.
         let successor =
             if removed.len() == 1 { added.first().map(|(key, ..)| key.clone()) } else { None };
         for key in removed {
@@ -219,8 +222,8 @@ impl Rewriter {
     }
 }
 
-/// Renames named tables in place and with their comments: a removed and an added one match if their
-/// values are equal. Returns `old` under the new names.
+/// Renames named tables in place, with their comments. A removed table and an added one match if
+/// their values are equal. Returns `old` under the new names.
 fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
     let mut renamed = old.clone();
     for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {
@@ -241,12 +244,12 @@ fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> to
     renamed
 }
 
-/// Removes and returns the comment after the last entry of `list` if another entry follows
-/// (`comes`).
-fn comment_of_the_last(list: &mut toml_edit::Array, comes: bool) -> String {
+/// Removes the comment after the last entry of `list` and returns it, if another entry follows.
+/// `followed` is `true` if one follows. Otherwise returns an empty string.
+fn comment_of_the_last(list: &mut toml_edit::Array, followed: bool) -> String {
     let trailing = list.trailing().as_str().unwrap_or_default();
     match trailing.rfind('\n') {
-        Some(end) if comes && list.trailing_comma() && trailing.contains('#') => {
+        Some(end) if followed && list.trailing_comma() && trailing.contains('#') => {
             let (comment, rest) = (trailing[..end].to_string(), trailing[end..].to_string());
             list.set_trailing(rest);
             comment
@@ -264,7 +267,8 @@ fn spaces_before(value: &toml_edit::Value) -> String {
     }
 }
 
-/// Replaces a value that is no table; in a list of numbers only those that differ.
+/// Replaces the value of `item`, which is no table, by `new`. In a list of numbers, only the
+/// numbers that differ from `old` are replaced.
 fn edit_leaf(item: &mut Item, old: Option<&Value>, new: &Value) {
     let Some(value) = item.as_value_mut() else {
         *item = Item::Value(leaf(new));
@@ -283,12 +287,12 @@ fn edit_leaf(item: &mut Item, old: Option<&Value>, new: &Value) {
         }
         return;
     }
-    // A colour written as `#rrggbb` stays so as long as that is exact.
+    // A colour written as `#rrggbb` is written in this form again if the form is exact for `new`.
     let code = if value.is_str() { color(new).and_then(Color::to_hex) } else { None };
     replace(value, code.map_or_else(|| leaf(new), toml_edit::Value::from));
 }
 
-/// Replaces `place` by `new` and keeps the comments and spaces around it.
+/// Replaces the value `place` by `new` and keeps the comments and spaces around it.
 fn replace(place: &mut toml_edit::Value, mut new: toml_edit::Value) {
     *new.decor_mut() = place.decor().clone();
     *place = new;

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, Deserializer};
 
-/// Largest file that is read [bytes], which holds some hundred thousand objects.
+/// Largest scene file that is read [bytes]. A file of this size has some hundred thousand objects.
 const MAX_BYTES: u64 = 64 << 20;
 
 impl Scene {
@@ -29,8 +29,8 @@ impl Scene {
         read_text(path).and_then(|t| Self::parse_in(&t, &path.display().to_string(), resolver))
     }
 
-    /// Reads and validates a scene from `text`; diagnostics call it `name`, and file names are
-    /// relative to that path's folder.
+    /// Parses and validates a scene from `text`. `name` is the file name in diagnostics; file names
+    /// in the scene are relative to the folder of `name`.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -38,7 +38,8 @@ impl Scene {
         Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }
 
-    /// Does the same as [`Scene::parse`], with the files that the scene names in `resolver`.
+    /// Parses and validates a scene like [`Scene::parse`]. `resolver` reads the files that the
+    /// scene refers to.
     pub(crate) fn parse_in(
         text: &str,
         name: &str,
@@ -48,8 +49,8 @@ impl Scene {
     }
 }
 
-/// A valid scene and the parsed text that describes it. The text is parsed once and the scene
-/// validated once.
+/// A valid scene and the parsed text that describes it, so that the text is parsed once and the
+/// scene validated once.
 pub(crate) struct SourceScene<'a> {
     pub scene: Scene,
     pub former_words: Vec<FormerWord>,
@@ -59,7 +60,7 @@ pub(crate) struct SourceScene<'a> {
 }
 
 impl<'a> SourceScene<'a> {
-    /// Parses and validates a scene from `text`; diagnostics call it `name`.
+    /// Parses and validates a scene from `text`. `name` is the file name in diagnostics.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -100,7 +101,7 @@ impl<'a> SourceScene<'a> {
         }
     }
 
-    /// Returns the lints of the scene and the warning about former words, in the order of the file.
+    /// Returns the lints of the scene and the warning about former words, sorted by location.
     pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
         let (name, text, root) = (self.name, self.text, self.root.get_ref());
         let mut warnings = with_locations(name, text, root, self.scene.warnings());
@@ -109,7 +110,7 @@ impl<'a> SourceScene<'a> {
         warnings
     }
 
-    /// Returns the warning about former words, if the file has any.
+    /// Returns the warning about former words; `None` if the file has none.
     pub(crate) fn migration_warning(&self) -> Option<Diagnostic> {
         migrate::warning(self.name, self.text, self.root.get_ref(), &self.former_words)
     }
@@ -134,8 +135,8 @@ pub(crate) fn read_text(path: &Path) -> Result<String, SceneErrors> {
         return Err(fail("this is a directory", "Expected a scene file (TOML)."));
     }
     let mut bytes = Vec::new();
-    // One byte more than the limit shows that a file is too large; a device without end is not read
-    // to its end.
+    // Reading stops one byte above the limit: this byte shows that a file is too large, and an
+    // endless device is not read for ever.
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(fail(

@@ -101,7 +101,8 @@ impl SchemaChecker<'_> {
         });
     }
 
-    /// Returns the path below the table that the subject names: `shape.sphere`.
+    /// Returns the part of the current path below the table that the subject of a diagnostic names:
+    /// `shape.sphere`.
     fn inner(&self) -> String {
         let above = match self.path.first().map(String::as_str) {
             Some("object" | "light" | "materials" | "cameras") => 2,
@@ -119,7 +120,8 @@ impl SchemaChecker<'_> {
         self.add(span, format!("{name} is {}", describe(value)), format!("Expected {expected}."));
     }
 
-    /// Adds an error about an unknown key. Returns the key that was probably intended.
+    /// Adds an error about an unknown key. Returns the key that was probably intended; `None` if no
+    /// key is similar.
     fn unknown(
         &mut self,
         key: &Spanned<toml::de::DeString>,
@@ -194,7 +196,8 @@ impl SchemaChecker<'_> {
         self.path.pop();
     }
 
-    /// Validates each entry of a list with `each`, with its position in the path.
+    /// Validates each entry of a list with `each`, while the index of the entry is part of the
+    /// path.
     fn entries(
         &mut self,
         list: &[Spanned<DeValue>],
@@ -255,8 +258,8 @@ impl SchemaChecker<'_> {
 }
 
 /// Returns `true` if a value that is no table has the right type. Ranges of whole numbers are
-/// checked here, since an unsigned integer cannot hold values outside; all other ranges in
-/// [`Scene::faults`](crate::scene::Scene::faults).
+/// checked here, since an unsigned integer cannot hold values outside. All other ranges are checked
+/// in [`Scene::faults`](crate::scene::Scene::faults).
 fn fits(takes: ValueType, value: &DeValue) -> bool {
     let list = |n: usize, each: &dyn Fn(&DeValue) -> bool| match value {
         DeValue::Array(list) => list.len() == n && list.iter().all(|v| each(v.get_ref())),

@@ -6,7 +6,8 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Returns line and column of the byte `at` of `text`, both from 1; columns count characters.
+/// Returns line and column of the byte offset `at` in `text`, both from 1; columns count
+/// characters.
 pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {
@@ -18,7 +19,8 @@ pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
     (before.matches('\n').count() + 1, visible.chars().count() + 1)
 }
 
-/// Returns the span of the value at `path`, or of its nearest ancestor in the file.
+/// Returns the span of the value at `path`. If the file does not have this value, the span is that
+/// of the nearest ancestor in the path.
 fn span(root: &DeTable, path: &[String]) -> Range<usize> {
     let Some((first, rest)) = path.split_first() else { return 0..0 };
     match root.get(first.as_str()) {

@@ -1,11 +1,12 @@
 //! Suggestions ("Did you mean"): the nearest known word.
 
-/// Returns the one of `words` that is near enough to `given` to be a typing error.
+/// Returns the word of `words` nearest to `given`, if `given` may be a typing error of that word.
+/// Returns `None` otherwise.
 pub(crate) fn nearest<'a>(
     given: &str,
     words: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
-    // Longer than any key by far: no typing error.
+    // Such a text is far longer than any key and no typing error.
     if given.len() > 100 {
         return None;
     }

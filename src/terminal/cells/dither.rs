@@ -1,22 +1,23 @@
-//! Ordered dithering to 256 colours, for pictures that no longer change.
+//! Ordered dithering to the 256-colour table, for pictures that no longer change.
 //!
-//! Thomas Knoll's pattern dithering: for each pixel a few colours of the table are chosen whose mean in
-//! linear light approximates the pixel. They are sorted by lightness, and the pixel's position in an
-//! ordered pattern selects one.
+//! The method is Thomas Knoll's pattern dithering. For each pixel a few colours of the table are
+//! chosen. Their mean in linear light approximates the colour of the pixel. The chosen colours are
+//! sorted by lightness, and the position of the pixel in an ordered pattern selects one of them.
 
 use crate::terminal::cells::Raster;
 use crate::terminal::cells::oklab::{code, linear};
 use crate::terminal::cells::palette256;
 
-/// Number of mixed colours, one per cell of the pattern.
+/// Number of table colours that are mixed for a pixel, one per cell of the pattern.
 const MIXED: usize = 4;
-/// Bayer's pattern of order 2.
+/// Bayer's ordered pattern of 2 x 2 pixels.
 const PATTERN: [[usize; 2]; 2] = [[0, 2], [3, 1]];
-/// Share of the error so far that the next colour compensates. 1 reproduces the mean best but mixes
-/// distant colours, which looks coarse at the size of a cell.
+/// Share of the accumulated error that the choice of the next colour compensates. A share of 1
+/// reproduces the mean best but mixes distant colours, which looks coarse because half a cell is
+/// large.
 const STRENGTH: f32 = 0.5;
 
-/// Returns an index into the table of 256 for each pixel.
+/// Returns the index of a table colour for each pixel.
 pub fn dithered(raster: &Raster) -> Vec<u8> {
     let mut last = None;
     let mut mixed = [0; MIXED];
@@ -32,7 +33,7 @@ pub fn dithered(raster: &Raster) -> Vec<u8> {
     indices
 }
 
-/// Returns table colours whose mean approximates `rgb`, from dark to light.
+/// Returns the table colours to mix for `rgb`, from dark to light. Their mean approximates `rgb`.
 fn mixture(rgb: [u8; 3]) -> [u8; MIXED] {
     let target = linear(rgb);
     let mut missing = [0.0f32; 3];
@@ -52,7 +53,7 @@ mod tests {
     use super::*;
     use crate::terminal::cells::Oklab;
 
-    /// The mean over the pattern is closer than the nearest table colour.
+    /// Compares the mean over the pattern with the nearest single table colour.
     #[test]
     fn dithered_mean_is_closer_than_nearest_color() {
         let (mut plain, mut mixed) = (0.0, 0.0);

@@ -1,20 +1,20 @@
-//! False-colour images of numbers, with their scales.
+//! False-colour images of numbers such as depth and noise, with the scales of their colours.
 //!
-//! Magnitudes use the map *inferno* (Stéfan van der Walt and Nathaniel Smith, 2015). Its lightness rises
-//! evenly, so that equal steps look equal, also without colour vision.
+//! Magnitudes use the colour map *inferno* (Stéfan van der Walt and Nathaniel Smith, 2015). The
+//! lightness of this map rises evenly, so that equal steps look equal, even without colour vision.
 
 use crate::terminal::cells::Raster;
 
-/// Mapping of numbers to a colour map.
+/// Mapping of a range of numbers to a colour map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// Number at the dark end.
+    /// Lower end of the range, which is dark unless the scale is reversed.
     pub low: f64,
-    /// Number at the bright end.
+    /// Upper end of the range, which is bright unless the scale is reversed.
     pub high: f64,
-    /// Logarithmic instead of linear; `low` is then greater than 0.
+    /// `true` for a logarithmic scale, which requires `low` > 0. `false` for a linear one.
     pub logarithmic: bool,
-    /// Reversed: `low` is bright.
+    /// `true` if the scale is reversed: `low` is then bright.
     pub reversed: bool,
 }
 
@@ -24,7 +24,8 @@ impl Scale {
         Self { low, high, logarithmic: false, reversed: false }
     }
 
-    /// Creates a logarithmic scale over the positive finite `values`; from 1 to 10 if there are none.
+    /// Creates a logarithmic scale from the smallest to the largest positive finite number of
+    /// `values`. The scale is from 1 to 10 if there are no such numbers.
     pub fn logarithmic(values: impl IntoIterator<Item = f64>) -> Self {
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
         for value in values.into_iter().filter(|v| *v > 0.0 && v.is_finite()) {
@@ -37,7 +38,8 @@ impl Scale {
         Self { low, high, logarithmic: true, reversed: false }
     }
 
-    /// Returns the position of `value`, from 0 (dark) to 1 (bright). NaN counts as `low`'s end.
+    /// Returns the position of `value` in the colour map, from 0 (dark) to 1 (bright). NaN has the
+    /// position of `low`.
     pub fn part(&self, value: f64) -> f64 {
         let [low, high, value] =
             [self.low, self.high, value].map(|v| if self.logarithmic { v.ln() } else { v });
@@ -46,7 +48,8 @@ impl Scale {
         if self.reversed { 1.0 - part } else { part }
     }
 
-    /// Returns the number at position `part`, from 0 (dark) to 1 (bright).
+    /// Returns the number at position `part` of the colour map. `part` is from 0 (dark) to 1
+    /// (bright).
     pub fn value(&self, part: f64) -> f64 {
         let part = if self.reversed { 1.0 - part } else { part };
         if self.logarithmic {
@@ -62,16 +65,17 @@ impl Scale {
     }
 }
 
-/// Returns the colour of a magnitude, from 0 (dark) to 1 (bright).
+/// Returns the colour of a magnitude. `part` is clamped to 0 (dark) to 1 (bright).
 pub fn magnitude(part: f64) -> [u8; 3] {
     let color = colorous::INFERNO.eval_continuous(part.clamp(0.0, 1.0));
     [color.r, color.g, color.b]
 }
 
-/// Colour of no difference.
+/// Colour of a difference of 0.
 const DIFFERENCE_MIDDLE: [u8; 3] = [24, 24, 27];
 
-/// Returns the colour of a signed difference: -1 (darker) is blue, 0 nearly black, 1 (brighter) orange.
+/// Returns the colour of a signed difference: blue for -1 (darker), nearly black for 0, orange for
+/// 1 (brighter).
 pub fn difference(part: f64) -> [u8; 3] {
     const LESS: [u8; 3] = [96, 178, 255];
     const MORE: [u8; 3] = [255, 152, 64];
@@ -83,10 +87,10 @@ pub fn difference(part: f64) -> [u8; 3] {
     })
 }
 
-/// Returns a colour for an object by number. Consecutive numbers have distant hues.
+/// Returns the colour of the object with number `id`. Consecutive numbers have distant hues.
 pub fn object_color(id: u32) -> [u8; 3] {
-    // Steps of the golden angle never return to the same hue; lightness and chroma alternate so that
-    // even close hues differ.
+    // The hue advances by the golden angle, so that no hue is repeated. Lightness and chroma take
+    // turns, so that colours of similar hue differ as well.
     let hue = (f64::from(id) * 0.618_033_988_749_895).fract() * std::f64::consts::TAU;
     let lightness = [0.74, 0.58, 0.86][id as usize % 3];
     let chroma = [0.13, 0.15, 0.09][id as usize % 3];
@@ -120,15 +124,16 @@ fn linear_from_oklab(l: f64, a: f64, b: f64) -> [f64; 3] {
     ]
 }
 
-/// Colour of a pixel without hit.
+/// Colour of a pixel whose camera ray hits no object.
 const NO_HIT: [u8; 3] = [14, 14, 16];
 
-/// Returns an image of object numbers; `None` is a pixel without hit.
+/// Returns an image of object numbers. `None` means that the camera ray hits no object.
 pub fn objects(width: usize, height: usize, ids: &[Option<u32>]) -> Raster {
     Raster::from_fn(width, height, |i| ids.get(i).copied().flatten().map_or(NO_HIT, object_color))
 }
 
-/// Returns an image of unit normals, each component mapped from -1..=1 to 0..=255.
+/// Returns an image of unit normals. Each component is mapped from -1..=1 to 0..=255. `None` means
+/// that the camera ray hits no object.
 pub fn normals(width: usize, height: usize, normals: &[Option<[f32; 3]>]) -> Raster {
     Raster::from_fn(width, height, |i| {
         normals.get(i).copied().flatten().map_or(NO_HIT, |normal| {
@@ -137,7 +142,8 @@ pub fn normals(width: usize, height: usize, normals: &[Option<[f32; 3]>]) -> Ras
     })
 }
 
-/// Returns an image of distances and its scale: logarithmic from nearest (bright) to farthest.
+/// Returns an image of distances, and its scale. The scale is logarithmic, from the nearest
+/// distance (bright) to the farthest (dark). `None` means that the camera ray hits no object.
 pub fn depth(width: usize, height: usize, distances: &[Option<f32>]) -> (Raster, Scale) {
     let known = distances.iter().flatten().map(|d| f64::from(*d));
     let scale = Scale { reversed: true, ..Scale::logarithmic(known) };
@@ -167,7 +173,7 @@ mod tests {
         assert_eq!([log.part(0.1), log.part(100.0)], [0.0, 1.0]);
         let none = Scale::logarithmic([]);
         assert_eq!((none.low, none.high), (1.0, 10.0));
-        // A single value is bright.
+        // A scale over a single value shows it bright.
         assert_eq!(Scale::logarithmic([4.0]).part(4.0), 1.0);
     }
 
@@ -192,7 +198,7 @@ mod tests {
 
     #[test]
     fn object_colors_are_distinguishable() {
-        // Any two of the first 12, and any two consecutive ones.
+        // Checked for any two of the first 12 numbers, and for any two consecutive numbers.
         let distance = |a, b| Oklab::of(object_color(a)).distance(Oklab::of(object_color(b)));
         for a in 0..12 {
             for b in 0..a {

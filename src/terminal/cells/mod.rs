@@ -1,7 +1,7 @@
-//! Conversion of images to terminal cells: pixels of half a cell in, glyphs and colours out.
+//! Conversion of images to terminal cells, that is, to glyphs with colours. A pixel is half a cell.
 //!
-//! A cell is about twice as high as it is wide, so each shows two square pixels, one above the other.
-//! The module is independent of scenes and of the screen's layout.
+//! A cell is about twice as high as it is wide. Each cell therefore shows two square pixels, one
+//! above the other. The module is independent of scenes and of the screen's layout.
 
 mod dither;
 mod false_color;
@@ -17,7 +17,7 @@ pub use oklab::Oklab;
 pub(crate) use oklab::{code, linear};
 pub use palette256::nearest as nearest_indexed;
 
-/// Colours of a terminal.
+/// Set of colours that a terminal can show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Colors {
     /// 24-bit sRGB.
@@ -45,19 +45,20 @@ impl Colors {
     }
 }
 
-/// An image of square pixels, two to a cell.
+/// An image of square pixels. A cell shows two pixels, one above the other.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct Raster {
-    /// Pixels in a row, one to a cell.
+    /// Number of pixels in a row: one per cell.
     pub width: usize,
-    /// Rows of pixels, two to a row of cells.
+    /// Number of rows of pixels: two per row of cells.
     pub height: usize,
-    /// sRGB, `[row][column]`, `width * height` of them.
+    /// `width * height` pixels in 8-bit sRGB, row by row.
     pub pixels: Vec<[u8; 3]>,
 }
 
 impl Raster {
-    /// Creates an image of `width` x `height` pixels. `pixel(index)` returns them row by row.
+    /// Creates an image of `width` x `height` pixels. `pixel(index)` returns the colour of a pixel;
+    /// indices count row by row.
     pub fn from_fn(width: usize, height: usize, pixel: impl FnMut(usize) -> [u8; 3]) -> Self {
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
     }
@@ -75,23 +76,24 @@ pub enum CellColor {
     Plain,
     /// 24-bit sRGB.
     Rgb([u8; 3]),
-    /// Index into the terminal's table of 256.
+    /// Index into the terminal's table of 256 colours.
     Indexed(u8),
 }
 
-/// Cell of the picture: glyph and colours.
+/// Terminal cell of the picture: glyph and colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PictureCell {
-    /// One column wide.
+    /// Character of the cell, one column wide.
     pub glyph: char,
     /// Colour of the glyph.
     pub fg: CellColor,
-    /// Colour behind it.
+    /// Colour behind the glyph.
     pub bg: CellColor,
 }
 
 impl PictureCell {
-    /// Returns the colours of the upper and the lower half in a dark terminal with xterm's colours.
+    /// Returns the mean colours of the upper and the lower half, as a dark terminal with xterm's
+    /// colours shows them.
     pub fn halves(&self) -> [Oklab; 2] {
         let rgb = |color, plain| match color {
             CellColor::Plain => plain,
@@ -108,7 +110,8 @@ impl PictureCell {
 }
 
 impl PictureCell {
-    /// Returns the colours of the upper and the lower half, if both are 24-bit colours.
+    /// Returns the colours of the upper and the lower half. Returns `None` unless each half has one
+    /// 24-bit colour.
     pub fn colors(&self) -> Option<[[u8; 3]; 2]> {
         let halves = match self.glyph {
             '▀' => [self.fg, self.bg],
@@ -130,24 +133,26 @@ impl Default for PictureCell {
     }
 }
 
-/// Assumed default foreground and background of a terminal, sRGB.
+/// Assumed default foreground of a terminal, 8-bit sRGB.
 const PLAIN_FG: [u8; 3] = [229; 3];
+/// Assumed default background of a terminal, 8-bit sRGB.
 const PLAIN_BG: [u8; 3] = [0; 3];
 
-/// Image as terminal cells.
+/// Image converted to terminal cells.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct PictureCells {
-    /// Cells in a row.
+    /// Number of cells in a row.
     pub columns: u16,
-    /// Rows of cells.
+    /// Number of rows of cells.
     pub rows: u16,
-    /// `[row][column]`, `columns * rows` of them.
+    /// `columns * rows` cells, row by row.
     pub cells: Vec<PictureCell>,
 }
 
 impl PictureCells {
-    /// Converts `raster` for a terminal with `colors`. `settled` is `true` if the picture will not change
-    /// soon; it is then dithered in 256 colours. Dithering would make a changing picture flicker.
+    /// Converts `raster` for a terminal with `colors`. `settled` is `true` if the picture will not
+    /// change soon. In 256 colours a settled picture is dithered. A changing picture is not,
+    /// because dithering would make it flicker.
     ///
     /// The last row of cells is half empty if the raster has an odd number of rows.
     pub fn new(raster: &Raster, colors: Colors, settled: bool) -> Self {
@@ -178,7 +183,7 @@ impl PictureCells {
         Self { columns: raster.width as u16, rows: rows as u16, cells }
     }
 
-    /// Returns the cell at `column` and `row`; `None` outside the image.
+    /// Returns the cell at `column` and `row`. Returns `None` outside the image.
     pub fn cell(&self, column: u16, row: u16) -> Option<&PictureCell> {
         let inside = column < self.columns && row < self.rows;
         inside.then(|| {
@@ -187,8 +192,8 @@ impl PictureCells {
     }
 }
 
-/// Creates a cell of two halves; `lower` is `None` below the last row of pixels. Equal halves need no
-/// glyph.
+/// Creates a cell from the colours of its halves. `lower` is `None` below the last row of pixels.
+/// The glyph of equal halves is a space.
 fn two_halves(upper: CellColor, lower: Option<CellColor>) -> PictureCell {
     match lower {
         Some(lower) if lower == upper => {

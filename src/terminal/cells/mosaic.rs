@@ -1,9 +1,10 @@
-//! Mosaic: an image in large blocks of one colour, which takes few bytes.
+//! Mosaic: an image of large blocks, each of one colour, which needs few bytes.
 
 use crate::terminal::cells::oklab::{code, linear};
 
-/// Returns for each half cell the mean, in linear light, of its block of `side` x `side` half cells.
-/// `pixels` has rows of `width`; where it is `None` the result is `None`.
+/// Replaces each half cell by the mean, in linear light, of its block of `side` x `side` half
+/// cells. `pixels` holds the colours of the half cells in rows of `width`. A half cell that is
+/// `None` stays `None` and does not count in the mean.
 pub fn blocks(pixels: &[Option<[u8; 3]>], width: usize, side: usize) -> Vec<Option<[u8; 3]>> {
     if width == 0 {
         return Vec::new();
@@ -33,7 +34,8 @@ mod tests {
         let black = Some([0; 3]);
         let pixels = [white, black, white, black, black, None, white, white, white];
         let means = blocks(&pixels, 3, 2);
-        // A quarter of the light of white is the 8-bit level 137.
+        // The mean of one white and three black half cells is a linear light of 0.25, which is the
+        // 8-bit level 137.
         let mean = Some([137; 3]);
         assert_eq!(means[..3], [mean, mean, white]);
         assert_eq!(means[3..6], [mean, mean, None]);

@@ -1,4 +1,4 @@
-//! OKLab, a colour space in which distances approximate visible differences.
+//! OKLab: a colour space in which distances approximate visible differences.
 //!
 //! Björn Ottosson, "A perceptual color space for image processing" (2020), with the matrices for
 //! linear sRGB as he published them in 2021.
@@ -9,25 +9,26 @@ use std::sync::LazyLock;
 /// Colour in OKLab.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Oklab {
-    /// Lightness, 0 black to 1 white.
+    /// Lightness, from 0 (black) to 1 (white).
     pub l: f32,
-    /// From green (negative) to red; -0.24..=0.28 within sRGB.
+    /// Green (negative) to red (positive). The range within sRGB is -0.24..=0.28.
     pub a: f32,
-    /// From blue (negative) to yellow; -0.32..=0.2 within sRGB.
+    /// Blue (negative) to yellow (positive). The range within sRGB is -0.32..=0.2.
     pub b: f32,
 }
 
-/// Linear light, 0..=1, of 8-bit sRGB levels (IEC 61966-2-1).
+/// Linear light, 0..=1, of each 8-bit sRGB level (IEC 61966-2-1).
 static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f64 / 255.0) as f32));
 
-/// Returns the linear light, 0..=1, of 8-bit sRGB.
+/// Converts 8-bit sRGB to linear light, 0..=1.
 pub(crate) fn linear(rgb: [u8; 3]) -> [f32; 3] {
     let table = &*LINEAR;
     rgb.map(|code| table[usize::from(code)])
 }
 
-/// Returns the 8-bit sRGB level with the nearest linear light. `linear` is clamped to 0..=1.
+/// Converts linear light to the 8-bit sRGB level whose linear light is nearest. `linear` is clamped
+/// to 0..=1.
 pub(crate) fn code(linear: f32) -> u8 {
     let table = &*LINEAR;
     let above = table.partition_point(|l| *l < linear).min(255);
@@ -36,12 +37,12 @@ pub(crate) fn code(linear: f32) -> u8 {
 }
 
 impl Oklab {
-    /// Converts 8-bit sRGB.
+    /// Converts 8-bit sRGB to OKLab.
     pub fn of(rgb: [u8; 3]) -> Self {
         Self::of_linear(linear(rgb))
     }
 
-    /// Converts linear sRGB, usually 0..=1.
+    /// Converts linear sRGB to OKLab. Components are usually in 0..=1.
     pub fn of_linear([r, g, b]: [f32; 3]) -> Self {
         let l = (0.412_221_47 * r + 0.536_332_54 * g + 0.051_445_993 * b).cbrt();
         let m = (0.211_903_5 * r + 0.680_699_5 * g + 0.107_396_96 * b).cbrt();
@@ -53,7 +54,8 @@ impl Oklab {
         }
     }
 
-    /// Returns the distance of two colours. Black and white are 1 apart; 0.02 is just visible side by side.
+    /// Returns the Euclidean distance of two colours. It is 1 between black and white. A distance
+    /// of 0.02 is just visible if the colours are side by side.
     pub fn distance(self, other: Self) -> f32 {
         self.distance_squared(other).sqrt()
     }
@@ -94,7 +96,7 @@ mod tests {
         }
     }
 
-    /// Primaries of CSS Color 4 and its test suite.
+    /// Expected values are those of CSS Color 4 and its test suite.
     #[test]
     fn oklab_of_primaries_matches_css() {
         near(Oklab::of([255, 255, 255]), [1.0, 0.0, 0.0], 1e-4);
@@ -110,7 +112,7 @@ mod tests {
             assert_eq!(code(linear([c; 3])[0]), c);
         }
         assert_eq!([code(-1.0), code(2.0), code(f32::NAN)], [0, 255, 0]);
-        // The threshold between two levels is their midpoint.
+        // The threshold between two levels is the midpoint of their linear light.
         let [low, high] = [100, 101].map(|c| linear([c; 3])[0]);
         assert_eq!([code(0.51 * low + 0.49 * high), code(0.49 * low + 0.51 * high)], [100, 101]);
     }

@@ -1,12 +1,12 @@
-//! Cells in 16 colours or none, with shading glyphs of different density.
+//! Cells in 16 colours, or without colours, with shading glyphs of different density.
 
 use crate::terminal::cells::oklab::{Oklab, code, linear};
 use crate::terminal::cells::palette_cache::PaletteCache;
 use crate::terminal::cells::{CellColor, PLAIN_BG, PLAIN_FG, PictureCell, palette256};
 use std::sync::LazyLock;
 
-/// Glyphs and the share of their cell that they cover. Shades are nominal (25, 50, 75 %); the others
-/// were measured in DejaVu Sans Mono.
+/// Glyphs, each with the share of the cell that it covers. The shares of the shades ░▒▓ are nominal
+/// (25, 50, 75 %). The other shares were measured in DejaVu Sans Mono.
 const COVERAGE: [(char, f32); 9] = [
     (' ', 0.0),
     ('.', 0.025),
@@ -20,24 +20,28 @@ const COVERAGE: [(char, f32); 9] = [
 ];
 /// Glyphs for mixtures of two colours.
 const SHADES: [char; 3] = ['░', '▒', '▓'];
-/// Background colours of mixtures: black, greys and white, which keep the hue.
+/// Background colours of mixtures: black, two greys and white. They leave the hue of the foreground
+/// unchanged.
 const NEUTRAL: [u8; 4] = [0, 7, 8, 15];
-/// OKLab distance by which two half blocks must be closer than one shade to be chosen, so that a
-/// changing picture does not flicker between them.
+/// Least gain for which half blocks are preferred to a shade: the sum of the OKLab errors of both
+/// halves must be smaller by this distance. Without it a changing picture would flicker between
+/// half blocks and shades.
 const HALVES_GAIN: f32 = 0.05;
 
-/// Returns the share of its cell that a glyph covers, 0..=1. Half blocks are not in the table.
+/// Returns the share of the cell that `glyph` covers, 0..=1. Returns 0.5 for glyphs that are not in
+/// the table, such as half blocks.
 pub fn coverage(glyph: char) -> f32 {
     COVERAGE.iter().find(|(known, _)| *known == glyph).map_or(0.5, |(_, part)| *part)
 }
 
-/// Returns the mean colour of a cell with share `coverage` of `fg` on `bg`.
+/// Returns the mean colour of a cell of which `fg` covers the share `coverage` and `bg` the
+/// remainder.
 pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
     let (fg, bg) = (linear(fg), linear(bg));
     Oklab::of_linear([0, 1, 2].map(|c| coverage * fg[c] + (1.0 - coverage) * bg[c]))
 }
 
-/// The 16 colours, and shades of pairs of them.
+/// Candidate cells: the 16 colours alone, and shades of one colour on a neutral one.
 static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     let mixed = NEUTRAL.into_iter().flat_map(|bg| (0..16).map(move |fg| (fg, bg)));
     let mixed = mixed.filter(|(fg, bg)| fg != bg).flat_map(|(fg, bg)| {
@@ -50,7 +54,7 @@ static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     (0..16).map(flat).chain(mixed).collect()
 });
 
-/// Colours of [`CELLS`].
+/// Mean colours of [`CELLS`].
 static SHADED: LazyLock<PaletteCache> = LazyLock::new(|| {
     let look = |cell: &PictureCell| match (cell.fg, cell.bg) {
         (CellColor::Indexed(fg), CellColor::Indexed(bg)) => {
@@ -62,7 +66,7 @@ static SHADED: LazyLock<PaletteCache> = LazyLock::new(|| {
     PaletteCache::new(CELLS.iter().map(look).collect())
 });
 
-/// The 16 colours in OKLab.
+/// The 16 colours, without shades.
 static BARE: LazyLock<PaletteCache> = LazyLock::new(|| {
     PaletteCache::new((0..16).map(|index| Oklab::of(palette256::rgb(index))).collect())
 });
@@ -71,17 +75,17 @@ fn flat(index: u8) -> PictureCell {
     PictureCell { glyph: ' ', fg: CellColor::Plain, bg: CellColor::Indexed(index) }
 }
 
-/// Returns the nearest of the 16 colours.
+/// Returns the index of the nearest of the 16 colours.
 pub fn nearest(rgb: [u8; 3]) -> u8 {
     BARE.nearest(rgb) as u8
 }
 
-/// Returns a cell for two halves in 16 colours: one shade of two colours, or a half block.
+/// Returns the cell in 16 colours that approximates two halves: a shade for both, or a half block.
 pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     let target = [upper, lower].map(Oklab::of);
     let [a, b] = [upper, lower].map(linear);
     let shade = SHADED.nearest([0, 1, 2].map(|c| code(0.5 * (a[c] + b[c]))));
-    // Similar halves are never better as a half block.
+    // For similar halves a half block cannot gain enough.
     if target[0].distance(target[1]) < HALVES_GAIN {
         return CELLS[shade];
     }
@@ -98,7 +102,7 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     CELLS[shade]
 }
 
-/// Returns a cell for two halves without colours, by lightness.
+/// Returns the cell without colours that approximates the lightness of two halves.
 pub fn pair_mono(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     static LIGHTNESS: LazyLock<Vec<(char, f32)>> = LazyLock::new(|| {
         COVERAGE.map(|(glyph, part)| (glyph, mixture(PLAIN_FG, PLAIN_BG, part).l)).to_vec()
@@ -136,7 +140,7 @@ mod tests {
         }
         assert_eq!(last, 1.0);
         assert_eq!(pair_mono([0; 3], [0; 3]).glyph, ' ');
-        // An edge within the cell is a half block.
+        // An edge between the halves of a cell gives a half block.
         assert_eq!(pair_mono([255; 3], [0; 3]).glyph, '▀');
         assert_eq!(pair_mono([0; 3], [255; 3]).glyph, '▄');
     }
@@ -146,7 +150,7 @@ mod tests {
         let flat = |rgb| pair(rgb, rgb);
         assert_eq!(flat([255, 0, 0]), super::flat(9));
         assert_eq!(flat([0, 0, 0]), super::flat(0));
-        // A dark red is red with black, a light one red with white.
+        // Dark red is a shade of red on black; light red is a shade of red on white.
         for (rgb, neutral) in [([110, 0, 0], 0), ([255, 150, 140], 15)] {
             let PictureCell { glyph, fg: CellColor::Indexed(fg), bg: CellColor::Indexed(bg) } =
                 flat(rgb)

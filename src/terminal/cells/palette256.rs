@@ -1,17 +1,19 @@
-//! The 256 colours of xterm: 16 that users configure, a cube of 216, and 24 greys.
+//! The 256-colour table of xterm: 16 colours that users configure, a colour cube of 216, and 24
+//! greys.
 
 use crate::terminal::cells::oklab::Oklab;
 use crate::terminal::cells::palette_cache::PaletteCache;
 use std::sync::LazyLock;
 
-/// 8-bit levels along each edge of the cube.
+/// 8-bit levels along each edge of the colour cube.
 const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
-/// First index of the cube. The 16 colours before it vary between users.
+/// First index of the colour cube. The 16 colours before it differ between users and are not
+/// chosen.
 const FIRST: u8 = 16;
 /// First index of the greys.
 const GREYS: u8 = 232;
 
-/// The 16 ANSI colours as xterm has them.
+/// Default values of the 16 ANSI colours in xterm, 8-bit sRGB.
 const ANSI: [[u8; 3]; 16] = [
     [0, 0, 0],
     [205, 0, 0],
@@ -31,7 +33,7 @@ const ANSI: [[u8; 3]; 16] = [
     [255, 255, 255],
 ];
 
-/// Returns the sRGB of a table colour.
+/// Returns the 8-bit sRGB of table colour `index`.
 pub fn rgb(index: u8) -> [u8; 3] {
     match index {
         ..FIRST => ANSI[usize::from(index)],
@@ -43,17 +45,18 @@ pub fn rgb(index: u8) -> [u8; 3] {
     }
 }
 
-/// Colours from [`FIRST`] on.
+/// The colours of the cube and the greys, which start at [`FIRST`].
 static CHOICES: LazyLock<PaletteCache> =
     LazyLock::new(|| PaletteCache::new((FIRST..=255).map(|index| Oklab::of(rgb(index))).collect()));
 
-/// Returns the colour of cube and greys nearest to `rgb`, which is rounded to 6 bits a channel.
-/// Neighbours in the table differ by at least 10 of 255 levels.
+/// Returns the index of the colour nearest to `rgb` among the cube and the greys. `rgb` is rounded
+/// to 6 bits per channel. The error of this is small, because neighbours in the table differ by at
+/// least 10 of 255 levels.
 pub fn nearest(rgb: [u8; 3]) -> u8 {
     FIRST + CHOICES.nearest(rgb) as u8
 }
 
-/// Returns the OKLab lightness of a colour of cube or greys, 0..=1.
+/// Returns the OKLab lightness, 0..=1, of a colour of the cube or a grey.
 pub fn lightness(index: u8) -> f32 {
     CHOICES.look(usize::from(index.saturating_sub(FIRST))).l
 }
@@ -79,7 +82,7 @@ mod tests {
         }
     }
 
-    /// The cached choice is never visibly worse than a search at full precision.
+    /// Compares the cached colour with the result of a search at full precision.
     #[test]
     fn nearest_color_matches_exact_search() {
         let mut exact_hits = 0;

@@ -1,15 +1,17 @@
-//! Cache of the nearest palette colour.
+//! Palette with a cache of searches for the nearest colour.
 
 use crate::terminal::cells::oklab::Oklab;
 use std::sync::atomic::{AtomicU16, Ordering};
 
-/// Bits of each channel in the key. Rounding to them moves a colour by at most 2 of 255 levels.
+/// Number of bits per channel of a cache key. Rounding to 6 bits changes a colour by at most 2 of
+/// 255 levels.
 const BITS: usize = 6;
 
-/// Palette with a cache of nearest colours.
+/// Palette that remembers the nearest colour of each sRGB colour, rounded to 6 bits per channel.
 pub struct PaletteCache {
     looks: Vec<Oklab>,
-    /// Index of the nearest choice plus 1, for each of the 2^18 boxes of sRGB; 0 if not searched yet.
+    /// Index of the nearest palette colour plus 1, for each of the 2^18 boxes of sRGB. 0 means that
+    /// the box was not searched yet.
     known: Vec<AtomicU16>,
 }
 
@@ -19,19 +21,21 @@ impl PaletteCache {
         Self { looks, known: (0..1 << (3 * BITS)).map(|_| AtomicU16::new(0)).collect() }
     }
 
-    /// Returns colour `index`.
+    /// Returns the palette colour `index`.
     pub fn look(&self, index: usize) -> Oklab {
         self.looks[index]
     }
 
-    /// Returns the index of the colour nearest to `rgb`, which is rounded to 6 bits a channel.
+    /// Returns the index of the palette colour nearest to `rgb`. `rgb` is rounded to 6 bits per
+    /// channel.
     pub fn nearest(&self, rgb: [u8; 3]) -> usize {
         let coarse = rgb.map(|c| usize::from(c) >> (8 - BITS));
         let known = &self.known[(coarse[0] << (2 * BITS)) | (coarse[1] << BITS) | coarse[2]];
-        // Concurrent threads store the same index.
+        // Threads that search the same box at the same time store the same index.
         match known.load(Ordering::Relaxed) {
             0 => {
-                // Boxes span the whole range, so that black and white are exact.
+                // The 64 steps of a channel are spread over 0..=255, so that black and white are
+                // exact.
                 let index = self.search(Oklab::of(coarse.map(|c| ((c * 255 + 31) / 63) as u8)));
                 known.store(index as u16 + 1, Ordering::Relaxed);
                 index
@@ -40,7 +44,7 @@ impl PaletteCache {
         }
     }
 
-    /// Returns the index of the colour nearest to `target`.
+    /// Returns the index of the palette colour nearest to `target`.
     pub fn search(&self, target: Oklab) -> usize {
         let mut best = (f32::INFINITY, 0);
         for (index, look) in self.looks.iter().enumerate() {

@@ -1,12 +1,13 @@
-//! Encoding of cells in few bytes: colours are sent only when they change, of equivalent glyphs the one
-//! with the fewest colour changes is chosen, and the cursor moves by the shortest sequence.
+//! Encoding of cells in few bytes. Colours are sent only when they change. Among glyphs that look
+//! the same, the one with the fewest colour changes is chosen. The cursor moves by the shortest
+//! sequence.
 
 use ratatui::buffer::Cell;
 use ratatui::style::{Color, Modifier};
 use std::io::Write;
 use unicode_width::UnicodeWidthStr;
 
-/// Attributes: flag, SGR parameter that sets it, SGR parameter that resets it.
+/// Attributes, each with the SGR parameter that sets it and the SGR parameter that resets it.
 const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
     (Modifier::BOLD, 1, 22),
     (Modifier::DIM, 2, 22),
@@ -19,10 +20,10 @@ const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
     (Modifier::CROSSED_OUT, 9, 29),
 ];
 
-/// Attributes that are visible on a space.
+/// Attributes that are visible on a space character.
 const LINES: Modifier = Modifier::REVERSED.union(Modifier::UNDERLINED).union(Modifier::CROSSED_OUT);
 
-/// Colours and attributes of the next character.
+/// Colours and attributes with which the terminal shows the next character.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Pen {
     fg: Color,
@@ -30,45 +31,46 @@ struct Pen {
     modifier: Modifier,
 }
 
-/// Encoder with the terminal's current pen and cursor.
+/// Encoder of cells. It tracks the current pen and the cursor of the terminal.
 #[derive(Clone, Debug)]
 pub struct Encoder {
     pen: Pen,
-    /// Column and row of the cursor; `None` if unknown.
+    /// Column and row of the cursor. `None` if unknown.
     cursor: Option<(u16, u16)>,
     columns: u16,
 }
 
 impl Encoder {
-    /// Creates an encoder for a terminal with default pen.
+    /// Creates an encoder for a terminal with default colours, without attributes, and with unknown
+    /// cursor position.
     pub fn new(columns: u16) -> Self {
         let pen = Pen { fg: Color::Reset, bg: Color::Reset, modifier: Modifier::empty() };
         Self { pen, cursor: None, columns }
     }
 
-    /// Clears the terminal and resets the pen.
+    /// Writes the sequence that clears the terminal and resets the pen.
     pub fn clear(&mut self, out: &mut Vec<u8>) {
         *self = Self::new(self.columns);
         out.extend(b"\x1b[m\x1b[2J");
     }
 
-    /// Writes a cell.
+    /// Writes the sequence that shows `cell` at column `x` and row `y`.
     pub fn cell(&mut self, out: &mut Vec<u8>, x: u16, y: u16, cell: &Cell) {
         self.go(out, x, y);
         let (symbol, pen) = self.cheapest(cell);
         self.set(out, pen);
         out.extend(symbol.as_bytes());
         let width = symbol.width() as u16;
-        // Terminals differ at the right edge and in the width of wide characters.
+        // Terminals differ in the cursor position after the last column and after wide characters.
         self.cursor = (width == 1 && x + 1 < self.columns).then_some((x + 1, y));
     }
 
-    /// Marks the position of the cursor as unknown.
+    /// Marks the position of the cursor as unknown, after other output has moved it.
     pub fn moved(&mut self) {
         self.cursor = None;
     }
 
-    /// Moves the cursor.
+    /// Moves the cursor to column `x` and row `y`.
     pub fn go(&mut self, out: &mut Vec<u8>, x: u16, y: u16) {
         let before = self.cursor.replace((x, y));
         let counted = |n: u16, letter: char| match n {
@@ -93,7 +95,7 @@ impl Encoder {
         out.extend(shortest.as_bytes());
     }
 
-    /// Returns the symbol and pen that look like `cell` and need the fewest changes.
+    /// Returns a symbol and a pen that together look like `cell` and need the fewest bytes.
     fn cheapest<'a>(&self, cell: &'a Cell) -> (&'a str, Pen) {
         let Cell { fg, bg, modifier, .. } = *cell;
         let symbol = cell.symbol();
@@ -109,10 +111,12 @@ impl Encoder {
         };
         let [upper, lower] = halves;
         let is_flat = upper == lower;
-        // Default foreground and background differ.
+        // The default colour of the foreground differs from that of the background, so that they
+        // cannot be exchanged.
         let is_explicit = upper != Color::Reset && lower != Color::Reset;
         let candidates: &[(&str, Pen)] = match (is_explicit, is_flat) {
-            // No full block: in some fonts it leaves an edge of the background uncovered.
+            // A full block is never used: in some fonts it leaves an edge of the background
+            // uncovered.
             (true, true) => &[(" ", pen(self.pen.fg, upper))],
             (true, false) => &[("▀", pen(upper, lower)), ("▄", pen(lower, upper))],
             (false, _) if symbol == " " => &[(" ", pen(self.pen.fg, bg))],
@@ -120,7 +124,7 @@ impl Encoder {
         };
         let changes = |(symbol, pen): &(&str, Pen)| {
             let colors = usize::from(pen.fg != self.pen.fg) + usize::from(pen.bg != self.pen.bg);
-            // A colour takes far more bytes than a glyph.
+            // A colour needs far more bytes than a glyph, so colours are weighted by 16.
             16 * colors + symbol.len()
         };
         candidates.iter().min_by_key(|candidate| changes(candidate)).copied().unwrap_or(plain)
@@ -225,7 +229,7 @@ mod tests {
         let cells = [(5, 1, half("▀", 1, 2)), (6, 1, half(" ", 7, 2)), (7, 1, half("▀", 1, 1))];
         let expected = "\x1b[2;6H\x1b[38;2;1;0;0;48;2;2;0;0m▀ \x1b[48;2;1;0;0m ";
         assert_eq!(encoded(&cells), expected);
-        // The pen's foreground does not matter.
+        // A full block is sent as a space, so that the foreground of the pen does not matter.
         let cells = [(0, 0, half("▀", 1, 2)), (1, 0, half("█", 1, 9))];
         let expected = "\x1b[H\x1b[38;2;1;0;0;48;2;2;0;0m▀\x1b[48;2;1;0;0m ";
         assert_eq!(encoded(&cells), expected);
@@ -249,7 +253,7 @@ mod tests {
 
     fn any_cell() -> impl Strategy<Value = Cell> {
         let symbol = prop_oneof![Just("▀"), Just("▄"), Just("█"), Just(" "), Just("a"), Just("é")];
-        // Terminals differ on bold and dim together, which the dashboard does not use.
+        // Bold and dim are not combined: terminals differ in it, and the dashboard does not use it.
         let weight =
             prop_oneof![Just(Modifier::empty()), Just(Modifier::BOLD), Just(Modifier::DIM)];
         let style = prop_oneof![
@@ -303,7 +307,7 @@ mod tests {
             parser.process(&out);
             for y in 0..rows {
                 for x in 0..columns {
-                    // The same cell, sent alone and without substitution.
+                    // The reference is the cell sent alone, with its own symbol and pen.
                     let cell = &expected[(x, y)];
                     let mut alone = vt100::Parser::new(high, wide, 0);
                     let mut bytes = Vec::new();

@@ -1,10 +1,10 @@
-//! Frame difference: the cells that a frame sends.
+//! Frame difference: selects the cells that a frame sends.
 //!
-//! Text is sent first, row by row. Then cells of the picture with a visible difference are sent, the
-//! largest difference first, within the frame's budget. A new picture that does not fit is sent as a
-//! mosaic of coarse blocks first. While samples accumulate, cells are compared again only after the number
-//! of samples has grown by a factor of 2^(1/4), from 64 on 2^(1/2). Invisible differences are sent when
-//! the connection is otherwise idle.
+//! Text is sent first, row by row. Cells of the picture with a visible difference follow, the
+//! largest difference first, within the byte budget of the frame. A new picture that does not fit
+//! is sent as a mosaic of coarse blocks first. While samples accumulate, cells are compared again
+//! only after the number of samples has grown by a factor of 2^(1/4), or 2^(1/2) from 64 samples
+//! on. Invisible differences are sent when the connection is otherwise idle.
 
 mod encode;
 mod perceptual;
@@ -18,9 +18,10 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::{Position, Rect};
 use std::time::Duration;
 
-/// Bytes of a frame besides its cells: cursor, synchronised update, acknowledgement request.
+/// Number of bytes of a frame besides its cells: cursor, synchronised update, acknowledgement
+/// request.
 const FRAME_OVERHEAD: usize = 64;
-/// Time without change after which a picture is sent exactly.
+/// Time without change of the picture after which invisible differences are sent as well.
 const IDLE: Duration = Duration::from_secs(2);
 
 /// Contents that the terminal should show.
@@ -28,17 +29,19 @@ const IDLE: Duration = Duration::from_secs(2);
 pub struct TargetFrame<'a> {
     /// All cells.
     pub cells: &'a Buffer,
-    /// Text cursor; `None` hides it.
+    /// Position of the text cursor. `None` hides the cursor.
     pub cursor: Option<Position>,
     /// Area of the picture; may be empty.
     pub picture: Rect,
-    /// For each cell of that area, row by row, `true` if nothing covers the picture.
+    /// For each cell of the picture's area, row by row, `true` if the cell shows the picture, and
+    /// `false` if text covers it.
     pub uncovered: &'a [bool],
-    /// Number that increases when the picture changes other than by more samples.
+    /// Number that increases when the picture changes for another reason than more samples, such as
+    /// an edit or a camera movement.
     pub subject: u64,
     /// Number that increases when the picture may have changed.
     pub version: u64,
-    /// Samples per pixel.
+    /// Number of samples per pixel.
     pub samples: f64,
     /// `true` if the picture will not change without input.
     pub settled: bool,
@@ -47,9 +50,9 @@ pub struct TargetFrame<'a> {
 /// Summary of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Frame {
-    /// `true` if it has cells of the picture.
+    /// `true` if the frame contains cells of the picture.
     pub picture: bool,
-    /// Bytes of invisible differences.
+    /// Number of bytes that encode invisible differences.
     pub flushed: usize,
 }
 
@@ -60,7 +63,7 @@ pub struct Pending {
     pub text: bool,
     /// `true` if visible differences of the picture remain.
     pub visible: bool,
-    /// Earliest time for invisible differences; `None` if there are none.
+    /// Earliest time at which invisible differences are sent. `None` if there are none.
     pub hidden: Option<Duration>,
 }
 
@@ -74,18 +77,18 @@ pub struct FrameDiff {
     encoder: Encoder,
     picture_diff: PerceptualDiff,
     subject: Option<u64>,
-    /// `true` until some form of the current picture was sent.
+    /// `true` until cells of the current subject, exact or as a mosaic, were sent.
     fresh: bool,
-    /// Samples per pixel at which cells are compared again.
+    /// Number of samples per pixel at which cells are compared again.
     next_samples: f64,
     version: u64,
-    /// Time at which the version changed.
+    /// Time of the last change of the version.
     version_at: Duration,
     pending: Pending,
 }
 
 impl FrameDiff {
-    /// Creates the state for a terminal with unknown contents.
+    /// Creates the frame difference for a terminal with unknown contents.
     pub fn new() -> Self {
         Self {
             shown: Buffer::empty(Rect::ZERO),
@@ -102,18 +105,18 @@ impl FrameDiff {
         }
     }
 
-    /// Returns the differences that the last frame has left.
+    /// Returns the differences that remain after the last frame.
     pub fn pending(&self) -> Pending {
         self.pending
     }
 
-    /// Records that the cursor was moved by other output.
+    /// Records that other output has moved the cursor.
     pub fn moved(&mut self) {
         self.encoder.moved();
     }
 
-    /// Appends the next frame to `out`, which stays empty if there is nothing to send. OKLab differences up
-    /// to `threshold` are invisible.
+    /// Appends the next frame, within the limits of `allowance`, to `out`. Appends no bytes if
+    /// there is nothing to send. OKLab differences up to `threshold` count as invisible.
     pub fn frame(
         &mut self,
         target: &TargetFrame,
@@ -144,7 +147,7 @@ impl FrameDiff {
             frame = self.send_picture(target, now, FrameBudget { bytes: room, ..allowance }, out);
         }
         if out.len() == before && target.cursor == self.cursor {
-            // Nothing was sent while the cursor was hidden.
+            // The frame is empty: the sequence that hides the cursor (6 bytes) is removed.
             out.truncate(if self.cursor.is_some() { before - 6 } else { before });
             return frame;
         }
@@ -165,8 +168,8 @@ impl FrameDiff {
         self.pending = Pending::default();
     }
 
-    /// Sends rows of text that differ, at least one and otherwise as many as fit into `room` bytes. Returns
-    /// `true` if all were sent.
+    /// Sends rows of text that differ: as many as fit into `room` bytes, but at least one. Returns
+    /// `true` if all of them were sent.
     fn send_text(&mut self, target: &TargetFrame, room: usize, out: &mut Vec<u8>) -> bool {
         let differences = self.shown.diff(target.cells);
         let text = differences.into_iter().filter(|(x, y, _)| !target.shows_picture(*x, *y));
@@ -183,7 +186,7 @@ impl FrameDiff {
             }
             self.encoder = encoder;
             for (x, y, cell) in row {
-                // A wide character takes the next cell as well.
+                // A wide character covers the next cell as well.
                 let width = unicode_width::UnicodeWidthStr::width(cell.symbol()).max(1) as u16;
                 for x in (*x..x.saturating_add(width)).take_while(|x| *x < target.cells.area.width)
                 {
@@ -216,7 +219,7 @@ impl FrameDiff {
         self.picture_diff.compare(target, &self.shown, is_due, threshold);
     }
 
-    /// Sends cells of the picture, as many as fit.
+    /// Sends as many cells of the picture as fit into `allowance`.
     fn send_picture(
         &mut self,
         target: &TargetFrame,
@@ -268,7 +271,9 @@ impl FrameDiff {
         frame
     }
 
-    /// Encodes the cells of `order` with the largest differences that fit into `room` bytes.
+    /// Encodes as many cells of `order` as fit into `room` bytes, those with the largest
+    /// differences first. `order` has the difference and the index of each cell; `cell` returns the
+    /// cell of an index.
     fn fitting<'a>(
         &self,
         area: Rect,
@@ -276,7 +281,7 @@ impl FrameDiff {
         room: usize,
         cell: impl Fn(usize) -> &'a Cell,
     ) -> Part {
-        // Ties are sorted by index, so that frames are deterministic.
+        // Cells of equal difference are sorted by index, so that frames are deterministic.
         order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let encoded = |count: usize| {
             let mut indices: Vec<_> = order[..count].iter().map(|(_, index)| *index).collect();
@@ -292,7 +297,7 @@ impl FrameDiff {
         };
         let mut best = Part { bytes: Vec::new(), encoder: self.encoder.clone(), cells: Vec::new() };
         let mut count = order.len();
-        // Half of the cells takes more than half of the bytes, so the estimate is never too small.
+        // Half of the cells need more than half of the bytes, so the estimate is never too small.
         while count > 0 {
             let part = encoded(count);
             if part.bytes.len() <= room {
@@ -301,7 +306,7 @@ impl FrameDiff {
             }
             count = (count * room / part.bytes.len()).min(count - 1);
         }
-        // A second estimate uses the space that is left.
+        // A second estimate uses the room that is left.
         if best.cells.len() < order.len() && 10 * best.bytes.len() < 9 * room {
             let estimate = best.cells.len() * room / best.bytes.len().max(1);
             let part = encoded((estimate - estimate / 50).clamp(best.cells.len(), order.len()));
@@ -316,10 +321,10 @@ impl FrameDiff {
         out.extend(&part.bytes);
         self.encoder = part.encoder;
         for (index, cell) in part.cells {
-            let place = position(target.picture, index);
-            let is_exact = cell == target.cells[place];
+            let cell_position = position(target.picture, index);
+            let is_exact = cell == target.cells[cell_position];
             self.picture_diff.sent(index, &cell, is_exact);
-            self.shown[place] = cell;
+            self.shown[cell_position] = cell;
         }
     }
 }
@@ -327,13 +332,14 @@ impl FrameDiff {
 /// Encoded cells of the picture.
 struct Part {
     bytes: Vec<u8>,
-    /// State of the encoder after them.
+    /// State of the encoder after these bytes.
     encoder: Encoder,
     cells: Vec<(usize, Cell)>,
 }
 
 impl TargetFrame<'_> {
-    /// Returns the index of a cell within the picture's area; `None` outside.
+    /// Returns the index of a cell within the area of the picture. Returns `None` for a cell
+    /// outside this area.
     fn index(&self, x: u16, y: u16) -> Option<usize> {
         let area = self.picture;
         let inside = area.contains(Position { x, y });
@@ -345,7 +351,7 @@ impl TargetFrame<'_> {
     }
 }
 
-/// Returns the position of cell `index` of `area`.
+/// Returns the position of cell `index` of `area`, counted row by row.
 fn position(area: Rect, index: usize) -> Position {
     let width = usize::from(area.width).max(1);
     Position { x: area.x + (index % width) as u16, y: area.y + (index / width) as u16 }

@@ -1,4 +1,5 @@
-//! Perceptual difference between the shown and the target cells of the picture.
+//! Perceptual difference between the cells of the picture that the terminal shows and those of the
+//! target frame.
 
 use crate::terminal::cells::{CellColor, Oklab, PictureCell, blocks};
 use crate::terminal::diff::{TargetFrame, position};
@@ -6,27 +7,29 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 
-/// Difference of a cell with unknown contents; greater than between black and white.
+/// Difference of a cell with unknown contents. It is greater than that between black and white, so
+/// that such cells are sent first.
 const UNKNOWN: f32 = 2.0;
 
 /// Colours of one cell of the picture.
 #[derive(Clone, Copy, Debug)]
 struct CellColors {
-    /// Target cell; `None` where the picture is covered.
+    /// Cell of the target frame. `None` where text covers the picture.
     target: Option<PictureCell>,
-    /// Colours of the target's halves.
+    /// Colours of the two halves of the target cell.
     look: [Oklab; 2],
-    /// Colours of the shown halves; `None` if unknown.
+    /// Colours of the two halves that the terminal shows. `None` if unknown.
     shown: Option<[Oklab; 2]>,
-    /// `true` if a difference counts, because a comparison was due since it was sent.
+    /// `true` if a difference of this cell may count as visible. After the cell was sent exactly,
+    /// its differences do not count until the next due comparison.
     counts: bool,
-    /// Difference from the target; 0 if equal.
+    /// Difference between shown and target cell. 0 if they are equal.
     error: f32,
     /// `true` if the difference is visible.
     visible: bool,
 }
 
-/// Perceptual difference of the picture's area.
+/// Perceptual differences of all cells in the area of the picture.
 #[derive(Debug, Default)]
 pub struct PerceptualDiff {
     area: Rect,
@@ -35,7 +38,7 @@ pub struct PerceptualDiff {
 }
 
 impl PerceptualDiff {
-    /// Forgets the contents of the terminal.
+    /// Marks the contents of the terminal as unknown.
     pub fn forget(&mut self) {
         self.area = Rect::ZERO;
         self.cells.clear();
@@ -59,12 +62,12 @@ impl PerceptualDiff {
         }
     }
 
-    /// Compares the shown cells with the target. `is_due` is `true` if every difference counts; otherwise
-    /// only those that counted before.
+    /// Compares the shown cells with the target. If `is_due` is `true`, every difference may count
+    /// as visible. Otherwise only cells whose differences counted before are considered.
     pub fn compare(&mut self, target: &TargetFrame, shown: &Buffer, is_due: bool, threshold: f32) {
         for (index, cell_colors) in self.cells.iter_mut().enumerate() {
-            let place = position(self.area, index);
-            let cell = &target.cells[place];
+            let cell_position = position(self.area, index);
+            let cell = &target.cells[cell_position];
             (cell_colors.error, cell_colors.visible) = (0.0, false);
             cell_colors.counts |= is_due;
             if !target.uncovered.get(index).copied().unwrap_or(false) {
@@ -76,7 +79,7 @@ impl PerceptualDiff {
                 cell_colors.target = Some(picture);
                 cell_colors.look = picture.halves();
             }
-            if *cell == shown[place] {
+            if *cell == shown[cell_position] {
                 (cell_colors.shown, cell_colors.counts) = (Some(cell_colors.look), false);
                 continue;
             }
@@ -84,19 +87,21 @@ impl PerceptualDiff {
                 cell_colors.shown.map_or(UNKNOWN, |shown| difference(shown, cell_colors.look));
             cell_colors.counts &= cell_colors.error > threshold;
             cell_colors.visible = cell_colors.counts;
-            // Different cells of equal colour have a positive error, so that they are sent at the end.
+            // Cells that differ but have equal colours get a positive error, so that they are sent
+            // last.
             cell_colors.error = cell_colors.error.max(f32::MIN_POSITIVE);
         }
     }
 
-    /// Records that text now covers the cell.
+    /// Records that text now covers cell `index`.
     pub fn covered(&mut self, index: usize) {
         if let Some(cell_colors) = self.cells.get_mut(index) {
             (cell_colors.shown, cell_colors.counts) = (None, true);
         }
     }
 
-    /// Records that `cell` is shown. `exact` is `true` if it equals the target.
+    /// Records that the terminal shows `cell` at `index`. `exact` is `true` if `cell` equals the
+    /// target.
     pub fn sent(&mut self, index: usize, cell: &Cell, exact: bool) {
         let cell_colors = &mut self.cells[index];
         let shown = picture_cell(cell).halves();
@@ -106,12 +111,12 @@ impl PerceptualDiff {
             if exact { 0.0 } else { difference(shown, cell_colors.look).max(f32::MIN_POSITIVE) };
     }
 
-    /// Returns errors and indices of cells with visible differences.
+    /// Returns the difference and the index of each cell with a visible difference.
     pub fn visible(&self) -> Vec<(f32, usize)> {
         self.select(|cell_colors| cell_colors.visible)
     }
 
-    /// Returns errors and indices of cells with invisible differences.
+    /// Returns the difference and the index of each cell with an invisible difference.
     pub fn hidden(&self) -> Vec<(f32, usize)> {
         self.select(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
@@ -126,8 +131,9 @@ impl PerceptualDiff {
         self.cells.iter().any(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
 
-    /// Returns the cells of a mosaic with blocks of `side` x `side` half cells, and gain and index of the
-    /// cells at which it is closer to the picture than the shown cell.
+    /// Returns a mosaic with blocks of `side` x `side` half cells. The first value has all its
+    /// cells. The second has the cells at which the mosaic is closer to the target than the shown
+    /// cell: the gain in OKLab distance, and the index.
     pub fn coarse(&self, target: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
         let rows = usize::from(self.area.height);
@@ -167,12 +173,12 @@ impl PerceptualDiff {
     }
 }
 
-/// Returns the larger difference of the two halves.
+/// Returns the larger of the OKLab distances of the upper and the lower halves.
 fn difference(a: [Oklab; 2], b: [Oklab; 2]) -> f32 {
     a[0].distance(b[0]).max(a[1].distance(b[1]))
 }
 
-/// Converts a cell of the buffer back to a cell of the picture.
+/// Converts a cell of a ratatui buffer to a cell of the picture.
 fn picture_cell(cell: &Cell) -> PictureCell {
     let cell_color = |color| match color {
         Color::Rgb(r, g, b) => CellColor::Rgb([r, g, b]),

@@ -120,11 +120,11 @@ fn unlimited_frame_sends_all_cells() {
     assert!(fixture.parser.screen().contents().contains("words"));
     assert_eq!(fixture.diff.pending(), Pending::default());
     assert_eq!(fixture.frame(1, EVERYTHING).1, b"");
-    // The smallest change is sent alone.
+    // If one cell changes, only this cell is sent.
     fixture.cells[(5, 5)].set_bg(Color::Rgb(1, 2, 3));
     assert!(fixture.frame(2, EVERYTHING).1.len() < 50);
     assert_eq!(fixture.exact(), 240);
-    // A new size clears the terminal.
+    // A change of the screen size clears the terminal.
     fixture.cells = Buffer::empty(Rect { width: 39, ..AREA });
     assert!(fixture.frame(3, EVERYTHING).1.starts_with(b"\x1b[m\x1b[2J"));
 }
@@ -154,16 +154,16 @@ fn text_precedes_picture_within_the_budget() {
 fn text_only_budget_sends_no_picture() {
     let mut fixture = Fixture::new();
     fixture.say(10, "words");
-    let beside = FrameBudget { bytes: 1500, picture: false, refinement: 0 };
-    let (frame, _) = fixture.frame(0, beside);
+    let text_only = FrameBudget { bytes: 1500, picture: false, refinement: 0 };
+    let (frame, _) = fixture.frame(0, text_only);
     assert_eq!((frame, fixture.exact()), (Frame::default(), 0));
     assert!(fixture.parser.screen().contents().contains("words"));
     assert!(fixture.diff.pending().visible);
-    assert_eq!(fixture.frame(1, beside).1, b"");
-    // Text beyond the budget comes row by row.
+    assert_eq!(fixture.frame(1, text_only).1, b"");
+    // Text that does not fit into the budget is sent row by row.
     let long: String = ('a'..='z').chain('0'..='9').collect();
     (9..12).for_each(|row| fixture.say(row, &long));
-    let narrow = FrameBudget { bytes: 120, ..beside };
+    let narrow = FrameBudget { bytes: 120, ..text_only };
     for rows in 1..=3 {
         let (_, bytes) = fixture.frame(2, narrow);
         assert!(bytes.len() <= 120, "{}", bytes.len());
@@ -176,7 +176,8 @@ fn text_only_budget_sends_no_picture() {
 fn largest_difference_is_sent_first() {
     let mut fixture = Fixture::new();
     fixture.frame(0, EVERYTHING);
-    // With a budget: three cells change.
+    // After a first frame with a budget, three cells change. The budget of the next frame suffices
+    // for one of them.
     fixture.samples = 2.0;
     fixture.frame(50, within(20_000));
     for (at, color) in [((3, 3), [24, 90, 90]), ((9, 6), [250, 250, 250]), ((20, 2), [150, 20, 60])]
@@ -206,10 +207,11 @@ fn invisible_differences_wait_for_idle_time() {
     assert_eq!(fixture.frame(100, within(20_000)).1, b"");
     let Pending { visible, hidden, .. } = fixture.diff.pending();
     assert_eq!((visible, hidden), (false, Some(ms(100) + IDLE)));
-    // After a time without change they are sent in slices.
+    // After `IDLE` without change, invisible differences are sent in slices.
     let (frame, bytes) = fixture.frame(2200, within(4000));
     assert!(frame.flushed > 500 && frame.flushed <= 2000 && bytes.len() <= 2000, "{frame:?}");
-    // A settled picture sends them at once, if the budget permits refinement.
+    // Invisible differences of a settled picture are sent at once, if the budget permits
+    // refinement.
     fixture.settled = true;
     assert_eq!(fixture.frame(2300, FrameBudget { refinement: 0, ..within(4000) }).1, b"");
     while fixture.diff.pending().hidden.is_some() {
@@ -223,7 +225,7 @@ fn cells_are_compared_after_enough_new_samples() {
     let mut fixture = Fixture::new();
     fixture.samples = 16.0;
     fixture.frame(0, within(20_000));
-    // Five percent more samples and a clearly different colour: nothing is sent.
+    // With only 6 % more samples even a visible difference is not sent.
     fixture.samples = 17.0;
     fixture.paint(|x, y| [8 * x as u8, 20 * y as u8, 150]);
     assert_eq!(fixture.frame(50, within(20_000)).1, b"");
@@ -231,7 +233,7 @@ fn cells_are_compared_after_enough_new_samples() {
     fixture.samples = 20.0;
     fixture.frame(100, within(20_000));
     assert_eq!(fixture.exact(), 240);
-    // A new subject is sent at once.
+    // A picture of a new subject is sent at once.
     fixture.subject += 1;
     fixture.samples = 1.0;
     fixture.paint(|x, y| [8 * x as u8, 20 * y as u8, 250]);
@@ -247,7 +249,7 @@ fn new_picture_appears_as_mosaic_first() {
     fixture.paint(|x, y| [255 - 8 * x as u8, 200 - 20 * y as u8, 20]);
     let (_, bytes) = fixture.frame(50, within(1200));
     assert!(bytes.len() <= 1200, "{}", bytes.len());
-    // Every cell is much closer.
+    // Every cell is near its target, although not exact.
     for at in PICTURE.positions() {
         let cell = fixture.parser.screen().cell(at.y, at.x).unwrap();
         let vt100::Color::Rgb(r, ..) = cell.bgcolor() else { panic!("{at} has no colour") };
@@ -267,9 +269,9 @@ fn uncovered_picture_is_sent_again() {
         fixture.say(row, "       overlay      ");
         range.for_each(|at| fixture.uncovered[at] = false);
     }
-    // Cells of the text beside those marked as covered belong to the picture.
-    let wide: Vec<_> = (0..240).map(|at| !(2..4).contains(&(at / 30)) || at % 30 >= 18).collect();
-    fixture.uncovered = wide;
+    // The mask covers exactly the cells of the text: columns 0 to 17 of the picture's rows 2 and 3.
+    let mask: Vec<_> = (0..240).map(|at| !(2..4).contains(&(at / 30)) || at % 30 >= 18).collect();
+    fixture.uncovered = mask;
     fixture.frame(50, within(20_000));
     assert!(fixture.parser.screen().contents().contains("overlay"));
     fixture.cells = before;

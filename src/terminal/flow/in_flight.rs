@@ -1,4 +1,4 @@
-//! Frames that were sent and are not acknowledged yet.
+//! Frames in flight: frames that were sent and are not acknowledged yet.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use std::time::Duration;
 pub struct InFlight {
     pub sent: Duration,
     pub bytes: usize,
-    /// `true` if it has cells of the picture.
+    /// `true` if the frame contains cells of the picture.
     pub picture: bool,
 }
 
@@ -17,7 +17,7 @@ pub struct InFlight {
 pub struct Acked {
     pub sent: Duration,
     pub bytes: usize,
-    /// `true` if no other frame was in flight when it was sent.
+    /// `true` if no other frame was in flight when this one was sent.
     pub alone: bool,
 }
 
@@ -35,7 +35,8 @@ impl FramesInFlight {
         self.queue.push_back((frame, alone));
     }
 
-    /// Removes the oldest frame. Returns it and the time of the acknowledgement before.
+    /// Records an acknowledgement and removes the oldest frame, to which it belongs. Returns this
+    /// frame and the time of the previous acknowledgement. Returns `None` if no frame is in flight.
     pub fn on_ack(&mut self, at: Duration) -> Option<(Acked, Option<Duration>)> {
         let (InFlight { sent, bytes, .. }, alone) = self.queue.pop_front()?;
         Some((Acked { sent, bytes, alone }, self.acked_at.replace(at)))
@@ -60,7 +61,7 @@ impl FramesInFlight {
         self.queue.iter().filter(|(frame, _)| frame.picture).count()
     }
 
-    /// Returns the bytes of frames with text only.
+    /// Returns the number of bytes of the frames that contain only text.
     pub fn text_bytes(&self) -> usize {
         let texts = self.queue.iter().filter(|(frame, _)| !frame.picture);
         texts.map(|(frame, _)| frame.bytes).sum()

@@ -4,25 +4,27 @@ use crate::terminal::Capabilities;
 use crate::terminal::flow::{DEFAULT_RATE, PacingMode};
 use std::time::Duration;
 
-/// Shortest round trip over SSH. A faster reply does not come from the terminal.
+/// Shortest plausible round trip over SSH. A faster reply comes from a program on this side of the
+/// connection instead of the terminal.
 const TOO_SOON: Duration = Duration::from_millis(3);
 
-/// State of the connection at the start.
+/// State of the connection before the first frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InitialLink {
-    /// Source of acknowledgements.
+    /// Method by which frames are paced.
     pub mode: PacingMode,
     /// Round trip of the terminal, if it was measured.
     pub round_trip: Option<Duration>,
-    /// `true` if the kernel reports its send queue.
+    /// `true` if the kernel reports the length of its TCP send queue.
     pub queue: bool,
-    /// Rate without any acknowledgement, in bytes per second.
+    /// Rate at which frames are sent in [`PacingMode::FixedRate`], in bytes per second.
     pub fixed_rate: f64,
 }
 
 impl InitialLink {
-    /// Derives the state from the replies of `terminal`. `queue` is `true` if the kernel reports its send
-    /// queue. `rate` is the user's fixed rate in bytes per second, which overrides measurement.
+    /// Derives the state from the replies of `terminal`. `queue` is `true` if the kernel reports
+    /// the length of its TCP send queue. `rate` is a fixed rate given by the user, in bytes per
+    /// second; the rate is not measured then.
     pub fn of(terminal: &Capabilities, queue: bool, rate: Option<f64>) -> Self {
         let fallback = if queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
         let multiplexer = terminal.environment.multiplexer;

@@ -1,10 +1,12 @@
-//! Flow control: the rate of the connection to the terminal and the size of the next frame.
+//! Flow control: measures the rate of the connection to the terminal and limits the size of the
+//! next frame.
 //!
-//! An SSH connection accepts a megabyte at once and shows it many seconds later. After each frame the
-//! program therefore requests the cursor position: the reply acknowledges the frame and yields round trip
-//! and rate. A frame holds at most what the connection carries in 100 ms, and only a few frames are in
-//! flight. If the terminal does not reply, or only a multiplexer does, the kernel's TCP send queue is
-//! measured instead. If the kernel does not report it, bytes are sent at a fixed rate.
+//! An SSH connection accepts a megabyte at once, and the terminal shows it many seconds later.
+//! After each frame the program therefore requests the cursor position. The reply acknowledges the
+//! frame and gives the round trip and the rate. A frame holds at most what the connection carries
+//! in 100 ms, and only a few frames are in flight. If only a multiplexer replies, or no program at
+//! all, the length of the kernel's TCP send queue is measured instead. If the kernel does not
+//! report this length, bytes are sent at a fixed rate.
 //!
 //! The module does no I/O and reads no clock: times and byte counts are arguments.
 
@@ -24,67 +26,71 @@ pub use tcp_send_queue::TcpSendQueue;
 
 /// Shortest interval between frames.
 pub const FRAME_INTERVAL: Duration = Duration::from_millis(33);
-/// Shortest interval between text updates without user input, over a connection.
+/// Shortest interval between frames of text alone without user input, over an SSH connection.
 pub const TEXT_INTERVAL: Duration = Duration::from_millis(500);
-/// Time in which the connection carries the largest frame.
+/// Time that the transmission of a full frame takes at the current rate.
 const FRAME_SPAN: Duration = Duration::from_millis(100);
-/// Smallest, initial and largest bytes of a frame.
+/// Smallest, initial and largest byte budget of a frame.
 const BUDGET: [f64; 3] = [2e3, 8e3, 200e3];
-/// Most frames in flight.
+/// Largest number of frames in flight. A frame is in flight until it is acknowledged.
 const MAX_IN_FLIGHT: usize = 6;
-/// Most bytes of text in flight beside frames of the picture.
+/// Largest number of bytes of text-only frames in flight, in addition to frames with cells of the
+/// picture.
 const MAX_TEXT: usize = 1500;
-/// Bytes of a frame below which its time does not show that the connection has become slower.
+/// Size of a frame, in bytes, below which its acknowledgement may raise the measured rate but not
+/// lower it. Latency dominates the time of such a frame.
 const SMALL: usize = 1000;
 /// Time after which an acknowledgement counts as lost.
 const LOST_AFTER: Duration = Duration::from_secs(3);
-/// Losses in a row after which no more acknowledgements are requested.
+/// Number of consecutive losses after which no more acknowledgements are requested.
 const MAX_LOSSES: u32 = 3;
 /// Interval at which the shortest round trip is measured again.
 const PROBE_INTERVAL: Duration = Duration::from_secs(30);
-/// Weight of a new measurement in the rate.
+/// Weight of a new measurement in the rate, which is an exponential moving average.
 const NEW_WEIGHT: f64 = 0.3;
-/// Time after a key during which the user counts as active.
+/// Time after user input during which the user counts as active.
 const ACTIVE_TIME: Duration = Duration::from_millis(500);
-/// Bytes in the kernel's send queue below which a frame never waits.
+/// Number of bytes in the kernel's send queue below which a frame never waits.
 const MIN_QUEUE: f64 = 16e3;
 /// Interval at which the kernel's send queue is measured.
 const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
-/// Rate of a connection without measurement, in bytes per second.
+/// Rate of a connection that cannot be measured, in bytes per second.
 pub const DEFAULT_RATE: f64 = 30e3;
-/// Share of the rate for differences below the threshold of visibility.
+/// Share of the rate that refinement may use: the sending of differences below the threshold of
+/// visibility.
 const REFINEMENT_SHARE: f64 = 0.25;
 
-/// Source of acknowledgements.
+/// Method by which frames are paced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PacingMode {
-    /// Local terminal: no acknowledgement needed.
+    /// The terminal is local and needs no acknowledgements.
     Unlimited,
-    /// The terminal replies, through a multiplexer if there is one.
+    /// The terminal acknowledges each frame by a reply, which passes through the multiplexer if
+    /// there is one.
     AckClocked(Option<Multiplexer>),
-    /// The kernel reports its TCP send queue.
+    /// The kernel reports the length of its TCP send queue.
     SendQueue,
-    /// None: a fixed rate.
+    /// Frames are sent at a fixed rate, without acknowledgements.
     FixedRate,
 }
 
 /// Limits of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameBudget {
-    /// Bytes in total; `usize::MAX` without limit.
+    /// Largest number of bytes in total. `usize::MAX` means no limit.
     pub bytes: usize,
     /// `true` if cells of the picture may be sent.
     pub picture: bool,
-    /// Bytes for differences below the threshold of visibility.
+    /// Largest number of bytes for refinement: differences below the threshold of visibility.
     pub refinement: usize,
 }
 
-/// State of the connection, for the user.
+/// State of the connection as displayed to the user.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkStatus {
     /// Rate in bytes per second, measured or fixed.
     pub rate: f64,
-    /// Source of acknowledgements.
+    /// Method by which frames are paced.
     pub mode: PacingMode,
 }
 
@@ -92,25 +98,27 @@ pub struct LinkStatus {
 #[derive(Debug)]
 pub struct FlowControl {
     mode: PacingMode,
-    /// Mode to return to when replies come again.
+    /// Mode to resume when a reply comes. `None` while no mode is suspended.
     suspended_mode: Option<PacingMode>,
     start: InitialLink,
-    /// Bytes per second.
+    /// Measured or fixed rate in bytes per second.
     rate: f64,
     round_trip: Option<Duration>,
     round_trip_at: Duration,
     in_flight: FramesInFlight,
     losses: u32,
-    /// Start of the user's activity.
+    /// Start of the last period of user activity.
     active_since: Duration,
-    /// End of the user's activity.
+    /// End of the last period of user activity.
     active_until: Duration,
     last_frame: Option<Duration>,
-    /// Time at which bytes sent without acknowledgement are through, by the rate.
+    /// Time at which the bytes sent without acknowledgement will have been transmitted, estimated
+    /// by the rate.
     free_at: Duration,
-    /// Time at which acknowledged frames are through, by the rate: the connection is then empty.
+    /// Time at which all frames sent with a request for acknowledgement will have been transmitted,
+    /// estimated by the rate. The connection is idle from then on.
     clear_at: Duration,
-    /// Earliest time of the next refinement.
+    /// Earliest time at which a frame may again contain refinement.
     refine_at: Duration,
     send_queue: SendQueueEstimate,
 }
@@ -142,17 +150,18 @@ impl FlowControl {
         }
     }
 
-    /// Returns the state for the user; `None` for a local terminal.
+    /// Returns the state of the connection for display. Returns `None` for a local terminal.
     pub fn reading(&self) -> Option<LinkStatus> {
         (self.mode != PacingMode::Unlimited)
             .then_some(LinkStatus { rate: self.rate, mode: self.mode })
     }
 
-    /// Returns the OKLab distance above which a difference counts as visible.
+    /// Returns the OKLab distance above which a difference counts as visible. It is larger for
+    /// slower connections.
     pub fn threshold(&self) -> f32 {
         match self.mode {
             PacingMode::Unlimited => 0.0,
-            // 10 Mbit/s and 300 kbit/s.
+            // The limits 1.25e6 and 37.5e3 bytes per second are 10 Mbit/s and 300 kbit/s.
             _ if self.rate > 1.25e6 => 0.01,
             _ if self.rate < 37.5e3 => 0.04,
             _ => 0.02,
@@ -167,7 +176,8 @@ impl FlowControl {
         self.active_until = now + ACTIVE_TIME;
     }
 
-    /// Returns the multiplexer that the request after a frame passes through; `None` without request.
+    /// Returns the multiplexer through which the request for acknowledgement after a frame passes.
+    /// The inner `None` means no multiplexer. Returns `None` if no request is to be sent.
     pub fn ack_request(&self) -> Option<Option<Multiplexer>> {
         match self.mode {
             PacingMode::AckClocked(multiplexer) => Some(multiplexer),
@@ -175,17 +185,19 @@ impl FlowControl {
         }
     }
 
-    /// Returns `true` if the kernel's send queue is due for [`FlowControl::held_back`].
+    /// Returns `true` if the caller should now measure the kernel's send queue and pass the result
+    /// to [`FlowControl::held_back`].
     pub fn asks_kernel(&self, now: Duration) -> bool {
         let measured_at = self.send_queue.asked;
         self.mode == PacingMode::SendQueue
             && measured_at.is_none_or(|at| at + QUEUE_INTERVAL <= now)
     }
 
-    /// Returns the limits of a frame that may be sent now; `None` if none may. `answers` is `true` if the
-    /// frame shows the effect of user input.
+    /// Returns the limits of a frame that may be sent now. Returns `None` if no frame may be sent.
+    /// `answers` is `true` if the frame shows the effect of user input.
     pub fn allowance(&self, now: Duration, answers: bool) -> Option<FrameBudget> {
-        // A small frame, because its reply measures the round trip.
+        // While the round trip is measured, a frame is small, so that its transmission adds little
+        // time.
         let bytes = if self.is_probing(now) { SMALL } else { self.budget() };
         let due = |interval| self.last_frame.is_none_or(|last| answers || last + interval <= now);
         if due(FRAME_INTERVAL) && self.has_room(now, answers) {
@@ -199,8 +211,8 @@ impl FlowControl {
         due.then_some(FrameBudget { bytes: text_bytes, picture: false, refinement: 0 })
     }
 
-    /// Returns the time at which [`FlowControl::allowance`] may permit a frame without further events.
-    /// `text` is `true` if text may be pending.
+    /// Returns the next time at which [`FlowControl::allowance`] may permit a frame even if no
+    /// reply or input comes before. `text` is `true` if text may remain to be sent.
     pub fn wakes_at(&self, now: Duration, text: bool) -> Duration {
         let after = |interval| self.last_frame.map_or(now, |last| last + interval);
         let frame = after(FRAME_INTERVAL);
@@ -211,7 +223,7 @@ impl FlowControl {
             PacingMode::AckClocked(_) if now < self.active_until.min(self.clear_at) => {
                 frame.max(self.clear_at)
             }
-            // By then a reply has come or is lost.
+            // By this time the oldest frame is acknowledged or counts as lost.
             PacingMode::AckClocked(_) => self.lost_at().unwrap_or(frame),
             PacingMode::SendQueue => {
                 let due = self.send_queue.asked.map_or(now, |at| at + QUEUE_INTERVAL);
@@ -223,13 +235,14 @@ impl FlowControl {
         if at > now { at } else { now + QUEUE_INTERVAL }
     }
 
-    /// Returns the earliest time of the next refinement.
+    /// Returns the earliest time at which a frame may again contain refinement.
     pub fn refine_at(&self) -> Duration {
         self.refine_at
     }
 
-    /// Records a sent frame. `picture` is `true` if it has cells of the picture; `flushed` are its bytes of
-    /// invisible differences.
+    /// Records that a frame of `bytes` bytes was sent. `picture` is `true` if the frame contains
+    /// cells of the picture. `flushed` is the number of its bytes that encode invisible
+    /// differences.
     pub fn sent(&mut self, now: Duration, bytes: usize, picture: bool, flushed: usize) {
         let seconds = |bytes: usize, rate: f64| Duration::from_secs_f64(bytes as f64 / rate);
         self.last_frame = Some(now);
@@ -252,8 +265,8 @@ impl FlowControl {
         }
     }
 
-    /// Records bytes that end inside a sequence, where no request is possible. Their time is estimated by
-    /// the rate.
+    /// Records that `bytes` bytes were sent without a request for acknowledgement, because they end
+    /// inside an escape sequence. The time of their transmission is estimated by the rate.
     pub fn sent_unasked(&mut self, now: Duration, bytes: usize) {
         if let PacingMode::AckClocked(_) = self.mode {
             self.last_frame = Some(now);
@@ -264,10 +277,11 @@ impl FlowControl {
         }
     }
 
-    /// Records a reply of the terminal. Returns `true` if a frame may have become possible.
+    /// Records a reply of the terminal, which acknowledges the oldest frame in flight. Returns
+    /// `true` if another frame may now be permitted.
     pub fn on_ack(&mut self, at: Duration) -> bool {
         if let Some(mode) = self.suspended_mode.take() {
-            // Late replies, as after a tunnel.
+            // Replies come again after an interruption, such as a train in a tunnel.
             self.mode = mode;
             self.rate = self.rate.min(self.start.fixed_rate);
             self.in_flight = FramesInFlight::default();
@@ -285,12 +299,14 @@ impl FlowControl {
             self.round_trip_at = at;
         }
         self.round_trip = self.round_trip.map(|least| least.min(elapsed));
-        // Transmission starts when the frame has reached the connection and the one before is through.
+        // The transmission time of a frame is the time of its acknowledgement minus `start`, which
+        // is 0.9 round trips after the frame was sent, but not before the previous acknowledgement.
         let earliest = frame.sent + self.round_trip.unwrap_or_default().mul_f64(0.9);
         let start = previous_ack.map_or(earliest, |previous| earliest.max(previous));
         let span = at.saturating_sub(start).max(Duration::from_millis(10));
         let rate = frame.bytes as f64 / span.as_secs_f64();
-        // A small frame measures a fast connection poorly; it only shows that it is not slow.
+        // The time of a small frame is mostly latency. It can prove a connection fast, but not
+        // slow.
         if frame.bytes >= SMALL || rate > self.rate {
             let is_full = 2 * frame.bytes >= self.budget() || span > 2 * FRAME_SPAN;
             if is_full || rate > self.rate {
@@ -300,7 +316,8 @@ impl FlowControl {
         true
     }
 
-    /// Records the bytes in the kernel's send queue; `None` if it no longer reports them.
+    /// Records the number of bytes in the kernel's send queue. `bytes` is `None` if the kernel no
+    /// longer reports it.
     pub fn held_back(&mut self, now: Duration, bytes: Option<usize>) {
         let Some(bytes) = bytes else {
             self.stop_requests(PacingMode::FixedRate, now);
@@ -311,7 +328,8 @@ impl FlowControl {
         let before = queue.asked.replace(now).map(|at| (at, queue.drained));
         (queue.bytes, queue.drained) = (bytes as f64, drained);
         let (since, drained_before) = match (before, queue.busy_since) {
-            // The queue is empty: the connection is at least as fast as the bytes sent.
+            // The queue is empty: the rate of the connection is at least that at which bytes were
+            // sent.
             (Some(before), _) if bytes == 0 => before,
             (_, Some(busy)) => busy,
             _ => {
@@ -334,7 +352,7 @@ impl FlowControl {
         self.rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate.max(BUDGET[0]);
     }
 
-    /// Discards acknowledgements that are overdue at `now`.
+    /// Counts all frames in flight as lost if the oldest one is overdue at `now`.
     pub fn expire(&mut self, now: Duration) {
         if self.lost_at().is_none_or(|at| at > now) {
             return;
@@ -349,7 +367,8 @@ impl FlowControl {
         }
     }
 
-    /// Returns the longest wait for outstanding replies before the program ends; `None` if there are none.
+    /// Returns the longest time to wait for outstanding replies before the program ends. Returns
+    /// `None` if no replies are outstanding.
     pub fn awaits(&self) -> Option<Duration> {
         let is_waiting = !self.in_flight.is_empty() || self.suspended_mode.is_some();
         is_waiting.then(|| 2 * self.round_trip.unwrap_or_default() + 2 * FRAME_SPAN)
@@ -360,7 +379,7 @@ impl FlowControl {
         !self.in_flight.is_empty()
     }
 
-    /// Returns the largest bytes of a frame.
+    /// Returns the largest number of bytes of a frame.
     fn budget(&self) -> usize {
         match self.mode {
             PacingMode::Unlimited => usize::MAX,
@@ -377,12 +396,15 @@ impl FlowControl {
                     return self.in_flight.is_empty();
                 }
                 let is_active = now < self.active_until;
-                // Input waits for no more than the frame being transmitted.
+                // While the user is active and the connection is busy, at most one frame is in
+                // flight, or two if the second shows the effect of input. Input then waits for at
+                // most the frame being transmitted.
                 let limit = match is_active && self.clear_at > now {
                     true => 1 + usize::from(answers),
                     false => self.target_in_flight(),
                 };
-                // The first effect of input does not wait for frames sent before the input.
+                // The first frame that shows the effect of input does not wait for frames sent
+                // before the input.
                 let newest_sent = self.in_flight.newest();
                 let is_first =
                     is_active && answers && newest_sent.is_some_and(|at| at < self.active_since);
@@ -399,16 +421,16 @@ impl FlowControl {
         }
     }
 
-    /// Returns the number of frames in flight that keeps the connection busy: one in transmission and those
-    /// within the round trip.
+    /// Returns the number of frames in flight that keeps the connection busy: one frame in
+    /// transmission, and the frames that fit into a round trip.
     fn target_in_flight(&self) -> usize {
         let round_trips =
             self.round_trip.unwrap_or_default().as_secs_f64() / FRAME_SPAN.as_secs_f64();
         (1 + round_trips.round() as usize).clamp(2, MAX_IN_FLIGHT)
     }
 
-    /// Returns `true` if the next frame is to measure the round trip, which is not done while the user is
-    /// active.
+    /// Returns `true` if the next frame is to measure the round trip. Always `false` while the user
+    /// is active.
     fn is_probing(&self, now: Duration) -> bool {
         let is_known = self.round_trip.is_some() && now < self.round_trip_at + PROBE_INTERVAL;
         matches!(self.mode, PacingMode::AckClocked(_)) && !is_known && now >= self.active_until

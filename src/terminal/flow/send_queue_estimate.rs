@@ -1,18 +1,19 @@
-//! Bytes still in the kernel's TCP send queue.
+//! Estimate of the bytes still in the kernel's TCP send queue.
 
 use std::time::Duration;
 
-/// Estimate of the send queue and its drain rate.
+/// Estimate of the length of the send queue and of the rate at which bytes leave it.
 #[derive(Debug, Default)]
 pub struct SendQueueEstimate {
-    /// Bytes in the queue.
+    /// Number of bytes in the queue: the last measurement plus the bytes sent since.
     pub bytes: f64,
     /// Time of the last measurement.
     pub asked: Option<Duration>,
-    /// Bytes that had left the queue by then.
+    /// Number of bytes that had left the queue by the last measurement.
     pub drained: f64,
-    /// Start of the period in which the queue was never empty, and the bytes drained before.
+    /// Start of the current period in which the queue was never empty, and the number of bytes that
+    /// had left the queue before this period.
     pub busy_since: Option<(Duration, f64)>,
-    /// Bytes sent in total.
+    /// Number of bytes sent in total.
     pub sent: f64,
 }

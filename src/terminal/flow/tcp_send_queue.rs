@@ -1,10 +1,11 @@
-//! Unacknowledged bytes of the SSH connection in the kernel's send queue (proc(5), `/proc/net/tcp`). They
-//! describe the path to the next host only.
+//! Number of bytes of the SSH connection in the kernel's send queue, which the other host has not
+//! acknowledged (proc(5), `/proc/net/tcp`). It describes only the path to the host at the other end
+//! of the TCP connection, such as a jump host.
 
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
-/// SSH connection in the kernel's table.
+/// SSH connection in the kernel's table of TCP connections.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TcpSendQueue {
     local: SocketAddr,
@@ -12,13 +13,15 @@ pub struct TcpSendQueue {
 }
 
 impl TcpSendQueue {
-    /// Finds the connection of `SSH_CONNECTION`; `None` if the kernel does not list it.
+    /// Finds the connection that `ssh_connection` describes, the value of `SSH_CONNECTION`. Returns
+    /// `None` if the kernel does not list it.
     pub fn find(ssh_connection: &str) -> Option<Self> {
         let queue = Self::parse(ssh_connection)?;
         queue.bytes().is_some().then_some(queue)
     }
 
-    /// Returns the unacknowledged bytes; `None` if the connection is not listed.
+    /// Returns the number of unacknowledged bytes. Returns `None` if the kernel does not list the
+    /// connection.
     pub fn bytes(&self) -> Option<usize> {
         let tables = ["/proc/net/tcp", "/proc/net/tcp6"];
         tables.into_iter().find_map(|path| self.bytes_in(&fs::read_to_string(path).ok()?))
@@ -29,7 +32,7 @@ impl TcpSendQueue {
         let fields: Vec<_> = text.split_whitespace().collect();
         let [client, client_port, server, server_port] = fields[..] else { return None };
         let address = |ip: &str, port: &str| {
-            // A scope such as `%eth0` is not part of the table's addresses.
+            // Addresses in the table have no scope such as `%eth0`.
             let ip = ip.split('%').next()?.parse().ok()?;
             Some(SocketAddr::new(unmapped(ip), port.parse().ok()?))
         };
@@ -47,8 +50,8 @@ impl TcpSendQueue {
     }
 }
 
-/// Parses an address of the table: the IP address as hexadecimal 32-bit words in native byte order, and
-/// the port.
+/// Parses an address of the table, such as `0100007F:0016`: the IP address as hexadecimal 32-bit
+/// words in native byte order, and the hexadecimal port.
 fn address(text: &str) -> Option<SocketAddr> {
     let (words, port) = text.split_once(':')?;
     let mut bytes = Vec::with_capacity(16);
@@ -100,7 +103,7 @@ mod tests {
         );
     }
 
-    /// Unread bytes of a connection within the test stay in the queue.
+    /// The test does not read from its connection, so the bytes stay in the queue.
     #[test]
     #[cfg(target_os = "linux")]
     fn kernel_reports_unread_bytes() {

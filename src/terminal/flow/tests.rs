@@ -17,15 +17,16 @@ struct Wire {
 }
 
 impl Wire {
-    /// Sends bytes. Returns the time of the reply.
+    /// Sends bytes. Returns the time at which the reply comes.
     fn send(&mut self, now: Duration, bytes: usize) -> Duration {
         self.free_at = self.free_at.max(now) + Duration::from_secs_f64(bytes as f64 / self.rate);
         self.free_at + self.round_trip
     }
 }
 
-/// Sends frames as large as permitted for `seconds`. Returns the share of the connection used in the
-/// second half, and the longest wait of bytes for the connection.
+/// Sends frames for `seconds`, each as large as permitted. Returns two results for the second half
+/// of this time: the share of the connection's rate that was used, and the longest time for which
+/// bytes waited in the connection.
 fn saturate(
     flow: &mut FlowControl,
     wire: &mut Wire,
@@ -86,7 +87,8 @@ fn input_waits_for_one_frame_only() {
     flow.act(now);
     flow.in_flight = FramesInFlight::default();
     flow.sent(now, 9000, true, 0);
-    // The effect of one key may go beside that frame, the next one not.
+    // The effect of one key may be sent while that frame is in flight, but not the effect of the
+    // next key.
     assert!(flow.allowance(now + ms(40), false).is_none());
     let effect = flow.allowance(now + ms(1), true).unwrap();
     assert!(effect.picture);
@@ -106,7 +108,7 @@ fn first_effect_of_input_does_not_wait_for_earlier_frames() {
     flow.act(now);
     assert!(flow.allowance(now, true).unwrap().picture);
     flow.sent(now, 8000, true, 0);
-    // The next one does.
+    // The effect of the next input waits.
     flow.act(ms(110));
     assert!(!flow.allowance(ms(110), true).is_some_and(|allowance| allowance.picture));
 }
@@ -139,7 +141,7 @@ fn lost_replies_stop_requests_and_late_ones_resume_them() {
     let reading = flow.reading().unwrap();
     assert_eq!((reading.mode, reading.rate), (PacingMode::FixedRate, DEFAULT_RATE));
     assert_eq!(flow.ack_request(), None);
-    // Frames continue at that rate.
+    // Frames are still sent, at the fixed rate.
     let mut sent = 0;
     for _ in 0..10_000 {
         now += ms(1);
@@ -163,7 +165,7 @@ fn send_queue_replaces_lost_replies() {
         flow.expire(LOST_AFTER * (i as u32 + 1));
     }
     assert_eq!(flow.reading().unwrap().mode, PacingMode::SendQueue);
-    // A connection of 100 kB/s: the rate is estimated from the send queue.
+    // The connection carries 100 kB/s. The rate is estimated from the send queue.
     let (mut queue, mut longest_queue) = (0.0f64, 0.0f64);
     for at in 9_001..20_000 {
         let now = ms(at);
@@ -180,7 +182,7 @@ fn send_queue_replaces_lost_replies() {
     let rate = flow.reading().unwrap().rate;
     assert!((80e3..120e3).contains(&rate), "{rate}");
     assert!(longest_queue < 32e3, "{longest_queue}");
-    // The connection is no longer listed.
+    // The kernel no longer lists the connection.
     flow.held_back(ms(20_000), None);
     assert_eq!(flow.reading().unwrap().mode, PacingMode::FixedRate);
 }

@@ -1,4 +1,5 @@
-//! Kitty's graphics protocol (sw.kovidgoyal.net/kitty/graphics-protocol): a PNG in chunks.
+//! Kitty's graphics protocol (sw.kovidgoyal.net/kitty/graphics-protocol): an image is sent as a PNG
+//! file in chunks.
 
 use crate::terminal::Area;
 use crate::terminal::image::transfer::Transfer;
@@ -6,17 +7,19 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use crossterm::cursor::MoveTo;
 
-/// Base64 characters of a chunk, a multiple of 4. The protocol allows 4096; 1024 fit into every budget.
+/// Number of base64 characters of a chunk, a multiple of 4. The protocol allows 4096. A chunk of
+/// 1024 fits into the smallest byte budget of a frame.
 const CHUNK: usize = 1024;
 
-/// Image number; below 256, so that an indexed colour encodes it in placeholders.
+/// Image number. It is below 256, because placeholders encode the number as an indexed foreground
+/// colour.
 pub const IMAGE: u8 = 163;
 
-/// Unicode placeholder for a cell of an image.
+/// Character that stands for a cell of an image (Unicode placeholder).
 const PLACEHOLDER: char = '\u{10eeee}';
 
-/// Combining marks that number the rows of placeholders: first and last of each run of the protocol's
-/// table.
+/// Combining marks that encode the row of a placeholder. The protocol has a table of them; each
+/// item here is the first and last code point of a consecutive run of that table.
 const MARKS: [[u32; 2]; 29] = [
     [0x305, 0x305],
     [0x30d, 0x30e],
@@ -54,25 +57,27 @@ pub fn max_rows() -> u16 {
     MARKS.iter().map(|[first, last]| (last - first + 1) as u16).sum()
 }
 
-/// Returns the text of each cell in a row of the image. It encodes the row; the terminal counts the
-/// columns from the left.
+/// Returns the text of each cell in row `row` of the image. The text encodes the row. The terminal
+/// counts the columns from the left.
 pub fn placeholder(row: u16) -> String {
     let mark = MARKS.iter().flat_map(|[first, last]| *first..=*last).nth(usize::from(row));
     [Some(PLACEHOLDER), mark.and_then(char::from_u32)].into_iter().flatten().collect()
 }
 
-/// Returns the bytes that show `png` at `place`. `stretched` scales it to its cells. `through_tmux` wraps
-/// it for the terminal behind tmux, which shows it at placeholders.
+/// Returns the bytes that show the image file `png` at `place`. If `stretched` is `true`, the
+/// terminal scales the image to these cells. If `through_tmux` is `true`, the bytes are wrapped for
+/// the terminal outside tmux, which shows the image at the positions of placeholders.
 pub fn transfer(png: &[u8], place: Area, stretched: bool, through_tmux: bool) -> Transfer {
     let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
     let letters = STANDARD.encode(png);
     let remove = format!("\x1b_Ga=d,d=I,i={IMAGE},q=2\x1b\\");
-    // An image with missing chunks is ended by a last chunk, which makes it invalid.
+    // An incomplete image is ended by an empty last chunk. The terminal then discards it as
+    // invalid.
     let give_up = "\x1b_Gm=0,q=2;\x1b\\".to_string();
     let remove = [give_up, remove].map(wrap).concat().into_bytes();
     let mut transfer = Transfer { remove, ..Transfer::default() };
     let Area { x, y, width, height } = place;
-    // The image appears at the cursor when its last chunk has come.
+    // The image appears at the cursor when the terminal has received its last chunk.
     let cursor = match through_tmux {
         true => String::new(),
         false => MoveTo(x, y).to_string(),
@@ -96,7 +101,7 @@ pub fn transfer(png: &[u8], place: Area, stretched: bool, through_tmux: bool) ->
     transfer
 }
 
-/// Wraps a sequence for the terminal behind tmux.
+/// Wraps a sequence so that tmux passes it to the terminal outside tmux.
 fn wrapped(sequence: &str) -> String {
     format!("\x1bPtmux;{}\x1b\\", sequence.replace('\x1b', "\x1b\x1b"))
 }

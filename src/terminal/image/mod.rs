@@ -1,8 +1,9 @@
-//! Viewer images: an exported picture, read from its file and encoded for the terminal by kitty's protocol
-//! or sixel, or as half blocks.
+//! Images for the viewer of exported pictures. An image is read from its file and encoded for the
+//! terminal by kitty's protocol, by sixel, or as half blocks.
 //!
-//! An image is sent in slices within the frame budget, because a transfer can take seconds and a key must
-//! take effect in tenths of a second. No widget does that.
+//! An image is sent in slices within the byte budget of a frame, because a transfer can take
+//! seconds and a key must take effect in tenths of a second. Existing widgets for images send them
+//! as a whole.
 
 mod kitty;
 mod shrink;
@@ -17,19 +18,20 @@ use shrink::shrunk;
 use std::path::Path;
 pub use transfer::Transfer;
 
-/// Largest width and height of a sixel image if the terminal reports none: xterm's limit.
+/// Largest width and height of a sixel image in pixels if the terminal reports no limit: the limit
+/// of xterm.
 const SIXEL_PX: usize = 1000;
-/// Size of a cell in pixels if the terminal reports none.
+/// Assumed width and height of a cell in pixels if the terminal does not report them.
 const CELL_PX: [u16; 2] = [8, 16];
-/// Estimated bytes per pixel.
+/// Estimated number of bytes per pixel of an encoded image.
 const BYTES_PER_PIXEL: f64 = 1.6;
 
-/// Protocol for images.
+/// Protocol by which images are shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Protocol {
-    /// Kitty's protocol, directly.
+    /// Kitty's protocol, without a multiplexer.
     Kitty,
-    /// Kitty's protocol with Unicode placeholders, to the terminal behind tmux.
+    /// Kitty's protocol with Unicode placeholders, sent through tmux to the terminal outside it.
     KittyThroughTmux,
     /// Sixel with this number of colours.
     Sixel(u16),
@@ -42,32 +44,34 @@ pub enum Protocol {
 pub struct ImageViewport {
     /// Protocol.
     pub protocol: Protocol,
-    /// Columns and rows of the screen; the last row holds the caption.
+    /// Columns and rows of the screen. The last row shows the caption.
     pub screen: [u16; 2],
     /// Width and height of a cell in pixels.
     pub cell_px: Option<[u16; 2]>,
-    /// Largest width and height of a sixel image, if the terminal reports it.
+    /// Largest width and height of a sixel image in pixels. `None` if the terminal reports no
+    /// limit.
     pub sixel_px: Option<[u16; 2]>,
-    /// Approximate limit of bytes; `None` without limit.
+    /// Approximate limit of the encoded size in bytes. `None` means no limit.
     pub max_bytes: Option<f64>,
 }
 
-/// Image that is prepared for the screen.
+/// Image prepared for the screen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewerImage {
-    /// Columns and rows of the screen that it was prepared for.
+    /// Columns and rows of the screen for which the image was prepared.
     pub screen: [u16; 2],
-    /// Width and height in the file.
+    /// Width and height of the image in the file, in pixels.
     pub size: [usize; 2],
-    /// Width and height as shown.
+    /// Width and height of the image as shown, in pixels.
     pub shown: [usize; 2],
     /// Protocol.
     pub protocol: Protocol,
-    /// Cells that it covers.
+    /// Cells that the image covers, in whole or in part.
     pub place: Area,
-    /// Half blocks, on the cells that the protocol's image covers completely.
+    /// Half blocks that show the image without the protocol. Beside an image of the protocol they
+    /// fill only cells that this image covers completely.
     pub raster: Raster,
-    /// Bytes that show it by the protocol; empty for half blocks.
+    /// Bytes that show the image by the protocol. Empty for [`Protocol::Blocks`].
     pub transfer: Transfer,
 }
 
@@ -79,7 +83,7 @@ impl Protocol {
             Some(Multiplexer::Tmux) if terminal.kitty_graphics && terminal.placeholders => {
                 Self::KittyThroughTmux
             }
-            // A tmux that reports sixel shows sixel itself.
+            // This includes tmux: a tmux that reports sixel shows sixel images itself.
             _ if terminal.sixel && terminal.cell_px.is_some() => {
                 Self::Sixel(terminal.sixel_colors.unwrap_or(256).clamp(2, 256))
             }
@@ -99,7 +103,8 @@ impl Protocol {
 }
 
 impl ImageViewport {
-    /// Returns the largest image and the size of a cell, in pixels. A half block counts as one square pixel.
+    /// Returns the size of the largest image and the size of a cell, in pixels. A half block counts
+    /// as one square pixel.
     fn px(&self) -> ([usize; 2], [usize; 2]) {
         let cell = match self.protocol {
             Protocol::Blocks => [1, 2],
@@ -117,7 +122,7 @@ impl ImageViewport {
         (largest, cell)
     }
 
-    /// Returns the size at which an image of `size` is shown. It is never enlarged.
+    /// Returns the size at which an image of `size` is shown. Images are never enlarged.
     fn fitting(&self, size: [usize; 2]) -> [usize; 2] {
         let (largest, _) = self.px();
         let [width, height] = size.map(|n| n as f64);
@@ -130,10 +135,11 @@ impl ImageViewport {
 }
 
 impl ViewerImage {
-    /// Reads the image at `path` and prepares it for `viewport`. `display` converts linear light (EXR).
+    /// Reads the image at `path` and prepares it for `viewport`. `display` converts the linear
+    /// light of an EXR file to 8-bit levels.
     ///
     /// # Errors
-    /// If it cannot be read or the screen is too small.
+    /// If the file cannot be read or the screen is too small.
     pub fn read(path: &Path, display: &Display, viewport: &ImageViewport) -> Result<Self, String> {
         let (size, pixels) = if path.extension().is_some_and(|e| e == "exr") {
             let picture = read_exr(path)?;
@@ -169,7 +175,8 @@ impl ViewerImage {
         let raster = match viewport.protocol {
             Protocol::Blocks => Raster { width: shown[0], height: shown[1], pixels: small },
             _ => {
-                // Cells that the protocol's image covers in part would show the half blocks beside it.
+                // Half blocks fill only cells that the image will cover completely. In other cells
+                // they would remain visible beside the image.
                 let covered = [0, 1].map(|i| (shown[i] / cell[i]).max(1));
                 let halves = [covered[0].min(shown[0]), (2 * covered[1]).min(shown[1])];
                 let pixels = shrunk(&small, shown, halves);
@@ -180,8 +187,9 @@ impl ViewerImage {
         Ok(Self { screen, size, shown, protocol, place, raster, transfer })
     }
 
-    /// Returns the text and the indexed colour of the cells in a row of `place` after the transfer; `None`
-    /// if the image is drawn over the cells.
+    /// Returns the text and the indexed colour of the cells in row `row` of `place` after the
+    /// transfer. Returns `None` if the protocol draws the image over the cells, without
+    /// placeholders.
     pub fn placeholder(&self, row: u16) -> Option<(String, u8)> {
         let has_placeholders = self.protocol == Protocol::KittyThroughTmux;
         has_placeholders.then(|| (kitty::placeholder(row), kitty::IMAGE))

@@ -3,8 +3,8 @@
 use crate::film::box_means;
 use crate::terminal::cells::{code, linear};
 
-/// Downscales `pixels` of `from` columns and rows to `to`, which is not larger. Each result is the mean of
-/// the area that it covers, in linear light.
+/// Downscales an image from `from` columns and rows to `to`, which is not larger. Each resulting
+/// pixel is the mean, in linear light, of the area of `pixels` that it covers.
 pub fn shrunk(pixels: &[[u8; 3]], from: [usize; 2], to: [usize; 2]) -> Vec<[u8; 3]> {
     if from == to || pixels.is_empty() {
         return pixels.to_vec();
@@ -20,7 +20,7 @@ mod tests {
     #[test]
     fn means_are_linear() {
         let checkers = [[0; 3], [255; 3], [255; 3], [0; 3]];
-        // Half of the light is the 8-bit level 188.
+        // The mean of black and white in linear light is 0.5, which is the 8-bit level 188.
         assert_eq!(shrunk(&checkers, [2, 2], [1, 1]), [[188; 3]]);
         assert_eq!(shrunk(&checkers, [2, 2], [2, 2]), checkers);
         assert_eq!(shrunk(&[], [0, 0], [0, 0]), [[0u8; 3]; 0]);

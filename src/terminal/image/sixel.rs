@@ -1,15 +1,17 @@
-//! Sixel: an image in strips with a palette each.
+//! Sixel: an image is sent in horizontal strips, each with its own palette.
 
 use crate::terminal::Area;
 use crate::terminal::image::transfer::Transfer;
 use crossterm::cursor::MoveTo;
 use icy_sixel::{EncodeOptions, sixel_encode};
 
-/// Most strips of an image. xterm keeps at most 16 images.
+/// Largest number of strips of an image. Each strip is an image of its own for the terminal, and
+/// xterm keeps at most 16 images.
 const MAX_STRIPS: u16 = 16;
 
-/// Returns the bytes that show `pixels`, with rows of `width`, at `place`. `cell_height` is in pixels;
-/// `colors` is the largest palette of a strip. Other output can be sent between strips.
+/// Returns the bytes that show `pixels`, in rows of `width` pixels, at `place`. `cell_height` is
+/// the height of a cell in pixels. `colors` is the largest number of colours of a strip. Other
+/// output can be sent between strips.
 ///
 /// # Errors
 /// If the image is empty.
@@ -54,7 +56,7 @@ mod tests {
             assert!(sixel.starts_with("\x1bP") && sixel.ends_with("\x1b\\"));
             let image = SixelImage::decode(sixel.as_bytes()).unwrap();
             assert_eq!(image.width, width);
-            // Rows come in sixes; those beyond the strip are transparent.
+            // Sixel encodes six rows at a time. Rows below the end of the strip are transparent.
             let drawn = image.pixels[..].chunks_exact(4).filter(|pixel| pixel[3] > 0);
             shown.extend(drawn.map(|p| [p[0], p[1], p[2]]));
         }

@@ -7,20 +7,22 @@ use std::ops::Range;
 pub struct Transfer {
     /// All bytes.
     pub bytes: Vec<u8>,
-    /// Offsets at which no sequence is open, so that other output may be sent, in ascending order. The last
-    /// one is the length.
+    /// Offsets between sequences, in ascending order, at which other output may be sent. The last
+    /// offset is the length of `bytes`.
     pub stops: Vec<usize>,
-    /// `true` if sequences may be divided anywhere and ended early by ST.
+    /// `true` if a sequence may be divided at any byte, and ended early by ST (string terminator).
     pub divisible: bool,
-    /// Bytes that remove the image, also a partial one.
+    /// Bytes that remove the image, even if it was sent in part only.
     pub remove: Vec<u8>,
-    /// `true` if the cells below the image must be drawn again after it.
+    /// `true` if the image overwrites the cells that it covers, so that they must be drawn again
+    /// after it.
     pub destroys: bool,
 }
 
 impl Transfer {
-    /// Returns the range of bytes after the first `sent`: at most `room`, or one sequence if that is longer
-    /// and indivisible. The second value is `true` if a sequence is open after them.
+    /// Returns the range of bytes to send next. `sent` is the number of bytes sent before. The
+    /// range has at most `room` bytes, except that an indivisible sequence is never divided. The
+    /// second value is `true` if the range ends inside a sequence.
     pub fn slice(&self, sent: usize, room: usize) -> (Range<usize>, bool) {
         let room = room.max(usize::from(self.divisible));
         let later_stops = &self.stops[self.stops.partition_point(|stop| *stop <= sent)..];
@@ -33,7 +35,7 @@ impl Transfer {
         }
     }
 
-    /// Adds a sequence.
+    /// Appends a complete sequence.
     pub fn add(&mut self, sequence: &[u8]) {
         self.bytes.extend(sequence);
         self.stops.push(self.bytes.len());
@@ -44,7 +46,7 @@ impl Transfer {
 mod tests {
     use super::*;
 
-    /// Slices of any size are contiguous and complete; only divisible sequences are divided.
+    /// Only divisible sequences are divided.
     #[test]
     fn slices_are_contiguous_and_complete() {
         for divisible in [false, true] {

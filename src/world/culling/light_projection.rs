@@ -8,17 +8,18 @@ use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
-/// Largest tangent of a direction in a perspective projection.
+/// Largest tangent of the angle between a direction and the view direction of a perspective
+/// projection. Wider views use a cube map.
 const MAX_TANGENT: f64 = 3.0;
 
-/// Projection of points to a face and two coordinates from 0 to 1.
+/// Projection of points in space to a face and two coordinates on that face, each from 0 to 1.
 pub(crate) enum LightProjection<S> {
     /// Projection from a point light among the primitives onto the six faces of a cube around it.
     CubeMap,
-    /// Projection from a point light on one side of all primitives; the third axis is the view
-    /// direction.
+    /// Projection from a point light that has all primitives on one side. The third axis is the
+    /// view direction.
     Perspective { axes: [[S; 3]; 3], low: [S; 2], scale: [S; 2] },
-    /// Projection along the direction of a directional light, onto two axes.
+    /// Projection along the direction of a directional light. The two axes are perpendicular to it.
     Orthographic { axes: [[S; 3]; 2], low: [S; 2], scale: [S; 2] },
 }
 
@@ -28,12 +29,14 @@ impl<S: Float> LightProjection<S> {
         if matches!(self, Self::CubeMap) { 6 } else { 1 }
     }
 
-    /// Returns the cell in which the light sees the rays' origins, and their depth. Points outside
-    /// of the projection get an arbitrary cell. `limit` is the distance to the light.
+    /// Returns the cell that contains the origin of each ray as seen from the light, and the depth
+    /// of the origin. Points outside of the projection get an arbitrary cell. `limit` is the
+    /// distance between origin and light, `side` the number of cells in a row.
     #[inline(always)]
     pub fn lookup<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
         let side = L::from_f64(side as f64);
-        // The sum of this and a number below 2^22 (in double precision: 2^51) has no fraction bits.
+        // The sum of this number and a number below 2^22 (in double precision 2^51) has no fraction
+        // bits.
         let rounder = L::from_f64(1.5 / L::EPSILON);
         let half = L::from_f64(0.5);
         let cell_index = |x: L| {
@@ -75,7 +78,7 @@ impl<S: Float> LightProjection<S> {
     }
 }
 
-/// Bounds of a projected ball on a face: two corners with coordinates from 0 to 1.
+/// Bounding rectangle of a projected ball on a face: two corners with coordinates from 0 to 1.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FaceRect {
     face: usize,
@@ -95,18 +98,18 @@ impl FaceRect {
     }
 }
 
-/// A projection with the bounds of the projected balls.
+/// A projection and the bounding rectangles of all projected balls.
 pub(crate) struct ProjectedBounds<S> {
     /// The projection.
     pub projection: LightProjection<S>,
-    /// Bounds of each ball.
+    /// Rectangles of each ball, one for each face that it overlaps.
     pub rects: Vec<Vec<FaceRect>>,
-    /// Suitable number of cells in a row.
+    /// Recommended number of cells in a row.
     pub side: usize,
 }
 
 impl<S: Float> ProjectedBounds<S> {
-    /// Projects balls. Their centres are relative to the light, if that is a point light.
+    /// Projects balls. For a point light, their centres are relative to the light.
     pub fn new(target: &LightTarget, balls: &[BoundingSphere]) -> Self {
         let (projection, rects) = match target {
             LightTarget::Direction(direction) => orthographic(*direction, balls),
@@ -118,8 +121,8 @@ impl<S: Float> ProjectedBounds<S> {
     }
 }
 
-/// Smallest and largest x / z of the points of a ball with z > 0. `x` and `z` are the coordinates
-/// of its centre. Returns `None` if there are no such points.
+/// Returns the smallest and the largest x / z over the points of a ball with z > 0. `x` and `z` are
+/// the coordinates of the centre. Returns `None` if the ball has no such points.
 fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     let distance = x.hypot(z);
     if distance <= radius {
@@ -133,7 +136,7 @@ fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     (low < FRAC_PI_2 && high > -FRAC_PI_2).then(|| (slope(low), slope(high)))
 }
 
-/// Projects balls around a light.
+/// Projects balls to a cube map around the light.
 fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
     let rect_on = |ball: &BoundingSphere, face: usize| {
         let axis = |i: usize| ball.center[(face / 2 + i) % 3];
@@ -149,7 +152,8 @@ fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<
     (LightProjection::CubeMap, balls.iter().map(rects).collect())
 }
 
-/// Projects balls on one side of a light; `None` if they are not.
+/// Projects balls by a perspective projection. Returns `None` if they are not on one side of the
+/// light.
 fn perspective<S: Float>(
     balls: &[BoundingSphere],
 ) -> Option<(LightProjection<S>, Vec<Vec<FaceRect>>)> {
@@ -169,7 +173,7 @@ fn perspective<S: Float>(
     Some((LightProjection::Perspective { axes, low, scale }, rects))
 }
 
-/// Projects balls along `direction`, the direction to the light.
+/// Projects balls along `direction`, which points to the light.
 fn orthographic<S: Float>(
     direction: DVec3,
     balls: &[BoundingSphere],
@@ -185,8 +189,8 @@ fn orthographic<S: Float>(
     (LightProjection::Orthographic { axes, low, scale }, rects)
 }
 
-/// Returns the offset and the factor that map all rectangles, given by their corners, to [0, 1],
-/// and the mapped rectangles.
+/// Maps all rectangles, given by their corners, to [0, 1]. Returns the offset and the factor of the
+/// map, and the mapped rectangles.
 fn normalized<S: Float>(corners: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<FaceRect>>) {
     let low = corners.iter().map(|s| s.0).fold(DVec2::INFINITY, DVec2::min);
     let high = corners.iter().map(|s| s.1).fold(DVec2::NEG_INFINITY, DVec2::max);
@@ -215,7 +219,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Checks that points of a ball are looked up in cells of the ball's bounds.
+    /// Checks that the cell of every point of a ball is among the cells of the ball's bounds.
     fn check_points_of_ball<L: SimdFloat>(slack: f64) {
         let mut random = Random(2);
         let side = 64;

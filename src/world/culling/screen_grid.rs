@@ -1,25 +1,26 @@
-//! Screen-space culling: projected bounds of primitives, and a grid of candidate lists.
+//! Screen-space culling: bounds of the projected primitives, and a grid of candidate lists.
 
 use crate::camera::PinholeCamera;
 use crate::primitive::{F32_RAY_ERROR, Form};
 use glam::DVec3;
 
-/// Bounds of a primitive's projection on the raster \[pixels\]: smallest and largest coordinates.
+/// Bounding rectangle of a projected primitive on the raster \[pixels\]: smallest and largest
+/// coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScreenBounds {
     low: [f64; 2],
     high: [f64; 2],
 }
 
-/// Margin for rounding of raster positions in single precision \[pixels\].
+/// Margin for rounding errors of raster positions in single precision \[pixels\].
 const MARGIN_PX: f64 = 0.25;
 
-/// Relative error of a ray's position on the picture plane at unit distance: eight roundings in
-/// single precision.
+/// Relative error of a ray's position on the picture plane at unit distance: eight rounding errors
+/// in single precision.
 const MAX_SLANT_ERROR: f64 = 5e-7;
 
 impl ScreenBounds {
-    /// Projects the corners of a form's bounding box. The bounds are infinite if a corner is not in
+    /// Projects the corners of a form's bounding box. The result is infinite if a corner is not in
     /// front of the eye.
     pub fn project(form: &Form, camera: &PinholeCamera) -> Self {
         let infinite = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
@@ -37,8 +38,8 @@ impl ScreenBounds {
             if depth <= 2.0 * ray_error {
                 return infinite;
             }
-            // A displacement by `ray_error` moves a point at distance l from the picture plane's
-            // origin by at most (1 + l) ray_error / (depth - ray_error) on the plane.
+            // If a point at distance l from the origin of the picture plane is displaced by
+            // `ray_error`, its projection moves by at most (1 + l) ray_error / (depth - ray_error).
             let length = from_eye.length() / depth;
             let plane_error =
                 (1.0 + length) * ray_error / (depth - ray_error) + MAX_SLANT_ERROR * length;
@@ -62,20 +63,22 @@ impl ScreenBounds {
 /// Side of a cell \[pixels\].
 const CELL_PX: usize = 16;
 
-/// Largest number of candidates that are tested in a list instead of the BVH.
+/// Largest number of candidates in a list. Rays through cells with more candidates traverse the
+/// BVH.
 const MAX_PER_CELL: usize = 16;
 
-/// Candidate list of each cell of the raster, if it is short.
+/// Candidate list of each cell of the raster.
 pub(crate) struct ScreenGrid {
     columns: usize,
     rows: usize,
-    /// Row by row, in ascending order; `None` for more than [`MAX_PER_CELL`].
+    /// Lists of primitive ids in ascending order, cells row by row. `None` for cells with more than
+    /// [`MAX_PER_CELL`] candidates.
     candidates: Vec<Option<Vec<u32>>>,
 }
 
 impl ScreenGrid {
-    /// Creates the grid of a raster of `size` pixels from the indices of primitives, in ascending
-    /// order, and their bounds.
+    /// Creates the grid of a raster of `size` pixels. `primitives` are ids in ascending order, with
+    /// the bounds of the primitives.
     pub fn new(
         size: [usize; 2],
         primitives: impl IntoIterator<Item = (u32, ScreenBounds)>,
@@ -102,8 +105,8 @@ impl ScreenGrid {
         Self { columns, rows, candidates }
     }
 
-    /// Returns the candidates of a rectangle of the raster, in ascending order; `None` for more
-    /// than [`MAX_PER_CELL`].
+    /// Returns the candidates of a rectangle of the raster, in ascending order. Returns `None` if
+    /// there are more than [`MAX_PER_CELL`].
     pub fn candidates(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Vec<u32>> {
         let span = |axis: usize, count: usize| {
             let end = (origin[axis] + extent[axis]).div_ceil(CELL_PX);

@@ -1,5 +1,6 @@
-//! Per-tile candidate lists: primitives that primary rays can hit, and possible occluders for each
-//! light. In most tiles one or two primitives are visible and have no occluder.
+//! Candidate lists per tile: the primitives that camera rays through the tile can hit, and the
+//! primitives that can occlude each light from their hit points. Most tiles have one or two visible
+//! primitives and no occluder.
 
 use crate::camera::PinholeCamera;
 use crate::lanes::{Float, SimdFloat};
@@ -11,7 +12,8 @@ use crate::world::culling::light_buffer::{LightBuffer, Occluder};
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use glam::DVec3;
 
-/// Candidates of some camera rays and of the shadow rays from their hit points.
+/// Candidates (primitives that have to be tested) of some camera rays, and of the shadow rays from
+/// their hit points.
 #[derive(Clone, Debug)]
 pub struct TileCandidates {
     /// Primitives that the camera rays can hit.
@@ -21,27 +23,30 @@ pub struct TileCandidates {
 }
 
 impl TileCandidates {
-    /// All primitives, for `lights` lights.
+    /// Candidates for rays without culling: all primitives, for camera rays and for each of
+    /// `lights` lights.
     pub(crate) fn all<L: SimdFloat>(geometry: &Aggregate<L>, lights: usize) -> Self {
         Self { primary: geometry.all().clone(), occluders: vec![geometry.all().clone(); lights] }
     }
 }
 
-/// Source of a tile's candidates.
+/// Method by which a tile's candidates are found.
 pub(crate) enum CullingMode {
-    /// The tile's view frustum, and the space between it and the lights.
+    /// Bounding volumes are tested against the tile's view frustum, and against the space between
+    /// the frustum and the lights.
     Frusta(FrustumCuller),
-    /// Projected bounds of each primitive.
+    /// Bounding rectangles of the projected primitives are tested against the tile.
     ScreenBounds(Vec<ScreenBounds>),
-    /// Candidate lists of screen cells, for primitives in a BVH.
+    /// Candidate lists are stored per screen cell; the primitives are in a BVH.
     ScreenGrid(ScreenGrid),
-    /// No candidate lists; the geometry may have bounding boxes or a BVH.
+    /// No candidate lists. The geometry may have bounding boxes or a BVH.
     Off,
 }
 
 impl CullingMode {
-    /// Returns the candidates of camera rays through a rectangle of the raster, and of shadow rays
-    /// from their hit points to `lights` lights; `None` if no primitive is ruled out.
+    /// Returns the candidates of the camera rays through a rectangle of the raster, and of the
+    /// shadow rays from their hit points to `lights` lights. Returns `None` if no primitive can be
+    /// excluded.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
@@ -70,22 +75,22 @@ impl CullingMode {
     }
 }
 
-/// Culler by view frusta and by the space between them and the lights.
+/// Culling by view frusta and by the space between visible surfaces and the lights.
 pub(crate) struct FrustumCuller {
-    /// Bounds of each primitive.
+    /// Bounding volume of each primitive.
     bounds: Vec<BoundingVolume>,
-    /// For each primitive, `true` if it may occlude lights from its own surface: it is concave, or
-    /// paths can be inside.
+    /// `true` for each primitive that may occlude lights from points on its own surface: it is
+    /// concave, or paths can be inside of it.
     self_shadowing: Vec<bool>,
     /// Position or direction of each light.
     lights: Vec<LightTarget>,
 }
 
 impl FrustumCuller {
-    /// Creates the culler of `forms`, one for each primitive. `eye` is the start of all camera
-    /// rays; `None` if they start elsewhere. `entered` is `true` for each primitive that paths can
-    /// be inside. `max_end_offset` is the largest distance between a light and the end point of its
-    /// shadow rays.
+    /// Creates the culler of `forms`, one for each primitive. `eye` is the common origin of all
+    /// camera rays; `None` if they start on a near plane. `entered` holds `true` for each primitive
+    /// that paths can be inside of. `max_end_offset` is the largest distance between a light and
+    /// the end point of its shadow rays.
     pub fn new<S: Float>(
         forms: Vec<&Form>,
         eye: Option<DVec3>,
@@ -101,8 +106,8 @@ impl FrustumCuller {
             }
             DeltaLight::Directional { wi } => LightTarget::Direction(vector(wi)),
         });
-        // The outside of a convex primitive does not occlude itself. Paths are inside only if they
-        // start there or are transmitted.
+        // A shadow ray that leaves the outside of a convex primitive cannot hit it again. Paths are
+        // inside of a primitive only if they start there or are transmitted.
         let self_shadowing = |(b, entered): (&BoundingVolume, &bool)| {
             let contains_eye = || eye.is_none_or(|eye| b.ball().contains(eye));
             !b.is_convex() || !b.is_flat() && (*entered || contains_eye())
@@ -111,7 +116,8 @@ impl FrustumCuller {
         Self { lights: targets.collect(), self_shadowing, bounds }
     }
 
-    /// Creates the light buffer of each light, of the primitives in the geometry's BVH.
+    /// Creates the light buffer of each light, over the primitives in the geometry's BVH. An entry
+    /// is `None` if a light buffer would not help.
     pub fn light_buffers<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
@@ -124,7 +130,8 @@ impl FrustumCuller {
         self.lights.iter().map(|light| LightBuffer::new(light, &occluders)).collect()
     }
 
-    /// Returns the candidates of camera rays inside `frustum`; of any rays, if it is `None`.
+    /// Returns the candidates of camera rays inside `frustum`, or of all rays if `frustum` is
+    /// `None`.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,

@@ -1,17 +1,19 @@
-//! Coincident surfaces, such as the bottom of a glass and the table on which it rests.
+//! Coincident surfaces: surfaces of different primitives at the same position, such as the bottom
+//! of a glass and the table below it.
 //!
 //! Rounding decides which of two coincident surfaces a ray hits first, and a ray that leaves one of
-//! them starts beyond the others. Where at least one of the surfaces transmits, paths therefore
-//! cross them one after the other, as if there were a gap of zero width between the primitives: a
-//! ray leaves the solids that it is inside, crosses flat primitives, and enters the solids behind.
-//! Of solids on the same side of the contact, transparent ones are outside of opaque ones, and
-//! later listed transparent ones outside of earlier ones. Flat transparent primitives are on both
-//! sides of opaque ones.
+//! them starts beyond the others. If at least one of the surfaces transmits, paths therefore cross
+//! coincident surfaces in a fixed order, as if the primitives had a gap of zero width: a ray first
+//! leaves the solids that it is inside, then crosses flat primitives, then enters the solids
+//! behind. Several solids on the same side are nested: transparent ones enclose opaque ones, and
+//! transparent solids that are listed later enclose those listed earlier. Flat transparent
+//! primitives are on both sides of opaque ones.
 //!
-//! Each surface has a layer, its position in the order along the ray. Exits of solids have negative
-//! layers, entries positive ones; for a ray of the opposite direction the signs change. Pairs of
-//! primitives that may touch are found at compilation, so that hits on other primitives cost no
-//! lookup.
+//! The *layer* of a surface is a number that gives its position in this order along the ray.
+//! Surfaces where the ray leaves a solid have negative layers, surfaces where it enters a solid
+//! have positive ones. For a ray of the opposite direction the signs change. A *contact* is a
+//! primitive that may touch another one. Contacts are found at compilation, so that hits on other
+//! primitives cost no lookup.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
@@ -19,37 +21,39 @@ use crate::primitive::{Aggregate, Form, PrimitiveId, SphereForm};
 use crate::world::integrator::nested_dielectrics::MediumStack;
 use glam::DVec3;
 
-/// Distance of coincident surfaces, in roundings of the largest coordinate. Parts of compounds have
-/// the same.
+/// Tie distance, in rounding errors of the largest coordinate. A surface is coincident with a hit
+/// point if its distance along the normal is at most one tie. The parts of compounds use the same
+/// value.
 const TIE: f64 = 16.0;
 
-/// Offset of ray origins from coincident surfaces, in ties.
+/// Offset of rays that leave coincident surfaces, in tie distances.
 const OFFSET_TIES: f64 = 1.5;
 
-/// Smallest cosine between the normals of coincident surfaces.
+/// Smallest cosine between the normals of two coincident surfaces. At larger angles they only
+/// intersect.
 const MIN_COSINE: f64 = 0.5;
 
-/// Kind of a surface, which determines its layer.
+/// Kind of a surface. It determines the layer.
 #[derive(Clone, Copy, Debug)]
 enum SurfaceKind {
-    /// Boundary of a transparent solid with this priority.
+    /// Boundary of a transparent solid with this priority (see [`MediumStack`]).
     Transparent(u32),
     /// Boundary of an opaque solid.
     Opaque,
-    /// Flat and transparent.
+    /// Flat transparent primitive.
     Pane,
-    /// Flat and opaque.
+    /// Flat opaque primitive.
     Sheet,
 }
 
-/// A primitive that may touch another one.
+/// Contact: a primitive that may touch another one.
 #[derive(Clone, Copy, Debug)]
 struct Contact<S> {
-    /// Id of the primitive; of a compound, that of its first part.
+    /// Id of the primitive. For a compound, the id of its first part.
     item: u32,
-    /// Half the distance within which surfaces are coincident.
+    /// Smallest tie distance at this contact, see [`TIE`].
     tie: S,
-    /// Bounding box, infinite where the primitive is unbounded.
+    /// Corners of the bounding box; infinite along axes on which the primitive is unbounded.
     low: [S; 3],
     high: [S; 3],
 }
@@ -61,15 +65,15 @@ impl<S: Float> Contact<S> {
         Self { item, tie: S::from_f64(tie), low, high }
     }
 
-    /// Half the distance within which surfaces are coincident at points with the given
-    /// [`rounding`].
+    /// Returns the tie distance at points whose coordinates have the given [`rounding`].
     #[inline(always)]
     fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
         rounding.max(L::splat(self.tie))
     }
 
-    /// Mask of lanes whose point may be on the primitive. One tie is the search distance; the other
-    /// covers the rounding of the search, which is far smaller.
+    /// Mask of lanes whose point may be on the primitive: its distance from the bounding box is at
+    /// most two ties. One tie is the length of the search, the other one covers the rounding error
+    /// of the search, which is far smaller.
     #[inline(always)]
     fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
         let distance =
@@ -80,55 +84,55 @@ impl<S: Float> Contact<S> {
     }
 }
 
-/// Rounding of the points' coordinates, times [`TIE`].
+/// Rounding error of the points' largest coordinates, times [`TIE`].
 #[inline(always)]
 fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
     point.max_abs() * L::from_f64(TIE * L::EPSILON)
 }
 
-/// Pairs of primitives that may touch, at least one of each pair transmissive.
+/// Contacts between primitives. At least one primitive of each touching pair transmits.
 pub(crate) struct Contacts<S> {
     /// Contacts of each primitive.
     contacts: Vec<Vec<Contact<S>>>,
-    /// Kind of each primitive, and the magnitude of its layer.
+    /// Kind of each primitive's surface, and the magnitude of its layer.
     kinds: Vec<(SurfaceKind, S)>,
 }
 
-/// State of rays that start on a surface that may coincide with others.
+/// State of rays that start on a surface that may coincide with other surfaces.
 #[derive(Clone, Copy)]
 pub(crate) struct CoincidentState<L: SimdFloat> {
-    /// Lanes that do.
+    /// Lanes whose rays start on such a surface.
     pub lanes: L::Mask,
-    /// Ids of the primitives.
+    /// Ids of the primitives on which the rays start.
     pub item: L,
-    /// Points on them.
+    /// Start points on the primitives.
     pub point: Vec3<L>,
-    /// Unit normals on the side to which the rays go.
+    /// Unit normals of the primitives, on the side to which the rays leave.
     pub axis: Vec3<L>,
-    /// Layers of the surfaces.
+    /// Layers of the surfaces on which the rays start.
     pub layer: L,
 }
 
-/// Result of a search for the next coincident surface.
+/// Result of a search for the next coincident surface along the rays.
 pub(crate) struct CoincidentQuery<L: SimdFloat> {
-    /// Lanes with such a surface.
+    /// Lanes in which a surface was found.
     pub lanes: L::Mask,
-    /// Lanes whose current surface touches another one.
+    /// Lanes whose current surface coincides with another one.
     pub touching: L::Mask,
     pub item: L,
     pub triangle: L,
     pub layer: L,
-    /// Offset of the origins of rays that leave it.
+    /// Offset of rays that leave the surface.
     pub offset: L,
 }
 
 impl<L: SimdFloat> CoincidentState<L> {
-    /// Returns the state of rays in the opposite direction.
+    /// Returns the state of rays in the opposite directions.
     pub fn reversed(&self) -> Self {
         Self { axis: -self.axis, layer: -self.layer, ..*self }
     }
 
-    /// `yes` where `mask` is true, `no` elsewhere, with the lanes of `no`.
+    /// Returns `yes` in lanes where `mask` is true and `no` elsewhere. `lanes` is that of `no`.
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self {
             lanes: no.lanes,
@@ -141,10 +145,10 @@ impl<L: SimdFloat> CoincidentState<L> {
 }
 
 impl<S: Float> Contacts<S> {
-    /// Finds the contacts of `forms`, whose coordinates are rounded to `epsilon` and have the error
-    /// `input_error` in the scene file. `transparent` is `true` for primitives that transmit;
-    /// `priority_of` are the priorities of the transparent solids that they bound. Returns `None`
-    /// if no transmissive primitive touches another one.
+    /// Finds the contacts of `forms`. Coordinates are rounded to `epsilon`, and have the error
+    /// `input_error` in the scene file. `transparent` holds `true` for each primitive that
+    /// transmits. `priority_of` holds the priority of the transparent solid that each primitive
+    /// bounds. Returns `None` if no transmissive primitive touches another one.
     pub fn new(
         forms: &[Form],
         primitives: &[PrimitiveId],
@@ -191,9 +195,9 @@ impl<S: Float> Contacts<S> {
         Some(Self { contacts, kinds })
     }
 
-    /// Mask of `lanes`, each with a `point` on one of `items`, where another primitive may touch.
-    /// Most primitives touch others in few places only, which the bounding boxes of the others
-    /// limit.
+    /// Returns the lanes among `lanes` whose `point`, on the primitive `items`, may touch another
+    /// primitive. Most primitives touch others in small regions only; the bounding boxes of the
+    /// others exclude the remaining points.
     #[inline(always)]
     pub fn near<L: SimdFloat<Scalar = S>>(
         &self,
@@ -212,8 +216,9 @@ impl<S: Float> Contacts<S> {
         near
     }
 
-    /// Layer of `item` for rays that come from the layer `before`. `leaves` selects rays in the
-    /// direction of its outward normal.
+    /// Returns the layer of `item` for rays that come from a surface with the layer `before`.
+    /// `leaves` selects rays that run in the direction of the item's outward normal and therefore
+    /// leave it.
     fn layer<L: SimdFloat<Scalar = S>>(&self, item: u32, leaves: L::Mask, before: L) -> L {
         let (kind, layer) = &self.kinds[item as usize];
         let layer = L::splat(*layer);
@@ -225,8 +230,8 @@ impl<S: Float> Contacts<S> {
         L::select(is_negative, -layer, layer)
     }
 
-    /// Finds the first surface behind the one on which rays start, among those that coincide with
-    /// it. `media` are those of the rays.
+    /// Finds the next surface along the rays of `coincident` among those that coincide with their
+    /// start points. `media` are the media of the rays.
     pub fn next<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
@@ -245,9 +250,9 @@ impl<S: Float> Contacts<S> {
         out
     }
 
-    /// Finds the first surface along the rays among that of `coincident`, whose layer is ignored,
-    /// and those that coincide with it. `leaves` selects rays in the direction of its outward
-    /// normal.
+    /// Finds the first surface along the rays among the surface of `coincident` and the surfaces
+    /// that coincide with it. The layer in `coincident` is ignored. `leaves` selects rays that run
+    /// in the direction of the outward normal of the surface.
     pub fn first<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
@@ -274,7 +279,8 @@ impl<S: Float> Contacts<S> {
         out
     }
 
-    /// Replaces `out` by the first surface between the layers of `coincident` and `out`.
+    /// Replaces `out` by the coincident surface with the smallest layer above that of `coincident`,
+    /// if it is below the layer of `out`.
     #[inline(never)]
     fn search<L: SimdFloat<Scalar = S>>(
         &self,
@@ -292,8 +298,8 @@ impl<S: Float> Contacts<S> {
                 if near.none() {
                     continue;
                 }
-                // The search ray runs along the normal through the point, independent of the angle
-                // of the path's ray.
+                // The search ray runs along the normal through the point. Its result does not
+                // depend on the angle of the path's ray.
                 let tie = contact.tie(rounding);
                 let origin = coincident.axis.mul_add(-tie, coincident.point);
                 let limit = L::select(near, tie + tie, L::from_f64(-1.0));
@@ -307,7 +313,8 @@ impl<S: Float> Contacts<S> {
                     let leaves = cosine.gt(L::zero());
                     let mut parallel = other_lanes & cosine.abs().gt(L::from_f64(MIN_COSINE));
                     if let (SurfaceKind::Transparent(priority), _) = &self.kinds[other as usize] {
-                        // A path leaves only solids that it is inside, and enters only others.
+                        // A path leaves only solids that it is inside of, and enters only solids
+                        // that it is outside of.
                         let within = media.contains(L::from_f64(f64::from(*priority)));
                         parallel = parallel & ((within & leaves) | (!within & !leaves));
                     }
@@ -329,8 +336,8 @@ impl<S: Float> Contacts<S> {
     }
 }
 
-/// Returns the bounding box of a form, infinite where the form is unbounded. Planes perpendicular
-/// to an axis are bounded along it.
+/// Returns the bounding box of a form; infinite if the form is unbounded. Planes perpendicular to
+/// an axis are bounded along that axis.
 fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
     let (low, high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
     form.bounds().unwrap_or_else(|| {
@@ -343,8 +350,8 @@ fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
     })
 }
 
-/// Returns the pairs of forms for which `wanted` is true and whose bounding boxes overlap or nearly
-/// do, sorted.
+/// Returns all pairs of forms for which `wanted` is true and whose bounding boxes overlap or nearly
+/// overlap. The pairs are sorted.
 fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
     let mut out = Vec::new();
     let infinite = (DVec3::NEG_INFINITY, DVec3::INFINITY);
@@ -367,7 +374,7 @@ fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, u
             }
         }
     }
-    // The order of the scene's list is independent of positions.
+    // Sorted by index, so that the order does not depend on positions.
     out.sort_unstable();
     out
 }
@@ -388,7 +395,7 @@ fn may_touch(a: &Form, b: &Form, slack: f64) -> bool {
     ) = (a, b)
     {
         let distance = center.distance(*other);
-        // The balls touch side by side, or one inside the other.
+        // Two spheres can touch side by side, or one inside the other.
         return distance <= radius + size + slack && distance + slack >= (radius - size).abs();
     }
     true

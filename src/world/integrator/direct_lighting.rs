@@ -2,14 +2,14 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Mask, SimdFloat, Vec3};
-use crate::world::culling::light_buffer::ShadowRays;
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::interaction::SurfaceInteraction;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
-/// Adds the ambient light and the light of every source that the surfaces return to `out`.
+/// Adds the ambient light and the light of all sources that the surfaces reflect to the radiance in
+/// `out`.
 #[inline(always)]
 pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -53,14 +53,8 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
             let occluded = if SIMPLE {
                 world.geometry.occluded_linear(&ray, t_max, lit, occluders)
             } else if let Some(Some(buffer)) = world.light_buffers.get(index) {
-                let rays = ShadowRays {
-                    ray,
-                    start_item: interaction.item,
-                    starts_outside: interaction.front,
-                    t_max,
-                    active: lit,
-                };
-                buffer.occluded(&world.geometry, &rays, occluders)
+                let start = (interaction.item, interaction.front);
+                buffer.occluded(&world.geometry, &ray, start, t_max, lit, occluders)
             } else {
                 world.geometry.occluded(&ray, t_max, lit, occluders)
             };

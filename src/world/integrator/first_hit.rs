@@ -1,4 +1,4 @@
-//! First hits of camera rays: features for picking and for views other than the picture.
+//! First hits of camera rays, for picking objects with a pointer and for auxiliary images.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -11,20 +11,21 @@ pub struct FirstHit {
     pub object: Option<u32>,
     /// Distance from the eye to the hit point in scene units; infinite for the background.
     pub depth: f32,
-    /// Unit geometric normal in scene axes, on the visible side; zero for the background.
+    /// Unit geometric normal in scene coordinates, on the side that faces the eye; zero for the
+    /// background.
     pub normal: [f32; 3],
-    /// `true` if the visible side of the surface reflects rays.
+    /// `true` if the surface reflects rays on the side that faces the eye.
     pub reflects: bool,
 }
 
 impl FirstHit {
-    /// A miss.
+    /// Value for a ray that hits no primitive.
     pub const MISS: Self =
         Self { object: None, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
 }
 
 /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the same
-/// length. Points are columns and rows of the raster in pixels, with fractions.
+/// length. A point is a column and a row of the raster in pixels, with fractions.
 pub(crate) fn trace_first_hits<L: SimdFloat>(
     world: &World<L>,
     points: &[[f64; 2]],
@@ -110,7 +111,7 @@ mod tests {
         hits
     }
 
-    /// One unit of the picture plane is 10 pixels; the rectangles are 5 units away.
+    /// Ten pixels cover one unit of the picture plane. The rectangles are 5 units away.
     #[test]
     fn first_hits_have_objects_distances_and_normals() {
         let points = [[15.0, 10.0], [21.0, 10.0], [9.0, 10.0], [15.0, 0.5], [21.0, 19.9]];
@@ -124,7 +125,7 @@ mod tests {
                 hits.iter().map(|s| s.reflects).collect::<Vec<_>>(),
                 [false, true, false, false, true]
             );
-            // Normals of backs point to the visible side.
+            // Normals of back sides point to the eye.
             for hit in [hits[0], hits[1], hits[2]] {
                 let [x, y, z] = hit.normal;
                 assert!(x.abs() < 1e-5 && y.abs() < 1e-5 && (z - 1.0).abs() < 1e-5, "{hit:?}");

@@ -1,4 +1,4 @@
-//! Surface interactions: normals, offsets and BSDFs at the hit points of a packet.
+//! Surface interactions: normals, ray offsets and BSDFs at the hit points of a packet.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
@@ -7,28 +7,29 @@ use crate::world::world::World;
 
 /// Surface properties at the hit points of a packet.
 pub(crate) struct SurfaceInteraction<L: SimdFloat> {
-    /// Shading normal, on the side from which the rays come.
+    /// Unit shading normal, on the side from which the rays arrive.
     pub normal: Vec3<L>,
-    /// Geometric normal, on the side from which the rays come. It differs from `normal` on smooth
-    /// meshes and bump maps only. Light from behind it does not reach the surface.
+    /// Unit geometric normal, on the side from which the rays arrive. It differs from `normal` only
+    /// on smooth meshes and bump-mapped surfaces. Light from behind the geometric normal does not
+    /// reach the surface.
     pub geometric: Vec3<L>,
     /// Hit points.
     pub point: Vec3<L>,
-    /// Distance from `point`, along the normal, at which secondary rays start.
+    /// Distance from `point` along the geometric normal at which secondary rays start.
     pub offset: L,
-    /// Lanes that hit the side to which the primitive's own normal points.
+    /// Lanes whose rays hit the outside of the primitive, to which its own normal points.
     pub front: L::Mask,
     /// Ids of the primitives.
     pub item: L,
-    /// Ids of the BSDFs.
+    /// Indices of the BSDFs, stored as ids.
     bsdf: L,
-    /// Factor of the BSDF's albedo, from textures and vertex colours.
+    /// Factor by which textures and vertex colours multiply the albedo of the BSDF.
     pub albedo_factor: Vec3<L>,
     /// Diffuse albedo.
     pub diffuse: Vec3<L>,
-    /// Lanes with a BSDF: all but those that hit the back of a one-sided surface.
+    /// Lanes that have a BSDF. Only hits on the back of a one-sided surface have none.
     pub has_bsdf: L::Mask,
-    /// Lanes whose BSDF returns direct light.
+    /// Lanes whose BSDF reflects direct light.
     pub direct_mask: L::Mask,
     /// Lanes whose BSDF has a highlight.
     pub highlight_mask: L::Mask,
@@ -37,7 +38,8 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> SurfaceInteraction<L> {
-    /// Index of each BSDF that occurs among `lanes`, with its lanes.
+    /// Iterates over the BSDFs that occur in `lanes`: the index of each, and the lanes that have
+    /// it.
     #[inline(always)]
     pub fn bsdfs(&self, lanes: L::Mask) -> impl Iterator<Item = (usize, L::Mask)> {
         let (bsdf, mut remaining) = (self.bsdf, lanes);
@@ -48,13 +50,13 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         })
     }
 
-    /// Origin of rays that leave on the side from which the rays came.
+    /// Origins of rays that leave on the side from which the incoming rays arrived.
     #[inline(always)]
     pub fn ray_origin(&self) -> Vec3<L> {
         self.geometric.mul_add(self.offset, self.point)
     }
 
-    /// Origin of rays that leave on the other side.
+    /// Origins of rays that leave on the opposite side.
     #[inline(always)]
     pub fn ray_origin_behind(&self) -> Vec3<L> {
         self.geometric.mul_add(-self.offset, self.point)
@@ -69,20 +71,21 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.reflecting = self.reflecting.and_not(lanes);
     }
 
-    /// Removes `lanes` from direct lighting.
+    /// Excludes `lanes` from direct lighting.
     #[inline(always)]
     pub fn shade(&mut self, lanes: L::Mask) {
         self.direct_mask = self.direct_mask.and_not(lanes);
     }
 
-    /// Returns `direction`, mirrored at the surface where it points into it.
+    /// Returns `direction`. Where it points into the surface, it is mirrored at the geometric
+    /// tangent plane.
     #[inline(always)]
     pub fn reflect_into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
         let height = direction.dot(self.geometric).min(L::zero());
         self.geometric.mul_add(height * L::from_f64(-2.0), direction)
     }
 
-    /// Takes `other` in `lanes`, in which no mask of `self` is set.
+    /// Copies the interaction of `other` in `lanes`. No mask of `self` is set in these lanes.
     #[inline(always)]
     fn blend(&mut self, lanes: L::Mask, other: &Self) {
         self.normal = Vec3::select(lanes, other.normal, self.normal);
@@ -100,7 +103,7 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
     }
 }
 
-/// Creates the interactions of the active rays; `None` if no ray is active.
+/// Creates the interactions of the active rays. Returns `None` if no ray is active.
 #[inline(always)]
 pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -117,8 +120,8 @@ pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     })
 }
 
-/// Creates the interactions of a packet that hit several primitives: `first` in its lanes, others
-/// in `remaining`.
+/// Creates the interactions of a packet whose rays hit several primitives. `first` holds the
+/// interactions of one primitive; the lanes in `remaining` hit other primitives.
 #[inline(never)]
 fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -135,7 +138,7 @@ fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     interaction
 }
 
-/// Creates the interactions of `lanes`, which hit the primitive `item`.
+/// Creates the interactions of `lanes`, which all hit the primitive `item`.
 #[inline(always)]
 fn interact_one<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -150,7 +153,7 @@ fn interact_one<L: SimdFloat, const SIMPLE: bool>(
     let index = world.bsdf_of[item as usize];
     let bsdf = &world.bsdfs[index as usize];
     let mut normal = geometric;
-    // Built at each use: one shared instance would be spilled to memory in worlds without textures.
+    // Built at each use. A shared instance would be spilled to memory in worlds without textures.
     let shading_points = || ShadingPoints { item, triangle: hit.triangle, surface, lanes };
     if !SIMPLE && world.smooth {
         normal = shading_normal(world, &shading_points(), (front, geometric), ray.direction);

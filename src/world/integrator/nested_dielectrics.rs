@@ -1,10 +1,10 @@
 //! Nested dielectrics with priorities (Schmidt and Budge 2002, *Simple Nested Dielectrics in Ray
 //! Traced Images*).
 //!
-//! Where transparent solids overlap, the one that the scene lists last has the highest priority and
-//! fills the common space; boundaries of the others are suppressed there. A bubble is therefore
-//! listed after its ball, and water may overlap the wall of a glass that is listed after it.
-//! Outside of all solids the index of refraction is 1.
+//! Where transparent solids overlap, the solid that the scene lists last has the highest priority
+//! and fills the common space. The boundaries of the other solids are suppressed there. A bubble is
+//! therefore listed after the glass ball that contains it, and water may overlap the wall of a
+//! glass that is listed after the water. Outside of all solids the index of refraction is 1.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, next_distinct};
@@ -15,12 +15,12 @@ use crate::world::integrator::coincident_surfaces::Contacts;
 use crate::world::integrator::interaction::SurfaceInteraction;
 use glam::DVec3;
 
-/// Number of solids around one point that a medium stack holds; of more, it holds those listed
-/// last.
+/// Largest number of nested solids that a medium stack holds. If a point is inside of more solids,
+/// the stack holds those listed last.
 const MAX_NESTING: usize = 4;
 
-/// Priorities of the solids that rays are inside (interior list), in descending order; 0 is no
-/// solid. The solid with the highest priority fills the space.
+/// Interior list of each ray: priorities of the solids that the ray is inside of, in descending
+/// order. Priority 0 marks an empty entry. The solid with the highest priority fills the space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MediumStack<L> {
     priorities: [L; MAX_NESTING],
@@ -33,7 +33,7 @@ impl<L: SimdFloat> MediumStack<L> {
         Self { priorities: [L::zero(); MAX_NESTING] }
     }
 
-    /// Priority of the solid that fills the space.
+    /// Priority of the solid that fills the space; 0 for vacuum.
     #[inline(always)]
     fn top(&self) -> L {
         self.priorities[0]
@@ -69,7 +69,7 @@ impl<L: SimdFloat> MediumStack<L> {
         out
     }
 
-    /// `yes` where `mask` is true, `no` elsewhere.
+    /// Returns `yes` in lanes where `mask` is true and `no` elsewhere.
     #[inline(always)]
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self {
@@ -93,48 +93,52 @@ pub(crate) struct StartRegion {
 }
 
 impl StartRegion {
-    /// Returns `true` if the bounding box of `form` reaches into the region, or if it has none.
+    /// Returns `true` if the bounding box of `form` overlaps the region, or if the form has no
+    /// bounding box.
     fn reaches(&self, form: &Form) -> bool {
         form.bounds()
             .is_none_or(|(low, high)| self.eye.clamp(low, high).distance(self.eye) <= self.radius)
     }
 }
 
-/// The transmissive surfaces of a world.
+/// Transmissive surfaces of a world, and the solids that they bound.
 pub(crate) struct NestedDielectrics<L: SimdFloat> {
     /// Priority of the transparent solid that each primitive bounds; 0 if it bounds none.
     priority_of: Vec<u32>,
-    /// Index of refraction by priority; 1 for priority 0.
+    /// Index of refraction of the solid with each priority; 1 for priority 0.
     indices: Vec<L::Scalar>,
-    /// Priority and boundary of each solid in which camera rays may start.
+    /// Solids that may contain the origins of camera rays: the priority of each, and its boundary.
     around_eye: Vec<(u32, Aggregate<L>)>,
-    /// Pairs of touching primitives, at least one of them transmissive; `None` if there are none.
+    /// Contacts between primitives, at least one of each touching pair transmissive. `None` if
+    /// there are none.
     pub contacts: Option<Contacts<L::Scalar>>,
 }
 
 /// Hits of a packet on transmissive surfaces.
 pub(crate) struct InterfaceHit<L: SimdFloat> {
-    /// Lanes that hit one.
+    /// Lanes whose ray hits a transmissive surface.
     pub lanes: L::Mask,
-    /// Lanes that hit it from outside of its solid.
+    /// Lanes whose ray hits the surface from outside of the solid that it bounds.
     pub outer: L::Mask,
-    /// Lanes that hit a thin surface, which bounds no solid.
+    /// Lanes whose ray hits a thin surface, which bounds no solid.
     pub thin: L::Mask,
-    /// Lanes that hit a boundary inside of a solid with a higher priority, where it has no effect.
+    /// Lanes whose ray hits a suppressed boundary: inside of a solid with a higher priority, where
+    /// the boundary has no effect.
     pub suppressed: L::Mask,
-    /// Index of refraction in front of the surface.
+    /// Index of refraction on the side from which the ray arrives.
     pub n_i: L,
-    /// Index of refraction behind the surface; for thin surfaces that of their material.
+    /// Index of refraction behind the surface. For thin surfaces, that of their material.
     pub n_t: L,
-    /// Media of reflected rays.
+    /// Media of the reflected rays.
     pub medium_reflected: MediumStack<L>,
-    /// Media of transmitted rays.
+    /// Media of the transmitted rays.
     pub medium_transmitted: MediumStack<L>,
 }
 
 impl<L: SimdFloat> NestedDielectrics<L> {
-    /// Compiles the transmissive surfaces of `primitives`, whose BSDFs are `bsdf_of`. Camera rays
-    /// start in `start`. Returns `None` if no BSDF transmits.
+    /// Compiles the transmissive surfaces of `primitives`. `bsdf_of` holds the index of the BSDF of
+    /// each primitive. Camera rays start in the region `start`. Returns `None` if no BSDF
+    /// transmits.
     pub fn new(
         geometry: &RecenteredGeometry,
         primitives: &[PrimitiveId],
@@ -175,13 +179,13 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         Some(Self { priority_of, indices, around_eye, contacts })
     }
 
-    /// For each primitive, `true` if paths can be inside of the solid that it bounds.
+    /// Returns `true` for each primitive that bounds a solid that paths can be inside of.
     pub fn entered(&self) -> Vec<bool> {
         self.priority_of.iter().map(|priority| *priority > 0).collect()
     }
 
-    /// Returns the media in which camera rays start: the solids whose boundary they first hit from
-    /// inside.
+    /// Returns the media in which camera rays start: the solids whose boundary each ray first hits
+    /// from inside.
     pub fn at_start(&self, ray: &Ray<L>) -> MediumStack<L> {
         let mut media = MediumStack::vacuum();
         for (priority, solid) in &self.around_eye {
@@ -199,7 +203,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         media
     }
 
-    /// Index of refraction of the solid with `priority`.
+    /// Returns the index of refraction of the solid with `priority`.
     fn index(&self, priority: L) -> L {
         let index_of = |priority: L::Scalar| self.indices[priority.to_f64() as usize];
         let first = priority.lane(0);
@@ -209,8 +213,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         L::from_fn(|lane| index_of(priority.lane(lane)))
     }
 
-    /// Returns the hits of `lanes` on transmissive surfaces. `media` are those of the rays;
-    /// `thin_index` is the index of refraction of thin surfaces.
+    /// Returns the transmissive surfaces among the hits of `lanes`. `media` are the media of the
+    /// rays. `thin_index` is the index of refraction of thin surfaces.
     pub fn cross(
         &self,
         interaction: &SurfaceInteraction<L>,
@@ -266,7 +270,7 @@ mod tests {
         assert_eq!(priorities(&media.without(2.0)), [5.0, 1.0, 0.0, 0.0]);
         assert_eq!(priorities(&media.without(3.0)), priorities(&media));
         assert_eq!(priorities(&media.without(5.0).without(1.0).without(2.0)), [0.0; 4]);
-        // Of five solids the stack holds the four that are listed last.
+        // With five nested solids the stack holds the four that are listed last.
         let full = media.with(3.0).with(4.0);
         assert_eq!(priorities(&full), [5.0, 4.0, 3.0, 2.0]);
     }

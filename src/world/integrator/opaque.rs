@@ -1,5 +1,5 @@
-//! Integrator of worlds without transmission: one ray per path and depth, with direct lighting at
-//! each hit (Whitted 1980), reflections sampled from the lobes.
+//! Integrator of worlds without transmission (Whitted 1980). At each hit it computes direct
+//! lighting and continues the path with one reflected ray, sampled from the reflection lobe.
 
 use crate::bvh::Ray;
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -11,8 +11,8 @@ use crate::world::integrator::interaction::{SurfaceInteraction, interact};
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
-/// Traces camera rays in a world without transmissive surfaces. `SIMPLE` is the world's
-/// [`simple`](World::simple), here and in the functions that it calls.
+/// Traces camera rays in a world without transmissive surfaces. `SIMPLE` is the value of
+/// [`World::simple`], here and in all called functions.
 #[inline(never)]
 pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool>(
     world: &'a World<L>,
@@ -60,9 +60,9 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool>(
     }
 }
 
-/// Replaces the rays of `path` by reflected rays, whose directions are sampled from the lobes.
-/// `bounce` is the number of reflections before. Returns the lanes with a throughput of at least
-/// [`min_weight`](World::min_weight).
+/// Replaces the rays of `path` by reflected rays, with directions sampled from the reflection
+/// lobes. `bounce` is the number of earlier reflections. Returns the lanes whose new throughput is
+/// at least [`min_weight`](World::min_weight).
 #[inline(always)]
 pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

@@ -6,11 +6,12 @@ use crate::world::light_groups::MAX_GROUPS;
 
 /// Radiance of a packet's samples, per light group, for lights of unit colour and intensity.
 pub struct Radiance<L> {
-    /// The first [`World::groups`](crate::world::World::groups) entries are in use.
+    /// Radiance of each light group. Only the first [`World::groups`](crate::world::World::groups)
+    /// entries are in use.
     pub groups: [Vec3<L>; MAX_GROUPS],
 }
 
-/// Cost of traced packets.
+/// Cost of traced packets, and the kind of their reflections.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     /// Number of rays: camera, shadow, reflected and transmitted.
@@ -24,16 +25,17 @@ pub struct Counts {
 #[derive(Clone, Copy)]
 pub(crate) struct Path<L> {
     pub ray: Ray<L>,
-    /// Factor of radiance along the ray in the radiance of the sample (beta).
+    /// Factor by which radiance along the ray contributes to the radiance of the sample (beta).
     pub throughput: Vec3<L>,
 }
 
 impl<L: SimdFloat> Path<L> {
-    /// Largest throughput. Larger ones saturate the film, and an infinite one times black is NaN.
+    /// Largest throughput. A larger one would saturate the film, and infinity times 0 (black) is
+    /// NaN.
     const MAX_THROUGHPUT: f64 = (1u64 << 60) as f64;
 
-    /// Returns `throughput` limited to [`Self::MAX_THROUGHPUT`], for mirrors that amplify without
-    /// bound.
+    /// Returns `throughput`, limited to [`Self::MAX_THROUGHPUT`]. Mirrors that amplify light would
+    /// let it grow without limit.
     #[inline(always)]
     pub fn bounded(throughput: Vec3<L>) -> Vec3<L> {
         let max = L::from_f64(Self::MAX_THROUGHPUT);

@@ -19,7 +19,7 @@ struct SurfaceTexture<S> {
 
 /// Textures and bump maps of all primitives.
 pub(crate) struct SurfaceTextures<L: SimdFloat> {
-    /// By primitive; `None` without texture and bump map.
+    /// Texture and bump map of each primitive. `None` for primitives with neither.
     of_item: Vec<Option<SurfaceTexture<L::Scalar>>>,
 }
 
@@ -29,13 +29,13 @@ pub(crate) struct ShadingPoints<L: SimdFloat> {
     pub item: u32,
     /// Ids of the triangles, if the primitive is a mesh.
     pub triangle: L,
-    /// The points, with outward normals.
+    /// Hit points, with outward normals.
     pub surface: SurfacePoint<L>,
     /// Lanes that hit the primitive.
     pub lanes: L::Mask,
 }
 
-/// Returns the projection that a mapping selects on a shape.
+/// Returns the projection that `mapping` selects for a shape with the given texture space.
 fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
     match (mapping, space.default_mapping) {
         (Mapping::Planar, _) | (Mapping::Uv | Mapping::Auto, DefaultMapping::Planar) => {
@@ -54,8 +54,8 @@ fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
 
 impl<L: SimdFloat> SurfaceTextures<L> {
     /// Compiles the textures and bump maps of `primitives`. `material_of` returns the material of a
-    /// primitive; `origin` is the point of the scene that became the world's origin. Returns `None`
-    /// if no material has a texture or bump map.
+    /// primitive. `origin` is the point in scene coordinates that became the origin of world
+    /// coordinates. Returns `None` if no material has a texture or bump map.
     pub fn new<'a>(
         scene: &Scene,
         primitives: &[PrimitiveId],
@@ -70,7 +70,8 @@ impl<L: SimdFloat> SurfaceTextures<L> {
             return None;
         }
         let world_from_scene = DAffine3::from_translation(-origin);
-        // The texture spaces of the last object: primitives of one object are adjacent.
+        // The texture spaces of the latest object are cached, because the primitives of an object
+        // are adjacent.
         let mut spaces: (usize, Vec<TextureSpace>) = (usize::MAX, Vec::new());
         let of_item = primitives.iter().map(|id| {
             let material = material_of(id);
@@ -113,7 +114,7 @@ impl<L: SimdFloat> SurfaceTextures<L> {
         self.textures().any(|texture| texture.bump.is_some())
     }
 
-    /// Names of the features in use, for the inventory.
+    /// Names of the texture features in use, for the inventory of the scene.
     pub fn features(&self) -> Vec<&'static str> {
         let albedos = || self.textures().filter_map(|texture| texture.albedo.as_ref());
         let is_image = |t: &CompiledTexture<_>| matches!(t, CompiledTexture::Image { .. });
@@ -125,8 +126,8 @@ impl<L: SimdFloat> SurfaceTextures<L> {
     }
 }
 
-/// Returns texture coordinates: the mesh's own, where `mapping` uses them and the mesh has some,
-/// else those of the projection.
+/// Returns texture coordinates. They are the mesh's own coordinates if the mesh has some and
+/// `mapping` uses them, and otherwise those of the projection.
 fn coordinates<L: SimdFloat>(
     geometry: &Aggregate<L>,
     mapping: &TextureMapping<L::Scalar>,
@@ -150,8 +151,8 @@ fn surface_texture<L: SimdFloat>(
     world.surface_textures.as_ref()?.of_item[item as usize].as_ref()
 }
 
-/// Returns the factor of the BSDF's albedo: vertex colour times texture; `None` if the primitive
-/// has neither.
+/// Returns the factor by which vertex colour and texture multiply the albedo of the BSDF. Returns
+/// `None` if the primitive has neither.
 #[inline(never)]
 pub(crate) fn albedo_factor<L: SimdFloat>(
     world: &World<L>,
@@ -168,9 +169,10 @@ pub(crate) fn albedo_factor<L: SimdFloat>(
     Some(vertex_color.map_or(color, |vertex_color| vertex_color.component_mul(color)))
 }
 
-/// Returns the shading normal of surfaces that rays along `direction` hit: interpolated on smooth
-/// meshes, perturbed by bump maps. It lies on the side of `geometric`, the geometric normal on the
-/// side of the rays, and faces them. `front` selects lanes in which `geometric` points outwards.
+/// Returns unit shading normals at the hit points of rays along `direction`: interpolated on smooth
+/// meshes, perturbed by bump maps. `geometric` is the geometric normal on the side from which the
+/// rays arrive. The shading normal is on the same side, and is bent so that it faces the rays.
+/// `front` selects lanes in which `geometric` points outwards.
 #[inline(never)]
 pub(crate) fn shading_normal<L: SimdFloat>(
     world: &World<L>,

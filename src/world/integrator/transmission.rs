@@ -1,4 +1,5 @@
-//! Integrator of worlds with transmission: paths split into reflected and transmitted rays.
+//! Integrator of worlds with transmission. At an interface a path splits into a reflected and a
+//! transmitted ray.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -14,25 +15,24 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
 /// Number of interfaces, counted from the eye, at which a path splits into reflection and
-/// refraction. Beyond this depth one of the two is chosen at random.
+/// refraction. At later interfaces one of the two is chosen at random.
 const SPLIT_DEPTH: usize = 2;
 
-/// A packet of path branches.
+/// Branches of the paths of a packet, all at the same depth.
 #[derive(Clone, Copy)]
 struct Branch<L: SimdFloat> {
     path: Path<L>,
     lanes: L::Mask,
-    /// Media of the rays.
+    /// Media that the rays are inside of.
     media: MediumStack<L>,
-    /// Number of surfaces on the path before the ray.
+    /// Number of surfaces that the path has hit before this ray.
     bounce: u32,
-    /// State of rays that start on one of several coincident surfaces; `None` if there are no such
-    /// rays.
+    /// State of rays that start on one of several coincident surfaces. `None` if no ray does.
     coincident: Option<CoincidentState<L>>,
 }
 
-/// Reflected branches that wait for the transmitted branches of the same interface. There is at
-/// most one for each depth.
+/// Reflected branches that are traced after the transmitted branches of the same interface. The
+/// stack holds at most one branch for each depth.
 struct BranchStack<L: SimdFloat> {
     branches: [Option<Branch<L>>; SPLIT_DEPTH],
 }
@@ -49,7 +49,8 @@ impl<L: SimdFloat> BranchStack<L> {
     }
 }
 
-/// Reflected and transmitted rays at the interfaces of a packet.
+/// Reflected and transmitted directions at the interfaces of a packet, with the throughputs of the
+/// paths that continue in them.
 struct SplitDirections<L> {
     /// Directions of the reflected rays.
     reflected: Vec3<L>,
@@ -61,7 +62,7 @@ struct SplitDirections<L> {
     transmitted_weight: Vec3<L>,
 }
 
-/// The inputs that all branches of a packet share.
+/// Integrator with the inputs that all branches of a packet share.
 pub(crate) struct TransmissionIntegrator<'a, L: SimdFloat> {
     pub world: &'a World<L>,
     pub nested_dielectrics: &'a NestedDielectrics<L>,
@@ -69,8 +70,8 @@ pub(crate) struct TransmissionIntegrator<'a, L: SimdFloat> {
 }
 
 impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
-    /// Traces camera rays. In every lane the transmitted branch of an interface is traced before
-    /// the reflected one, independently of the other lanes.
+    /// Traces camera rays. In every lane, the transmitted branch of an interface is traced before
+    /// the reflected one, whatever the other lanes do.
     #[inline(never)]
     pub fn trace(
         &self,
@@ -96,7 +97,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         }
     }
 
-    /// Traces the rays of `branch`, adds the radiance of their hit points to `out`, and replaces
+    /// Traces the rays of `branch` and adds the radiance of their hit points to `out`. Replaces
     /// `branch` by its continuation. Returns `false` if no path continues.
     fn advance(
         &self,
@@ -225,11 +226,11 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         lanes.any()
     }
 
-    /// Resolves hits of `lanes` on coincident surfaces: replaces `hit` and `interaction` by those
-    /// of the surface that comes first in the order of layers. `contact_lanes` are those where
-    /// another primitive may touch; `behind` is the surface found behind the one that the rays
-    /// left, if any. Returns the state of rays that pass the surface; `None` if there are no
-    /// coincident surfaces.
+    /// Resolves hits of `lanes` on coincident surfaces. It replaces `hit` and `interaction` by
+    /// those of the surface with the lowest layer, which the path crosses first (see [`Contacts`]).
+    /// `contact_lanes` are the lanes whose hit point may touch another primitive. `behind` is the
+    /// coincident surface that was found behind the start points of the rays, if there is one.
+    /// Returns the state of rays that pass the surface. Returns `None` if no surfaces coincide.
     #[inline(never)]
     fn coincident(
         &self,
@@ -243,7 +244,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let (mut layer, mut offset, mut coincident_lanes) =
             (L::zero(), interaction.offset, L::mask(false));
         if let Some(next) = behind {
-            // The surface that the rays left occludes all lights on their side.
+            // The surface that the rays left occludes all lights on the side of the rays.
             if self.world.shadows {
                 interaction.shade(next.lanes);
             }
@@ -281,7 +282,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         coincident_lanes.any().then_some(coincident)
     }
 
-    /// Returns the hits of `lanes` on transmissive surfaces; `None` if there are none.
+    /// Returns the transmissive surfaces among the hits of `lanes`. Returns `None` if there are
+    /// none.
     fn interface_hit(
         &self,
         interaction: &SurfaceInteraction<L>,
@@ -301,8 +303,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             .then(|| self.nested_dielectrics.cross(interaction, transmissive, media, index))
     }
 
-    /// Samples the reflected and transmitted directions of surfaces of which some transmit.
-    /// `bounce` is the number of surfaces before.
+    /// Samples the reflected and transmitted directions at surfaces of which at least one
+    /// transmits. `bounce` is the number of surfaces that the path has hit before.
     fn split_directions(
         &self,
         path: &Path<L>,
@@ -345,7 +347,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 directions.reflected_weight = Vec3::select(lanes, tir, directions.reflected_weight);
             }
             let Some((strength, lobe)) = &bsdf.reflection else { continue };
-            // Not on backs without a bsdf.
+            // Hits on the back of a one-sided surface have no BSDF to reflect.
             let lanes = lanes & interaction.reflecting & reflected_share.gt(L::zero());
             if lanes.none() {
                 continue;
@@ -364,7 +366,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         }
         if self.world.smooth {
             directions.reflected = interaction.reflect_into_hemisphere(directions.reflected);
-            // Directions that stay in front of the surface are mirrored behind it.
+            // Transmitted directions that stay in front of the surface are mirrored to the other
+            // side.
             directions.transmitted = -interaction.reflect_into_hemisphere(-directions.transmitted);
         }
         directions.reflected_weight = Path::bounded(directions.reflected_weight);

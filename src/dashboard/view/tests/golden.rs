@@ -1,11 +1,11 @@
-//! Text of every screen, compared with `tests/screens`.
+//! Golden test: the text of every screen is compared with the files in `tests/screens`.
 
 use crate::dashboard::view::tests::states::{STATES, tracing};
 use crate::dashboard::view::tests::{drawn, row_text};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Columns and rows.
+/// Terminal sizes, columns and rows.
 const SIZES: [[u16; 2]; 5] = [[200, 60], [120, 36], [80, 24], [40, 12], [39, 11]];
 
 #[test]
@@ -40,7 +40,7 @@ fn screens_match_golden_files() {
     assert!(different.is_empty(), "{}\nZERKALO_BLESS=1 takes them over", different.join("\n"));
 }
 
-/// Every file in `tests/screens` belongs to a state.
+/// Checks that every file in `tests/screens` belongs to a state.
 #[test]
 fn every_screen_has_its_state() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/screens");

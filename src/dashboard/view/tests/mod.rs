@@ -1,6 +1,7 @@
-//! Screens in each state at each size.
+//! Tests of screens in each state of the model at several sizes.
 //!
-//! `tests/screens` holds the text of every screen; `ZERKALO_BLESS=1` rewrites it.
+//! `tests/screens` contains the text of every screen. With `ZERKALO_BLESS=1` the golden test
+//! rewrites it.
 
 mod golden;
 mod paint;
@@ -13,7 +14,7 @@ use crate::dashboard::view::View;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 
-/// Draws the screen of a model.
+/// Returns the screen of a model and the position of its text cursor.
 fn drawn(model: &Model) -> (Buffer, Option<Position>) {
     let [width, height] = model.screen;
     let mut buffer = Buffer::empty(Rect { x: 0, y: 0, width, height });

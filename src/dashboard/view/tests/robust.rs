@@ -1,4 +1,5 @@
-//! Every state is drawn at every size and colour depth.
+//! Tests that drawing neither panics nor emits control characters, in any state, size and colour
+//! depth.
 
 use crate::dashboard::model::Colors;
 use crate::dashboard::view::tests::drawn;
@@ -24,7 +25,7 @@ proptest! {
     }
 }
 
-/// Sizes around every threshold of the layout.
+/// Draws every state at sizes around every threshold of the layout.
 #[test]
 fn every_state_draws_at_threshold_sizes() {
     for (_, make) in STATES {

@@ -1,4 +1,4 @@
-//! Models in every visually distinct state.
+//! Models in every state that looks different on the screen.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::Focus;
@@ -21,7 +21,8 @@ use crate::scene::{Scene, built_in};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A name, and the changes to a model that has been tracing for a while.
+/// The name of a state, and the function that puts a model into it. The model shows a render in
+/// progress before.
 pub type Named = (&'static str, fn(&mut Model));
 
 /// Creates a model of the built-in scene after 212 samples.
@@ -171,7 +172,7 @@ fn broken(model: &mut Model) {
     model.file.broken = Some(Scene::parse(text, "mirror-room.toml").unwrap_err());
 }
 
-/// Every state.
+/// Every state, by name.
 pub const STATES: &[Named] = &[
     ("first-time", |m| {
         m.first_time = true;

@@ -1,4 +1,4 @@
-//! Styles, which the text of screens does not cover.
+//! Tests of styles, which the golden texts of screens do not contain.
 
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{Colors, Model};
@@ -19,7 +19,7 @@ fn corner(buffer: &Buffer, area: Area) -> (String, Color, Modifier) {
     (cell.symbol().to_string(), cell.fg, cell.modifier)
 }
 
-/// Exactly one panel's border differs from all others: that of the panel with the focus.
+/// Checks that the border of the panel with the focus differs from the borders of all other panels.
 #[test]
 fn focus_is_visible_at_every_colour_depth() {
     for colors in Colors::ALL {
@@ -52,7 +52,7 @@ fn focus_is_visible_at_every_colour_depth() {
     }
 }
 
-/// Each colour depth uses only its own colours.
+/// Checks that the screen has no colours that the colour depth does not support.
 #[test]
 fn colours_stay_within_colour_depth() {
     for (name, make) in STATES {
@@ -128,7 +128,7 @@ fn defaults_are_dimmed_and_problems_red() {
     assert!(defaults.iter().all(|color| *color != Color::Reset), "{defaults:?}");
 }
 
-/// At 80 columns hints and status parts are not truncated.
+/// Checks that hints and parts of the status line are omitted as a whole rather than truncated.
 #[test]
 fn status_and_hints_are_not_truncated() {
     for (name, make) in STATES {

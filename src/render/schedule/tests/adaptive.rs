@@ -10,16 +10,18 @@ fn adaptive_spp_is_the_mean_and_noisy_tiles_get_most() {
     assert_eq!(reason, StoppedBy::Spp);
     let spp = schedule.spp();
     assert!(spp.mean <= 200.0 && spp.mean > 199.9, "{spp:?}");
-    // The calm tiles share the exploration: 200 * EXPLORATION / 0.7 samples each, in whole blocks.
+    // The tiles without noise share the rays of exploration: 200 * EXPLORATION / 0.7 samples each,
+    // in whole blocks.
     assert!((2 * MIN_SAMPLES..=40).contains(&spp.min), "{spp:?}");
     assert!(spp.max > 500, "{spp:?}");
 }
 
-/// Ratio of uniform to adaptive samples at equal error.
+/// Returns the ratio of uniform to adaptive samples at equal error. `share` is the share of noisy
+/// tiles.
 ///
-/// An exact model of the best order gives 8.4, 2.6 and 1.1 for shares of 0.05, 0.3 and 0.9 with tiles that
-/// differ among themselves. Equal noisy tiles, and others without noise, would give at most
-/// 1 / (share + (1 - share) 32 / 1024): 12.4, 3.1 and 1.11.
+/// An exact model of the best allocation gives 8.4, 2.6 and 1.1 for shares of 0.05, 0.3 and 0.9,
+/// with tiles of different noise. If all noisy tiles were equal and the others had no noise, the
+/// gain would be at most 1 / (share + (1 - share) 32 / 1024): 12.4, 3.1 and 1.11.
 fn gain(share: f64) -> f64 {
     let tiles = 2000;
     let mut uniform = Model::exact(clustered(tiles, share));
@@ -35,10 +37,11 @@ fn gain(share: f64) -> f64 {
 
 #[test]
 fn adaptive_sampling_saves_samples() {
-    // Where noise is nearly everywhere at most 1 / 0.9, less 2 % for an RMSE that ends 1 % below the target and 0.5 %
-    // for counts in whole blocks of a quarter.
+    // If nearly all tiles are noisy, the gain is at most 1 / 0.9. From this 2 % are lost because
+    // the RMSE ends 1 % below the target, and 0.5 % because counts grow in whole blocks of a
+    // quarter.
     for (share, least) in [(0.05, 8.4), (0.3, 2.6), (0.9, 1.08)] {
-        // Exploration takes its share from the noisy tiles.
+        // The rays of exploration are missing in the noisy tiles.
         let (gain, least) = (gain(share), (1.0 - EXPLORATION) * least);
         assert!(gain >= least, "{share}: {gain}");
     }
@@ -93,7 +96,8 @@ fn decisions_are_deterministic_and_independent_of_time() {
     assert_eq!(waves(0.0), waves(1000.0));
 }
 
-/// Noise in validation pixels alone draws samples, and few more than a uniform picture takes.
+/// Noise that only validation pixels contain draws samples, but few more than a uniform picture
+/// takes.
 #[test]
 fn noise_in_validation_pixels_is_sampled_away() {
     for hidden in [vec![7], (0..100).step_by(3).collect::<Vec<_>>()] {
@@ -113,7 +117,7 @@ fn noise_in_validation_pixels_is_sampled_away() {
     }
 }
 
-/// Tiles without any estimated error take turns, the least sampled first.
+/// Tiles without any estimated error are sampled in turn, the tile with the fewest samples first.
 #[test]
 fn clean_tiles_are_explored_evenly() {
     let mut model = Model::exact(clustered(400, 0.1));
@@ -123,7 +127,7 @@ fn clean_tiles_are_explored_evenly() {
     assert!(*least > 64 && *most <= 2 * least, "{least} to {most}");
 }
 
-/// Tiles of equal noise get about equal counts in spite of chance in their estimates.
+/// Tiles of equal noise get about equal counts, although their estimates differ by chance.
 #[test]
 fn chance_in_estimates_of_equal_tiles_draws_no_samples() {
     let mut model = Model::random(vec![NOISY; 400], 64, 5);

@@ -1,8 +1,9 @@
-//! Changes during the work: stop criteria, estimates, length of pieces.
+//! Changes during a render: stop criteria, estimates, lengths of pieces.
 
 use crate::render::schedule::tests::*;
 
-/// Traces to the end, every wave in pieces of at most `tiles` jobs of at most `longest` samples.
+/// Traces to the end. Every wave is cut to pieces of at most `tiles` jobs with at most `longest`
+/// samples.
 fn finish_in_pieces(
     model: &mut Model,
     schedule: &mut Schedule,
@@ -70,7 +71,7 @@ fn higher_target_resumes_after_the_lower_one() {
                 let report = model.run(&wave);
                 schedule.complete(&wave, &report);
             }
-            // All but the last decision, which gives A and B the remaining samples.
+            // A and B are even after all decisions but the last, which adds the remaining samples.
             assert!(ends[..ends.len() - 2].iter().all(|even| *even), "after {low} {adaptive}");
             assert_eq!(schedule.spp().mean, 2000.0);
             // The lower target is reached at once.
@@ -90,7 +91,7 @@ fn new_estimates_replace_the_old_ones() {
     let (before, samples) = (schedule.noise().unwrap(), schedule.samples());
     schedule.forget_estimates();
     assert_eq!((schedule.noise(), schedule.eta_seconds(1.0)), (None, None));
-    // The picture is displayed three times as bright, and so is its error.
+    // The picture becomes three times as bright on the display, and its error three times as large.
     model.truth.iter_mut().for_each(|t| t.sigma *= 3.0);
     let estimates: Vec<_> =
         (0..36).map(|tile| Some((schedule.tiles[tile].done, model.estimate(tile)))).collect();
@@ -98,7 +99,8 @@ fn new_estimates_replace_the_old_ones() {
     let after = schedule.noise().unwrap();
     assert!((after.rmse_codes / before.rmse_codes - 3.0).abs() < 1e-9);
     assert_eq!(schedule.samples(), samples);
-    // The convergence of this picture is unknown: the range is wide, and holds.
+    // The convergence of the new picture is unknown. The estimated range is wide, but contains the
+    // true time.
     let (low, high) = schedule.eta_seconds(1.0).unwrap();
     assert!(high > 2.0 * low, "{low}..{high}");
     let rays = schedule.rays() as f64;

@@ -24,19 +24,20 @@ struct Truth {
 const CALM: Truth = Truth { sigma: 0.0, slope: 0.5, glossy: false, rays_per_sample: 2 };
 const NOISY: Truth = Truth { sigma: 40.0, slope: 0.5, glossy: true, rays_per_sample: 3 };
 
-/// Simulated picture that reports on waves.
+/// Simulated picture that reports on waves as a film does.
 struct Model {
     truth: Vec<Truth>,
     pixels: Vec<u32>,
     /// Samples per replicate of each tile.
     counts: [Vec<u32>; 2],
-    /// Sums of the errors of `[replicate][tile][effective pixel]`, as random walks; empty for exact errors.
+    /// Sums of the errors of each effective pixel, as random walks:
+    /// `[replicate][tile][effective pixel]`. Empty if the errors are exact.
     walks: [Vec<Vec<f64>>; 2],
     rng: Rng,
     waves: usize,
-    /// Blocks of samples must start at packet boundaries.
+    /// `true` if blocks of samples must start at packet boundaries.
     aligned: bool,
-    /// Tiles with an error in validation pixels only.
+    /// Tiles with an error that only validation pixels contain.
     hidden: Vec<usize>,
 }
 
@@ -55,14 +56,15 @@ impl Model {
         }
     }
 
-    /// Random errors of slope 0.5: each tile's error consists of `effective` independent values.
+    /// Creates a picture with random errors of slope 0.5. The error of each tile consists of
+    /// `effective` independent values.
     fn random(truth: Vec<Truth>, effective: usize, seed: u64) -> Self {
         let tiles = truth.len();
         let walks = vec![vec![0.0; effective]; tiles];
         Self { walks: [walks.clone(), walks], rng: Rng(seed), ..Self::exact(truth) }
     }
 
-    /// Estimate from A - B, if the film holds equally many samples of both.
+    /// Returns the estimate from A - B. The film must hold equally many samples of both.
     fn estimate(&self, tile: usize) -> TileNoise {
         let n = f64::from(self.counts[0][tile]);
         let [a, b] = [&self.walks[0][tile], &self.walks[1][tile]];
@@ -128,7 +130,7 @@ impl Model {
         Schedule::new(&self.pixels, settings)
     }
 
-    /// Runs to the end at a nanosecond per ray; panics if it does not end.
+    /// Renders to the end, at one nanosecond per ray. Panics if the render does not end.
     fn finish(&mut self, settings: Settings) -> (Schedule, StoppedBy) {
         let mut schedule = self.schedule(settings);
         for _ in 0..100_000 {
@@ -156,8 +158,8 @@ fn spp(spp: u32) -> Stop {
     Stop { spp: Some(spp), ..Stop::default() }
 }
 
-/// Returns `tiles` tiles in a square, of which the first `share`, in rows, are noisy: noise in pictures is
-/// clustered.
+/// Returns `tiles` tiles in a square. The first `share` of them, row by row, are noisy, because
+/// noise in pictures is clustered.
 fn clustered(tiles: usize, share: f64) -> Vec<Truth> {
     (0..tiles).map(|i| if (i as f64) < share * tiles as f64 { NOISY } else { CALM }).collect()
 }

@@ -50,11 +50,11 @@ fn caps_hold_for_glossy_tiles_only() {
             "the noise is that of the whole picture"
         );
 
-        // All tiles are glossy: no work is left.
+        // All tiles are glossy, so that no work is left at the cap.
         let mut model = Model::exact(vec![NOISY; 25]);
         let (schedule, reason) = model.finish(settings);
         assert_eq!((reason, schedule.spp().max), (StoppedBy::RaysPerPixel, 40));
-        // A cap does not keep a count from being reached.
+        // A cap does not prevent a mean sample count from being reached.
         let (_, reason) = model_of(NOISY).finish(Settings { stop: spp(30), ..settings });
         assert_eq!(reason, StoppedBy::Spp);
     }
@@ -68,7 +68,7 @@ fn time_ends_the_work_with_equal_replicates() {
     assert_eq!(reason, StoppedBy::Time);
     assert_eq!(model.counts[0], model.counts[1]);
     assert!(schedule.spp().min >= 2);
-    // A time of 0 gives a picture.
+    // A time limit of 0 still gives a picture.
     let stop = Stop { seconds: Some(0.0), ..Stop::default() };
     let (schedule, _) = model_of(NOISY).finish(until(stop, true));
     assert_eq!(schedule.spp().min, 2);
@@ -81,7 +81,7 @@ fn time_is_overshot_by_little() {
             let stop = Stop { seconds: Some(0.5), ..Stop::default() };
             let mut model = Model::exact(vec![NOISY; tiles]);
             let (schedule, _) = model.finish(until(stop, adaptive));
-            // At a nanosecond per ray.
+            // One ray takes a nanosecond.
             let seconds = schedule.rays() as f64 * 1e-9;
             assert!(seconds < 0.66, "{tiles} tiles, adaptive {adaptive}: {seconds} s");
         }
@@ -166,7 +166,7 @@ fn estimated_time_left_is_a_range_that_holds() {
         let report = model.run(&wave);
         schedule.complete(&wave, &report);
     }
-    // 32 of 100 samples in one second.
+    // 32 of 100 samples took one second.
     let (low, high) = schedule.eta_seconds(1.0).unwrap();
     assert!((low - 68.0 / 32.0).abs() < 1e-9 && low == high);
     assert!((schedule.progress(1.0).unwrap() - 0.32).abs() < 1e-9);
