@@ -100,9 +100,9 @@ fn uniform_rays(sample: &Sample, seed: u64, reference: &Reference, target: f64) 
     }
 }
 
-/// What adaptive pictures of a scene say about their error and what it is. The error of one picture scatters by
-/// 1 / sqrt(2 k) of itself, and so does the estimate, where k pixels carry the noise, however good the estimator is. So seeds
-/// are added, `seeds` at most, until their pictures together have `ENOUGH` such pixels.
+/// Compares reported and true error of adaptive pictures of a scene. Where k pixels carry the noise, the error of one
+/// picture scatters by 1 / sqrt(2 k) of its value, and so does any estimate of it. Seeds are added, at most `seeds`,
+/// until their pictures together have `ENOUGH` such pixels.
 fn examine(number: u64, reference_count: u32, seeds: u64) -> Outcome {
     let sample = scene(number);
     let reference = Reference::new(&sample, reference_count);
