@@ -202,7 +202,7 @@ impl<S: Float> Compounds<S> {
         spans: &[Interval<L>],
         t: L,
     ) -> L::Mask {
-        with_scratch(compound.depth, L::mask(false), |stack| {
+        with_scratch::<8, _, _>(compound.depth, L::mask(false), |stack| {
             let mut top = 0;
             for op in &self.ops[compound.ops.clone()] {
                 if let Op::Part(i) = op {
@@ -237,7 +237,7 @@ impl<S: Float> Compounds<S> {
             t: L::zero(),
             tag: L::from_id(0),
         };
-        with_scratch(compound.depth, nothing, |stack| {
+        with_scratch::<8, _, _>(compound.depth, nothing, |stack| {
             let mut top = 0;
             for op in &self.ops[compound.ops.clone()] {
                 if let Op::Part(i) = op {
@@ -288,8 +288,8 @@ impl<S: Float> Compounds<S> {
         let parts = &self.parts[compound.parts.clone()];
         let outside = Interval { enter: never, leave: always };
         let end = Event { t: never, tie: L::zero() };
-        with_scratch(compound.spans, outside, |spans| {
-            with_scratch(2 * compound.spans, end, |ends| {
+        with_scratch::<8, _, _>(compound.spans, outside, |spans| {
+            with_scratch::<16, _, _>(2 * compound.spans, end, |ends| {
                 let tie = ray.origin.max_abs().max(L::splat(compound.reach))
                     * L::from_f64(TIE * L::EPSILON);
                 let mut count = 0;

@@ -64,10 +64,13 @@ impl<L: SimdFloat> Transition<L> {
     }
 }
 
-/// Runs `use_it` with room for `n` values, on the stack if they are few.
+/// Runs `use_it` with room for `n` values: on the stack if they are at most `FEW`, else on the heap.
 #[inline(always)]
-pub fn with_scratch<T: Copy, R>(n: usize, fill: T, use_it: impl FnOnce(&mut [T]) -> R) -> R {
-    const FEW: usize = 8;
+pub fn with_scratch<const FEW: usize, T: Copy, R>(
+    n: usize,
+    fill: T,
+    use_it: impl FnOnce(&mut [T]) -> R,
+) -> R {
     let (mut few, mut many) = ([fill; FEW], Vec::new());
     // A single call, so that the compiler inlines `use_it`.
     use_it(if n <= FEW {
