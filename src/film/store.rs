@@ -289,7 +289,8 @@ impl Film {
         self.touched().map(|(_, tile)| tile.saturated_samples()).sum()
     }
 
-    /// Number of sums (of one pixel, group, channel and replicate) that have reached their limit.
+    /// Number of sums that have reached their limit. There is one sum for each pixel, group, channel
+    /// and replicate.
     pub fn saturated(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated()).sum()
     }

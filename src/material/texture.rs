@@ -43,7 +43,7 @@ description! {
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
         /// Repeats per unit of u and of v: the larger, the smaller the picture.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
-        /// Added to the scaled u and v, in repeats: moves the picture to the left and down.
+        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
         /// Continuation of the image beyond its edges.
         wrap: Wrap = "repeat";
@@ -66,7 +66,7 @@ description! {
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
         /// Repeats per unit of u and of v: the larger, the smaller the picture.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
-        /// Added to the scaled u and v, in repeats: moves the picture to the left and down.
+        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
     }
 }
@@ -84,7 +84,7 @@ description! {
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
         /// Repeats per unit of u and of v: the larger, the smaller the picture.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
-        /// Added to the scaled u and v, in repeats: moves the picture to the left and down.
+        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
         /// Continuation of the image beyond its edges.
         wrap: Wrap = "repeat";

@@ -242,7 +242,7 @@ impl<L: SimdFloat> Aggregate<L> {
         hit
     }
 
-    /// Returns the items of `set`, each as part, number in the part and box.
+    /// Returns each item of `set` with its batch range, its number in that range and its box.
     #[inline(always)]
     fn boxed<'a>(
         &'a self,

@@ -35,11 +35,11 @@ const TIE: f64 = 16.0;
 enum Op {
     /// Pushes a part.
     Part(u32),
-    /// Replaces two entries by their union.
+    /// Replaces the top two stack entries by their union.
     Or,
-    /// Replaces two entries by their intersection.
+    /// Replaces the top two stack entries by their intersection.
     And,
-    /// Replaces two entries by the lower without the upper.
+    /// Replaces the top two stack entries by the lower one without the upper one.
     Minus,
 }
 

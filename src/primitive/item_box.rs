@@ -36,14 +36,14 @@ impl Acceleration {
     /// Names and meanings.
     pub const CHOICES: &'static [Choice] = &[
         Choice { name: "auto", doc: "the fastest, by measurement" },
-        Choice { name: "none", doc: "every ray meets everything" },
+        Choice { name: "none", doc: "every ray tests every primitive" },
+        Choice { name: "screen-bounds", doc: "screen bounds of each primitive, for camera rays" },
+        Choice { name: "obb", doc: "oriented bounding boxes: one per primitive, in its own space" },
         Choice {
-            name: "screen-bounds",
-            doc: "a rectangle on the screen per thing, for camera rays",
+            name: "aabb",
+            doc: "axis-aligned bounding boxes: one per primitive, in the scene's space",
         },
-        Choice { name: "obb", doc: "a box per thing, in its own space" },
-        Choice { name: "aabb", doc: "a box per thing, in the scene's space" },
-        Choice { name: "bvh", doc: "a tree of boxes" },
+        Choice { name: "bvh", doc: "a bounding volume hierarchy" },
     ];
 
     /// Returns the name.

@@ -15,7 +15,7 @@ pub struct Inventory {
 pub(super) struct InventorySources<'a, S> {
     /// Description of the primitives.
     pub geometry: String,
-    /// Names of texture features.
+    /// Names of the texture features that the scene uses, such as `bump`.
     pub textures: Vec<&'static str>,
     pub bsdfs: &'a [Bsdf<S>],
     pub groups: &'a [LightGroupSource],
