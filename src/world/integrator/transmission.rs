@@ -43,9 +43,17 @@ impl<L: SimdFloat> BranchStack<L> {
         self.branches[branch.bounce as usize - 1] = Some(branch);
     }
 
-    /// Pops the branch of the largest depth.
-    fn pop(&mut self) -> Option<Branch<L>> {
-        self.branches.iter_mut().rev().find_map(Option::take)
+    /// Moves the branch of the largest depth to `branch`. Returns `false` if the stack is empty.
+    fn pop_into(&mut self, branch: &mut Branch<L>) -> bool {
+        for slot in self.branches.iter_mut().rev() {
+            // Copied in place: branches are large.
+            if let Some(next) = slot {
+                *branch = *next;
+                *slot = None;
+                return true;
+            }
+        }
+        false
     }
 }
 
@@ -88,11 +96,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         loop {
             let candidates =
                 if branch.bounce == 0 { candidates } else { &self.world.all_candidates };
-            if !self.advance(&mut branch, candidates, &mut waiting, out, &mut counts) {
-                match waiting.pop() {
-                    Some(next) => branch = next,
-                    None => return counts,
-                }
+            let continues = self.advance(&mut branch, candidates, &mut waiting, out, &mut counts);
+            if !continues && !waiting.pop_into(&mut branch) {
+                return counts;
             }
         }
     }
