@@ -19,6 +19,8 @@ pub mod command;
 #[cfg(unix)]
 pub mod dashboard;
 #[cfg(unix)]
+pub mod disk;
+#[cfg(unix)]
 pub mod film;
 #[cfg(unix)]
 pub mod lanes;

@@ -1,7 +1,7 @@
 //! Reading of whole files up to a size limit, and resolution of file names that occur inside files.
 
 use crate::asset::error::{AssetError, FileLocation};
-use std::fs::File;
+use crate::disk::open_regular;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 
@@ -22,7 +22,6 @@ impl FileContents {
     /// # Errors
     /// If the file cannot be read, is not a regular file, or has more than `limit` bytes.
     pub fn read(path: &Path, limit: u64) -> Result<Self, AssetError> {
-        let metadata = std::fs::metadata(path).map_err(|e| read_error(path, &e))?;
         let error = |found: String, expected: &str| {
             Err(AssetError {
                 file: path.to_path_buf(),
@@ -31,16 +30,17 @@ impl FileContents {
                 expected: expected.to_string(),
             })
         };
-        if !metadata.is_file() {
-            return error("this is no regular file".to_string(), "a file");
-        }
+        let file = match open_regular(path) {
+            Err(e) if e.kind() == ErrorKind::InvalidInput => {
+                return error(e.to_string(), "a regular file");
+            }
+            opened => opened.map_err(|e| read_error(path, &e))?,
+        };
+        let metadata = file.metadata().map_err(|e| read_error(path, &e))?;
         if metadata.len() > limit {
             let found = format!("the file has {} MiB", metadata.len() >> 20);
             return error(found, &format!("at most {} MiB", limit >> 20));
         }
-        // The file is opened only after the check for a regular file, because opening a pipe would
-        // block until the pipe has a writer.
-        let file = File::open(path).map_err(|e| read_error(path, &e))?;
         let mut bytes = Vec::with_capacity(metadata.len() as usize);
         // One byte more than the limit is read, to detect that the file grew meanwhile.
         file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| read_error(path, &e))?;
@@ -66,7 +66,8 @@ impl FileContents {
         }
     }
 
-    /// Resolves `name`, a file name that occurs in this file, relative to the folder of this file.
+    /// Resolves `name`, a file name that occurs in this file, relative to the folder of this file, by
+    /// the rule in docs/scene-format.md.
     /// Returns `None` if `name` leads out of this folder: an absolute path, a path with `..`, or a
     /// URL.
     pub fn resolve_relative(&self, name: &str) -> Option<PathBuf> {

@@ -18,13 +18,13 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let [width, height] = scene.film.size;
     let groups = world.group_names();
     let bytes = film_bytes(scene.film.size, groups.len());
-    print_line(&format!("{}: valid", args.scene.display()));
-    print_line(&format!("  contains  {}", world.inventory()));
-    print_line(&format!("  picture   {width} x {height} pixels"));
-    print_line(&format!("  lights    {} separate: {}", groups.len(), groups.join(", ")));
-    print_line(&format!("  memory    {:.0} MB for the samples", (bytes as f64 * 1e-6).max(1.0)));
+    print_line(&format!("{}: valid", args.scene.display()))?;
+    print_line(&format!("  contains  {}", world.inventory()))?;
+    print_line(&format!("  picture   {width} x {height} pixels"))?;
+    print_line(&format!("  lights    {} separate: {}", groups.len(), groups.join(", ")))?;
+    print_line(&format!("  memory    {:.0} MB for the samples", (bytes as f64 * 1e-6).max(1.0)))?;
     for bias in world.biases() {
-        print_line(&format!("  biased    {bias}"));
+        print_line(&format!("  biased    {bias}"))?;
     }
     Ok(())
 }

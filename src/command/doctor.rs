@@ -46,7 +46,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
         unsaved_files: state.as_deref().map(kept_in).unwrap_or_default(),
         state,
     };
-    print_line(&report.report());
+    print_line(&report.report())?;
     Ok(())
 }
 

@@ -6,6 +6,7 @@ use crate::command::load_progress::LoadReporter;
 use crate::command::{Failure, print_line, warn};
 use crate::dashboard::message::Exported;
 use crate::dashboard::run::{Colors, DEFAULT_STOP, Setup, run as run_dashboard};
+use crate::disk::open_regular;
 use crate::film::Display;
 use crate::render::Options;
 use crate::render::schedule::{Criterion, Settings};
@@ -15,7 +16,6 @@ use crate::terminal::Environment;
 use crate::value::sanitized;
 use crate::world;
 use std::env;
-use std::fs::File;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -68,7 +68,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let ended = run_dashboard(setup).map_err(|error| Failure::Failed(error.to_string()))?;
     for exported in &ended.exported {
         match exported {
-            Ok(exported) => print_line(&summary(exported)),
+            Ok(exported) => print_line(&summary(exported))?,
             Err(reason) => warn(reason),
         }
     }
@@ -97,25 +97,26 @@ fn open(
             }
             Ok(Ok(file))
         }
-        Err(errors) => {
-            let readable = File::open(path).and_then(|file| file.metadata());
-            match readable.is_ok_and(|metadata| metadata.is_file()) {
-                true => Ok(Err((path.to_path_buf(), errors))),
-                false => Err(Failure::Failed(errors.to_string() + &orphaned_edits(path, state))),
-            }
-        }
+        Err(errors) => match open_regular(path).is_ok() {
+            true => Ok(Err((path.to_path_buf(), errors))),
+            false => Err(Failure::Failed(errors.to_string() + &orphaned_edits(path, state))),
+        },
     }
 }
 
-/// Returns a hint at unsaved edits of a scene whose file is gone. Returns an empty string if there
-/// are none.
+/// Returns a hint at unsaved edits of a scene whose file is gone, and at those of other users.
+/// Returns an empty string if there are none.
 fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     let found = Recovery::new(Some(path), "", state).find();
-    let hint = |path: &Path| {
+    let hint = |path: &Path, of: String| {
         let path = sanitized(&path.display().to_string());
-        format!("\nUnsaved edits of it are kept in {path}, which is a scene file itself.")
+        format!("\nUnsaved edits{of} are kept in {path}, which is a scene file itself.")
     };
-    found.orphans.first().map_or(String::new(), |lost| hint(lost.path()))
+    match (found.orphans.first(), found.foreign.first()) {
+        (Some(lost), _) => hint(lost.path(), " of it".to_string()),
+        (None, Some((path, user))) => hint(path, format!(" of user {}", sanitized(user))),
+        (None, None) => String::new(),
+    }
 }
 
 /// Formats a line about an exported picture:

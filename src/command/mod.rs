@@ -15,12 +15,14 @@ mod stats;
 
 pub use cpu::require as require_cpu;
 
+use crate::disk;
 use crate::value::sanitized;
 use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use std::ffi::OsString;
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -34,7 +36,7 @@ enum Failure {
     /// Exit status 2, with the message.
     Usage(String),
     /// The command was ended by a signal, after it saved the picture or the edits so far. The value
-    /// is the exit status: 129, 130 or 143.
+    /// is the exit status: 129, 130, 131 or 143.
     Signalled(u8),
 }
 
@@ -91,7 +93,9 @@ fn end(error: &clap::Error) -> ! {
         warn(error.render().to_string().trim_end());
         std::process::exit(error.exit_code());
     }
-    error.exit()
+    let printed = error.print();
+    let failed = printed.is_err_and(|error| error.kind() != std::io::ErrorKind::BrokenPipe);
+    std::process::exit(if failed { 1 } else { error.exit_code() })
 }
 
 /// Prints a line on stderr. Errors are ignored, so that a closed stderr is no failure.
@@ -99,9 +103,26 @@ fn warn(message: &str) {
     let _ = writeln!(std::io::stderr(), "{}", sanitized_lines(message));
 }
 
-/// Prints a line on stdout. Errors are ignored, so that a closed stdout is no failure.
-fn print_line(message: &str) {
-    let _ = writeln!(std::io::stdout(), "{}", sanitized_lines(message));
+/// Prints a line on stdout. A reader that has closed the pipe, such as `head`, is no failure.
+fn print_line(message: &str) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    let printed = writeln!(stdout, "{}", sanitized_lines(message)).and_then(|()| stdout.flush());
+    match printed {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::Failed(format!("cannot write to stdout: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes a file of results. An existing file is replaced in one step.
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    disk::write(path, bytes).map_err(|error| Failure::Failed(error.to_string()))
+}
+
+/// Checks before the work that the file of results at `path` can be written.
+fn check_file(path: &Path) -> Result<(), Failure> {
+    disk::check_writable(path).map_err(|error| Failure::Failed(error.to_string()))
 }
 
 /// Escapes control characters in the lines of `message`, which may contain file names.

@@ -5,8 +5,9 @@ use crate::command::load_progress::LoadReporter;
 use crate::command::progress::Progress;
 use crate::command::signals::Signals;
 use crate::command::stats::{Stats, peak_rss_bytes};
-use crate::command::{Failure, print_line, warn};
-use crate::film::{Depth, ImageOutput, WriteError};
+use crate::command::{Failure, check_file, print_line, warn, write_file};
+use crate::disk::WriteError;
+use crate::film::{Depth, ImageOutput};
 use crate::render::Options;
 use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};
@@ -59,7 +60,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         .ok_or_else(|| Failure::Failed("the renderer has no picture".to_string()))?;
     written.map_err(failed_write)?;
     let write_seconds = writing.elapsed().as_secs_f64();
-    print_line(&summary(output.path(), size, &report, end));
+    let printed = print_line(&summary(output.path(), size, &report, end));
 
     if let Some(path) = &args.stats {
         let stats = Stats {
@@ -99,8 +100,9 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
                 End::Signal(_) => "signal",
             },
         };
-        stats.write(path).map_err(Failure::Failed)?;
+        write_file(path, stats.json().as_bytes())?;
     }
+    printed?;
     match end {
         End::Done(_) => Ok(()),
         End::Signal(status) => Err(Failure::Signalled(status)),
@@ -176,15 +178,7 @@ fn check_stats_path(path: &Path, output: &Path) -> Result<(), Failure> {
         let path = path.display();
         return Err(Failure::Usage(format!("--stats and --output name the same file, {path}")));
     }
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let what = if path.is_dir() {
-        "it is a directory"
-    } else if !parent.is_dir() {
-        "its directory does not exist"
-    } else {
-        return Ok(());
-    };
-    Err(Failure::Failed(format!("cannot write {}: {what}", path.display())))
+    check_file(path)
 }
 
 fn options(args: &RenderArgs) -> Options {

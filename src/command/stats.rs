@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 use std::fs;
-use std::path::Path;
 
 /// Contents of the JSON file. The keys must not change, because scripts rely on them.
 #[derive(Debug, Serialize)]
@@ -61,11 +60,9 @@ pub struct Stats {
 }
 
 impl Stats {
-    /// Writes the JSON file at `path`.
-    pub fn write(&self, path: &Path) -> Result<(), String> {
-        let json = serde_json::to_string_pretty(self).expect("plain numbers and strings");
-        let shown = path.display();
-        fs::write(path, json + "\n").map_err(|e| format!("cannot write {shown}: {e}"))
+    /// Returns the statistics as JSON.
+    pub fn json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("plain numbers and strings") + "\n"
     }
 }
 

@@ -38,7 +38,7 @@ pub use invalid::{INVALID_REMEMBERED, InvalidSample, InvalidSamples};
 pub use light_weights::{LightWeights, Replicates};
 pub use linear_image::LinearImage;
 pub use noise::{Estimator, Mse, Noise, TileNoise};
-pub use output::{ImageOutput, WriteError};
+pub use output::ImageOutput;
 pub use png::png_of_rgb;
 pub use png_read::read_png;
 pub use probe::Probe;

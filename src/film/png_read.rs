@@ -1,7 +1,7 @@
 //! PNG reader for the image viewer.
 
+use crate::disk::open_regular;
 use png::{ColorType, Decoder, Transformations};
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -14,7 +14,7 @@ const MAX_PIXELS: u64 = 1 << 26;
 /// # Errors
 /// Fails if the file cannot be read or is too large.
 pub fn read_png(path: &Path) -> Result<([usize; 2], Vec<[u8; 3]>), String> {
-    let file = File::open(path).map_err(|error| error.to_string())?;
+    let file = open_regular(path).map_err(|error| error.to_string())?;
     let mut decoder = Decoder::new(BufReader::new(file));
     decoder.set_transformations(Transformations::EXPAND | Transformations::STRIP_16);
     let mut reader = decoder.read_info().map_err(|error| error.to_string())?;

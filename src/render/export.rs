@@ -1,7 +1,8 @@
 //! Export of pictures with metadata about their origin. Equal pictures have equal metadata, which
 //! therefore holds no dates, times or numbers of threads.
 
-use crate::film::{Depth, Display, ImageData, ImageOutput, Tone, WriteError};
+use crate::disk::WriteError;
+use crate::film::{Depth, Display, ImageData, ImageOutput, Tone};
 use crate::render::render_state::RenderState;
 use crate::render::session::Report;
 use crate::sampling::SamplerKind;

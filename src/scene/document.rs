@@ -1,11 +1,14 @@
 //! Scene documents: the text of a scene file with its comments, and the scene that it describes.
 
 use crate::asset::Assets;
+use crate::disk::open_regular;
 use crate::scene::diagnostic::{Diagnostic, SceneErrors};
 use crate::scene::format::migrate::{FormerWord, write_present};
 use crate::scene::format::patch::rewrite;
 use crate::scene::format::read::{SourceScene, read_text};
 use crate::scene::{AssetResolver, Scene};
+use std::fs::File;
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 use toml_edit::DocumentMut;
@@ -43,8 +46,22 @@ impl Document {
     /// # Errors
     /// As [`Scene::read`].
     pub fn read_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
+        Self::read_opened(path, assets, |path| File::open(path))
+    }
+
+    /// Reads and validates the scene in the regular file at `path`. Other files are refused without
+    /// waiting for their content.
+    pub(super) fn read_regular(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
+        Self::read_opened(path, assets, open_regular)
+    }
+
+    fn read_opened(
+        path: &Path,
+        assets: Arc<Assets>,
+        open: impl Fn(&Path) -> io::Result<File>,
+    ) -> Result<Self, SceneErrors> {
         let name = path.display().to_string();
-        read_text(path)
+        read_text(path, open)
             .and_then(|text| Self::parse_in(text, &name, AssetResolver::new(path, assets)))
     }
 

@@ -1,11 +1,10 @@
 //! Scene files on disk: opening, atomic saving, detection of changes by other programs.
 
 use crate::asset::Assets;
-use crate::scene::recovery::{TEMPORARY, lock};
+use crate::disk::{Existing, Replacement, WriteError, open_regular};
 use crate::scene::{Document, Scene, SceneErrors};
 use crate::value::{fnv1a64, sanitized};
 use std::fmt;
-use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -24,7 +23,7 @@ pub struct SceneFile {
 pub enum DiskState {
     /// The file has these bytes, or the scene has no file yet.
     Unchanged,
-    /// Another program has written the file, or the file is no longer readable.
+    /// Another program has written the file, or the file is no longer a readable regular file.
     Changed,
     /// The file has been deleted or moved.
     Missing,
@@ -70,7 +69,7 @@ impl fmt::Display for SaveError {
 impl std::error::Error for SaveError {}
 
 impl SceneFile {
-    /// Reads and validates the scene file at `path`.
+    /// Reads and validates the scene file at `path`, which must be a regular file.
     ///
     /// # Errors
     /// As [`Scene::read`].
@@ -84,7 +83,7 @@ impl SceneFile {
     /// # Errors
     /// As [`Scene::read`].
     pub fn open_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
-        let document = Document::read_with(path, assets)?;
+        let document = Document::read_regular(path, assets)?;
         let fingerprint = fnv1a64(document.text().as_bytes());
         Ok(Self { path: Some(path.to_path_buf()), document, fingerprint })
     }
@@ -151,11 +150,14 @@ impl SceneFile {
 
     /// Reads the file and compares it with the bytes that this program last read or wrote.
     pub fn on_disk(&self) -> DiskState {
-        match self.path.as_deref().map(content) {
-            None => DiskState::Unchanged,
-            Some(Ok(Some(found))) if found == self.fingerprint => DiskState::Unchanged,
-            Some(Ok(None)) => DiskState::Missing,
-            Some(_) => DiskState::Changed,
+        self.path.as_deref().map_or(DiskState::Unchanged, |path| self.state_of(&content(path)))
+    }
+
+    fn state_of(&self, found: &io::Result<Option<u64>>) -> DiskState {
+        match found {
+            Ok(Some(found)) if *found == self.fingerprint => DiskState::Unchanged,
+            Ok(None) => DiskState::Missing,
+            _ => DiskState::Changed,
         }
     }
 
@@ -178,10 +180,18 @@ impl SceneFile {
     ///
     /// # Errors
     /// If there is no file yet, if another program has written the file (unless `overwrite` is
-    /// `true`), or if the file cannot be written.
+    /// `true`), if the path leads to something other than a regular file, or if the file cannot be
+    /// written.
     pub fn save(&mut self, scene: &Scene, overwrite: bool) -> Result<(), SaveError> {
         let Some(path) = self.path.clone() else { return Err(SaveError::Untitled) };
-        if !overwrite && self.on_disk() == DiskState::Changed {
+        let found = content(&path);
+        if let Err(error) = &found
+            && error.kind() == ErrorKind::InvalidInput
+        {
+            let what = format!("{error}; save under another name");
+            return Err(SaveError::Failed { path, what });
+        }
+        if !overwrite && self.state_of(&found) == DiskState::Changed {
             return Err(SaveError::Changed(path));
         }
         let mut document = self.document.clone();
@@ -225,14 +235,16 @@ impl SceneFile {
 }
 
 /// Returns the fingerprint of the file's content; `None` if there is no file.
+///
+/// # Errors
+/// [`ErrorKind::InvalidInput`] if the path leads to something other than a regular file.
 fn content(path: &Path) -> io::Result<Option<u64>> {
-    match File::open(path) {
-        Ok(file) if file.metadata()?.is_file() => {
+    match open_regular(path) {
+        Ok(file) => {
             let mut bytes = Vec::new();
             file.take(1 << 30).read_to_end(&mut bytes)?;
             Ok(Some(fnv1a64(&bytes)))
         }
-        Ok(_) => Err(ErrorKind::InvalidInput.into()),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error),
     }
@@ -240,75 +252,17 @@ fn content(path: &Path) -> io::Result<Option<u64>> {
 
 /// Replaces the content of `path` by `text` atomically and durably.
 fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
-    let failed = |what: String| SaveError::Failed { path: path.to_path_buf(), what };
-    // A symbolic link stays a link: its target is replaced.
-    let is_link = path.symlink_metadata().is_ok_and(|m| m.file_type().is_symlink());
-    let file = match is_link.then(|| fs::canonicalize(path)) {
-        Some(Ok(real)) => real,
-        Some(Err(_)) => return Err(failed("it is a symbolic link without a target".to_string())),
-        None => path.to_path_buf(),
-    };
-    let existing = fs::metadata(&file).ok();
-    if let Some(existing) = &existing {
-        if !existing.is_file() {
-            return Err(failed("it is not a regular file; name another one".to_string()));
-        }
-        if !overwrite {
-            return Err(SaveError::Exists(path.to_path_buf()));
-        }
-        if existing.permissions().readonly() {
-            let what = "it is read-only; make it writable or save under another name";
-            return Err(failed(what.to_string()));
-        }
-    }
-    let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty());
-    let directory = parent.unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    let [prefix, suffix] = TEMPORARY;
-    builder.prefix(prefix).suffix(suffix);
-    // An existing file keeps its permissions; a new file gets the permissions that the umask
-    // leaves.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    let written = builder.tempfile_in(directory).and_then(|mut temporary| {
-        lock(&temporary);
-        if let Some(existing) = &existing {
-            temporary.as_file().set_permissions(existing.permissions())?;
-        }
-        temporary.write_all(text.as_bytes())?;
-        temporary.as_file().sync_all()?;
-        Ok(temporary)
+    let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
+    let written = Replacement::begin(path, existing).and_then(|mut replacement| {
+        let written = replacement.temporary().write_all(text.as_bytes());
+        written.map_err(|error| replacement.explain(&error))?;
+        replacement.commit()
     });
-    let explained = |error: io::Error| failed(explain(&error, directory));
-    let temporary = written.map_err(explained)?;
-    // The file is not overwritten even if it was created in the meantime.
-    let persisted =
-        if overwrite { temporary.persist(&file) } else { temporary.persist_noclobber(&file) };
-    persisted.map_err(|e| match e.error.kind() {
+    written.map_err(|WriteError { kind, what, remedy, .. }| match kind {
         ErrorKind::AlreadyExists => SaveError::Exists(path.to_path_buf()),
-        _ => explained(e.error),
-    })?;
-    // Makes the new name durable. Not every system allows a directory to be synced.
-    if let Ok(directory) = File::open(directory) {
-        let _ = directory.sync_all();
-    }
-    Ok(())
-}
-
-fn explain(error: &io::Error, directory: &Path) -> String {
-    let directory = sanitized(&directory.display().to_string());
-    match error.kind() {
-        ErrorKind::NotFound => format!("the directory {directory} does not exist; create it first"),
-        ErrorKind::NotADirectory => format!("{directory} is not a directory"),
-        ErrorKind::PermissionDenied => {
-            format!("no permission to write in the directory {directory}; save somewhere else")
-        }
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-            format!("no space is left in {directory}")
-        }
-        _ => error.to_string(),
-    }
+        _ => SaveError::Failed {
+            path: path.to_path_buf(),
+            what: sanitized(&format!("{what}; {remedy}")),
+        },
+    })
 }

@@ -103,7 +103,7 @@ fn failed_saves_give_the_cause() {
     let error = file.save_as(&missing, &scene, false).unwrap_err().to_string();
     assert!(error.contains("does not exist; create it first"), "{error}");
     let error = file.save_as(directory.path(), &scene, true).unwrap_err().to_string();
-    assert!(error.contains("not a regular file"), "{error}");
+    assert!(error.contains("it is a directory; add a file name"), "{error}");
     let mut permissions = fs::metadata(&path).unwrap().permissions();
     permissions.set_readonly(true);
     fs::set_permissions(&path, permissions).unwrap();
@@ -126,4 +126,24 @@ fn saving_keeps_links_and_permissions() {
     assert!(link.symlink_metadata().unwrap().file_type().is_symlink());
     assert!(fs::read_to_string(&path).unwrap().ends_with("depth = 3\n"));
     assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o640);
+}
+
+/// A pipe without another end would block whoever opens it.
+#[test]
+fn pipe_in_place_of_the_file_is_refused_without_blocking() {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    let directory = tempfile::tempdir().unwrap();
+    let (path, mut file) = opened(directory.path());
+    fs::remove_file(&path).unwrap();
+    mknodat(CWD, &path, FileType::Fifo, Mode::from_raw_mode(0o600), 0).unwrap();
+    assert_eq!(file.on_disk(), DiskState::Changed);
+    for overwrite in [false, true] {
+        let error = file.save(&edited(&file, 3), overwrite).unwrap_err().to_string();
+        assert!(error.contains("it is a pipe, not a regular file; save under"), "{error}");
+    }
+    assert!(file.reload().unwrap_err().to_string().contains("it is a pipe"));
+    assert!(SceneFile::open(&path).is_err());
+    assert_eq!(file.document().text(), BUILT_IN);
+    let other = directory.path().join("other.toml");
+    file.save_as(&other, &edited(&file, 3), false).unwrap();
 }

@@ -6,10 +6,12 @@
 //! orphan of a process that was killed. The lock is taken before the file gets its name, so that
 //! other processes never see the file of a running process unlocked.
 
+use crate::disk::{TEMPORARY, is_own, lock, open_regular_with, user_name};
 use crate::value::fnv1a64;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, DirBuilder, File, Metadata, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 use tempfile::NamedTempFile;
@@ -23,8 +25,6 @@ const MAX_BYTES: u64 = 64 << 20;
 const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
 /// Word in place of the fingerprint if the scene had no file.
 const NO_FILE: &str = "none";
-/// Prefix and suffix of the names of temporary files.
-pub(super) const TEMPORARY: [&str; 2] = [".zerkalo-", ".tmp"];
 /// Age above which an unlocked temporary file is removed.
 const STALE_AFTER: Duration = Duration::from_secs(60);
 
@@ -50,6 +50,8 @@ pub struct RecoveryFile {
     pub orphans: Vec<Orphan>,
     /// Recovery files that cannot be read, each with the reason. These files stay on disk.
     pub unreadable: Vec<(PathBuf, String)>,
+    /// Recovery files of other users, each with the user's name or number. They are not read.
+    pub foreign: Vec<(PathBuf, String)>,
     /// `true` if another running process has unsaved edits of the scene.
     pub elsewhere: bool,
 }
@@ -143,7 +145,8 @@ impl Recovery {
         }
     }
 
-    /// Finds the orphaned edits of the scene. Empty files are removed.
+    /// Finds the orphaned edits of the scene. Empty files are removed. Files of other users are not
+    /// read: their content is not this user's work.
     pub fn find(&self) -> RecoveryFile {
         let mut found = RecoveryFile::default();
         for (folder, name) in &self.candidates {
@@ -153,9 +156,10 @@ impl Recovery {
                     continue;
                 }
                 match read_orphan(&path) {
-                    Ok(Some(lost)) if lost.text.trim().is_empty() => lost.kept.remove(),
-                    Ok(Some(lost)) => found.orphans.push(lost),
-                    Ok(None) => {}
+                    Ok(Found::Orphan(lost)) if lost.text.trim().is_empty() => lost.kept.remove(),
+                    Ok(Found::Orphan(lost)) => found.orphans.push(lost),
+                    Ok(Found::OfUser(id)) => found.foreign.push((path, user_name(id))),
+                    Ok(Found::Nothing) => {}
                     Err(error) if error.kind() == ErrorKind::WouldBlock => found.elsewhere = true,
                     Err(error) => found.unreadable.push((path, error.to_string())),
                 }
@@ -200,15 +204,8 @@ impl Saved {
     }
 }
 
-#[cfg(unix)]
 fn is_same(a: &Metadata, b: &Metadata) -> bool {
-    use std::os::unix::fs::MetadataExt;
     (a.dev(), a.ino()) == (b.dev(), b.ino())
-}
-
-#[cfg(not(unix))]
-fn is_same(a: &Metadata, b: &Metadata) -> bool {
-    a.created().ok() == b.created().ok()
 }
 
 /// Returns `name` for the number 1, `name-2` for 2, `name-3` for 3.
@@ -218,11 +215,6 @@ fn numbered(name: &OsStr, number: u32) -> OsString {
         name.push(format!("-{number}"));
     }
     name
-}
-
-/// Locks a temporary file for the life of this process. File systems without locks are tolerated.
-pub(super) fn lock(temporary: &NamedTempFile) {
-    let _ = temporary.as_file().try_lock();
 }
 
 /// Creates a locked temporary file in `folder` with the content `text`, readable by the user only.
@@ -261,36 +253,53 @@ fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved>
 /// Opens the file at `path` for reading and for writing; some file systems grant a lock only on a
 /// file that is open for writing.
 fn open(path: &Path) -> io::Result<File> {
-    File::options().read(true).write(true).open(path)
+    open_regular_with(File::options().read(true).write(true), path)
 }
 
-/// Returns the orphaned edits in the file at `path`; `None` if there is no such file.
+/// Result of opening a recovery file.
+enum Found {
+    /// There is no such file.
+    Nothing,
+    /// The file belongs to the user with this number.
+    OfUser(u32),
+    Orphan(Orphan),
+}
+
+/// Reads the orphaned edits in the file at `path`.
 ///
 /// # Errors
 /// [`ErrorKind::WouldBlock`] if a running process holds the lock; any other error if the file
 /// cannot be read.
-fn read_orphan(path: &Path) -> io::Result<Option<Orphan>> {
+fn read_orphan(path: &Path) -> io::Result<Found> {
+    let folder = path.parent().unwrap_or(Path::new("."));
     // Another process may replace the file after it was opened here: then the new file is read.
     for _ in 0..5 {
-        // The type is checked before opening, since opening a pipe can block forever.
+        // The type is checked before opening, because symbolic links are not followed.
         match fs::symlink_metadata(path) {
-            Ok(metadata) if metadata.is_file() => {}
-            Ok(_) => return Err(io::Error::other("it is not a regular file")),
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            Ok(metadata) if !metadata.is_file() => {
+                return Err(io::Error::other("it is not a regular file"));
+            }
+            Ok(metadata) if !is_own(&metadata, folder) => return Ok(Found::OfUser(metadata.uid())),
+            Ok(_) => {}
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::Nothing),
             Err(error) => return Err(error),
         }
         let kept = match open(path) {
             Ok(file) => Saved { path: path.to_path_buf(), file },
-            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::Nothing),
             Err(error) => return Err(error),
         };
+        let metadata = kept.file.metadata()?;
+        if !is_own(&metadata, folder) {
+            return Ok(Found::OfUser(metadata.uid()));
+        }
         match kept.file.try_lock() {
             Err(TryLockError::WouldBlock) => return Err(ErrorKind::WouldBlock.into()),
             // File systems without locks report an error: the file counts as unlocked.
             Ok(()) | Err(TryLockError::Error(_)) => {}
         }
         if kept.has_its_name() {
-            return read(kept).map(Some);
+            return read(kept).map(Found::Orphan);
         }
     }
     Err(ErrorKind::WouldBlock.into())

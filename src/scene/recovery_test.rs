@@ -220,3 +220,22 @@ fn only_old_unlocked_temporary_files_are_removed() {
     );
     remove_stale(&folder.path().join("nowhere"));
 }
+
+/// Only the superuser can give a file to another user.
+#[test]
+fn recovery_file_of_another_user_is_not_offered() {
+    use std::os::unix::fs::chown;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.toml");
+    let hidden = folder.path().join(".a.toml.unsaved");
+    fs::write(&hidden, "theirs").unwrap();
+    assert_eq!(texts(&of(&path).find()), ["theirs"]);
+    if chown(&hidden, Some(4321), None).is_err() {
+        return;
+    }
+    let found = of(&path).find();
+    assert!(found.orphans.is_empty());
+    let [(at, user)] = &found.foreign[..] else { panic!("{found:?}") };
+    assert_eq!((at.file_name(), user.as_str()), (hidden.file_name(), "4321"));
+    assert_eq!(fs::read_to_string(&hidden).unwrap(), "theirs");
+}

@@ -62,6 +62,11 @@ and every key with a default may be left out. Unknown keys are errors.
   square lobe has a square base of the same area, with the side sqrt(pi) x roughness; the microfacet
   lobes have the slope of equal second moment, `alpha` = roughness / (2 sqrt 2), unless `alpha` is
   given. So a change of the lobe keeps the blur comparable.
+- A scene may name any file that its reader may read: a name is relative to the folder of the scene
+  file, and `..`, absolute paths and symbolic links are followed, as in a shell. Only regular files
+  are read, so that no device or pipe blocks; their content goes into the picture and into messages
+  only. A file that a mesh file names in turn lies in the folder of that mesh file or below: such a
+  name has no `..`, is not absolute, and is no URL.
 - A light with falloff `none` gives a white matt surface that faces it the radiance `intensity` at any
   distance. With `inverse-square` the intensity is a radiant intensity [W/sr]: the
   irradiance is intensity x cosine / distance squared.

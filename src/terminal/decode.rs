@@ -10,7 +10,8 @@
 //!   string. The decoder passes ESC on only together with a byte that proves a sequence.
 //! - `ESC O c` (SS3), `ESC [ [ c` (Linux console) and `ESC [ M b x y` (X10 mouse) have further
 //!   bytes after the byte that `vte` takes for the final one.
-//! - Pasted text may hold any bytes.
+//! - Pasted text may hold any bytes, and it may pause. Only its end sequence ends it. After a pause
+//!   Escape and Ctrl-C end it too, in case that the end sequence was lost.
 //! - `vte` discards the data of APC strings (`ESC _`), in which kitty replies. The decoder passes
 //!   them on as DCS strings (`ESC P`).
 //! - `vte` ends a DCS string at the byte 9C, which is also part of UTF-8 characters such as Ü.
@@ -27,13 +28,15 @@ use std::time::Duration;
 const INTRODUCER_WAIT: Duration = Duration::from_millis(500);
 /// Longest pause inside any other sequence but pasted text.
 const SEQUENCE_WAIT: Duration = Duration::from_secs(2);
-/// Longest pause inside pasted text.
+/// Pause inside pasted text after which the text so far is reported. The bytes after the pause are
+/// still pasted text.
 const PASTE_WAIT: Duration = Duration::from_secs(10);
 /// Largest number of bytes of a string that are kept. Further bytes are skipped.
 const MAX_STRING: usize = 4096;
 /// Largest number of bytes of pasted text that are kept. Further bytes are skipped.
 const MAX_PASTE: usize = 1 << 20;
 
+const ETX: u8 = 0x03;
 const ESC: u8 = 0x1b;
 const BEL: u8 = 0x07;
 const CAN: u8 = 0x18;
@@ -62,6 +65,8 @@ enum State {
     /// After ESC inside a string that started with ESC and this byte.
     StringEscape(u8),
     Paste,
+    /// Inside pasted text of which a part was reported after a pause.
+    PausedPaste,
 }
 
 /// Decoder of terminal input. The caller measures time: if no byte comes within
@@ -113,6 +118,8 @@ impl Decoder {
             State::Escape => Some(self.escape_wait),
             State::Introducer(_) => Some(INTRODUCER_WAIT),
             State::Paste => Some(PASTE_WAIT),
+            State::PausedPaste if self.taken.is_empty() => None,
+            State::PausedPaste => Some(INTRODUCER_WAIT),
             _ => Some(SEQUENCE_WAIT),
         }
     }
@@ -124,7 +131,10 @@ impl Decoder {
                 self.escape_given_up = true;
                 self.interpreter.press(Key::plain(Code::Esc));
             }
-            State::Paste => self.end_paste(),
+            State::Paste | State::PausedPaste => {
+                self.pause_paste();
+                return std::mem::take(&mut self.interpreter.events);
+            }
             _ => self.abandon(),
         }
         self.restart();
@@ -133,7 +143,7 @@ impl Decoder {
 
     fn byte(&mut self, byte: u8) {
         match (self.state, byte) {
-            (State::Paste, _) => self.paste(byte),
+            (State::Paste | State::PausedPaste, _) => self.paste(byte),
             (State::Ground, ESC) => {
                 self.restart();
                 self.state = State::Escape;
@@ -277,6 +287,25 @@ impl Decoder {
     fn end_paste(&mut self) {
         let text = String::from_utf8_lossy(&self.taken).into_owned();
         self.complete(Some(Event::Paste(text)));
+    }
+
+    /// Reports the pasted text so far after a pause. Escape or Ctrl-C, pressed after an earlier
+    /// pause, ends the paste.
+    fn pause_paste(&mut self) {
+        let is_paused = self.state == State::PausedPaste;
+        let key = self.taken.pop_if(|last| is_paused && [ESC, ETX].contains(last));
+        if !self.taken.is_empty() {
+            self.end_paste();
+        }
+        self.restart();
+        match key {
+            Some(ESC) => {
+                self.escape_given_up = true;
+                self.interpreter.press(Key::plain(Code::Esc));
+            }
+            Some(key) => self.byte(key),
+            None => self.state = State::PausedPaste,
+        }
     }
 
     /// Reports the key Alt-`[`, Alt-`O` or the like if the incomplete sequence consists of an

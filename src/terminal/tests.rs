@@ -283,10 +283,40 @@ fn pasted_text_produces_no_keys() {
     let pasted = all_at_once(&format!("\x1b[200~{long}\x1b[201~x"));
     assert!(matches!(&pasted[0], Event::Paste(kept) if kept.len() == 1 << 20));
     assert_eq!(keys(&pasted[1..]), ["x"]);
-    // A paste whose end never comes is reported after a pause.
+}
+
+#[test]
+fn paste_with_a_pause_stays_a_paste() {
     let mut decoder = Decoder::new(WAIT);
+    let paste = |text: &str| Event::Paste(text.into());
     assert_eq!(decoder.take(b"\x1b[200~half"), []);
-    assert_eq!(decoder.give_up(), [Event::Paste("half".into())]);
+    assert_eq!(decoder.give_up(), [paste("half")]);
+    // The connection may be silent for any time.
+    assert_eq!(decoder.patience(), None);
+    assert_eq!(decoder.take(b"]]]\x03dq\x1b["), []);
+    assert!(decoder.patience().is_some());
+    let rest = decoder.take(b"201~x");
+    assert_eq!(rest[0], paste("]]]\x03dq"));
+    assert_eq!(keys(&rest[1..]), ["x"]);
+    assert_eq!(keys(&decoder.take(b"y")), ["y"]);
+}
+
+#[test]
+fn escape_and_interrupt_end_a_paste_without_end() {
+    for (byte, key) in [(b"\x1b", "Esc"), (b"\x03", "Ctrl-c")] {
+        let mut decoder = Decoder::new(WAIT);
+        decoder.take(b"\x1b[200~half");
+        // Before a pause they are pasted text.
+        assert_eq!(decoder.take(byte), []);
+        assert!(matches!(&decoder.give_up()[..], [Event::Paste(_)]), "{key}");
+        assert_eq!(decoder.take(b"q"), []);
+        assert_eq!(decoder.give_up(), [Event::Paste("q".into())]);
+        assert_eq!(decoder.take(byte), []);
+        assert_eq!(keys(&decoder.give_up()), [key]);
+        assert_eq!(keys(&decoder.take(b"q")), ["q"], "{key}");
+        // The end that comes late after all is no key.
+        assert_eq!(keys(&decoder.take(b"\x1b[201~q")), ["q"], "{key}");
+    }
 }
 
 #[test]

@@ -169,6 +169,25 @@ fn scenes_read_regular_files_only() {
     }
 }
 
+/// The rule stands in docs/scene-format.md.
+#[test]
+#[cfg(unix)]
+fn scenes_name_files_anywhere() {
+    let desk = Desk::new();
+    fs::create_dir(desk.path("scenes")).unwrap();
+    let mesh = desk.path("m.obj");
+    fs::write(&mesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    std::os::unix::fs::symlink(&mesh, desk.path("scenes/link.obj")).unwrap();
+    for name in ["../m.obj", "link.obj", mesh.to_str().unwrap()] {
+        let scene = format!(
+            "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
+        );
+        fs::write(desk.path("scenes/mesh.toml"), scene).unwrap();
+        let run = desk.run(&["check", "scenes/mesh.toml"]);
+        assert_eq!(run.status, 0, "{name}: {}", run.err);
+    }
+}
+
 /// Files that a mesh file names must be in its own folder or below.
 #[test]
 fn files_named_by_meshes_stay_in_their_folder() {

@@ -1,6 +1,8 @@
 //! The command line as users and scripts use it.
 
 mod hostile;
+#[cfg(unix)]
+mod outputs;
 mod refusals;
 #[cfg(unix)]
 mod signals;

@@ -44,7 +44,7 @@ fn failures_have_status_1_a_located_message_and_leave_the_old_picture() {
         (&["render", "scene.toml", "-o", "file/a.png"], "file"),
         (&["render", "scene.toml", "-o", "old.png", "--stats", "none/s.json"], "none"),
         (&["check", "bad.toml"], "bad.toml:21:"),
-        (&["new", "scene.toml"], "scene.toml exists"),
+        (&["new", "scene.toml"], "scene.toml: there is such a file already"),
         (&["new", "none/a.toml"], "none"),
     ] {
         let run = desk.run(args);

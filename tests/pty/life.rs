@@ -27,7 +27,7 @@ fn built_in_scene_opens_and_quits() {
 #[test]
 fn signals_restore_the_terminal() {
     let fixture = Fixture::with_room();
-    for (name, expected) in [("TERM", 143), ("INT", 130), ("HUP", 129)] {
+    for (name, expected) in [("TERM", 143), ("INT", 130), ("HUP", 129), ("QUIT", 131)] {
         let terminal = fixture.open(&["room.toml"], [80, 24]);
         wait_for_picture(&terminal);
         signal(name, terminal.process_id());

@@ -6,7 +6,7 @@ mod table;
 
 use crate::command::args::MeasureArgs;
 use crate::command::signals::Signals;
-use crate::command::{Failure, print_line, warn};
+use crate::command::{Failure, check_file, print_line, warn, write_file};
 use crate::film::{self, Display};
 use crate::measure::{self, Experiment, Plan, Reference};
 use crate::scene::Document;
@@ -23,6 +23,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     if let Some(path) = &args.plot {
         drawing(path).map_err(Failure::Usage)?;
     }
+    [&args.json, &args.csv, &args.plot].into_iter().flatten().try_for_each(|p| check_file(p))?;
     let document = Document::read(&args.scene).map_err(|e| failed(e.to_string()))?;
     for warning in document.warnings() {
         warn(&format!("warning: {warning}"));
@@ -68,16 +69,17 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
 
     let about =
         table::About { scene: &args.scene, threads, lanes, single, measurement: &measurement };
-    print_line(&about.to_string());
+    let printed = print_line(&about.to_string());
     if let Some(path) = &args.json {
-        write(path, &data::json(&about))?;
+        write_file(path, &data::json(&about))?;
     }
     if let Some(path) = &args.csv {
-        write(path, &data::csv(&measurement))?;
+        write_file(path, &data::csv(&measurement))?;
     }
     if let Some(path) = &args.plot {
         plot(path, &about)?;
     }
+    printed?;
     match signals.caught() {
         Some(status) => Err(Failure::Signalled(status)),
         None => Ok(()),
@@ -108,12 +110,7 @@ fn plot(path: &Path, about: &table::About) -> Result<(), Failure> {
         }),
     };
     let bytes = drawn.map_err(|e| Failure::Failed(format!("cannot draw: {e}")))?;
-    write(path, &bytes)
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    std::fs::write(path, bytes)
-        .map_err(|e| Failure::Failed(format!("cannot write {}: {e}", path.display())))
+    write_file(path, &bytes)
 }
 
 /// Reads the reference picture from an EXR file.

@@ -123,7 +123,7 @@ impl Autosave {
             .into_iter()
             .flatten()
             .for_each(remove_stale);
-        let RecoveryFile { mut orphans, unreadable, elsewhere } = self.recovery.find();
+        let RecoveryFile { mut orphans, unreadable, foreign, elsewhere } = self.recovery.find();
         let mut messages: Vec<_> = unreadable
             .iter()
             .map(|(path, why)| {
@@ -131,6 +131,10 @@ impl Autosave {
                 Message::Warning(format!("unsaved edits in {path} cannot be read: {why}"))
             })
             .collect();
+        messages.extend(foreign.iter().map(|(path, user)| {
+            let [path, user] = [&path.display().to_string(), user].map(|text| sanitized(text));
+            Message::Warning(format!("{path} has unsaved edits of user {user}: not offered to you"))
+        }));
         if elsewhere {
             let text = "this scene is open elsewhere, with unsaved edits";
             messages.push(Message::Warning(text.to_string()));

@@ -1,8 +1,8 @@
 //! Measurement of input latency: the time from reading an input event until the frame that responds
 //! to the event has been written to the terminal.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use crate::disk;
+use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -127,14 +127,13 @@ impl LatencyRecorder {
     /// the event was read, the kind of response, and the latency in milliseconds. Events without
     /// response are left out.
     pub fn write(&self, path: &Path) -> io::Result<()> {
-        let mut file = BufWriter::new(File::create(path)?);
-        writeln!(file, "read_seconds,answer,milliseconds")?;
+        let mut table = "read_seconds,answer,milliseconds\n".to_string();
         for Answered { read, picture, after } in self.answered.iter().flatten() {
             let answer = if *picture { "picture" } else { "screen" };
             let (read, after) = (read.as_secs_f64(), 1e3 * after.as_secs_f64());
-            writeln!(file, "{read:.6},{answer},{after:.3}")?;
+            table += &format!("{read:.6},{answer},{after:.3}\n");
         }
-        file.flush()
+        disk::write(path, table.as_bytes()).map_err(io::Error::other)
     }
 
     /// Returns the lines of a summary: one for each kind of response, and one for the traffic.

@@ -4,7 +4,7 @@
 use crate::terminal::Tty;
 use crossbeam_channel::{Receiver, unbounded};
 use rustix::process::{Signal, getpid, kill_current_process_group, kill_process};
-use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGWINCH};
+use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGWINCH};
 use signal_hook::iterator;
 use std::io;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ pub(super) const HUNG_UP: u8 = (SIGNALLED + SIGHUP) as u8;
 /// Meaning of a signal for the event loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SignalEvent {
-    /// The program is to end with this exit status: 129, 130 or 143.
+    /// The program is to end with this exit status: 129, 130, 131 or 143.
     End(u8),
     /// The terminal may have a new size.
     Resized,
@@ -63,7 +63,7 @@ pub(super) enum StopTarget {
 /// before the terminal enters raw mode, because the default handlers would end the program without
 /// restoring it.
 pub(super) fn block() -> io::Result<iterator::Signals> {
-    iterator::Signals::new([SIGHUP, SIGINT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])
+    iterator::Signals::new([SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])
 }
 
 /// Starts the thread that handles signals. If the program is still running when `patience` has

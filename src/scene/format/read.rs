@@ -7,7 +7,7 @@ use crate::scene::format::source_map::{line_column, with_locations};
 use crate::scene::{AssetResolver, Scene};
 use serde::Deserialize;
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -26,7 +26,8 @@ impl Scene {
     /// right.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
         let resolver = AssetResolver::new(path, Arc::default());
-        read_text(path).and_then(|t| Self::parse_in(&t, &path.display().to_string(), resolver))
+        read_text(path, |path| File::open(path))
+            .and_then(|t| Self::parse_in(&t, &path.display().to_string(), resolver))
     }
 
     /// Parses and validates a scene from `text`. `name` is the file name in diagnostics; file names
@@ -116,8 +117,11 @@ impl<'a> SourceScene<'a> {
     }
 }
 
-/// Returns the text of the scene file at `path`.
-pub(crate) fn read_text(path: &Path) -> Result<String, SceneErrors> {
+/// Returns the text of the scene file at `path`, which `open` opens.
+pub(crate) fn read_text(
+    path: &Path,
+    open: impl Fn(&Path) -> io::Result<File>,
+) -> Result<String, SceneErrors> {
     let name = path.display().to_string();
     let fail = |found: &str, help: &str| SceneErrors::of_file(&name, found.to_string(), help);
     let io = |error: std::io::Error| match error.kind() {
@@ -127,9 +131,12 @@ pub(crate) fn read_text(path: &Path) -> Result<String, SceneErrors> {
         std::io::ErrorKind::PermissionDenied => {
             fail("permission to read the file is denied", "Check who may read it.")
         }
+        std::io::ErrorKind::InvalidInput => {
+            fail(&error.to_string(), "Expected a scene file (TOML).")
+        }
         _ => fail(&format!("the file cannot be read: {error}"), ""),
     };
-    let file = File::open(path).map_err(io)?;
+    let file = open(path).map_err(io)?;
     let metadata = file.metadata().map_err(io)?;
     if metadata.is_dir() {
         return Err(fail("this is a directory", "Expected a scene file (TOML)."));

@@ -1,0 +1,11 @@
+//! Files on disk: reading of regular files without waiting, replacement of files in one step, and
+//! the rule for symbolic links of other users.
+
+mod open;
+mod owner;
+mod replace;
+
+pub(crate) use open::open_regular_with;
+pub use open::{open_regular, require_regular};
+pub use owner::{is_own, user_name};
+pub use replace::{Existing, Replacement, TEMPORARY, WriteError, check_writable, lock, write};

@@ -1,0 +1,455 @@
+//! Replacement of files in one step: a failure leaves the old file unchanged.
+
+use crate::disk::{require_regular, user_name};
+use rustix::process::geteuid;
+use std::fmt;
+use std::fs::{self, File, Metadata, Permissions};
+use std::io::{self, ErrorKind, Write};
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// Prefix and suffix of the names of temporary files.
+pub const TEMPORARY: [&str; 2] = [".zerkalo-", ".tmp"];
+/// Largest number of symbolic links that are followed, as in Linux.
+const MAX_LINKS: usize = 40;
+
+/// Reason for which a file cannot be written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WriteError {
+    /// The requested file.
+    pub path: PathBuf,
+    /// Kind of the problem.
+    pub kind: ErrorKind,
+    /// Problem, as a clause of a sentence.
+    pub what: String,
+    /// Advice to the user, as a clause of a sentence.
+    pub remedy: String,
+}
+
+impl fmt::Display for WriteError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "cannot write {}: {}; {}", self.path.display(), self.what, self.remedy)
+    }
+}
+
+impl std::error::Error for WriteError {}
+
+/// Treatment of an existing file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Existing {
+    /// The file is replaced. If its path is a symbolic link, the link stays and its target is
+    /// replaced. The permissions stay.
+    Replace,
+    /// Writing fails, also if another program creates the file in the meantime.
+    Refuse,
+}
+
+/// New content of a file. It is written to a temporary file in the same folder, which gets the name
+/// of the file by [`Replacement::commit`]. The temporary file is removed when the value is dropped.
+#[derive(Debug)]
+pub struct Replacement {
+    /// Path as requested.
+    path: PathBuf,
+    /// Path of the file, with symbolic links followed.
+    target: PathBuf,
+    folder: PathBuf,
+    existing: Existing,
+    /// `true` if there was a file at the beginning.
+    exists: bool,
+    temporary: NamedTempFile,
+}
+
+impl Replacement {
+    /// Creates the temporary file.
+    ///
+    /// # Errors
+    /// Fails if the file could not be replaced now: it is not a regular file, it is read-only, it
+    /// exists and `existing` refuses that, the folder is not writable, or the path is a symbolic
+    /// link that [`may_follow`] does not permit.
+    pub fn begin(path: &Path, existing: Existing) -> Result<Self, WriteError> {
+        let error = |kind, what: &str, remedy: &str| WriteError {
+            path: path.to_path_buf(),
+            kind,
+            what: what.to_string(),
+            remedy: remedy.to_string(),
+        };
+        let target = match existing {
+            Existing::Replace => follow(path).map_err(|e| of_link(path, &e))?,
+            Existing::Refuse if path.symlink_metadata().is_ok() => return Err(exists(path)),
+            Existing::Refuse => path.to_path_buf(),
+        };
+        let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let folder = parent.unwrap_or(Path::new(".")).to_path_buf();
+        let old = fs::metadata(&target).ok();
+        if let Some(old) = &old {
+            if old.is_dir() {
+                let kind = ErrorKind::IsADirectory;
+                return Err(error(kind, "it is a directory", "add a file name"));
+            }
+            require_regular(old.file_type())
+                .map_err(|e| error(e.kind(), &e.to_string(), "name another file"))?;
+            if old.permissions().readonly() {
+                let what = "the existing file is read-only";
+                let remedy = "make it writable or name another file";
+                return Err(error(ErrorKind::PermissionDenied, what, remedy));
+            }
+        }
+        let mut builder = tempfile::Builder::new();
+        // An existing file keeps its permissions. A new file gets those that the umask allows.
+        builder.prefix(TEMPORARY[0]).suffix(TEMPORARY[1]);
+        builder.permissions(Permissions::from_mode(0o666));
+        let created = builder.tempfile_in(&folder).and_then(|temporary| {
+            lock(&temporary);
+            if let Some(old) = &old {
+                temporary.as_file().set_permissions(old.permissions())?;
+            }
+            Ok(temporary)
+        });
+        let exists = old.is_some();
+        match created {
+            Ok(temporary) => {
+                Ok(Self { path: path.to_path_buf(), target, folder, existing, exists, temporary })
+            }
+            Err(error) => Err(explain(path, &folder, exists, &error)),
+        }
+    }
+
+    /// Returns the temporary file, to be written.
+    pub fn temporary(&mut self) -> &mut NamedTempFile {
+        &mut self.temporary
+    }
+
+    /// Converts an I/O error that occurred while the temporary file was written.
+    pub fn explain(&self, error: &io::Error) -> WriteError {
+        explain(&self.path, &self.folder, self.exists, error)
+    }
+
+    /// Stores the content on the disk and gives the temporary file the name of the file.
+    ///
+    /// # Errors
+    /// Fails if the content cannot be stored or the file cannot be replaced; an existing file is
+    /// then unchanged.
+    pub fn commit(self) -> Result<(), WriteError> {
+        let synced = self.temporary.as_file().sync_all();
+        synced.map_err(|error| self.explain(&error))?;
+        let Self { path, target, folder, existing, exists, temporary } = self;
+        let renamed = match existing {
+            Existing::Replace => temporary.persist(&target),
+            Existing::Refuse => temporary.persist_noclobber(&target),
+        };
+        renamed.map_err(|e| explain(&path, &folder, exists, &e.error))?;
+        // Stores the new name on the disk. Some systems do not let a directory be opened or
+        // synchronised; the file is complete in any case.
+        if let Ok(directory) = File::open(&folder) {
+            let _ = directory.sync_all();
+        }
+        Ok(())
+    }
+}
+
+/// Locks a temporary file for the life of this process, which shows that the file is in use. On
+/// file systems without locks, leftover temporary files are not removed.
+pub fn lock(temporary: &NamedTempFile) {
+    let _ = temporary.as_file().try_lock();
+}
+
+/// Replaces the content of the file at `path` by `bytes`. A target that is not a regular file, and
+/// an open file of this process such as `/dev/stdout`, gets the bytes appended.
+///
+/// # Errors
+/// Fails if the file cannot be written; an existing regular file is then unchanged.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    if is_stream(path) {
+        let opened = File::options().append(true).open(path);
+        return opened.and_then(|mut stream| stream.write_all(bytes)).map_err(|error| WriteError {
+            path: path.to_path_buf(),
+            kind: error.kind(),
+            what: error.to_string(),
+            remedy: "name another file".to_string(),
+        });
+    }
+    let mut replacement = Replacement::begin(path, Existing::Replace)?;
+    let written = replacement.temporary().write_all(bytes);
+    written.map_err(|error| replacement.explain(&error))?;
+    replacement.commit()
+}
+
+/// Checks that [`write`] could write the file at `path` now, without changing it.
+///
+/// # Errors
+/// Returns the error that writing would return now.
+pub fn check_writable(path: &Path) -> Result<(), WriteError> {
+    if is_stream(path) { Ok(()) } else { Replacement::begin(path, Existing::Replace).map(drop) }
+}
+
+/// Returns `true` if `path` leads to a pipe, a device or a socket, or to an open file of a process.
+/// Opening one of the latter through a symbolic link such as `/dev/stdout` reaches the open file
+/// itself, which a replacement would not.
+fn is_stream(path: &Path) -> bool {
+    let is_other = |m: Metadata| !m.is_file() && !m.is_dir();
+    fs::metadata(path).is_ok_and(is_other)
+        || follow(path).is_err_and(|e| e.kind() == ErrorKind::Unsupported)
+}
+
+/// Follows the symbolic links at `path`. Returns the path of a file that is no link; it may not
+/// exist.
+///
+/// # Errors
+/// [`ErrorKind::PermissionDenied`] with an explanation if [`may_follow`] does not permit a link;
+/// [`ErrorKind::Unsupported`] for a link to an open file of a process.
+fn follow(path: &Path) -> io::Result<PathBuf> {
+    let mut path = path.to_path_buf();
+    for _ in 0..MAX_LINKS {
+        let Some(link) = path.symlink_metadata().ok().filter(Metadata::is_symlink) else {
+            return Ok(path);
+        };
+        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let folder = parent.unwrap_or(Path::new(".")).to_path_buf();
+        let directory = fs::metadata(&folder)?;
+        if !may_follow(&Owner::of(&link), &Owner::of(&directory), geteuid().as_raw()) {
+            let why = format!(
+                "it is a symbolic link of user {} in a folder that everybody may write to",
+                user_name(link.uid())
+            );
+            return Err(io::Error::new(ErrorKind::PermissionDenied, why));
+        }
+        if fs::canonicalize(&folder)?.starts_with("/proc") {
+            return Err(ErrorKind::Unsupported.into());
+        }
+        path = folder.join(fs::read_link(&path)?);
+    }
+    Err(io::Error::other("too many symbolic links lead to it"))
+}
+
+/// Owner and permission bits of a file.
+struct Owner {
+    user: u32,
+    mode: u32,
+}
+
+impl Owner {
+    fn of(metadata: &Metadata) -> Self {
+        Self { user: metadata.uid(), mode: metadata.mode() }
+    }
+}
+
+/// Returns `true` if `user` may write through the symbolic link `link` in the folder `folder`. In a
+/// sticky folder that everybody may write to, only links of `user` and of the folder's owner are
+/// followed: the rule of Linux's `fs.protected_symlinks` (proc_sys_fs(5)), here on every system and
+/// whatever its setting.
+fn may_follow(link: &Owner, folder: &Owner, user: u32) -> bool {
+    const STICKY_AND_WRITABLE_BY_ALL: u32 = 0o1002;
+    let is_shared = folder.mode & STICKY_AND_WRITABLE_BY_ALL == STICKY_AND_WRITABLE_BY_ALL;
+    !is_shared || link.user == user || link.user == folder.user
+}
+
+fn of_link(path: &Path, error: &io::Error) -> WriteError {
+    WriteError {
+        path: path.to_path_buf(),
+        kind: error.kind(),
+        what: match error.kind() {
+            ErrorKind::Unsupported => "it is an open file of a process".to_string(),
+            _ => error.to_string(),
+        },
+        remedy: "name another file".to_string(),
+    }
+}
+
+fn exists(path: &Path) -> WriteError {
+    WriteError {
+        path: path.to_path_buf(),
+        kind: ErrorKind::AlreadyExists,
+        what: "there is such a file already, and it was not changed".to_string(),
+        remedy: "name another one or remove it first".to_string(),
+    }
+}
+
+/// Explains an I/O error. `exists` is `true` if there is an old file.
+fn explain(path: &Path, folder: &Path, exists: bool, error: &io::Error) -> WriteError {
+    let shown = folder.display();
+    let kept = if exists { "the old file is unchanged" } else { "no file was written" };
+    let (what, remedy) = match error.kind() {
+        ErrorKind::AlreadyExists => return self::exists(path),
+        ErrorKind::NotFound if !folder.exists() => {
+            (format!("the directory {shown} does not exist"), "create it first or name another one")
+        }
+        ErrorKind::NotADirectory => (format!("{shown} is not a directory"), "name a directory"),
+        ErrorKind::PermissionDenied => (
+            format!("no permission to write in the directory {shown}"),
+            "name a directory that you may write to",
+        ),
+        ErrorKind::ReadOnlyFilesystem => {
+            (format!("the file system of {shown} is read-only"), "name a directory on another one")
+        }
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => (
+            format!("no space is left for it in {shown}, and {kept}"),
+            "free some space or name a directory on another disk",
+        ),
+        _ => (format!("{error}, and {kept}"), "if that is unclear, try another directory"),
+    };
+    WriteError { path: path.to_path_buf(), kind: error.kind(), what, remedy: remedy.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::{lchown, symlink};
+
+    fn message(result: Result<(), WriteError>) -> String {
+        result.unwrap_err().to_string()
+    }
+
+    fn count(folder: &Path) -> usize {
+        fs::read_dir(folder).unwrap().count()
+    }
+
+    #[test]
+    fn unwritable_file_is_reported_before_the_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let check = |path: &Path| message(check_writable(path));
+        let missing = check(&folder.path().join("no/such/a.png"));
+        assert!(missing.contains("no/such does not exist; create it first"), "{missing}");
+        assert!(check(folder.path()).contains("it is a directory; add a file name"));
+        let file = folder.path().join("file");
+        fs::write(&file, "old").unwrap();
+        let under_file = check(&file.join("a.png"));
+        assert!(under_file.contains("is not a directory"), "{under_file}");
+        check_writable(&file).unwrap();
+        check_writable(&folder.path().join("new")).unwrap();
+        let mut permissions = fs::metadata(&file).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&file, permissions).unwrap();
+        assert!(check(&file).contains("the existing file is read-only; make it writable"));
+        assert_eq!(fs::read(&file).unwrap(), b"old");
+        assert_eq!(count(folder.path()), 1);
+    }
+
+    #[test]
+    fn uncommitted_replacement_changes_nothing_and_explains() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let begin = || {
+            let mut replacement = Replacement::begin(&path, Existing::Replace).unwrap();
+            replacement.temporary().write_all(&[7; 100_000]).unwrap();
+            replacement
+        };
+        let error = begin().explain(&ErrorKind::StorageFull.into()).to_string();
+        assert!(error.contains("a.png: no space is left for it in"), "{error}");
+        assert!(error.contains("no file was written; free some space"), "{error}");
+        fs::write(&path, "old").unwrap();
+        for (kind, words) in [
+            (ErrorKind::StorageFull, "and the old file is unchanged"),
+            (ErrorKind::QuotaExceeded, "and the old file is unchanged"),
+            (ErrorKind::ReadOnlyFilesystem, "read-only"),
+            (ErrorKind::PermissionDenied, "no permission"),
+            (ErrorKind::Other, "other error, and the old file is unchanged"),
+        ] {
+            let error = begin().explain(&kind.into()).to_string();
+            assert!(error.contains(words), "{error}");
+            assert_eq!(fs::read(&path).unwrap(), b"old");
+            assert_eq!(count(folder.path()), 1);
+        }
+    }
+
+    #[test]
+    fn refused_existing_file_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, dangling] = ["a", "link"].map(|name| folder.path().join(name));
+        symlink("nowhere", &dangling).unwrap();
+        let new = Replacement::begin(&path, Existing::Refuse).unwrap();
+        // Another program creates the file in the meantime.
+        fs::write(&path, "theirs").unwrap();
+        assert!(message(new.commit()).contains("such a file already"));
+        for path in [&path, &dangling] {
+            let error = Replacement::begin(path, Existing::Refuse).unwrap_err();
+            assert_eq!(error.kind, ErrorKind::AlreadyExists);
+        }
+        assert_eq!(fs::read(&path).unwrap(), b"theirs");
+        assert_eq!(count(folder.path()), 2);
+    }
+
+    #[test]
+    fn own_links_and_permissions_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let [real, link, second] = ["real", "link", "second"].map(|n| folder.path().join(n));
+        fs::write(&real, "old").unwrap();
+        fs::set_permissions(&real, Permissions::from_mode(0o640)).unwrap();
+        symlink("real", &link).unwrap();
+        symlink(&link, &second).unwrap();
+        write(&second, b"new").unwrap();
+        assert!([&link, &second].iter().all(|path| path.is_symlink()));
+        assert_eq!(fs::read(&real).unwrap(), b"new");
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&real) & 0o777, 0o640);
+        // A new file has the permissions of any other file that the user creates.
+        let [new, plain] = ["new", "plain"].map(|name| folder.path().join(name));
+        write(&new, b"new").unwrap();
+        fs::write(&plain, "").unwrap();
+        assert_eq!(mode(&new), mode(&plain));
+        symlink(&second, folder.path().join("loop")).unwrap();
+        fs::remove_file(&link).unwrap();
+        symlink("second", &link).unwrap();
+        assert!(message(write(&second, b"new")).contains("too many symbolic links"));
+    }
+
+    #[test]
+    fn links_are_followed_as_with_protected_symlinks() {
+        let owner = |user, mode| Owner { user, mode };
+        let link = |user| owner(user, 0o120_777);
+        for (link_user, folder, user, expected) in [
+            // Sticky and writable by all, as /tmp.
+            (1001, owner(0, 0o41_777), 1000, false),
+            (1001, owner(0, 0o41_777), 0, false),
+            (1001, owner(0, 0o41_777), 1001, true),
+            (0, owner(0, 0o41_777), 1000, true),
+            // Not sticky; not writable by all.
+            (1001, owner(0, 0o40_777), 1000, true),
+            (1001, owner(0, 0o41_775), 1000, true),
+            (1001, owner(0, 0o40_755), 1000, true),
+        ] {
+            let followed = may_follow(&link(link_user), &folder, user);
+            assert_eq!(followed, expected, "link of {link_user}, {:o}, {user}", folder.mode);
+        }
+    }
+
+    /// Only the superuser can give a link to another user.
+    #[test]
+    fn link_of_another_user_in_a_shared_folder_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let shared = folder.path().join("shared");
+        fs::create_dir(&shared).unwrap();
+        fs::set_permissions(&shared, Permissions::from_mode(0o1777)).unwrap();
+        let [victim, link] = [folder.path().join("victim"), shared.join("link")];
+        fs::write(&victim, "old").unwrap();
+        symlink(&victim, &link).unwrap();
+        write(&link, b"mine").unwrap();
+        assert_eq!(fs::read(&victim).unwrap(), b"mine");
+        if lchown(&link, Some(4321), None).is_err() {
+            return;
+        }
+        let error = message(write(&link, b"new"));
+        assert!(error.contains("symbolic link of user 4321"), "{error}");
+        assert_eq!(fs::read(&victim).unwrap(), b"mine");
+        // The second link of a chain counts as well.
+        let outer = folder.path().join("outer");
+        symlink(&link, &outer).unwrap();
+        assert!(message(write(&outer, b"new")).contains("symbolic link of user 4321"));
+    }
+
+    #[test]
+    fn devices_get_the_bytes_themselves() {
+        write(Path::new("/dev/null"), b"gone").unwrap();
+        #[cfg(target_os = "linux")]
+        assert!(message(write(Path::new("/dev/full"), b"no")).contains("No space left"));
+        let file = tempfile::NamedTempFile::new().unwrap();
+        if Path::new("/proc/self/fd").exists() {
+            use std::os::fd::AsRawFd;
+            fs::write(file.path(), "kept ").unwrap();
+            let path = format!("/proc/self/fd/{}", file.as_file().as_raw_fd());
+            write(Path::new(&path), b"appended").unwrap();
+            assert_eq!(fs::read(file.path()).unwrap(), b"kept appended");
+            assert!(Replacement::begin(Path::new(&path), Existing::Replace).is_err());
+        }
+    }
+}
