@@ -80,6 +80,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("base64", &["asset", "terminal"]),
     ("clap", &["command"]),
     ("colorous", &["terminal"]),
+    ("crc32fast", &["film"]),
     ("crossbeam_channel", &["render", "dashboard", "terminal"]),
     ("crossterm", &["terminal"]),
     ("csv", &["command"]),

@@ -2,7 +2,7 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::value::linear_from_srgb;
+use crate::value::{Fnv1a64, linear_from_srgb};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
 use std::io::Cursor;
 use std::sync::LazyLock;
@@ -44,6 +44,16 @@ static BYTES: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(255));
 static WORDS: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(65535));
 
 impl Image {
+    /// Adds size and pixels to `hash`.
+    pub fn hash_contents(&self, hash: &mut Fnv1a64) {
+        self.size.iter().for_each(|n| hash.update(&n.to_le_bytes()));
+        hash.update(&[self.channels as u8]);
+        match &self.texels {
+            Texels::Bytes(bytes) => hash.update(bytes),
+            Texels::Words(words) => words.iter().for_each(|w| hash.update(&w.to_le_bytes())),
+        }
+    }
+
     /// Decodes a file in memory. The format is determined by the first bytes of the file.
     ///
     /// # Errors

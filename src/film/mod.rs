@@ -12,6 +12,7 @@ mod downsample;
 mod exr;
 mod exr_header;
 mod exr_read;
+pub mod file;
 mod image_data;
 mod invalid;
 mod light_weights;

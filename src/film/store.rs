@@ -26,6 +26,13 @@ pub struct Header {
     pub precision: String,
 }
 
+impl Header {
+    /// Returns `true` if `scale` is a power of two and a normal number.
+    pub(super) fn is_valid_scale(scale: f64) -> bool {
+        scale.is_normal() && scale > 0.0 && scale.to_bits() << 12 == 0
+    }
+}
+
 /// Integer sums of samples for every pixel, light group, channel and replicate. The order of
 /// addition changes no bit. Radiance is the sum of a pixel divided by `scale * count`.
 #[derive(Debug)]
@@ -95,8 +102,10 @@ impl Film {
         assert!(!scales.is_empty(), "a film without light groups");
         assert!(scales.len() <= MAX_FILM_GROUPS, "a film of {} light groups", scales.len());
         for scale in scales {
-            let power_of_two = scale.is_normal() && *scale > 0.0 && scale.to_bits() << 12 == 0;
-            assert!(power_of_two, "a film scale of {scale}, which is not a power of two");
+            assert!(
+                Header::is_valid_scale(*scale),
+                "a film scale of {scale}, which is not a power of two"
+            );
         }
         let [columns, rows] = [width.div_ceil(TILE), height.div_ceil(TILE)];
         let inside = |size: usize, i: usize| (size - i * TILE).min(TILE);
@@ -317,8 +326,29 @@ impl Film {
         Ok(())
     }
 
-    fn check_addable(&self, other: &Self) -> Result<(), Mismatch> {
-        let (ours, theirs) = (&self.header, &other.header);
+    /// Creates an empty tile in the place of the tile `index`, to be filled and handed to
+    /// [`Film::add_at`].
+    pub(super) fn new_tile(&self, index: usize) -> Tile {
+        let mut tile = Tile::cleared(self.groups(), self.tiles[index].extent());
+        tile.clear_if_stale(self.epoch);
+        tile
+    }
+
+    /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to the tile `index`.
+    pub(super) fn add_at(&mut self, index: usize, tile: Tile) -> Result<(), Mismatch> {
+        let ours = &mut self.tiles[index];
+        if !ours.is_of(self.epoch) {
+            *ours = tile;
+            return Ok(());
+        }
+        ours.add_tile(&tile).map_err(|()| Mismatch::Overlap(index))
+    }
+
+    /// Checks that the samples of a film with the header `theirs` can be added.
+    ///
+    /// # Errors
+    /// Fails if size, scales, seed or precision differ.
+    pub fn check_header(&self, theirs: &Header) -> Result<(), Mismatch> {
         let properties = |h: &Header| -> [(&'static str, String); 4] {
             [
                 ("size", format!("{}x{}", h.width, h.height)),
@@ -327,12 +357,15 @@ impl Film {
                 ("precision", h.precision.clone()),
             ]
         };
-        for ((property, ours), (_, theirs)) in properties(ours).into_iter().zip(properties(theirs))
-        {
-            if ours != theirs {
-                return Err(Mismatch::Header(property, ours, theirs));
-            }
-        }
+        let ours = properties(&self.header);
+        let different = ours.into_iter().zip(properties(theirs)).find(|(a, b)| a != b);
+        different.map_or(Ok(()), |((property, ours), (_, theirs))| {
+            Err(Mismatch::Header(property, ours, theirs))
+        })
+    }
+
+    fn check_addable(&self, other: &Self) -> Result<(), Mismatch> {
+        self.check_header(&other.header)?;
         let overlap = other.touched().find(|(index, theirs)| {
             theirs.lattice_px() != 0 && self.tile(*index).is_some_and(|t| t.lattice_px() != 0)
         });

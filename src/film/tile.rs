@@ -253,6 +253,21 @@ impl Tile {
         self.bad.record(sample);
     }
 
+    /// Sets everything but the sums, as it was in the tile of a file. `full` is `true` if a sum has
+    /// reached its limit.
+    pub(super) fn restore(
+        &mut self,
+        counts: [u32; 2],
+        saturated_samples: u64,
+        bad: InvalidSamples,
+        full: bool,
+    ) {
+        self.counts = counts;
+        self.saturated_samples = saturated_samples;
+        self.bad = bad;
+        self.full = full;
+    }
+
     pub(super) fn bad(&self) -> &InvalidSamples {
         &self.bad
     }

@@ -359,6 +359,16 @@ impl crate::material::Material {
         [texture, bump].into_iter().flatten().filter(|file| !file.is_empty())
     }
 
+    /// Returns the images of texture and bump that were read.
+    pub fn images(&self) -> impl Iterator<Item = &Arc<Image>> {
+        let texture = match &self.texture {
+            Some(Texture::Image(image)) => image.image(),
+            _ => None,
+        };
+        let bump = self.bump.as_ref().and_then(|Bump::Image(image)| image.image());
+        [texture, bump].into_iter().flatten()
+    }
+
     /// Loads the files that the material names with `load`, unless content or an error is there
     /// already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Image>, AssetError>) {

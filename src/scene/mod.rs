@@ -6,6 +6,7 @@
 
 mod asset_resolver;
 mod builtin;
+mod contents_hash;
 mod diagnostic;
 mod document;
 pub mod edit;

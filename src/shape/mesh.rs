@@ -153,6 +153,15 @@ impl Shape {
             _ => None,
         }
     }
+
+    /// Returns the mesh that was read from the file that the shape names. Returns `None` if the
+    /// shape names no file or the file could not be read.
+    pub fn mesh(&self) -> Option<&Arc<Mesh>> {
+        match self {
+            Self::MeshDesc(mesh) => mesh.content.as_ref()?.as_ref().ok(),
+            _ => None,
+        }
+    }
 }
 
 #[cfg(test)]

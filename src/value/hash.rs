@@ -1,11 +1,34 @@
 //! A hash that is stable across platforms and versions.
 
-/// Returns the 64-bit FNV-1a hash (Fowler, Noll, Vo), with the offset basis and prime of
+/// Incremental 64-bit FNV-1a hash (Fowler, Noll, Vo), with the offset basis and prime of
 /// draft-eastlake-fnv.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fnv1a64(u64);
+
+impl Default for Fnv1a64 {
+    fn default() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+impl Fnv1a64 {
+    /// Adds bytes.
+    pub fn update(&mut self, bytes: &[u8]) {
+        const PRIME: u64 = 0x0000_0100_0000_01b3;
+        self.0 = bytes.iter().fold(self.0, |h, byte| (h ^ u64::from(*byte)).wrapping_mul(PRIME));
+    }
+
+    /// Hash of all bytes added so far.
+    pub fn value(self) -> u64 {
+        self.0
+    }
+}
+
+/// Returns the 64-bit FNV-1a hash of `bytes`, see [`Fnv1a64`].
 pub fn fnv1a64(bytes: &[u8]) -> u64 {
-    const OFFSET_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
-    const PRIME: u64 = 0x0000_0100_0000_01b3;
-    bytes.iter().fold(OFFSET_BASIS, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(PRIME))
+    let mut hash = Fnv1a64::default();
+    hash.update(bytes);
+    hash.value()
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ pub use bvh::{Mesh, TriangleBlock};
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
+use crate::value::Fnv1a64;
 
 /// Largest number of triangles of a mesh: 64 Mi.
 pub const MAX_TRIANGLES: usize = 1 << 26;
@@ -46,6 +47,33 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
+    /// Adds all data that pictures depend on to `hash`.
+    pub fn hash_contents(&self, hash: &mut Fnv1a64) {
+        let Self {
+            positions,
+            center,
+            triangles,
+            normals,
+            uvs,
+            colors,
+            color_of,
+            bounds: _,
+            notes: _,
+        } = self;
+        let mut floats = |list: &[f32]| list.iter().for_each(|x| hash.update(&x.to_le_bytes()));
+        floats(positions.as_flattened());
+        floats(normals.as_deref().unwrap_or_default().as_flattened());
+        floats(uvs.as_deref().unwrap_or_default().as_flattened());
+        floats(colors.as_flattened());
+        center.iter().for_each(|x| hash.update(&x.to_le_bytes()));
+        triangles.as_flattened().iter().for_each(|i| hash.update(&i.to_le_bytes()));
+        color_of.iter().for_each(|i| hash.update(&i.to_le_bytes()));
+        // The lengths separate the lists.
+        let lengths = [positions.len(), triangles.len(), colors.len()];
+        lengths.iter().for_each(|n| hash.update(&(*n as u64).to_le_bytes()));
+        hash.update(&[u8::from(normals.is_some()), u8::from(uvs.is_some())]);
+    }
+
     /// Parses a file in memory. The format is determined by the extension of the file name.
     ///
     /// # Errors

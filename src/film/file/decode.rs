@@ -1,0 +1,372 @@
+//! Reader of film files. Every length is compared with the length of the file before memory is
+//! allocated.
+
+use crate::disk::open_regular;
+use crate::film::display::Display;
+use crate::film::file::encode::CHECKSUM_BYTES;
+use crate::film::file::{
+    DONE, FilmFileHeader, HEAD, MAGIC, MAX_SIDE, META, TILES, TILES_PER_CHUNK, Tag, VERSION,
+    tile_record,
+};
+use crate::film::light_weights::LightWeights;
+use crate::film::store::{Film, Header};
+use crate::film::{MAX_FILM_GROUPS, TILE};
+use crate::value::truncated;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::File;
+use std::io::{BufReader, ErrorKind, Read};
+use std::path::{Path, PathBuf};
+
+/// Smallest size of a tile record \[bytes\].
+const RECORD_BYTES: u64 = 8;
+
+/// Reason for which a film file cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReadError {
+    /// The file.
+    pub path: PathBuf,
+    /// Problem, as a clause of a sentence.
+    pub what: String,
+    /// Advice to the user, as a clause of a sentence.
+    pub remedy: String,
+}
+
+impl fmt::Display for ReadError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "cannot use {}: {}; {}", self.path.display(), self.what, self.remedy)
+    }
+}
+
+impl std::error::Error for ReadError {}
+
+/// Film file of which everything before the tiles has been read.
+#[derive(Debug)]
+pub struct FilmReader<R> {
+    input: Input<R>,
+    header: FilmFileHeader,
+    /// The first `TILE` chunk, or the `DONE` chunk.
+    next: Chunk,
+    checksums: crc32fast::Hasher,
+}
+
+/// Bytes of a film file.
+#[derive(Debug)]
+struct Input<R> {
+    path: PathBuf,
+    bytes: R,
+    /// Number of bytes that are left in the file.
+    left: u64,
+}
+
+#[derive(Debug)]
+struct Chunk {
+    tag: Tag,
+    contents: Vec<u8>,
+    checksum: [u8; CHECKSUM_BYTES],
+}
+
+impl FilmReader<BufReader<File>> {
+    /// Opens the film file at `path` and reads everything before the tiles.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read, is no film file, or is damaged.
+    pub fn open(path: &Path) -> Result<Self, ReadError> {
+        let error = |what: String, remedy: &str| ReadError {
+            path: path.to_path_buf(),
+            what,
+            remedy: remedy.to_string(),
+        };
+        let opened = open_regular(path).and_then(|file| Ok((file.metadata()?.len(), file)));
+        let (length, file) = opened.map_err(|e| match e.kind() {
+            ErrorKind::NotFound => error("there is no such file".into(), "check its name"),
+            ErrorKind::InvalidInput => error(e.to_string(), "name a file"),
+            _ => error(e.to_string(), "check its name and permissions"),
+        })?;
+        Self::new(path, BufReader::with_capacity(1 << 16, file), length)
+    }
+}
+
+impl<R: Read> FilmReader<R> {
+    /// Reads everything before the tiles from `bytes`, which has `length` bytes. `path` is the name
+    /// of the file in errors.
+    ///
+    /// # Errors
+    /// Fails if the bytes cannot be read, are no film file, or are damaged.
+    pub fn new(path: &Path, bytes: R, length: u64) -> Result<Self, ReadError> {
+        let mut input = Input { path: path.to_path_buf(), bytes, left: length };
+        let mut checksums = crc32fast::Hasher::new();
+        let magic = input.take(MAGIC.len() as u64, "its first bytes")?;
+        if magic != MAGIC {
+            return Err(input.error(
+                "it is no film file: its first bytes are others",
+                "name a file that `zerkalo render --checkpoint` has written",
+            ));
+        }
+        let version = input.take(4, "its version")?;
+        if version != VERSION.to_le_bytes() {
+            let version = u32::from_le_bytes([version[0], version[1], version[2], version[3]]);
+            return Err(input.error(
+                format!("it has version {version} of the format, and this program reads {VERSION}"),
+                "use the program that wrote it, or render again",
+            ));
+        }
+        checksums.update(&magic);
+        checksums.update(&VERSION.to_le_bytes());
+        let mut next = input.chunk()?;
+        let mut chunks = BTreeMap::new();
+        let mut head = None;
+        let mut metadata = None;
+        while ![TILES, DONE].contains(&next.tag) {
+            checksums.update(&next.tag);
+            checksums.update(&(next.contents.len() as u64).to_le_bytes());
+            checksums.update(&next.contents);
+            checksums.update(&next.checksum);
+            let twice = match next.tag {
+                HEAD => head.replace(next.contents).is_some(),
+                META => metadata.replace(next.contents).is_some(),
+                tag => chunks.insert(tag, next.contents).is_some(),
+            };
+            if twice {
+                return Err(input.damaged("a part of it occurs twice"));
+            }
+            next = input.chunk()?;
+        }
+        let mut header = head
+            .and_then(|head| decode_head(&mut Fields::new(&head), length))
+            .ok_or_else(|| input.damaged("its head has impossible values"))?;
+        header.metadata = metadata
+            .and_then(|metadata| decode_metadata(&mut Fields::new(&metadata)))
+            .ok_or_else(|| input.damaged("its metadata are not readable"))?;
+        header.chunks = chunks;
+        Ok(Self { input, header, next, checksums })
+    }
+
+    /// Everything before the tiles.
+    pub fn header(&self) -> &FilmFileHeader {
+        &self.header
+    }
+
+    /// Reads the film.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read or is damaged.
+    pub fn read(self) -> Result<(FilmFileHeader, Film), ReadError> {
+        let mut film = Film::new(self.header.film.clone());
+        let header = self.add_to(&mut film)?;
+        Ok((header, film))
+    }
+
+    /// Adds the samples of the file to `film`. After an error the film may hold a part of them.
+    ///
+    /// # Errors
+    /// Fails if size, scales, seed or precision differ from those of `film`, or if the file cannot
+    /// be read or is damaged.
+    pub fn add_to(self, film: &mut Film) -> Result<FilmFileHeader, ReadError> {
+        let Self { mut input, header, mut next, mut checksums } = self;
+        if let Err(mismatch) = film.check_header(&header.film) {
+            return Err(input.error(mismatch.to_string(), "name a file of the same render"));
+        }
+        let mut tiles = 0;
+        while next.tag == TILES {
+            let added =
+                add_tiles(film, &mut Fields::new(&next.contents), &mut tiles, header.groups());
+            added.ok_or_else(|| input.damaged(format!("tile {tiles} has impossible values")))?;
+            checksums.update(&next.checksum);
+            next = input.chunk()?;
+        }
+        let mut done = Fields::new(&next.contents);
+        let expected = (film.tile_count() as u64, checksums.finalize());
+        if next.tag != DONE || done.u64().zip(done.u32()) != Some(expected) || !done.is_empty() {
+            return Err(input.damaged("its parts do not belong together"));
+        }
+        if tiles != film.tile_count() {
+            let found = format!("it has {tiles} tiles of {}", film.tile_count());
+            return Err(input.damaged(found));
+        }
+        if input.left != 0 {
+            return Err(input.damaged(format!("{} bytes follow its end", input.left)));
+        }
+        Ok(header)
+    }
+}
+
+impl FilmFileHeader {
+    fn groups(&self) -> usize {
+        self.film.scales.len()
+    }
+}
+
+/// Adds the tiles of a chunk to `film`. `next` is the number of the next tile.
+fn add_tiles(film: &mut Film, fields: &mut Fields, next: &mut usize, groups: usize) -> Option<()> {
+    let [first, count] = [fields.u32()? as usize, fields.u32()? as usize];
+    if first != *next || count > TILES_PER_CHUNK || first + count > film.tile_count() {
+        return None;
+    }
+    for index in first..first + count {
+        *next = index;
+        if let Some(rest) = fields.0.strip_prefix(&[0; RECORD_BYTES as usize]) {
+            fields.0 = rest;
+            continue;
+        }
+        let mut tile = film.new_tile(index);
+        tile_record::decode(&mut tile, groups, fields)?;
+        film.add_at(index, tile).ok()?;
+    }
+    *next = first + count;
+    fields.is_empty().then_some(())
+}
+
+/// Decodes the `HEAD` chunk of a file with `length` bytes. Metadata and other chunks stay empty.
+fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
+    let [width, height, groups] = [fields.u32()?, fields.u32()?, fields.u32()?].map(|n| n as usize);
+    let tiles = width.div_ceil(TILE) as u64 * height.div_ceil(TILE) as u64;
+    let sides = 1..=MAX_SIDE;
+    let possible = sides.contains(&width)
+        && sides.contains(&height)
+        && (1..=MAX_FILM_GROUPS).contains(&groups)
+        && tiles * RECORD_BYTES <= length;
+    if !possible {
+        return None;
+    }
+    let (mut scales, mut weights, mut group_names) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..groups {
+        let scale = fields.f64()?;
+        if !Header::is_valid_scale(scale) {
+            return None;
+        }
+        scales.push(scale);
+        let weight = [fields.f64()?, fields.f64()?, fields.f64()?];
+        if !weight.iter().all(|w| w.is_finite() && *w >= 0.0) {
+            return None;
+        }
+        weights.push(weight);
+        group_names.push(fields.text()?);
+    }
+    let (seed, precision) = (fields.u64()?, fields.text()?);
+    let exposure_ev = fields.f64()?;
+    let tone = fields.text()?.parse().ok()?;
+    let plain = ["single", "double"].contains(&precision.as_str()) && exposure_ev.is_finite();
+    (plain && fields.is_empty()).then(|| FilmFileHeader {
+        film: Header { width, height, scales, seed, precision },
+        weights: LightWeights { weights },
+        group_names,
+        display: Display { exposure_ev, tone },
+        metadata: Vec::new(),
+        chunks: BTreeMap::new(),
+    })
+}
+
+fn decode_metadata(fields: &mut Fields) -> Option<Vec<(String, String)>> {
+    let count = fields.u32()?;
+    let entries = (0..count).map(|_| Some((fields.text()?, fields.text()?)));
+    let entries = entries.collect::<Option<Vec<_>>>()?;
+    fields.is_empty().then_some(entries)
+}
+
+impl<R: Read> Input<R> {
+    fn error(&self, what: impl Into<String>, remedy: &str) -> ReadError {
+        let (path, remedy) = (self.path.clone(), remedy.to_string());
+        ReadError { path, what: what.into(), remedy }
+    }
+
+    fn damaged(&self, what: impl Into<String>) -> ReadError {
+        self.error(
+            format!("it is damaged or was altered: {}", what.into()),
+            "copy it again, or use an older one",
+        )
+    }
+
+    /// Reads `length` bytes of the part of the file that `part` describes.
+    fn take(&mut self, length: u64, part: &str) -> Result<Vec<u8>, ReadError> {
+        let cut = |input: &Self| {
+            let what = format!("it ends in the middle of {part}: it was not copied as a whole");
+            input.error(what, "copy it again, or use an older one")
+        };
+        if length > self.left {
+            return Err(cut(self));
+        }
+        let mut bytes = Vec::new();
+        let size = usize::try_from(length).unwrap_or(usize::MAX);
+        if bytes.try_reserve_exact(size).is_err() {
+            let what = format!("{part} takes {length} bytes of memory, which the system refuses");
+            return Err(self.error(what, "use a machine with more memory"));
+        }
+        bytes.resize(size, 0);
+        match self.bytes.read_exact(&mut bytes) {
+            Ok(()) => {}
+            // The file has become shorter in the meantime.
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Err(cut(self)),
+            Err(error) => return Err(self.error(error.to_string(), "check the disk")),
+        }
+        self.left -= length;
+        Ok(bytes)
+    }
+
+    fn chunk(&mut self) -> Result<Chunk, ReadError> {
+        let start = self.take(12, "a part")?;
+        let (tag, length) = start.split_at(4);
+        let tag: Tag = [tag[0], tag[1], tag[2], tag[3]];
+        let name = truncated(&String::from_utf8_lossy(&tag)).to_string();
+        let length = Fields::new(length).u64().unwrap_or(u64::MAX);
+        let contents = self.take(length, &format!("the part {name}"))?;
+        let checksum = self.take(CHECKSUM_BYTES as u64, &format!("the part {name}"))?;
+        let mut expected = crc32fast::Hasher::new();
+        expected.update(&start);
+        expected.update(&contents);
+        if checksum != expected.finalize().to_le_bytes() {
+            return Err(self.damaged(format!("the checksum of its part {name} is wrong")));
+        }
+        let checksum = [checksum[0], checksum[1], checksum[2], checksum[3]];
+        Ok(Chunk { tag, contents, checksum })
+    }
+}
+
+/// Fields at the start of a byte string, which are removed as they are read. All methods return
+/// `None` if there are too few bytes or a value is not valid.
+pub struct Fields<'a>(&'a [u8]);
+
+impl<'a> Fields<'a> {
+    /// Creates the fields in `bytes`.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self(bytes)
+    }
+
+    /// Returns `true` if no bytes are left.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Reads `length` bytes.
+    pub fn take(&mut self, length: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(length)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    /// Reads a byte.
+    pub fn u8(&mut self) -> Option<u8> {
+        self.take(1).map(|bytes| bytes[0])
+    }
+
+    /// Reads a 32-bit number.
+    pub fn u32(&mut self) -> Option<u32> {
+        self.take(4).and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes)
+    }
+
+    /// Reads a 64-bit number.
+    pub fn u64(&mut self) -> Option<u64> {
+        self.take(8).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes)
+    }
+
+    /// Reads a floating-point number.
+    pub fn f64(&mut self) -> Option<f64> {
+        self.u64().map(f64::from_bits)
+    }
+
+    /// Reads a text.
+    pub fn text(&mut self) -> Option<String> {
+        let length = self.u32()? as usize;
+        String::from_utf8(self.take(length)?.to_vec()).ok()
+    }
+}

@@ -1,0 +1,108 @@
+//! Writer of film files.
+
+use crate::disk::{Existing, Replacement, WriteError};
+use crate::film::file::{
+    DONE, FilmFileHeader, HEAD, MAGIC, META, TILES, TILES_PER_CHUNK, Tag, VERSION, tile_record,
+};
+use crate::film::store::Film;
+use std::io::Write;
+use std::path::Path;
+
+/// Length of the checksum at the end of a chunk \[bytes\].
+pub(super) const CHECKSUM_BYTES: usize = 4;
+
+impl FilmFileHeader {
+    /// Encodes everything before the tiles.
+    pub fn encode(&self) -> Vec<u8> {
+        let mut out = [&MAGIC[..], &VERSION.to_le_bytes()].concat();
+        out.extend(chunk(HEAD, |head| self.encode_head(head)));
+        out.extend(chunk(META, |meta| {
+            meta.extend((self.metadata.len() as u32).to_le_bytes());
+            for (key, value) in &self.metadata {
+                text(key, meta);
+                text(value, meta);
+            }
+        }));
+        for (tag, contents) in &self.chunks {
+            debug_assert!(![HEAD, META, TILES, DONE].contains(tag), "a chunk with a fixed tag");
+            out.extend(chunk(*tag, |out| out.extend(contents)));
+        }
+        out
+    }
+
+    fn encode_head(&self, out: &mut Vec<u8>) {
+        let film = &self.film;
+        for n in [film.width, film.height, film.scales.len()] {
+            out.extend((n as u32).to_le_bytes());
+        }
+        for (group, scale) in film.scales.iter().enumerate() {
+            out.extend(scale.to_le_bytes());
+            let weights = self.weights.weights.get(group).unwrap_or(&[1.0; 3]);
+            weights.iter().for_each(|weight| out.extend(weight.to_le_bytes()));
+            text(self.group_names.get(group).map_or("", String::as_str), out);
+        }
+        out.extend(film.seed.to_le_bytes());
+        text(&film.precision, out);
+        out.extend(self.display.exposure_ev.to_le_bytes());
+        text(&self.display.tone.to_string(), out);
+    }
+}
+
+/// Number of `TILE` chunks of a film.
+pub fn tile_chunks(film: &Film) -> usize {
+    film.tile_count().div_ceil(TILES_PER_CHUNK)
+}
+
+/// Encodes the `TILE` chunk with the number `index`, which is below [`tile_chunks`]. Parts of a
+/// first pass that is in progress are left out.
+pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
+    let first = index * TILES_PER_CHUNK;
+    let count = (film.tile_count() - first).min(TILES_PER_CHUNK);
+    chunk(TILES, |out| {
+        out.extend((first as u32).to_le_bytes());
+        out.extend((count as u32).to_le_bytes());
+        (first..first + count).for_each(|tile| tile_record::encode(film.tile(tile), out));
+    })
+}
+
+/// Encodes the last chunk of a file. `pieces` are the encoded header and all encoded tiles.
+pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
+    let mut checksum = crc32fast::Hasher::new();
+    // The header holds several chunks. Its own bytes stand for their checksums.
+    for (i, piece) in pieces.iter().enumerate() {
+        let start = if i == 0 { 0 } else { piece.len() - CHECKSUM_BYTES };
+        checksum.update(&piece[start..]);
+    }
+    let checksum = checksum.finalize();
+    chunk(DONE, |out| {
+        out.extend((film.tile_count() as u64).to_le_bytes());
+        out.extend(checksum.to_le_bytes());
+    })
+}
+
+/// Writes a film file from its encoded pieces: header, tiles, end. The file at `path` is replaced
+/// when the new one is complete and stored on the disk.
+///
+/// # Errors
+/// Fails if the file cannot be written; an existing file is then unchanged.
+pub fn write_film_file(path: &Path, pieces: &[Vec<u8>]) -> Result<(), WriteError> {
+    let mut replacement = Replacement::begin(path, Existing::Replace)?;
+    let written = pieces.iter().try_for_each(|piece| replacement.temporary().write_all(piece));
+    written.map_err(|error| replacement.explain(&error))?;
+    replacement.commit()
+}
+
+fn text(text: &str, out: &mut Vec<u8>) {
+    out.extend((text.len() as u32).to_le_bytes());
+    out.extend(text.as_bytes());
+}
+
+fn chunk(tag: Tag, contents: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    let mut out = [&tag[..], &[0; 8]].concat();
+    contents(&mut out);
+    let length = (out.len() - 12) as u64;
+    out[4..12].copy_from_slice(&length.to_le_bytes());
+    let checksum = crc32fast::hash(&out);
+    out.extend(checksum.to_le_bytes());
+    out
+}

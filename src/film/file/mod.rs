@@ -1,0 +1,72 @@
+//! Film files (`.zk`): a film with all its integer sums, and what is needed to continue its render.
+//!
+//! All numbers are little-endian. A file consists of
+//!
+//! - the magic bytes `89 5A 4B 46 0D 0A 1A 0A`. A transfer in text mode changes them, as in PNG;
+//! - the version of the format (u32);
+//! - chunks. A chunk has a tag (four letters), the length of its contents in bytes (u64), its
+//!   contents, and a CRC-32 (IEEE 802.3, u32) of tag, length and contents.
+//!
+//! | tag | contents |
+//! |---|---|
+//! | `HEAD` | width, height, number of light groups (u32 each); for each group its scale and its weights in red, green, blue (f64 each) and its name; seed (u64); precision; exposure in stops (f64); tone curve |
+//! | `META` | number of entries (u32), then key and value of each, as in the metadata of pictures |
+//! | others | contents that this module does not interpret, in the order of their tags |
+//! | `TILE` | number of the first tile and number of tiles (u32 each), then the records of up to 64 consecutive tiles, row by row |
+//! | `DONE` | number of tiles (u64), and the CRC-32 (u32) of all bytes before the first `TILE` chunk and the checksums of the `TILE` chunks; the end of the file |
+//!
+//! A text has its length in bytes (u32) before it. A tile record begins with the sample counts of A
+//! and B (u32 each) and ends there if both are 0. Then follow the number of samples above the film's
+//! limit (u64), the number of invalid samples (u64), the number of remembered ones (u8) with index,
+//! x, y (u32 each) and replicate (u8), and the sums. Sums are stored in planes, in the order
+//! replicate, group, channel. A plane has the number of bytes of its largest sum (u8, 0 to 8), then
+//! the low bytes of the sum of each pixel inside the picture, row by row. This takes about 60 % of
+//! the memory of the film, and less time than writing the rest would take.
+
+mod decode;
+mod encode;
+#[cfg(test)]
+mod tests;
+mod tile_record;
+
+pub use decode::{Fields, FilmReader, ReadError};
+pub use encode::{encode_end, encode_tiles, tile_chunks, write_film_file};
+
+use crate::film::display::Display;
+use crate::film::light_weights::LightWeights;
+use crate::film::store::Header;
+use std::collections::BTreeMap;
+
+/// First bytes of a film file.
+const MAGIC: [u8; 8] = *b"\x89ZKF\r\n\x1a\n";
+/// Version of the format that is written and read.
+const VERSION: u32 = 1;
+/// Number of tiles in a `TILE` chunk.
+const TILES_PER_CHUNK: usize = 64;
+/// Largest width and height of a film that is read [pixels].
+const MAX_SIDE: usize = 1 << 17;
+
+/// Tag of a chunk.
+pub type Tag = [u8; 4];
+
+const HEAD: Tag = *b"HEAD";
+const META: Tag = *b"META";
+const TILES: Tag = *b"TILE";
+const DONE: Tag = *b"DONE";
+
+/// Contents of a film file except for the tiles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilmFileHeader {
+    /// Size, scales, seed and precision of the film.
+    pub film: Header,
+    /// Weight of each light group in the picture.
+    pub weights: LightWeights,
+    /// Name of each light group.
+    pub group_names: Vec<String>,
+    /// Display transform under which the noise was estimated.
+    pub display: Display,
+    /// Keys and values that describe the picture, as in picture files.
+    pub metadata: Vec<(String, String)>,
+    /// Further chunks by tag. The tags `HEAD`, `META`, `TILE` and `DONE` are not allowed.
+    pub chunks: BTreeMap<Tag, Vec<u8>>,
+}
