@@ -72,9 +72,13 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
             Err(reason) => warn(reason),
         }
     }
-    if let Some(path) = &ended.kept {
-        let path = path.display();
-        warn(&format!("unsaved edits are kept in {path}; the next start offers them"));
+    match &ended.kept {
+        Ok(Some(path)) => {
+            let path = path.display();
+            warn(&format!("unsaved edits are kept in {path}; the next start offers them"));
+        }
+        Ok(None) => {}
+        Err(reason) => warn(reason),
     }
     ended.latencies.iter().for_each(|line| warn(line));
     ended.signalled.map_or(Ok(()), |status| Err(Failure::Signalled(status)))

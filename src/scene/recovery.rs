@@ -31,8 +31,10 @@ const STALE_AFTER: Duration = Duration::from_secs(60);
 /// Writer and finder of the recovery files of one scene.
 #[derive(Debug)]
 pub struct Recovery {
-    /// Candidate folders and file names, in order of preference.
-    candidates: Vec<(PathBuf, OsString)>,
+    /// Folder of the scene and name of the recovery file in it, if the scene has a file.
+    beside: Option<(PathBuf, OsString)>,
+    /// State folder and name of the recovery file in it. The second choice.
+    state: Option<(PathBuf, OsString)>,
     saved: Option<Saved>,
 }
 
@@ -84,7 +86,7 @@ impl Recovery {
     /// Creates the recovery of the scene in the file at `path`, or of a scene without a file that
     /// is called `name`. `state` is the folder from [`state_folder`].
     pub fn new(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
-        let mut candidates = Vec::new();
+        let mut beside = None;
         let stem = match path {
             Some(path) => {
                 // Every path to the same file gives the same name.
@@ -95,15 +97,24 @@ impl Recovery {
                 hidden.push(&name);
                 hidden.push(".unsaved");
                 let folder = canonical.parent().filter(|folder| !folder.as_os_str().is_empty());
-                candidates.push((folder.unwrap_or(Path::new(".")).to_path_buf(), hidden));
+                beside = Some((folder.unwrap_or(Path::new(".")).to_path_buf(), hidden));
                 let hash = fnv1a64(canonical.as_os_str().as_encoded_bytes());
                 format!("{:.40}-{hash:016x}", name.to_string_lossy())
             }
             None => format!("{:.40}", name.replace('/', "-")),
         };
-        candidates
-            .extend(state.map(|folder| (folder.to_path_buf(), format!("{stem}.unsaved").into())));
-        Self { candidates, saved: None }
+        let state = state.map(|folder| (folder.to_path_buf(), format!("{stem}.unsaved").into()));
+        Self { beside, state, saved: None }
+    }
+
+    /// Returns the candidate folders and file names, in order of preference.
+    fn candidates(&self) -> impl Iterator<Item = &(PathBuf, OsString)> {
+        self.beside.iter().chain(&self.state)
+    }
+
+    /// Returns a recovery of the same scene that writes to the state folder only.
+    pub fn elsewhere(&self) -> Self {
+        Self { beside: None, state: self.state.clone(), saved: None }
     }
 
     /// Returns the path of the recovery file; `None` if none is written.
@@ -124,18 +135,19 @@ impl Recovery {
             saved.file = locked_temporary(folder, &text)?.persist(&saved.path)?;
             return Ok(());
         }
-        self.saved = None;
+        let mut saved = None;
         let mut failed = io::Error::new(ErrorKind::NotFound, "no folder to keep them in");
-        for (folder, name) in &self.candidates {
+        for (folder, name) in self.candidates() {
             match create_numbered(folder, name, &text) {
                 Ok(kept) => {
-                    self.saved = Some(kept);
-                    return Ok(());
+                    saved = Some(kept);
+                    break;
                 }
                 Err(error) => failed = error,
             }
         }
-        Err(failed)
+        self.saved = saved;
+        if self.saved.is_some() { Ok(()) } else { Err(failed) }
     }
 
     /// Removes the recovery file. Callers use this when no edits are unsaved.
@@ -149,7 +161,7 @@ impl Recovery {
     /// read: their content is not this user's work.
     pub fn find(&self) -> RecoveryFile {
         let mut found = RecoveryFile::default();
-        for (folder, name) in &self.candidates {
+        for (folder, name) in self.candidates() {
             for number in 1..=MAX_FILES {
                 let path = folder.join(numbered(name, number));
                 if self.path() == Some(&*path) {

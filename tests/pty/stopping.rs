@@ -189,3 +189,25 @@ fn doctor_reports_after_restoring_the_terminal() {
         assert!(report.contains(part), "no {part:?} in {report}");
     }
 }
+
+/// Whoever opens a pipe without another end waits for ever.
+#[test]
+fn pipe_in_place_of_the_scene_blocks_neither_edits_nor_the_end() {
+    let fixture = Fixture::with_room();
+    let mut terminal = fixture.open(&["room.toml"], [120, 36]);
+    wait_for_picture(&terminal);
+    fs::remove_file(fixture.path("room.toml")).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(fixture.path("room.toml")).status();
+    assert!(made.unwrap().success());
+    // The watch of the file meets the pipe.
+    std::thread::sleep(Duration::from_millis(1500));
+    terminal.send("]");
+    terminal.wait_for_text("room.toml ●");
+    terminal.send("\x13");
+    terminal.wait_for_text("not a regular file");
+    signal("TERM", terminal.process_id());
+    let (status, bytes) = terminal.end();
+    assert_eq!(status, 143);
+    assert!(bytes.contains("unsaved edits are kept in"), "{bytes:?}");
+    assert!(fs::metadata(fixture.path(".room.toml.unsaved")).unwrap().len() > 100);
+}

@@ -20,10 +20,12 @@ pub struct Autosave {
     /// User's state folder.
     state: Option<PathBuf>,
     pending: Option<Pending>,
+    /// Scene in the recovery file, if this session has written it.
+    kept: Option<Arc<Scene>>,
     /// Orphaned edits that the user has neither recovered nor discarded. The last is offered next.
     found: Vec<Orphan>,
-    /// The last write failed, and the failure has been reported.
-    complained: bool,
+    /// Cause of the failure of the last write. It has been reported.
+    failed: Option<String>,
 }
 
 /// Edits that have not been written to the recovery file.
@@ -44,25 +46,29 @@ impl Autosave {
             recovery: Recovery::new(path, name, state.as_deref()),
             state,
             pending: None,
+            kept: None,
             found: Vec::new(),
-            complained: false,
+            failed: None,
         }
     }
 
     /// Prepares a save of `scene`: an existing recovery file is updated to `scene` first. If the
     /// program is killed during the save, the next start then does not offer outdated edits.
-    pub fn saving(&mut self, file: &SceneFile, scene: &Scene) {
+    pub fn saving(&mut self, file: &SceneFile, scene: &Arc<Scene>) {
         if self.recovery.path().is_some() {
             // An error is ignored here because the save reports it.
             let _ = self.recovery.keep(&file.text_of(scene), file.fingerprint());
+            self.kept = Some(Arc::clone(scene));
         }
     }
 
     /// Records that `scene` was written to the scene file at `path`, and removes the recovery file.
-    pub fn saved(&mut self, scene: &Arc<Scene>, path: &Path) {
+    /// Edits that were made after `scene` become pending again.
+    pub fn saved(&mut self, scene: &Arc<Scene>, path: &Path, now: Instant) {
+        let newest = self.pending.take().map(|pending| pending.scene).or(self.kept.take());
         self.recovery.forget();
         self.recovery = Recovery::new(Some(path), "", self.state.as_deref());
-        self.pending.take_if(|pending| *pending.scene == **scene);
+        self.note(newest.filter(|newest| **newest != **scene), now);
     }
 
     /// Schedules an autosave of `scene` at time `now`. If `scene` is `None`, cancels a scheduled
@@ -75,6 +81,8 @@ impl Autosave {
             }
             None => {
                 self.pending = None;
+                self.kept = None;
+                self.failed = None;
                 self.recovery.forget();
             }
         }
@@ -92,19 +100,45 @@ impl Autosave {
         let scene = self.pending.take()?.scene;
         let text = file.text_of(&scene);
         if file.holds(&text) {
+            self.kept = None;
             self.recovery.forget();
             return None;
         }
         match self.recovery.keep(&text, file.fingerprint()) {
             Ok(()) => {
-                self.complained = false;
+                self.kept = Some(scene);
+                self.failed = None;
                 None
             }
-            Err(_) if std::mem::replace(&mut self.complained, true) => None,
-            Err(error) => Some(Message::Warning(format!(
-                "unsaved edits would be lost if the program were killed: they cannot be kept ({error})"
-            ))),
+            Err(error) => match self.failed.replace(error.to_string()) {
+                Some(_) => None,
+                None => Some(Message::Warning(format!(
+                    "unsaved edits would be lost if the program were killed: they cannot be kept ({error})"
+                ))),
+            },
         }
+    }
+
+    /// Returns the path of the recovery file at the end of the session, if it exists.
+    ///
+    /// # Errors
+    /// An explanation if the last edits could not be written.
+    pub fn kept(&self) -> Result<Option<PathBuf>, String> {
+        match (&self.failed, self.path()) {
+            (None, path) => Ok(path.map(Path::to_path_buf)),
+            (Some(why), None) => {
+                Err(format!("unsaved edits are lost: they cannot be kept ({why})"))
+            }
+            (Some(why), Some(path)) => Err(format!(
+                "the last edits are lost: they cannot be kept ({why}); earlier ones are in {}",
+                path.display()
+            )),
+        }
+    }
+
+    /// Returns a recovery of the same scene that writes to the state folder only.
+    pub fn elsewhere(&self) -> Recovery {
+        self.recovery.elsewhere()
     }
 
     /// Returns the path of the recovery file, if it exists.

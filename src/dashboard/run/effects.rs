@@ -75,7 +75,7 @@ impl EffectRunner {
         let session = Session::new(threads, options.clone(), settings)?;
         let files = Files::new(file, state, results.clone())?;
         let exporter = Exporter {
-            document: files.document(),
+            file: files.shared(),
             folder: PathBuf::new(),
             stem,
             sampler: options.sampling.kind,
@@ -209,9 +209,9 @@ impl EffectRunner {
         self.files.flush(patience);
     }
 
-    /// Completes pending writes and ends the threads. Returns the remaining results, and the path
-    /// of the recovery file if there are unsaved edits.
-    pub fn finish(mut self) -> (Vec<Message>, Option<PathBuf>) {
+    /// Completes pending writes and ends the threads. Returns the remaining results, and the result
+    /// of [`Files::finish`].
+    pub fn finish(mut self) -> (Vec<Message>, Result<Option<PathBuf>, String>) {
         if let Some(resized) = self.resized.take() {
             resized.end();
         }

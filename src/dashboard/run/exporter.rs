@@ -1,8 +1,8 @@
 //! Exports to image files: the current picture, or a separate render at another size.
 
 use crate::dashboard::message::{Exported, Format, Message};
-use crate::dashboard::run::file_worker::SharedDocument;
 use crate::dashboard::run::paths;
+use crate::dashboard::run::shared_file::SharedFile;
 use crate::film::{Depth, Display, ImageOutput};
 use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Settings, Stop};
@@ -25,7 +25,7 @@ const LOOK: Duration = Duration::from_millis(200);
 #[derive(Clone)]
 pub struct Exporter {
     /// Text of the scene file, for the metadata.
-    pub document: SharedDocument,
+    pub file: SharedFile,
     /// Folder that exports are written to.
     pub folder: PathBuf,
     /// Part of the file name before the counter.
@@ -70,9 +70,9 @@ impl Exporter {
 
     /// Returns the name of the scene file, and the text that it would have if `scene` were saved.
     fn source(&self, scene: &Scene) -> (String, String) {
-        match self.document.get() {
-            Some(document) => {
-                let mut document = (*document).clone();
+        match self.file.get() {
+            Some(file) => {
+                let mut document = file.document().clone();
                 document.apply(scene);
                 (document.name().to_string(), document.text().to_string())
             }

@@ -1,64 +1,95 @@
 //! Thread that reads and writes the scene file and watches it for changes by other programs. The
-//! thread keeps a slow disk from blocking the dashboard.
+//! thread keeps a slow disk from blocking the dashboard. Recovery files are written by a thread of
+//! their own, which never waits for the scene file.
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::autosave::Autosave;
-use crate::scene::{DiskState, Document, SaveError, Scene, SceneErrors, SceneFile};
+use crate::dashboard::run::autosave_worker::{AutosaveJob, AutosaveWorker};
+use crate::dashboard::run::shared_file::SharedFile;
+use crate::scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime};
 
 /// Interval between checks of the scene file for changes by other programs.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
+/// Longest wait before a save for the update of the recovery file.
+const PREPARED_WITHIN: Duration = Duration::from_secs(2);
+/// Longest wait at the end for pending saves.
+const SAVED_WITHIN: Duration = Duration::from_secs(2);
+/// Longest wait at the end for the recovery file, and for the one in the state folder if the first
+/// one cannot be written in this time. The sum of the three waits is less than the grace period
+/// after a terminating signal.
+const KEPT_WITHIN: Duration = Duration::from_secs(1);
 
-enum Job {
-    Save { scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool },
+pub(super) enum Job {
+    Save {
+        scene: Arc<Scene>,
+        path: Option<PathBuf>,
+        overwrite: bool,
+        /// Disconnected as soon as the recovery file holds `scene`.
+        prepared: Receiver<()>,
+    },
     Load,
-    Autosave(Option<Arc<Scene>>),
-    Flush(Sender<()>),
-    Recover,
-    Discard,
+    /// Continue with this file, recovered in place of an unreadable one.
+    Adopt(Box<SceneFile>),
+    End,
 }
 
-/// Shared handle of the scene document (the text of the scene file) as last read or written. It is
-/// empty if the file has never been readable.
-#[derive(Clone, Default)]
-pub struct SharedDocument(Arc<Mutex<Option<Arc<Document>>>>);
-
-impl SharedDocument {
-    /// Returns the document. Returns `None` if the file has never been readable.
-    pub fn get(&self) -> Option<Arc<Document>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
-    fn put(&self, document: &Document) {
-        let document = Some(Arc::new(document.clone()));
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = document;
-    }
-}
-
-/// Handle of the thread that reads and writes the scene file.
+/// Handle of the threads of the scene file and of the recovery file.
 pub struct Files {
-    jobs: Option<Sender<Job>>,
-    document: SharedDocument,
-    thread: Option<JoinHandle<Option<PathBuf>>>,
+    jobs: Sender<Job>,
+    autosaves: Sender<AutosaveJob>,
+    shared: SharedFile,
+    /// Newest unsaved scene.
+    unsaved: Option<Arc<Scene>>,
+    threads: Option<[Worker; 2]>,
+}
+
+/// Thread that may never end, because a disk does not respond.
+struct Worker {
+    thread: JoinHandle<()>,
+    /// Disconnected at the end of the thread.
+    ended: Receiver<()>,
+}
+
+impl Worker {
+    fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> io::Result<Self> {
+        let (running, ended) = bounded(0);
+        let thread = thread::Builder::new().name(name.into()).spawn(move || {
+            let _running = running;
+            run();
+        })?;
+        Ok(Self { thread, ended })
+    }
+
+    /// Waits for the end of the thread. Returns `false` if it has not ended after `patience`.
+    fn join_within(self, patience: Duration) -> bool {
+        if self.ended.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {
+            return false;
+        }
+        match self.thread.join() {
+            Err(panic) if !thread::panicking() => std::panic::resume_unwind(panic),
+            _ => true,
+        }
+    }
 }
 
 impl Files {
-    /// Starts the thread for `file`, an open scene file or the path of an unreadable one. The
-    /// thread sends its results to `results`. `state` is the folder for recovery files that cannot
-    /// be written beside their scene file.
+    /// Starts the threads for `file`, an open scene file or the path of an unreadable one. The
+    /// threads send their results to `results`. `state` is the folder for recovery files that
+    /// cannot be written beside their scene file.
     pub fn new(
         file: Result<SceneFile, PathBuf>,
         state: Option<PathBuf>,
         results: Sender<Message>,
     ) -> io::Result<Self> {
         let (jobs, inbox) = unbounded();
-        let document = SharedDocument::default();
+        let (autosaves, autosave_inbox) = unbounded();
         let (path, file) = match file {
             Ok(file) => (file.path().map(Path::to_path_buf), Some(file)),
             Err(path) => (Some(path), None),
@@ -67,16 +98,38 @@ impl Files {
         // an unreadable file have been reported; its stamp avoids a second report.
         let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
         let name = file.as_ref().map_or("", |file| file.document().name());
-        let autosave = Autosave::new(path.as_deref(), name, state);
-        let worker = FileWorker { path, file, seen, autosave, document: document.clone(), results };
-        let thread = thread::Builder::new().name("files".into()).spawn(|| worker.run(inbox))?;
-        Ok(Self { jobs: Some(jobs), document, thread: Some(thread) })
+        let autosave = Autosave::new(path.as_deref(), name, state.clone());
+        let shared = SharedFile::new(autosave.elsewhere());
+        file.iter().for_each(|file| shared.put(file));
+        let autosave_worker = AutosaveWorker {
+            autosave,
+            path: path.clone(),
+            shared: shared.clone(),
+            jobs: jobs.clone(),
+            results: results.clone(),
+        };
+        let worker = FileWorker {
+            path,
+            file,
+            seen,
+            state,
+            autosaves: autosaves.clone(),
+            shared: shared.clone(),
+            results,
+        };
+        let threads = [
+            Worker::spawn("files", move || worker.run(&inbox))?,
+            Worker::spawn("autosave", move || autosave_worker.run(&autosave_inbox))?,
+        ];
+        Ok(Self { jobs, autosaves, shared, unsaved: None, threads: Some(threads) })
     }
 
     /// Writes `scene` to the scene file, or to `path`, which becomes the scene file. `overwrite`
     /// allows the replacement of content from other programs. The result is a [`Message::Saved`].
     pub fn save(&self, scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool) {
-        self.give(Job::Save { scene, path, overwrite });
+        let (preparing, prepared) = bounded(0);
+        self.give_autosave(AutosaveJob::Saving(Arc::clone(&scene), preparing));
+        self.give(Job::Save { scene, path, overwrite, prepared });
     }
 
     /// Reads the scene file. The result is a [`Message::Loaded`].
@@ -86,59 +139,96 @@ impl Files {
 
     /// Schedules an autosave of a scene with unsaved edits. The recovery file is written after a
     /// pause in editing, or when the program ends. `None` removes the recovery file.
-    pub fn autosave(&self, scene: Option<Arc<Scene>>) {
-        self.give(Job::Autosave(scene));
+    pub fn autosave(&mut self, scene: Option<Arc<Scene>>) {
+        self.unsaved.clone_from(&scene);
+        self.give_autosave(AutosaveJob::Note(scene));
     }
 
     /// Writes unsaved edits to the recovery file without waiting for a pause. Blocks until the
     /// edits are written, at most for `patience`.
     pub fn flush(&self, patience: Duration) {
         let (done, completion) = bounded(1);
-        self.give(Job::Flush(done));
+        self.give_autosave(AutosaveJob::Flush(done));
         let _ = completion.recv_timeout(patience);
     }
 
     /// Adopts the edits of the last [`Message::OrphanedEdits`] as the unsaved edits of this
     /// session.
     pub fn recover(&self) {
-        self.give(Job::Recover);
+        self.give_autosave(AutosaveJob::Recover);
     }
 
     /// Discards the edits of the last [`Message::OrphanedEdits`].
     pub fn discard(&self) {
-        self.give(Job::Discard);
+        self.give_autosave(AutosaveJob::Discard);
     }
 
-    /// Waits for pending writes. Returns the path of the recovery file if there are unsaved edits.
-    pub fn finish(mut self) -> Option<PathBuf> {
-        self.join()
+    /// Waits for pending writes, at most four seconds in total. Returns the path of the recovery
+    /// file if there are unsaved edits. If the disk of the scene does not respond in time, they are
+    /// kept in the state folder.
+    ///
+    /// # Errors
+    /// An explanation if there are unsaved edits that cannot be kept.
+    pub fn finish(mut self) -> Result<Option<PathBuf>, String> {
+        self.end()
     }
 
-    fn join(&mut self) -> Option<PathBuf> {
-        drop(self.jobs.take());
-        match self.thread.take()?.join() {
-            Ok(kept) => kept,
-            Err(_) if thread::panicking() => None,
-            Err(panic) => std::panic::resume_unwind(panic),
+    fn end(&mut self) -> Result<Option<PathBuf>, String> {
+        let Some([files, autosave]) = self.threads.take() else { return Ok(None) };
+        self.give(Job::End);
+        files.join_within(SAVED_WITHIN);
+        let (reply, kept) = bounded(1);
+        self.give_autosave(AutosaveJob::End(reply));
+        if autosave.join_within(KEPT_WITHIN) {
+            return kept.recv().unwrap_or(Ok(None));
+        }
+        match (self.unsaved.take(), self.shared.get()) {
+            (Some(scene), Some(file)) => keep_elsewhere(&scene, &file, self.shared.elsewhere()),
+            _ => Ok(None),
         }
     }
 
-    /// Returns a handle of the scene document.
-    pub fn document(&self) -> SharedDocument {
-        self.document.clone()
+    /// Returns a handle of the scene file as last read or written.
+    pub fn shared(&self) -> SharedFile {
+        self.shared.clone()
     }
 
+    // Sending fails only after a panic of the thread, which `end` propagates.
+
     fn give(&self, job: Job) {
-        // Sending fails only after a panic of the thread, which `join` propagates.
-        let _ = self.jobs.as_ref().map(|jobs| jobs.send(job));
+        let _ = self.jobs.send(job);
+    }
+
+    fn give_autosave(&self, job: AutosaveJob) {
+        let _ = self.autosaves.send(job);
     }
 }
 
-/// Waits for pending writes.
+/// Waits for pending writes as [`Files::finish`] does.
 impl Drop for Files {
     fn drop(&mut self) {
-        self.join();
+        let _ = self.end();
     }
+}
+
+/// Keeps `scene` as the unsaved edits of `file` by `recovery`, in a thread of its own, since this
+/// disk may not respond either.
+fn keep_elsewhere(
+    scene: &Scene,
+    file: &SceneFile,
+    mut recovery: Recovery,
+) -> Result<Option<PathBuf>, String> {
+    let (text, base) = (file.text_of(scene), file.fingerprint());
+    let (reply, kept) = bounded(1);
+    thread::spawn(move || {
+        let kept = recovery.keep(&text, base).map(|()| recovery.path().map(Path::to_path_buf));
+        // Sending fails if the receiver has timed out and is gone.
+        let _ = reply.send(kept.map_err(|error| error.to_string()));
+    });
+    let no_answer = || Err("the disk does not respond".to_string());
+    kept.recv_timeout(KEPT_WITHIN)
+        .unwrap_or_else(|_| no_answer())
+        .map_err(|why| format!("unsaved edits are lost: they cannot be kept ({why})"))
 }
 
 /// Modification time and length of a file, to detect changes; `None` if the file has no metadata.
@@ -156,32 +246,34 @@ struct FileWorker {
     file: Option<SceneFile>,
     /// Stamp of the scene file when it was last read, written or checked.
     seen: FileStamp,
-    autosave: Autosave,
-    document: SharedDocument,
+    /// User's state folder.
+    state: Option<PathBuf>,
+    autosaves: Sender<AutosaveJob>,
+    shared: SharedFile,
     results: Sender<Message>,
 }
 
 impl FileWorker {
-    /// Executes jobs until all senders are dropped. Returns the path of the recovery file if there
-    /// are unsaved edits.
-    fn run(mut self, inbox: Receiver<Job>) -> Option<PathBuf> {
-        self.publish();
-        for message in self.autosave.search(file_or_path(&self.file, &self.path)) {
-            self.send(message);
-        }
+    /// Executes jobs until [`Job::End`].
+    fn run(mut self, inbox: &Receiver<Job>) {
         let mut checked = Instant::now();
         loop {
             let next_check = checked + CHECK_INTERVAL;
-            let due = self.autosave.due().map_or(next_check, |due| due.min(next_check));
-            match inbox.recv_deadline(due) {
-                Ok(job) => self.work(job),
+            match inbox.recv_deadline(next_check) {
+                Ok(Job::Save { scene, path, overwrite, prepared }) => {
+                    let _ = prepared.recv_timeout(PREPARED_WITHIN);
+                    let saved = self.save(&scene, path, overwrite);
+                    self.send(Message::Saved(scene, saved));
+                }
+                Ok(Job::Load) => {
+                    let loaded = self.load();
+                    self.send(Message::Loaded(Box::new(loaded)));
+                }
+                Ok(Job::Adopt(file)) => self.file = Some(*file),
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => break,
+                Ok(Job::End) | Err(RecvTimeoutError::Disconnected) => break,
             }
             let now = Instant::now();
-            if self.autosave.due().is_some_and(|due| due <= now) {
-                self.write_autosave();
-            }
             if next_check <= now {
                 checked = now;
                 if self.changed() {
@@ -189,44 +281,6 @@ impl FileWorker {
                 }
             }
         }
-        self.write_autosave();
-        self.autosave.path().map(Path::to_path_buf)
-    }
-
-    fn work(&mut self, job: Job) {
-        match job {
-            Job::Save { scene, path, overwrite } => {
-                let saved = self.save(&scene, path, overwrite);
-                self.send(Message::Saved(scene, saved));
-            }
-            Job::Load => {
-                let loaded = self.load();
-                self.send(Message::Loaded(Box::new(loaded)));
-            }
-            Job::Autosave(scene) => self.autosave.note(scene, Instant::now()),
-            Job::Flush(done) => {
-                self.write_autosave();
-                // Sending fails if the receiver has timed out and is gone.
-                let _ = done.try_send(());
-            }
-            Job::Recover => {
-                let unreadable_path = self.path.as_deref().filter(|_| self.file.is_none());
-                if let Some(file) = self.autosave.recover(unreadable_path) {
-                    self.file = Some(file);
-                    self.publish();
-                }
-            }
-            Job::Discard => {
-                self.autosave.discard();
-                let next = self.autosave.offer(file_or_path(&self.file, &self.path));
-                next.into_iter().for_each(|message| self.send(message));
-            }
-        }
-    }
-
-    fn write_autosave(&mut self) {
-        let warning = self.file.as_ref().and_then(|file| self.autosave.write(file));
-        warning.into_iter().for_each(|message| self.send(message));
     }
 
     fn send(&self, message: Message) {
@@ -258,16 +312,17 @@ impl FileWorker {
             let what = "its contents are not a scene".to_string();
             return Err(SaveError::Failed { path: self.path.clone().unwrap_or_default(), what });
         };
-        self.autosave.saving(file, scene);
         match path {
             Some(path) => file.save_as(&path, scene, overwrite)?,
             None => file.save(scene, overwrite)?,
         }
         let path = file.path().ok_or(SaveError::Untitled)?.to_path_buf();
         self.seen = stamp(&path);
-        self.autosave.saved(scene, &path);
-        self.path = Some(path.clone());
+        let recovery = Recovery::new(Some(&path), "", self.state.as_deref());
+        self.shared.set_elsewhere(recovery.elsewhere());
         self.publish();
+        let _ = self.autosaves.send(AutosaveJob::Saved(Arc::clone(scene), path.clone()));
+        self.path = Some(path.clone());
         Ok(path)
     }
 
@@ -290,18 +345,9 @@ impl FileWorker {
 
     fn publish(&self) {
         if let Some(file) = &self.file {
-            self.document.put(file.document());
+            self.shared.put(file);
         }
     }
-}
-
-/// Returns the scene file, or the path of an unreadable one, which is empty for a scene without
-/// file.
-fn file_or_path<'a>(
-    file: &'a Option<SceneFile>,
-    path: &'a Option<PathBuf>,
-) -> Result<&'a SceneFile, &'a Path> {
-    file.as_ref().ok_or(path.as_deref().unwrap_or(Path::new("")))
 }
 
 #[cfg(test)]
@@ -336,7 +382,7 @@ mod tests {
         files.save(Arc::new(scene.clone()), None, false);
         let saved = inbox.recv_timeout(PATIENCE).unwrap();
         assert!(matches!(saved, Message::Saved(_, Ok(at)) if at == path));
-        assert_eq!(files.document().get().unwrap().scene(), &scene);
+        assert_eq!(files.shared().get().unwrap().document().scene(), &scene);
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL + CHECK_INTERVAL / 2);
         assert!(quiet.is_err(), "{quiet:?}");
         fs::write(&path, format!("{}\n# more\n", starter())).unwrap();
@@ -365,7 +411,7 @@ mod tests {
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
         files.load();
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_ok());
-        assert!(files.document().get().is_some());
+        assert!(files.shared().get().is_some());
     }
 
     #[test]
@@ -377,11 +423,11 @@ mod tests {
         scene.film.size = [64, 48];
         let scene = Arc::new(scene);
         let hidden = folder.path().join(".a.toml.unsaved");
-        let (files, _inbox) = opened(&path);
+        let (mut files, _inbox) = opened(&path);
         files.autosave(Some(Arc::clone(&scene)));
-        assert_eq!(files.finish(), Some(hidden.clone()));
+        assert_eq!(files.finish(), Ok(Some(hidden.clone())));
         assert!(fs::read_to_string(&hidden).unwrap().contains("64"));
-        let (files, inbox) = opened(&path);
+        let (mut files, inbox) = opened(&path);
         let offered = inbox.recv_timeout(PATIENCE).unwrap();
         assert!(
             matches!(&offered, Message::OrphanedEdits(left) if left.scene == scene),
@@ -390,15 +436,15 @@ mod tests {
         files.recover();
         files.autosave(Some(Arc::clone(&scene)));
         files.save(Arc::clone(&scene), None, false);
-        assert_eq!(files.finish(), None);
+        assert_eq!(files.finish(), Ok(None));
         assert!(!hidden.exists());
         assert!(fs::read_to_string(&path).unwrap().contains("64"));
-        let (files, _inbox) = opened(&path);
+        let (mut files, _inbox) = opened(&path);
         files.autosave(Some(Arc::new(Scene::parse(starter(), "a").unwrap())));
         files.flush(PATIENCE);
         assert!(hidden.exists());
         files.autosave(None);
-        assert_eq!(files.finish(), None);
+        assert_eq!(files.finish(), Ok(None));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
@@ -413,5 +459,69 @@ mod tests {
         files.save(Arc::new(scene), Some(path.clone()), false);
         drop(files);
         assert_eq!(fs::read_to_string(&path).unwrap(), starter());
+    }
+
+    /// Scene file in `folder`, and a scene that differs from it.
+    fn edited(folder: &Path) -> (PathBuf, Arc<Scene>) {
+        let path = folder.join("a.toml");
+        fs::write(&path, starter()).unwrap();
+        let mut scene = Scene::parse(starter(), "a").unwrap();
+        scene.film.size = [64, 48];
+        (path, Arc::new(scene))
+    }
+
+    /// A channel that nobody reads stands for a disk that does not respond.
+    fn opened_blocking(path: &Path, state: Option<PathBuf>) -> (Files, Receiver<Message>) {
+        let (results, inbox) = bounded(0);
+        (Files::new(Ok(SceneFile::open(path).unwrap()), state, results).unwrap(), inbox)
+    }
+
+    #[test]
+    fn edits_are_kept_while_the_scene_file_blocks() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, scene) = edited(folder.path());
+        let (mut files, _inbox) = opened_blocking(&path, None);
+        files.load();
+        files.autosave(Some(Arc::clone(&scene)));
+        files.flush(PATIENCE);
+        let hidden = folder.path().join(".a.toml.unsaved");
+        assert!(fs::read_to_string(&hidden).unwrap().contains("64"));
+        assert_eq!(files.finish(), Ok(Some(hidden)), "quitting does not wait for ever");
+    }
+
+    #[test]
+    fn edits_are_kept_elsewhere_if_the_recovery_file_blocks() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, scene) = edited(folder.path());
+        // The offer of these edits blocks the thread.
+        fs::write(folder.path().join(".a.toml.unsaved"), "[trace]\nmax_depth = 3\n").unwrap();
+        let state = folder.path().join("state");
+        let (mut files, _inbox) = opened_blocking(&path, Some(state.clone()));
+        files.autosave(Some(scene));
+        let kept = files.finish().unwrap().expect("a recovery file");
+        assert!(kept.starts_with(&state) && fs::read_to_string(&kept).unwrap().contains("64"));
+        let found = Recovery::new(Some(&path), "", Some(&state)).find();
+        assert!(found.orphans.iter().any(|lost| lost.path() == kept), "the next start offers them");
+        let (mut files, _inbox) = opened_blocking(&path, None);
+        files.autosave(Some(edited(folder.path()).1));
+        assert!(files.finish().unwrap_err().contains("unsaved edits are lost"));
+    }
+
+    #[test]
+    fn edits_after_a_save_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, first) = edited(folder.path());
+        let mut second = Scene::clone(&first);
+        second.film.size = [80, 60];
+        let (mut files, inbox) = opened(&path);
+        files.autosave(Some(Arc::clone(&first)));
+        files.flush(PATIENCE);
+        files.save(first, None, false);
+        files.autosave(Some(Arc::new(second)));
+        files.flush(PATIENCE);
+        assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::Saved(_, Ok(_))));
+        let kept = files.finish().unwrap().expect("a recovery file");
+        assert!(fs::read_to_string(&path).unwrap().contains("64, 48"));
+        assert!(fs::read_to_string(kept).unwrap().contains("80, 60"));
     }
 }

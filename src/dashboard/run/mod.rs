@@ -2,6 +2,7 @@
 //! in other threads, whose results come back through channels.
 
 mod autosave;
+mod autosave_worker;
 mod diagnose;
 mod effects;
 mod exporter;
@@ -13,6 +14,7 @@ mod input;
 mod job_control;
 mod latency;
 mod paths;
+mod shared_file;
 mod signals;
 mod writer;
 
@@ -65,15 +67,15 @@ pub struct Setup {
 }
 
 /// Result of running a dashboard.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Ended {
     /// Exit status, if a signal has ended the dashboard.
     pub signalled: Option<u8>,
     /// Results of exports that finished after the screen was restored.
     pub exported: Vec<Result<Exported, String>>,
     /// Path of the recovery file, if there are unsaved edits. The next start offers to recover
-    /// them.
-    pub kept: Option<PathBuf>,
+    /// them. The error explains why unsaved edits are lost.
+    pub kept: Result<Option<PathBuf>, String>,
     /// Lines of the summary of input latencies; empty unless [`Setup::trace`] is set.
     pub latencies: Vec<String>,
 }
@@ -101,7 +103,12 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     let mut keyboard = Keyboard::new(&surroundings);
     let ending = || signals.is_ending();
     let Ok(terminal) = probe(&screen.tty(), &mut keyboard, surroundings, &ending) else {
-        return Ok(Ended { signalled: Some(HUNG_UP), ..Ended::default() });
+        return Ok(Ended {
+            signalled: Some(HUNG_UP),
+            exported: Vec::new(),
+            kept: Ok(None),
+            latencies: Vec::new(),
+        });
     };
     let model = Model::new(Start {
         path,
