@@ -470,7 +470,7 @@ mod tests {
         (path, Arc::new(scene))
     }
 
-    /// A channel that nobody reads stands for a disk that does not respond.
+    /// Opens the file with a channel without reader, which blocks as a disk that does not respond.
     fn opened_blocking(path: &Path, state: Option<PathBuf>) -> (Files, Receiver<Message>) {
         let (results, inbox) = bounded(0);
         (Files::new(Ok(SceneFile::open(path).unwrap()), state, results).unwrap(), inbox)
