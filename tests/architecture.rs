@@ -66,7 +66,7 @@ const FOLDERS: &[(&str, &[&str])] = &[
     ("material", &["asset", "value", "sampling", "lanes"]),
     ("asset", &["bvh", "value", "disk"]),
     ("bvh", &["lanes"]),
-    ("light", &["value", "lanes"]),
+    ("light", &["value", "sampling", "lanes"]),
     ("camera", &["value", "lanes"]),
     ("film", &["value", "disk", "lanes"]),
     ("value", &[]),

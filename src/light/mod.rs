@@ -1,27 +1,45 @@
-//! Point and directional lights.
+//! Lights: points, directions, and surfaces with a size.
 
+mod area;
 mod delta;
+mod emitter;
 
+pub use area::{DiskLight, EmitterSurface, RectangleLight, SphereLight};
 pub use delta::{DeltaLight, LightSample};
+pub use emitter::{Emitter, EmitterSample};
 
 use crate::value::{Color, Description, Field, ValidationError, choices, description};
 
 description! {
-    /// A light: exactly one of `point` and `directional`, a colour, an intensity.
+    /// A light: exactly one of `point`, `directional`, `sphere`, `rectangle` and `disk`, a colour, an
+    /// intensity.
     pub struct Light: Default {
         /// Name; no two lights have the same.
         name: String, or "a number";
-        /// Light from one point. Exactly one of `point` and `directional` is given.
-        point: Option<Point>, or "`directional` is needed";
+        /// Light from one point. A light has exactly one of `point`, `directional`, `sphere`,
+        /// `rectangle` and `disk`.
+        point: Option<Point>, or "another kind is needed";
         /// Light from infinitely far away.
-        directional: Option<Directional>, or "`point` is needed";
+        directional: Option<Directional>, or "another kind is needed";
+        /// Light from a sphere.
+        sphere: Option<SphereLight>, or "another kind is needed";
+        /// Light from one side of a rectangle.
+        rectangle: Option<RectangleLight>, or "another kind is needed";
+        /// Light from one side of a disk.
+        disk: Option<DiskLight>, or "another kind is needed";
         /// Colour; multiplies the intensity.
         color: Color = [1.0, 1.0, 1.0], in LIGHT;
-        /// With falloff `inverse-square` the radiant intensity [W/sr]. With `none`, and for a
-        /// directional light, the brightness of a white matt surface that faces the light.
-        intensity: f64 = 1.0, in LIGHT "W/sr, or irradiance / π";
+        /// Radiance or power of a sphere, rectangle or disk, by `unit`. Radiant intensity [W/sr] of
+        /// a point with falloff `inverse-square`. With `none`, and for a directional light, the
+        /// brightness of a white matt surface that faces the light.
+        intensity: f64 = 1.0, in LIGHT "W/(sr m²), W, W/sr, or irradiance / π";
+        /// Unit of the intensity of a sphere, rectangle or disk.
+        unit: LightUnit = "radiance";
         /// Falloff of a point light with the distance.
         falloff: Falloff = "none";
+        /// `false` hides the surface of a sphere, rectangle or disk from the camera and from
+        /// mirrors. It still lights matt surfaces and makes highlights.
+        visible: bool = true;
         /// `false` switches the light off.
         on: bool = true;
     }
@@ -53,33 +71,98 @@ choices! {
     }
 }
 
+choices! {
+    /// Unit of the intensity of a light with a size.
+    pub enum LightUnit {
+        /// radiance \[W/(sr m²)\]: the brightness of the light as the camera sees it
+        Radiance = "radiance",
+        /// power \[W\]: π times the radiance times the area that shines, for any size
+        Power = "power",
+    }
+}
+
 /// Keys of `[[light]]`.
 pub const FIELDS: &[Field] = Light::FIELDS;
 
 impl Light {
     /// Returns the validation errors of the light.
     pub fn faults(&self) -> Vec<ValidationError> {
-        let kinds = match (&self.point, &self.directional) {
-            (Some(_), None) => None,
-            (None, None) => Some(ValidationError::new(
+        let kinds = self.kinds();
+        let kind_fault = match &kinds[..] {
+            [_] => None,
+            [] => Some(ValidationError::new(
                 "",
-                "neither point nor directional is given",
-                "exactly one of them, such as point = { position = [2.0, 4.0, 3.0] }",
+                "the light has no kind",
+                "one of point, directional, sphere, rectangle and disk, such as \
+                 point = { position = [2.0, 4.0, 3.0] }",
             )),
-            (Some(_), Some(_)) => Some(ValidationError::new(
-                "directional",
-                "both point and directional are given",
-                "exactly one of them; a second light needs its own [[light]]",
+            [first, second, ..] => Some(ValidationError::new(
+                second,
+                format!("both {first} and {second} are given"),
+                "exactly one kind; a second light needs its own [[light]]",
             )),
-            (None, Some(_)) => (self.falloff == Falloff::InverseSquare).then(|| {
-                ValidationError::new(
-                    "falloff",
-                    "falloff is \"inverse-square\", but a directional light has no distance",
-                    "falloff \"none\", or a point light",
-                )
-            }),
         };
-        self.validator().and(kinds).errors()
+        let is_point = kinds == ["point"];
+        let has_size = self.surface().is_some();
+        let other_fault = if kind_fault.is_some() {
+            None
+        } else if self.falloff == Falloff::InverseSquare && !is_point {
+            Some(ValidationError::new(
+                "falloff",
+                "falloff is \"inverse-square\", but only a point light has a falloff",
+                "falloff \"none\", or a point light",
+            ))
+        } else if self.unit == LightUnit::Power && !has_size {
+            Some(ValidationError::new(
+                "unit",
+                "unit is \"power\", but only a sphere, rectangle or disk has one",
+                "unit \"radiance\", or a light with a size",
+            ))
+        } else if !self.visible && !has_size {
+            Some(ValidationError::new(
+                "visible",
+                "visible is false, but only a sphere, rectangle or disk is visible",
+                "visible = true, or a light with a size",
+            ))
+        } else {
+            None
+        };
+        self.validator().and(kind_fault).and(other_fault).errors()
+    }
+
+    /// Names of the kinds that are given. A valid light has exactly one.
+    pub fn kinds(&self) -> Vec<&'static str> {
+        let given = [
+            ("point", self.point.is_some()),
+            ("directional", self.directional.is_some()),
+            ("sphere", self.sphere.is_some()),
+            ("rectangle", self.rectangle.is_some()),
+            ("disk", self.disk.is_some()),
+        ];
+        given.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
+    }
+
+    /// Surface of a light with a size. `None` for a point or directional light.
+    pub fn surface(&self) -> Option<EmitterSurface> {
+        let sphere = self.sphere.map(EmitterSurface::Sphere);
+        let rectangle = self.rectangle.map(EmitterSurface::Rectangle);
+        sphere.or(rectangle).or(self.disk.map(EmitterSurface::Disk))
+    }
+
+    /// Position of the light: the point, or the centre of the surface. `None` for a directional
+    /// light.
+    pub fn position(&self) -> Option<[f64; 3]> {
+        let point = self.point.map(|point| point.position);
+        point.or(self.surface().map(|surface| surface.center().to_array()))
+    }
+
+    /// Position of the light, for edits. `None` for a directional light.
+    pub fn position_mut(&mut self) -> Option<&mut [f64; 3]> {
+        let Self { point, sphere, rectangle, disk, .. } = self;
+        let point = point.as_mut().map(|point| &mut point.position);
+        let sphere = sphere.as_mut().map(|sphere| &mut sphere.center);
+        let rectangle = rectangle.as_mut().map(|rectangle| &mut rectangle.center);
+        point.or(sphere).or(rectangle).or(disk.as_mut().map(|disk| &mut disk.center))
     }
 }
 

@@ -334,46 +334,79 @@ impl<S: Float> Bsdf<S> {
     }
 
     /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction`, before directions
-    /// below the surface are mirrored up. Returns `None` for a mirror. Scalar, in double precision,
-    /// for tests.
-    pub fn density(
+    /// below the surface are mirrored up, or `None` for a mirror. All directions are unit vectors.
+    #[inline(always)]
+    pub fn density<L: SimdFloat<Scalar = S>>(
         &self,
         lobe: &ReflectionLobe<S>,
-        incident: Vec3<f64>,
-        n: Vec3<f64>,
-        direction: Vec3<f64>,
-    ) -> Option<f64> {
+        incident: Vec3<L>,
+        n: Vec3<L>,
+        direction: Vec3<L>,
+    ) -> Option<L> {
         let mirror = incident.reflect(n);
         match lobe {
             ReflectionLobe::Mirror => None,
             ReflectionLobe::Cone { one_minus_cos } => {
-                Some(warp::cone_pdf(mirror.dot(direction), one_minus_cos.to_f64()))
+                Some(warp::cone_pdf(mirror, direction, L::splat(*one_minus_cos)))
             }
             ReflectionLobe::Square { side } => {
-                let local = Frame::around(mirror).to_local(direction);
-                Some(warp::square_pdf([local.x, local.y, local.z], side.to_f64()))
+                let local = Frame::around(mirror.renormalize()).to_local(direction);
+                Some(warp::square_pdf(local, L::splat(*side)))
             }
             ReflectionLobe::MicrofacetDistribution(facets) => {
-                let facets = MicrofacetDistribution::<f64>::new(
-                    facets.ggx,
-                    facets.alpha.to_f64(),
-                    facets.masking,
-                );
-                let view = -incident;
-                let h = (view + direction).normalize();
+                let h = direction - incident;
                 let (nh, tan2) = along_tan2(h, n);
-                let vh = view.dot(h);
-                if nh <= 0.0 || vh <= 0.0 {
-                    return Some(0.0);
-                }
-                let d = facets.density(tan2);
-                let nv = view.dot(n);
-                Some(if facets.ggx {
-                    d / ((1.0 + MicrofacetEval::<f64>::lambda(&facets, nv)) * 4.0 * nv)
+                let nv = -incident.dot(n);
+                let d: L = facets.density(tan2);
+                let four = L::from_f64(4.0);
+                let density = if facets.ggx {
+                    d / ((L::one() + MicrofacetEval::<L>::lambda(facets, nv)) * four * nv)
                 } else {
-                    d * nh / (4.0 * vh)
-                })
+                    // The squared length of h is twice its dot product with the direction to the
+                    // viewer.
+                    d * nh * L::from_f64(0.5) / h.length_squared()
+                };
+                Some(density.masked(nh.gt(L::zero()) & nv.gt(L::zero())))
             }
         }
+    }
+
+    /// Returns the reflection lobe in the given direction: its value [1/sr], with the cosine of the
+    /// light, and the density [1/sr] with which [`Bsdf::sample`] draws the direction. The quotient
+    /// is the weight of the sample. Both are zero for a mirror, and for directions below the
+    /// surface. The parameters are those of [`Bsdf::sample`].
+    #[inline(always)]
+    pub fn evaluate_lobe<L: SimdFloat<Scalar = S>>(
+        &self,
+        strength: S,
+        lobe: &ReflectionLobe<S>,
+        incident: Vec3<L>,
+        n: Vec3<L>,
+        direction: Vec3<L>,
+        fold: bool,
+    ) -> (Vec3<L>, L) {
+        let Some(mut density) = self.density(lobe, incident, n, direction) else {
+            return (Vec3::zero(), L::zero());
+        };
+        let nl = direction.dot(n);
+        let above = nl.gt(L::zero());
+        let h = || direction - incident;
+        let k = L::splat(strength);
+        let value = if let ReflectionLobe::MicrofacetDistribution(facets) = lobe {
+            let (h, nv) = (h(), -incident.dot(n));
+            let (nh, tan2) = along_tan2(h, n);
+            let (visible, total) =
+                facets.masking(nh, nv, nl, h.length_squared() * L::from_f64(0.5));
+            let d: L = facets.density(tan2);
+            let value = d * visible * k * L::from_f64(0.25) / (nv * total);
+            value.masked(nh.gt(L::zero()) & nv.gt(L::zero()))
+        } else {
+            if fold && let Some(mirrored) = self.density(lobe, incident, n, direction.reflect(n)) {
+                density += mirrored;
+            }
+            k * density
+        };
+        let cos = || (h().length_squared().sqrt() * L::from_f64(0.5)).min(L::one());
+        (self.reflection_fresnel.times(cos, value).masked(above), density.masked(above))
     }
 }

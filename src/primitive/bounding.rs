@@ -178,23 +178,48 @@ impl BoundingVolume {
         self.slack + ray_error(point) + F32_RAY_ERROR * reach.max(offset)
     }
 
+    /// Returns `true` if the form is flat, and the points of `lit` and the light are on the same
+    /// side of its plane. `above` returns the height of the light above a plane, and the error
+    /// within which the light may be on either side.
+    fn is_beside(&self, lit: &BoundingSphere, above: impl Fn((DVec3, f64)) -> (f64, f64)) -> bool {
+        let Some((normal, offset)) = self.plane else { return false };
+        let height = normal.dot(lit.center) - offset;
+        let (beyond, unsure) = above((normal, offset));
+        let sure = height.abs() > lit.radius + self.ray_error(lit.center) && beyond.abs() > unsure;
+        let radius = lit.radius + ray_error(lit.center) + F32_RAY_ERROR * lit.radius;
+        sure && height.abs() > radius && height * beyond > 0.0
+    }
+
+    /// Returns `true` if the form may be between some point of `lit` and some point of `light`.
+    pub fn may_occlude_ball(&self, lit: &BoundingSphere, light: &BoundingSphere) -> bool {
+        let above = |(normal, offset): (DVec3, f64)| {
+            let unsure = light.radius + self.ray_error(light.center);
+            (normal.dot(light.center) - offset, unsure)
+        };
+        if self.is_beside(lit, above) {
+            return false;
+        }
+        if !lit.radius.is_finite() || !self.ball.radius.is_finite() {
+            return true;
+        }
+        let grown = |ball: &BoundingSphere| BoundingSphere {
+            radius: ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center),
+            ..*ball
+        };
+        distance_to_hull(self.ball.center, &grown(light), &grown(lit)) <= grown(&self.ball).radius
+    }
+
     /// Returns `true` if the form may be between some point of `lit` and the light.
     pub fn may_occlude(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
         let slack = ray_error(lit.center) + F32_RAY_ERROR * lit.radius;
         let radius = lit.radius + slack;
-        if let Some((normal, offset)) = self.plane {
-            let height = normal.dot(lit.center) - offset;
-            // A light on the plane within rounding may be seen on either side.
-            let (beyond, unsure) = match towards {
-                LightTarget::Point(light) => (normal.dot(*light) - offset, self.ray_error(*light)),
-                LightTarget::Direction(direction) => (normal.dot(*direction), F32_RAY_ERROR),
-            };
-            let sure =
-                height.abs() > lit.radius + self.ray_error(lit.center) && beyond.abs() > unsure;
-            // Light and lit points are on the same side.
-            if sure && height.abs() > radius && height * beyond > 0.0 {
-                return false;
-            }
+        // A light on the plane within rounding may be seen on either side.
+        let above = |(normal, offset): (DVec3, f64)| match towards {
+            LightTarget::Point(light) => (normal.dot(*light) - offset, self.ray_error(*light)),
+            LightTarget::Direction(direction) => (normal.dot(*direction), F32_RAY_ERROR),
+        };
+        if self.is_beside(lit, above) {
+            return false;
         }
         if !lit.radius.is_finite() || !self.ball.radius.is_finite() {
             return true;
@@ -222,6 +247,27 @@ impl BoundingVolume {
             }
         }
     }
+}
+
+/// Returns the distance of `point` from the convex hull of two balls; negative inside. The hull is
+/// the union of all balls whose centres and radii are interpolated between those of `a` and `b`.
+fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64 {
+    let axis = b.center - a.center;
+    let length = axis.length().max(f64::MIN_POSITIVE);
+    let direction = axis / length;
+    let along = (point - a.center).dot(direction);
+    let across = (point - a.center - direction * along).length();
+    // Distance from the ball at `x` along the axis, a convex function. Its derivative is zero where
+    // the sine of the line to the point equals the slope of the hull's side.
+    let slope = (b.radius - a.radius) / length;
+    let distance = |x: f64| across.hypot(along - x) - (a.radius + slope * x);
+    let ends = distance(0.0).min(distance(length));
+    if slope.abs() >= 1.0 {
+        // One ball contains the other.
+        return ends;
+    }
+    let nearest = along + across * slope / (1.0 - slope * slope).sqrt();
+    distance(nearest.clamp(0.0, length)).min(ends)
 }
 
 /// All directions within an angle below 90 degrees of an axis.
@@ -284,6 +330,40 @@ mod tests {
         // Seen edge-on, without an end.
         let floor = part(&Form::Plane(PlaneForm { normal: DVec3::Y, offset: -0.1 })).unwrap();
         assert!(floor.radius.is_infinite());
+    }
+
+    /// Balls that cut a segment between two points of the hull's balls are near the hull, and the
+    /// hull ends within the sum of the balls.
+    #[test]
+    fn hull_of_two_balls_holds_every_segment_between_them() {
+        let mut random = 7u64;
+        let mut unit = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (random >> 40) as f64 / 8_388_608.0 - 1.0
+        };
+        let mut apart = 0;
+        for _ in 0..2000 {
+            let mut ball = |size: f64| BoundingSphere {
+                center: DVec3::new(unit(), unit(), unit()) * 3.0,
+                radius: size * (1.0 + unit()),
+            };
+            let (a, b, occluder) = (ball(1.0), ball(0.5), ball(0.3));
+            let distance = distance_to_hull(occluder.center, &a, &b);
+            for step in 0..=64 {
+                let s = f64::from(step) / 64.0;
+                let center = a.center.lerp(b.center, s);
+                let radius = a.radius + s * (b.radius - a.radius);
+                let to_ball = center.distance(occluder.center) - radius;
+                assert!(distance <= to_ball + 1e-12, "{a:?} {b:?} {occluder:?} {s}");
+            }
+            let bound = BoundingVolume::new(&ball_form(&occluder));
+            apart += u32::from(!bound.may_occlude_ball(&b, &a));
+        }
+        assert!((500..1900).contains(&apart), "{apart}");
+    }
+
+    fn ball_form(ball: &BoundingSphere) -> Form {
+        Form::Sphere(SphereForm { center: ball.center, radius: ball.radius })
     }
 
     #[test]

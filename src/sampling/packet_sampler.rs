@@ -142,15 +142,35 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Returns the position of each sample in its pixel, two coordinates in [0, 1).
     #[inline(always)]
     pub fn pixel(&self) -> (L, L) {
-        (self.joint(0), self.joint(1))
+        (self.joint(0, 0), self.joint(1, 0))
     }
 
     /// Returns two numbers in [0, 1) for the lobe of the surface that a path hits after `bounce`
     /// reflections.
     #[inline(always)]
     pub fn lobe_2d(&self, bounce: u32) -> (L, L) {
+        self.pair_2d(bounce, 0)
+    }
+
+    /// Returns two numbers in [0, 1) for emitter `light` at the surface that a path hits after
+    /// `bounce` reflections. They are those of the lobe at this surface under another scrambling:
+    /// the light of an emitter and the light of the lobe are summands of the radiance, never
+    /// factors of one product, so that they may share dimensions. Both are stratified together with
+    /// the position in the pixel and the lobes of earlier surfaces.
+    #[inline(always)]
+    pub fn light_2d(&self, bounce: u32, light: u32) -> (L, L) {
+        self.pair_2d(bounce, hash_scalar(light + 1))
+    }
+
+    /// Returns the two dimensions of the surface after `bounce` reflections, scrambled with `salt`.
+    #[inline(always)]
+    fn pair_2d(&self, bounce: u32, salt: u32) -> (L, L) {
         let d = self.points.sampler.first_lobe + 2 * bounce as usize;
-        if bounce < 2 { (self.joint(d), self.joint(d + 1)) } else { self.padded(bounce - 2) }
+        if bounce < 2 {
+            (self.joint(d, salt), self.joint(d + 1, salt))
+        } else {
+            self.padded(bounce - 2, salt)
+        }
     }
 
     /// Returns a number in [0, 1) for branch choice `number` of a path: reflection or transmission.
@@ -158,17 +178,17 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     #[inline(always)]
     pub fn branch_1d(&self, number: u32) -> L {
         if number < CHOICES {
-            self.joint(DIMENSIONS - CHOICES as usize + number as usize)
+            self.joint(DIMENSIONS - CHOICES as usize + number as usize, 0)
         } else {
             self.padded_choice(number - CHOICES)
         }
     }
 
-    /// Returns dimension `d` of the joint set.
+    /// Returns dimension `d` of the joint set. Each `salt` is a scrambling of its own.
     #[inline(always)]
-    fn joint(&self, d: usize) -> L {
+    fn joint(&self, d: usize, salt: u32) -> L {
         let points = self.points;
-        let dimension_salt = points.sampler.dimension_salt[d];
+        let dimension_salt = points.sampler.dimension_salt[d] ^ salt;
         let seed = match self.single_key {
             Some(key) => L::SimdU32::splat(hash_scalar(key ^ dimension_salt)),
             None => hash(self.key ^ L::SimdU32::splat(dimension_salt)),
@@ -181,11 +201,12 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns two numbers for lobe `pair` of the padded sets. Four lobes share a set.
+    /// Returns two numbers for lobe `pair` of the padded sets, scrambled with `salt`. Four lobes
+    /// share a set.
     #[cold]
-    fn padded(&self, pair: u32) -> (L, L) {
+    fn padded(&self, pair: u32, salt: u32) -> (L, L) {
         let d = 2 * (pair % 4) as usize;
-        let [a, b] = self.padded_set((pair / 4 + 1) ^ 0x5bd1_e995, [d, d + 1]);
+        let [a, b] = self.padded_set((pair / 4 + 1) ^ 0x5bd1_e995, [d, d + 1], salt);
         (a, b)
     }
 
@@ -194,14 +215,14 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     fn padded_choice(&self, number: u32) -> L {
         let per_set = DIMENSIONS as u32;
         let [x] =
-            self.padded_set((number / per_set + 1) ^ 0x9e37_79b9, [(number % per_set) as usize]);
+            self.padded_set((number / per_set + 1) ^ 0x9e37_79b9, [(number % per_set) as usize], 0);
         x
     }
 
-    /// Returns the given `dimensions` of the padded set `set`. Each padded set shuffles the sample
-    /// indices by a key of its own.
+    /// Returns the given `dimensions` of the padded set `set`, scrambled with `salt`. Each padded
+    /// set shuffles the sample indices by a key of its own.
     #[inline(always)]
-    fn padded_set<const N: usize>(&self, set: u32, dimensions: [usize; N]) -> [L; N] {
+    fn padded_set<const N: usize>(&self, set: u32, dimensions: [usize; N], salt: u32) -> [L; N] {
         let SampleBlock { sampler, index, .. } = self.points;
         let key = hash(self.key + L::SimdU32::splat(hash_scalar(set)));
         let shuffled = owen(index.reverse(), key).reverse();
@@ -210,7 +231,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
             *index = shuffled.lane(lane);
         }
         dimensions.map(|d| {
-            let seed = hash(key ^ L::SimdU32::splat(sampler.dimension_salt[d]));
+            let seed = hash(key ^ L::SimdU32::splat(sampler.dimension_salt[d] ^ salt));
             match sampler.settings.kind {
                 SamplerKind::Random => L::to_unit(hash(hash(*index ^ seed) + key)),
                 SamplerKind::Sobol => {

@@ -58,7 +58,7 @@ fn polynomial<L: SimdFloat>(k: &[f64], x: L) -> L {
 
 /// Samples a direction uniformly in the cone with half-angle theta around z.
 ///
-/// `one_minus_cos` is 1 - cos(theta), in [0, 1]. It is computed most exactly as 2 sin^2(theta / 2).
+/// `one_minus_cos` is 1 - cos(theta), in [0, 2]. It is computed most exactly as 2 sin^2(theta / 2).
 #[inline(always)]
 pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     let (x, y, r2) = disk(u, v);
@@ -69,9 +69,13 @@ pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     Vec3::new(x * scale, y * scale, L::one() - drop)
 }
 
-/// Density of [`cone`] [1/sr]: constant inside of the cone, 0 outside.
-pub fn cone_pdf(direction_z: f64, one_minus_cos: f64) -> f64 {
-    if 1.0 - direction_z <= one_minus_cos { 1.0 / (TAU * one_minus_cos) } else { 0.0 }
+/// Density of [`cone`] [1/sr] around the unit vector `axis`: constant inside of the cone, 0 outside.
+/// The cosine is compared by the distance between the ends of both unit vectors, which narrow cones
+/// leave more digits.
+#[inline(always)]
+pub fn cone_pdf<L: SimdFloat>(axis: Vec3<L>, direction: Vec3<L>, one_minus_cos: L) -> L {
+    let drop = (direction - axis).length_squared() * L::from_f64(0.5);
+    (L::one() / (one_minus_cos * L::from_f64(TAU))).masked(drop.le(one_minus_cos))
 }
 
 /// Samples the direction through a uniform point of a square. The square has the side `side`, is
@@ -83,10 +87,11 @@ pub fn square<L: SimdFloat>(u: L, v: L, side: L) -> Vec3<L> {
 }
 
 /// Density of [`square`] [1/sr]: 1 / (side^2 cos^3) inside of the square, 0 outside.
-pub fn square_pdf(direction: [f64; 3], side: f64) -> f64 {
-    let [x, y, z] = direction;
-    let inside = z > 0.0 && x.abs().max(y.abs()) <= 0.5 * side * z;
-    if inside { 1.0 / (side * side * z * z * z) } else { 0.0 }
+#[inline(always)]
+pub fn square_pdf<L: SimdFloat>(direction: Vec3<L>, side: L) -> L {
+    let Vec3 { x, y, z } = direction;
+    let inside = z.gt(L::zero()) & x.abs().max(y.abs()).le(side * z * L::from_f64(0.5));
+    (L::one() / (side * side * z * z * z)).masked(inside)
 }
 
 /// Samples a microfacet normal h with the density D(h) cos(h), where D is the Beckmann distribution

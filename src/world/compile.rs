@@ -3,13 +3,14 @@
 
 use crate::camera::PinholeCamera;
 use crate::lanes::{Float, SimdFloat};
-use crate::light::DeltaLight;
+use crate::light::{DeltaLight, Emitter};
 use crate::material::{Bsdf, Material};
-use crate::primitive::{Acceleration, Aggregate, Form, PrimitiveId};
+use crate::primitive::{Acceleration, Aggregate, BoundingSphere, Form, LightTarget, PrimitiveId};
 use crate::scene::{BelowHorizon, Filter, RayTypes, Scene};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates};
+use crate::world::integrator::emitter_lighting::EmitterSource;
 use crate::world::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::world::integrator::surface_textures::SurfaceTextures;
 use crate::world::inventory::{Inventory, InventorySources};
@@ -127,11 +128,21 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
     }
 }
 
+/// Height of emitters above objects that they touch, in rounding errors of the scene's extent. Rays
+/// that leave a surface start at half of this height.
+const EMITTER_LIFT: f64 = 16.0;
+
+/// Returns the length by which emitters are lifted, see [`Emitter::new`].
+fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
+    EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
+}
+
 /// The lights of a scene, their groups, and the groups' fixed-point scales.
 struct CompiledLights<S> {
     groups: LightGroups,
     scales: Vec<f64>,
     sources: Vec<LightSource<S>>,
+    emitters: Vec<EmitterSource<S>>,
 }
 
 impl<S: Float> CompiledLights<S> {
@@ -142,9 +153,10 @@ impl<S: Float> CompiledLights<S> {
         camera: &PinholeCamera,
     ) -> Self {
         let groups = LightGroups::new(scene, materials.has_direct(), materials.has_ambient());
+        let lift = emitter_lift::<S>(geometry);
         let materials_of = |object: usize| materials.of_parts(object);
         let distances = SceneDistances::new(scene, geometry, materials_of, camera, S::EPSILON);
-        let scales = groups.scales::<S>(scene, geometry.origin, &distances);
+        let scales = groups.scales::<S>(scene, (geometry.origin, lift), &distances);
         let sources = groups
             .lights(scene)
             .into_iter()
@@ -159,11 +171,43 @@ impl<S: Float> CompiledLights<S> {
                 Some(LightSource { light, group, emission, on_surface })
             })
             .collect();
-        Self { groups, scales, sources }
+        let emitters = groups
+            .lights(scene)
+            .into_iter()
+            .filter_map(|(index, group, emission)| {
+                let light = &scene.lights[index];
+                let emitter = Emitter::new(light, geometry.origin, lift)?;
+                let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
+                Some(EmitterSource { emitter, group, emission, visible: light.visible })
+            })
+            .collect();
+        Self { groups, scales, sources, emitters }
     }
 
-    fn lights(&self) -> Vec<DeltaLight<S>> {
-        self.sources.iter().map(|source| source.light).collect()
+    /// Target of the shadow rays to each light without a size.
+    fn targets(&self) -> Vec<LightTarget> {
+        let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
+        let target_of_source = |source: &LightSource<S>| match &source.light {
+            DeltaLight::InverseSquare { position } | DeltaLight::Constant { position } => {
+                LightTarget::Point(vector(position))
+            }
+            DeltaLight::Directional { wi } => LightTarget::Direction(vector(wi)),
+        };
+        self.sources.iter().map(target_of_source).collect()
+    }
+
+    /// Bounding sphere of each emitter.
+    fn emitter_bounds(&self) -> Vec<BoundingSphere> {
+        let bounds_of = |source: &EmitterSource<S>| {
+            let (center, radius) = (source.emitter.center(), source.emitter.radius());
+            BoundingSphere { center, radius }
+        };
+        self.emitters.iter().map(bounds_of).collect()
+    }
+
+    /// Number of lights and emitters.
+    fn count(&self) -> usize {
+        self.sources.len() + self.emitters.len()
     }
 
     /// Largest distance between a light and the end point of its shadow rays.
@@ -192,7 +236,7 @@ impl<S: Float> CompiledCulling<S> {
         lights: &CompiledLights<S>,
         entered: &[bool],
     ) -> Self {
-        let mut all_candidates = TileCandidates::all(geometry, lights.sources.len());
+        let mut all_candidates = TileCandidates::all(geometry, lights.count());
         let mut light_buffers = Vec::new();
         let form_of = |primitive: &PrimitiveId| &recentered.forms[primitive.form];
         let forms = || geometry.sources().iter().map(form_of);
@@ -200,8 +244,10 @@ impl<S: Float> CompiledCulling<S> {
             Acceleration::Auto => {
                 // Rays that start on a near plane may start inside a primitive.
                 let eye = (scene.camera.near == 0.0).then(|| camera.eye());
-                let light_targets = (&lights.lights()[..], lights.max_end_offset());
-                let culler = FrustumCuller::new(forms().collect(), eye, entered, light_targets);
+                let light_targets = (lights.targets(), lights.max_end_offset());
+                let emitters = lights.emitter_bounds();
+                let culler =
+                    FrustumCuller::new(forms().collect(), eye, entered, light_targets, emitters);
                 all_candidates = culler.candidates(geometry, None);
                 if geometry.has_tree() {
                     if scene.trace.ray_types >= RayTypes::Shadows {
@@ -272,7 +318,7 @@ impl<L: SimdFloat> World<L> {
                 textures: textures.as_ref().map(SurfaceTextures::features).unwrap_or_default(),
                 bsdfs: &materials.bsdfs,
                 groups: &lights.groups.members,
-                lights: lights.sources.len(),
+                lights: lights.count(),
                 precision: if L::EPSILON > 1e-10 { "single" } else { "double" },
             },
         );
@@ -301,6 +347,7 @@ impl<L: SimdFloat> World<L> {
             groups: lights.groups,
             scales: lights.scales,
             sources: lights.sources,
+            emitters: lights.emitters,
             culling: culling.mode,
             all_candidates: culling.all_candidates,
             light_buffers: culling.light_buffers,

@@ -73,20 +73,18 @@ impl Inventory {
             1 => Some(format!("1 {name}")),
             n => Some(format!("{n} {name}s")),
         };
-        let light_count = |directional: bool| {
+        let light_count = |kind: &str| {
             let lights_of = |source: &LightGroupSource| match source {
                 LightGroupSource::Light(i) => vec![*i],
                 LightGroupSource::Shared(list) => list.clone(),
                 _ => Vec::new(),
             };
-            groups
-                .iter()
-                .flat_map(lights_of)
-                .filter(|i| scene.lights[*i].directional.is_some() == directional)
-                .count()
+            let is_kind = |i: &usize| scene.lights[*i].kinds() == [kind];
+            groups.iter().flat_map(lights_of).filter(is_kind).count()
         };
-        parts.extend(counted(light_count(false), "point light"));
-        parts.extend(counted(light_count(true), "directional light"));
+        for kind in ["point", "directional", "sphere", "rectangle", "disk"] {
+            parts.extend(counted(light_count(kind), &format!("{kind} light")));
+        }
         let mut add_if = |present: bool, name: &str| {
             if present {
                 parts.push(name.to_string());

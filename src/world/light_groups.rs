@@ -3,7 +3,7 @@
 //! separately, so that colour and intensity can change without new samples.
 
 use crate::lanes::Float;
-use crate::light::{DeltaLight, Light};
+use crate::light::{DeltaLight, Emitter, Light};
 use crate::scene::Scene;
 use crate::value::Color;
 use crate::world::radiance_range::{RadianceRange, SceneDistances};
@@ -49,7 +49,8 @@ pub struct LightGroups {
 
 impl LightGroups {
     /// Creates the light groups of `scene`. `lit` is `true` if some surface reflects direct light,
-    /// `ambient` if some surface reflects ambient light.
+    /// `ambient` if some surface reflects ambient light. A light that no surface reflects still has
+    /// a group if it is visible itself.
     pub fn new(scene: &Scene, lit: bool, ambient: bool) -> Self {
         let mut members = Vec::new();
         if ambient && scene.ambient.color != Color::BLACK {
@@ -59,7 +60,7 @@ impl LightGroups {
             members.push(LightGroupSource::Background);
         }
         let emitting: Vec<usize> =
-            (0..scene.lights.len()).filter(|i| lit && emits(&scene.lights[*i])).collect();
+            (0..scene.lights.len()).filter(|i| contributes(&scene.lights[*i], lit)).collect();
         let pixels = scene.film.size.iter().map(|n| u64::from(*n)).product::<u64>().max(1);
         let max_groups = (FILM_BYTES / (pixels * GROUP_BYTES)) as usize;
         let max_light_groups = max_groups.saturating_sub(members.len()).clamp(1, MAX_LIGHT_GROUPS);
@@ -129,16 +130,20 @@ impl LightGroups {
     }
 
     /// Returns the scale of each group: the number of integer steps per unit of radiance in the
-    /// film, a power of two. It follows from the group's [`RadianceRange`].
+    /// film, a power of two. It follows from the group's [`RadianceRange`]. `lift` is the height
+    /// by which emitters are lifted.
     pub(super) fn scales<S: Float>(
         &self,
         scene: &Scene,
-        origin: DVec3,
+        (origin, lift): (DVec3, f64),
         distances: &SceneDistances,
     ) -> Vec<f64> {
         let range_of_light = |i: usize| {
-            let light = DeltaLight::<S>::new(&scene.lights[i], origin)?;
-            Some(distances.light(&light))
+            let light = &scene.lights[i];
+            if let Some(emitter) = Emitter::<S>::new(light, origin, lift) {
+                return Some(distances.emitter(&emitter, light.visible));
+            }
+            Some(distances.light(&DeltaLight::<S>::new(light, origin)?))
         };
         let range_of_emission = |i: &usize| {
             let channels = emission(&scene.lights[*i]).into_iter().filter(|s| *s > 0.0);
@@ -172,6 +177,12 @@ pub(super) fn emission(light: &Light) -> [f64; 3] {
 /// Returns `true` if the light is on and not black.
 pub(super) fn emits(light: &Light) -> bool {
     emission(light) != [0.0; 3]
+}
+
+/// Returns `true` if the light changes the picture: it emits, and surfaces reflect its light or it
+/// is visible. `lit` is `true` if some surface reflects direct light.
+pub(super) fn contributes(light: &Light, lit: bool) -> bool {
+    emits(light) && (lit || light.visible && light.surface().is_some())
 }
 
 #[cfg(test)]

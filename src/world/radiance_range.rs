@@ -22,7 +22,7 @@
 
 use crate::camera::PinholeCamera;
 use crate::lanes::Float;
-use crate::light::DeltaLight;
+use crate::light::{DeltaLight, Emitter};
 use crate::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
 use crate::primitive::{Form, box_distance};
 use crate::scene::{RayTypes, Scene};
@@ -277,6 +277,51 @@ impl<'a> SceneDistances<'a> {
             brightest: or_typical(out.brightest),
             extreme: or_typical(out.extreme),
             ..out
+        }
+    }
+
+    /// Range of an emitter of unit intensity.
+    pub fn emitter<S: Float>(&self, emitter: &Emitter<S>, visible: bool) -> RadianceRange {
+        let (center, radius) = (emitter.center(), emitter.radius());
+        let emitted = emitter.radiance().to_f64();
+        // Radiance of a white surface that faces the emitter at a distance from its centre.
+        let radiance_at = |distance: f64| {
+            emitted * (emitter.area() / (PI * distance * distance).max(f64::MIN_POSITIVE)).min(1.0)
+        };
+        let typical = radiance_at(center.length().max(self.radius));
+        let (mut dimmest, mut brightest, mut extreme) = (f64::INFINITY, 0.0f64, 0.0f64);
+        for (form, response) in self.forms.iter().zip(&self.responses) {
+            let Some(response) = response else { continue };
+            let near = form.clearance(center).unwrap_or(0.0) - radius;
+            let far = match form.bounds() {
+                Some(bounds) => match box_distance(bounds, center) {
+                    away if away > 0.0 => away,
+                    _ => 0.5 * bounds.0.distance(bounds.1),
+                },
+                None => near,
+            };
+            let nearest = radiance_at(near.max(0.0));
+            brightest = brightest.max(nearest * response.most);
+            extreme = extreme.max(nearest * response.peak * self.gain);
+            dimmest = dimmest.min(radiance_at(far.max(radius)) * response.least * self.faintest);
+        }
+        let mut spots = brightest;
+        if visible {
+            // The surface itself, unless it is smaller than a quarter of a pixel.
+            let (eye, pixel) = self.eye;
+            spots = spots.max(emitted);
+            extreme = extreme.max(emitted * self.gain);
+            if radius > 0.25 * pixel * eye.distance(center) {
+                brightest = brightest.max(emitted);
+            }
+        }
+        let or_typical = |x: f64| if x > 0.0 && x.is_finite() { x } else { typical };
+        RadianceRange {
+            typical,
+            dimmest: or_typical(dimmest),
+            brightest: or_typical(brightest),
+            spots: or_typical(spots),
+            extreme: or_typical(extreme),
         }
     }
 

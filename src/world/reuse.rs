@@ -9,7 +9,7 @@ use crate::material::Material;
 use crate::scene::{FilmSettings, Object, Scene};
 use crate::shape::Shape;
 use crate::value::Color;
-use crate::world::light_groups::{LightGroupSource, LightGroups, emission, emits};
+use crate::world::light_groups::{LightGroupSource, LightGroups, contributes, emission};
 use std::borrow::Cow;
 
 impl LightGroups {
@@ -60,7 +60,8 @@ impl LightGroups {
         let same_but_emission = |i: usize, light: &Light| {
             with_unit_emission(&compiled.lights[i]) == with_unit_emission(light)
         };
-        let mut emitting = scene.lights.iter().enumerate().filter(|(_, light)| emits(light));
+        let mut emitting =
+            scene.lights.iter().enumerate().filter(|(_, light)| contributes(light, self.lit));
         let same_emission_if_shared = |source: &LightGroupSource| match source {
             LightGroupSource::Shared(list) => list.iter().all(|i| {
                 scene.lights.get(*i).is_some_and(|l| emission(l) == emission(&compiled.lights[*i]))
@@ -69,9 +70,8 @@ impl LightGroups {
             | LightGroupSource::Background
             | LightGroupSource::Light(_) => true,
         };
-        !self.lit
-            || emitting.all(|(i, light)| is_compiled(i) && same_but_emission(i, light))
-                && self.members.iter().all(same_emission_if_shared)
+        emitting.all(|(i, light)| is_compiled(i) && same_but_emission(i, light))
+            && self.members.iter().all(same_emission_if_shared)
     }
 }
 

@@ -9,6 +9,7 @@ use crate::primitive::Aggregate;
 use crate::sampling::{PacketSampler, SampleSettings};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::tile::{CullingMode, TileCandidates};
+use crate::world::integrator::emitter_lighting::EmitterSource;
 use crate::world::integrator::first_hit::{self, FirstHit};
 use crate::world::integrator::nested_dielectrics::NestedDielectrics;
 use crate::world::integrator::opaque::trace_opaque;
@@ -20,7 +21,7 @@ use crate::world::light_groups::LightGroups;
 use crate::world::lights_on_surfaces::OnSurface;
 use crate::world::tile_tracer::CameraTracer;
 
-/// A light of the world, with its light group.
+/// A light without a size, with its light group.
 pub(super) struct LightSource<S> {
     pub light: DeltaLight<S>,
     /// Index of the light group.
@@ -40,6 +41,8 @@ pub struct World<L: SimdFloat> {
     pub(super) bsdf_of: Vec<u32>,
     pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
     pub(super) sources: Vec<LightSource<L::Scalar>>,
+    /// Lights with a size.
+    pub(super) emitters: Vec<EmitterSource<L::Scalar>>,
     /// Light group of ambient light. `None` if no surface reflects ambient light.
     pub(super) ambient: Option<usize>,
     /// Light group of the background. `None` if the background is black.
@@ -117,14 +120,17 @@ impl<L: SimdFloat> World<L> {
         origin: [usize; 2],
         extent: [usize; 2],
     ) -> Option<TileCandidates> {
-        let lights = self.sources.len();
+        let lights = self.sources.len() + self.emitters.len();
         self.culling.candidates(&self.geometry, lights, &self.camera, (origin, extent))
     }
 
     /// Returns `true` if the samples of a tile with these candidates are certainly black: no
-    /// primitive is a candidate of its camera rays, and the background is black.
+    /// primitive is a candidate of its camera rays, the background is black, and no emitter is
+    /// visible.
     pub(super) fn is_black(&self, candidates: &TileCandidates) -> bool {
-        self.background.is_none() && candidates.primary.is_empty()
+        self.background.is_none()
+            && candidates.primary.is_empty()
+            && !self.emitters.iter().any(|source| source.visible)
     }
 
     /// Traces one packet of paths. `origin` and `direction` are those of camera rays, as
@@ -148,10 +154,14 @@ impl<L: SimdFloat> World<L> {
         if let Some(nested_dielectrics) = &self.nested_dielectrics {
             TransmissionIntegrator { world: self, nested_dielectrics, sampler }
                 .trace(ray, candidates, active, out)
-        } else if self.simple {
-            trace_opaque::<_, true>(self, ray, candidates, sampler, active, out)
         } else {
-            trace_opaque::<_, false>(self, ray, candidates, sampler, active, out)
+            let trace = match (self.simple, self.emitters.is_empty()) {
+                (true, true) => trace_opaque::<_, true, false>,
+                (false, true) => trace_opaque::<_, false, false>,
+                (true, false) => trace_opaque::<_, true, true>,
+                (false, false) => trace_opaque::<_, false, true>,
+            };
+            trace(self, ray, candidates, sampler, active, out)
         }
     }
 

@@ -99,7 +99,7 @@ impl Chart {
 fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
     let finish = Bsdf::<f64>::new(material, true);
     let (_, spread) = finish.reflection.unwrap();
-    let incident = Vec3::of(combine(&[(-1.0, chart.view)]));
+    let incident = Vec3::<f64>::of(combine(&[(-1.0, chart.view)]));
     let n = Vec3::of(chart.n);
     let [w, h] = GRID.map(|g| g * FINE);
     let mut shares = vec![0.0; GRID[0] * GRID[1] + 1];

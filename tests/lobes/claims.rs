@@ -97,7 +97,7 @@ fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
         // Tested pointwise below: weight x density = f cos.
         ReflectionLobe::MicrofacetDistribution(_) => highlight_f(material, v, l),
         _ => {
-            let incident = Vec3::of(combine(&[(-1.0, v)]));
+            let incident = Vec3::<f64>::of(combine(&[(-1.0, v)]));
             let density = finish.density(&spread, incident, Vec3::of(n), Vec3::of(l)).unwrap();
             strength * density / dot(n, l)
         }

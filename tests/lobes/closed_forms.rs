@@ -227,13 +227,13 @@ fn closed_form_05_density_of_the_square() {
             for j in 0..steps {
                 let (s, c) = (2.0 * PI * (f64::from(j) + 0.5) / f64::from(steps)).sin_cos();
                 let d = [theta.sin() * c, theta.sin() * s, theta.cos()];
-                sum += warp::square_pdf(d, side) * theta.sin();
+                sum += warp::square_pdf(Vec3::of(d), side) * theta.sin();
             }
         }
         let integral = sum * half * 2.0 * PI / f64::from(steps * steps);
         assert!((integral - 1.0).abs() < 2e-3, "{side}: {integral}");
-        let corner = warp::square_pdf(vector(warp::square(0.999, 0.999, side)), side);
-        let middle = warp::square_pdf([0.0, 0.0, 1.0], side);
+        let corner = warp::square_pdf(warp::square(0.999, 0.999, side), side);
+        let middle = warp::square_pdf(Vec3::of([0.0, 0.0, 1.0]), side);
         let expected = (1.0 + 2.0 * (0.499 * side).powi(2)).powf(1.5);
         assert!((corner / middle / expected - 1.0).abs() < 1e-12);
     }

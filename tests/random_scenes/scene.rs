@@ -226,6 +226,7 @@ fn lights(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Vec<Light> {
             intensity: if far { strength } else { strength * area },
             falloff: if far { Falloff::None } else { falloff },
             on: chance(numbers, 9, 10),
+            ..Light::default()
         }
     };
     (0..count).map(light).collect()

@@ -176,6 +176,7 @@ fn light() -> impl Strategy<Value = Light> {
             intensity,
             falloff: if is_point && inverse { Falloff::InverseSquare } else { Falloff::None },
             on,
+            ..Light::default()
         },
     )
 }

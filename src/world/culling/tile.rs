@@ -3,8 +3,7 @@
 //! primitives and no occluder.
 
 use crate::camera::PinholeCamera;
-use crate::lanes::{Float, SimdFloat};
-use crate::light::DeltaLight;
+use crate::lanes::SimdFloat;
 use crate::primitive::{
     Aggregate, BoundingSphere, BoundingVolume, Form, Frustum, LightTarget, PrimitiveSet,
 };
@@ -18,7 +17,8 @@ use glam::DVec3;
 pub struct TileCandidates {
     /// Primitives that the camera rays can hit.
     pub(crate) primary: PrimitiveSet,
-    /// Possible occluders for each light of the world.
+    /// Possible occluders for each light of the world: first the lights without a size, then the
+    /// emitters.
     pub(crate) occluders: Vec<PrimitiveSet>,
 }
 
@@ -82,30 +82,26 @@ pub(crate) struct FrustumCuller {
     /// `true` for each primitive that may occlude lights from points on its own surface: it is
     /// concave, or paths can be inside of it.
     self_shadowing: Vec<bool>,
-    /// Position or direction of each light.
+    /// Position or direction of each light without a size.
     lights: Vec<LightTarget>,
+    /// Bounding sphere of each emitter.
+    emitters: Vec<BoundingSphere>,
 }
 
 impl FrustumCuller {
     /// Creates the culler of `forms`, one for each primitive. `eye` is the common origin of all
     /// camera rays; `None` if they start on a near plane. `entered` holds `true` for each primitive
     /// that paths can be inside of. `max_end_offset` is the largest distance between a light and
-    /// the end point of its shadow rays.
-    pub fn new<S: Float>(
+    /// the end point of its shadow rays. `emitters` are the bounding spheres of the emitters.
+    pub fn new(
         forms: Vec<&Form>,
         eye: Option<DVec3>,
         entered: &[bool],
-        (lights, max_end_offset): (&[DeltaLight<S>], f64),
+        (lights, max_end_offset): (Vec<LightTarget>, f64),
+        emitters: Vec<BoundingSphere>,
     ) -> Self {
         let bound = |form: &Form| BoundingVolume::new(form).grown(max_end_offset);
         let bounds: Vec<BoundingVolume> = forms.into_iter().map(bound).collect();
-        let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
-        let targets = lights.iter().map(|light| match light {
-            DeltaLight::InverseSquare { position } | DeltaLight::Constant { position } => {
-                LightTarget::Point(vector(position))
-            }
-            DeltaLight::Directional { wi } => LightTarget::Direction(vector(wi)),
-        });
         // A shadow ray that leaves the outside of a convex primitive cannot hit it again. Paths are
         // inside of a primitive only if they start there or are transmitted.
         let self_shadowing = |(b, entered): (&BoundingVolume, &bool)| {
@@ -113,7 +109,7 @@ impl FrustumCuller {
             !b.is_convex() || !b.is_flat() && (*entered || contains_eye())
         };
         let self_shadowing = bounds.iter().zip(entered).map(self_shadowing).collect();
-        Self { lights: targets.collect(), self_shadowing, bounds }
+        Self { lights, emitters, self_shadowing, bounds }
     }
 
     /// Creates the light buffer of each light, over the primitives in the geometry's BVH. An entry
@@ -143,16 +139,28 @@ impl FrustumCuller {
         };
         let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(visible_part).collect();
         let primary = geometry.select(|item| parts[item as usize].is_some());
-        let may_occlude = |item: usize, light: &LightTarget| {
-            let may_occlude_part = |(other, part): (usize, &Option<BoundingSphere>)| {
-                part.is_some_and(|part| {
-                    (other != item || self.self_shadowing[item])
-                        && self.bounds[item].may_occlude(&part, light)
-                })
-            };
-            parts.iter().enumerate().any(may_occlude_part)
+        // `true` if `occludes` holds for the light and one of the visible parts.
+        let occluders_of = |occludes: &dyn Fn(&BoundingVolume, &BoundingSphere) -> bool| {
+            geometry.select(|item| {
+                let item = item as usize;
+                let may_occlude_part = |(other, part): (usize, &Option<BoundingSphere>)| {
+                    part.is_some_and(|part| {
+                        (other != item || self.self_shadowing[item])
+                            && occludes(&self.bounds[item], &part)
+                    })
+                };
+                parts.iter().enumerate().any(may_occlude_part)
+            })
         };
-        let occluders_of = |light| geometry.select(|item| may_occlude(item as usize, light));
-        TileCandidates { primary, occluders: self.lights.iter().map(occluders_of).collect() }
+        let of_light =
+            |light: &LightTarget| occluders_of(&|bounds, part| bounds.may_occlude(part, light));
+        let of_emitter = |light: &BoundingSphere| {
+            occluders_of(&|bounds, part| bounds.may_occlude_ball(part, light))
+        };
+        let lights = self.lights.iter().map(of_light);
+        TileCandidates {
+            primary,
+            occluders: lights.chain(self.emitters.iter().map(of_emitter)).collect(),
+        }
     }
 }

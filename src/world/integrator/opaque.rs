@@ -7,14 +7,18 @@ use crate::material::ReflectionLobe;
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::direct_lighting::direct_lighting;
+use crate::world::integrator::emitter_lighting::{
+    ReflectingLobes, emitter_lighting, reflected_density, visible_emitters,
+};
 use crate::world::integrator::interaction::{SurfaceInteraction, interact};
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
 /// Traces camera rays in a world without transmissive surfaces. `SIMPLE` is the value of
-/// [`World::simple`], here and in all called functions.
+/// [`World::simple`], here and in all called functions. `EMITTERS` is `true` if the world has
+/// emitters.
 #[inline(never)]
-pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool>(
+pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS: bool>(
     world: &'a World<L>,
     ray: Ray<L>,
     mut candidates: &'a TileCandidates,
@@ -23,7 +27,7 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool>(
     out: &mut Radiance<L>,
 ) -> Counts {
     let mut counts = Counts::default();
-    let mut path = Path { ray, throughput: Vec3::of([1.0; 3]) };
+    let mut path = Path::new(ray);
     let mut bounce = 0;
     loop {
         counts.rays += u64::from(active.bits().count_ones());
@@ -36,15 +40,31 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool>(
         if let Some(group) = world.background {
             out.groups[group] += path.throughput.masked(active.and_not(is_hit));
         }
+        if EMITTERS {
+            visible_emitters(world, &path, hit.t, active, out);
+        }
         active = active & is_hit;
         let Some(interaction) = interact::<_, SIMPLE>(world, &path.ray, &hit, active) else {
             return counts;
         };
         direct_lighting::<_, SIMPLE>(world, &path, &interaction, candidates, out, &mut counts);
-        if bounce == world.depth || interaction.reflecting.none() {
+        let is_last = bounce == world.depth;
+        if EMITTERS {
+            let lanes = if is_last { L::mask(false) } else { interaction.reflecting };
+            emitter_lighting::<_, SIMPLE>(
+                world,
+                &path,
+                &interaction,
+                candidates,
+                (sampler, bounce),
+                &ReflectingLobes { lanes, share: L::one() },
+                (out, &mut counts),
+            );
+        }
+        if is_last || interaction.reflecting.none() {
             return counts;
         }
-        active = sample_reflection::<_, SIMPLE>(
+        active = sample_reflection::<_, SIMPLE, EMITTERS>(
             world,
             &mut path,
             &interaction,
@@ -64,7 +84,7 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool>(
 /// lobes. `bounce` is the number of earlier reflections. Returns the lanes whose new throughput is
 /// at least [`min_weight`](World::min_weight).
 #[inline(always)]
-pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool>(
+pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool, const EMITTERS: bool>(
     world: &World<L>,
     path: &mut Path<L>,
     interaction: &SurfaceInteraction<L>,
@@ -73,7 +93,8 @@ pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool>(
     counts: &mut Counts,
 ) -> L::Mask {
     let mut lobe_sample = None;
-    let Path { ray: Ray { direction: incident, .. }, throughput } = *path;
+    let incoming = *path;
+    let Path { ray: Ray { direction: incident, .. }, throughput, .. } = incoming;
     for (index, lanes) in interaction.bsdfs(interaction.reflecting) {
         let bsdf = &world.bsdfs[index];
         let Some((strength, lobe)) = &bsdf.reflection else { continue };
@@ -87,6 +108,11 @@ pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool>(
         let mut direction = sample.direction;
         if !SIMPLE && world.smooth {
             direction = interaction.reflect_into_hemisphere(direction);
+        }
+        if EMITTERS {
+            let density =
+                reflected_density::<_, SIMPLE>(world, &incoming, interaction, index, direction);
+            path.lobe_density = L::select(lanes, density, path.lobe_density);
         }
         path.ray.direction = Vec3::select(lanes, direction, path.ray.direction);
         let throughput = Path::bounded(throughput.component_mul(sample.weight));

@@ -16,8 +16,8 @@ pub struct Radiance<L> {
 pub struct Counts {
     /// Number of rays: camera, shadow, reflected and transmitted.
     pub rays: u64,
-    /// `true` if a path sampled a glossy lobe or chose between reflection and transmission at
-    /// random.
+    /// `true` if a path sampled a glossy lobe or a point of an emitter, or chose between reflection
+    /// and transmission at random.
     pub glossy: bool,
 }
 
@@ -27,12 +27,21 @@ pub(crate) struct Path<L> {
     pub ray: Ray<L>,
     /// Factor by which radiance along the ray contributes to the radiance of the sample (beta).
     pub throughput: Vec3<L>,
+    /// Density \[1/sr\] with which the ray was sampled; the largest finite number for camera rays,
+    /// mirrors and refraction. It is read only in worlds with emitters.
+    pub lobe_density: L,
 }
 
 impl<L: SimdFloat> Path<L> {
     /// Largest throughput. A larger one would saturate the film, and infinity times 0 (black) is
     /// NaN.
     const MAX_THROUGHPUT: f64 = (1u64 << 60) as f64;
+
+    /// Creates the path of camera rays.
+    #[inline(always)]
+    pub fn new(ray: Ray<L>) -> Self {
+        Self { ray, throughput: Vec3::of([1.0; 3]), lobe_density: L::from_f64(L::MAX) }
+    }
 
     /// Returns `throughput`, limited to [`Self::MAX_THROUGHPUT`]. Mirrors that amplify light would
     /// let it grow without limit.

@@ -3,11 +3,14 @@
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
-use crate::material::{Interface, ReflectionLobe};
+use crate::material::{FresnelSplit, Interface, ReflectionLobe, Transmission};
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState, Contacts};
 use crate::world::integrator::direct_lighting::direct_lighting;
+use crate::world::integrator::emitter_lighting::{
+    ReflectingLobes, emitter_lighting, reflected_density, visible_emitters,
+};
 use crate::world::integrator::interaction::{SurfaceInteraction, interact};
 use crate::world::integrator::nested_dielectrics::{InterfaceHit, MediumStack, NestedDielectrics};
 use crate::world::integrator::opaque::sample_reflection;
@@ -64,6 +67,8 @@ struct SplitDirections<L> {
     reflected: Vec3<L>,
     /// Throughput of the reflected paths.
     reflected_weight: Vec3<L>,
+    /// Densities \[1/sr\] of the reflected directions; see [`Path::lobe_density`].
+    reflected_density: L,
     /// Directions of the transmitted rays.
     transmitted: Vec3<L>,
     /// Throughput of the transmitted paths.
@@ -90,7 +95,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     ) -> Counts {
         let mut counts = Counts::default();
         let media = self.nested_dielectrics.at_start(&ray);
-        let path = Path { ray, throughput: Vec3::of([1.0; 3]) };
+        let path = Path::new(ray);
         let mut waiting = BranchStack { branches: [None; SPLIT_DEPTH] };
         let mut branch = Branch { path, lanes, media, bounce: 0, coincident: None };
         loop {
@@ -134,6 +139,10 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         if let Some(group) = world.background {
             out.groups[group] += path.throughput.masked(branch.lanes.and_not(is_hit));
         }
+        let has_emitters = !world.emitters.is_empty();
+        if has_emitters {
+            visible_emitters(world, &path, hit.t, branch.lanes, out);
+        }
         let lanes = branch.lanes & is_hit;
         let Some(mut interaction) = interact::<_, false>(world, &path.ray, &hit, lanes) else {
             return false;
@@ -154,19 +163,48 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             interaction.mask_out(interface_hit.suppressed);
         }
         direct_lighting::<_, false>(world, &path, &interaction, candidates, out, counts);
+        if has_emitters {
+            let lobes = if bounce == world.depth {
+                ReflectingLobes { lanes: L::mask(false), share: L::one() }
+            } else {
+                self.reflecting_lobes(&path, &interaction, interface_hit.as_ref())
+            };
+            emitter_lighting::<_, false>(
+                world,
+                &path,
+                &interaction,
+                candidates,
+                (self.sampler, bounce),
+                &lobes,
+                (out, counts),
+            );
+        }
         if bounce == world.depth {
             return false;
         }
         let bounce = bounce + 1;
         let Some(interface_hit) = interface_hit else {
-            branch.lanes = sample_reflection::<_, false>(
-                world,
-                &mut branch.path,
-                &interaction,
-                self.sampler,
-                bounce - 1,
-                counts,
-            );
+            let path = &mut branch.path;
+            let sampler = self.sampler;
+            branch.lanes = if has_emitters {
+                sample_reflection::<_, false, true>(
+                    world,
+                    path,
+                    &interaction,
+                    sampler,
+                    bounce - 1,
+                    counts,
+                )
+            } else {
+                sample_reflection::<_, false, false>(
+                    world,
+                    path,
+                    &interaction,
+                    sampler,
+                    bounce - 1,
+                    counts,
+                )
+            };
             branch.bounce = bounce;
             branch.coincident = coincident.as_ref().map(CoincidentState::reversed);
             return branch.lanes.any();
@@ -184,6 +222,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             path: Path {
                 ray: Ray { origin: interaction.ray_origin(), direction: split.reflected },
                 throughput: split.reflected_weight,
+                lobe_density: split.reflected_density,
             },
             lanes: both,
             media: MediumStack::select(
@@ -222,6 +261,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 direction: Vec3::select(transmitted, split.transmitted, split.reflected),
             },
             throughput: Vec3::select(transmitted, transmitted_weight, reflected_weight),
+            lobe_density: L::select(transmitted, L::from_f64(L::MAX), split.reflected_density),
         };
         let media =
             MediumStack::select(transmitted, &interface_hit.medium_transmitted, &reflected.media);
@@ -309,6 +349,30 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             .then(|| self.nested_dielectrics.cross(interaction, transmissive, media, index))
     }
 
+    /// Returns the lanes whose reflected rays are followed, with the fraction of the light that the
+    /// surfaces reflect.
+    fn reflecting_lobes(
+        &self,
+        path: &Path<L>,
+        interaction: &SurfaceInteraction<L>,
+        interface_hit: Option<&InterfaceHit<L>>,
+    ) -> ReflectingLobes<L> {
+        let (lanes, mut share) = (interaction.reflecting, L::one());
+        let Some(interface_hit) = interface_hit else {
+            return ReflectingLobes { lanes, share };
+        };
+        let incident = path.ray.direction;
+        let interface =
+            Interface::new(incident, interaction.normal, interface_hit.n_i, interface_hit.n_t);
+        for (index, lanes) in interaction.bsdfs(lanes & interface_hit.lanes) {
+            if let Some(transmission) = &self.world.bsdfs[index].transmission {
+                let shares = split_shares(&interface, interface_hit, transmission);
+                share = L::select(lanes, shares.reflected, share);
+            }
+        }
+        ReflectingLobes { lanes: lanes.and_not(interface_hit.suppressed), share }
+    }
+
     /// Samples the reflected and transmitted directions at surfaces of which at least one
     /// transmits. `bounce` is the number of surfaces that the path has hit before.
     fn split_directions(
@@ -326,6 +390,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let mut directions = SplitDirections {
             reflected: incident.reflect(interaction.normal),
             reflected_weight: Vec3::zero(),
+            reflected_density: L::from_f64(L::MAX),
             transmitted: Vec3::select(straight, incident, interface.refracted),
             transmitted_weight: Vec3::zero(),
         };
@@ -334,14 +399,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             let bsdf = &self.world.bsdfs[index];
             let mut reflected_share = L::one();
             if let Some(transmission) = &bsdf.transmission {
-                let mut shares = interface.split(transmission, interface_hit.outer);
-                if interface_hit.thin.any() {
-                    let thin = interface.split_thin(transmission);
-                    let choose = |a, b| L::select(interface_hit.thin, a, b);
-                    shares.reflected = choose(thin.reflected, shares.reflected);
-                    shares.transmitted = choose(thin.transmitted, shares.transmitted);
-                    shares.tir = choose(thin.tir, shares.tir);
-                }
+                let shares = split_shares(&interface, interface_hit, transmission);
                 reflected_share = shares.reflected.masked(!interface_hit.suppressed);
                 let transmitted = L::select(interface_hit.suppressed, L::one(), shares.transmitted);
                 directions.transmitted_weight = Vec3::select(
@@ -368,6 +426,16 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 bsdf.sample(*strength, lobe, incident, interaction.normal, uv, self.world.fold);
             let weight = path.throughput.component_mul(sample.weight) * reflected_share;
             directions.reflected = Vec3::select(lanes, sample.direction, directions.reflected);
+            if !self.world.emitters.is_empty() && !matches!(lobe, ReflectionLobe::Mirror) {
+                let mut direction = sample.direction;
+                if self.world.smooth {
+                    direction = interaction.reflect_into_hemisphere(direction);
+                }
+                let density =
+                    reflected_density::<_, false>(self.world, path, interaction, index, direction);
+                directions.reflected_density =
+                    L::select(lanes, density, directions.reflected_density);
+            }
             directions.reflected_weight = Vec3::select(lanes, weight, directions.reflected_weight);
         }
         if self.world.smooth {
@@ -380,4 +448,22 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         directions.transmitted_weight = Path::bounded(directions.transmitted_weight);
         directions
     }
+}
+
+/// Returns the shares of reflected and transmitted light at interfaces, which may be thin.
+#[inline(always)]
+fn split_shares<L: SimdFloat>(
+    interface: &Interface<L>,
+    interface_hit: &InterfaceHit<L>,
+    transmission: &Transmission<L::Scalar>,
+) -> FresnelSplit<L> {
+    let mut shares = interface.split(transmission, interface_hit.outer);
+    if interface_hit.thin.any() {
+        let thin = interface.split_thin(transmission);
+        let choose = |a, b| L::select(interface_hit.thin, a, b);
+        shares.reflected = choose(thin.reflected, shares.reflected);
+        shares.transmitted = choose(thin.transmitted, shares.transmitted);
+        shares.tir = choose(thin.tir, shares.tir);
+    }
+    shares
 }

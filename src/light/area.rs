@@ -1,0 +1,116 @@
+//! Descriptions of lights with a size: sphere, rectangle and disk. A light is a radiating surface
+//! without a body: rays pass through it, and it casts no shadow. An object behind or inside it gives
+//! it a housing.
+
+use crate::value::{description, unit};
+use glam::DVec3;
+use std::f64::consts::PI;
+
+description! {
+    /// Light from a sphere. Points inside of it are lit from all sides.
+    pub struct SphereLight: Copy {
+        /// Centre.
+        center: [f64; 3], in COORDINATE "scene units";
+        /// Radius.
+        radius: f64, in SIZE "scene units";
+    }
+}
+
+description! {
+    /// Light from one side of a rectangle.
+    pub struct RectangleLight: Copy {
+        /// Centre.
+        center: [f64; 3], in COORDINATE "scene units";
+        /// Width (across) and height (along `up`).
+        size: [f64; 2], in SIZE "scene units";
+        /// Direction of the side that shines.
+        normal: [f64; 3], as Direction;
+        /// Direction of the height, made perpendicular to `normal`. If the two are parallel, the
+        /// height is along z.
+        up: [f64; 3] => "up" "[0.0, 1.0, 0.0]", as Direction;
+    }
+}
+
+description! {
+    /// Light from one side of a disk.
+    pub struct DiskLight: Copy {
+        /// Centre.
+        center: [f64; 3], in COORDINATE "scene units";
+        /// Radius.
+        radius: f64, in SIZE "scene units";
+        /// Direction of the side that shines.
+        normal: [f64; 3], as Direction;
+    }
+}
+
+fn up() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
+}
+
+/// Returns unit vectors across, up and along `normal`. `up` is made perpendicular to the normal; if
+/// they are parallel within 1e-6, the z axis replaces it, or the x axis for a normal along z.
+/// Returns `None` if `normal` is zero.
+fn frame(normal: [f64; 3], up: [f64; 3]) -> Option<[DVec3; 3]> {
+    let front = unit(normal)?;
+    let across = |up: DVec3| Some(up.cross(front)).filter(|across| across.length() > 1e-6);
+    let right = unit(up).and_then(across).or(across(DVec3::Z)).or(across(DVec3::X))?.normalize();
+    Some([right, front.cross(right), front])
+}
+
+/// Surface of a light with a size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EmitterSurface {
+    /// Sphere.
+    Sphere(SphereLight),
+    /// Rectangle that shines from one side.
+    Rectangle(RectangleLight),
+    /// Disk that shines from one side.
+    Disk(DiskLight),
+}
+
+impl EmitterSurface {
+    /// Centre.
+    pub fn center(&self) -> DVec3 {
+        DVec3::from(match self {
+            Self::Sphere(sphere) => sphere.center,
+            Self::Rectangle(rectangle) => rectangle.center,
+            Self::Disk(disk) => disk.center,
+        })
+    }
+
+    /// Radius of the smallest ball around the centre that contains the surface.
+    pub fn radius(&self) -> f64 {
+        match self {
+            Self::Sphere(sphere) => sphere.radius,
+            Self::Rectangle(rectangle) => 0.5 * rectangle.size[0].hypot(rectangle.size[1]),
+            Self::Disk(disk) => disk.radius,
+        }
+    }
+
+    /// Area that shines.
+    pub fn area(&self) -> f64 {
+        match self {
+            Self::Sphere(sphere) => 4.0 * PI * sphere.radius * sphere.radius,
+            Self::Rectangle(rectangle) => rectangle.size[0] * rectangle.size[1],
+            Self::Disk(disk) => PI * disk.radius * disk.radius,
+        }
+    }
+
+    /// Smallest extent: the shorter side of a rectangle, otherwise the radius.
+    pub fn thickness(&self) -> f64 {
+        match self {
+            Self::Rectangle(rectangle) => rectangle.size[0].min(rectangle.size[1]),
+            _ => self.radius(),
+        }
+    }
+
+    /// Returns unit vectors across, up and to the side that shines. Any frame fits a sphere.
+    /// Returns `None` if the normal is zero.
+    pub fn frame(&self) -> Option<[DVec3; 3]> {
+        match self {
+            Self::Sphere(_) => Some([DVec3::X, DVec3::Y, DVec3::Z]),
+            Self::Rectangle(rectangle) => frame(rectangle.normal, rectangle.up),
+            Self::Disk(disk) => frame(disk.normal, up()),
+        }
+    }
+}

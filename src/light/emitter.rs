@@ -1,0 +1,395 @@
+//! Compiled lights with a size: intersection, sampling by solid angle or area, densities.
+
+use crate::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
+use crate::light::area::EmitterSurface;
+use crate::light::{Light, LightUnit};
+use crate::sampling::warp;
+use glam::DVec3;
+use std::f64::consts::{PI, TAU};
+
+/// Solid angle, in rounding errors, below which a rectangle is sampled by area. The boundaries of
+/// the spherical rectangle are angles of about 1 with an error of some roundings, so that a
+/// rectangle of this solid angle is sampled at points that are off by 1e-5 of its size.
+const MIN_SOLID_ANGLE: f64 = 2e5;
+
+/// Surface of a compiled emitter.
+#[derive(Clone, Copy, Debug)]
+enum Surface<S> {
+    Sphere {
+        radius: S,
+    },
+    /// Axes across and up, and the normal, to the side that shines.
+    Rectangle {
+        axes: [[S; 3]; 3],
+        size: [S; 2],
+    },
+    Disk {
+        axes: [[S; 3]; 3],
+        radius: S,
+    },
+}
+
+/// A compiled light with a size, white and of unit intensity.
+#[derive(Clone, Copy, Debug)]
+pub struct Emitter<S> {
+    surface: Surface<S>,
+    center: [S; 3],
+    /// Area that shines.
+    area: S,
+    /// Radiance, the same at every point and in every direction.
+    radiance: S,
+}
+
+/// Light incident at surface points from sampled points of an emitter.
+#[derive(Clone, Copy, Debug)]
+pub struct EmitterSample<L> {
+    /// Unit vector towards the sampled point.
+    pub wi: Vec3<L>,
+    /// Distance to the sampled point.
+    pub distance: L,
+    /// Density of the direction \[1/sr\]; zero if no light arrives.
+    pub density: L,
+    /// Radiance divided by the density; zero if no light arrives.
+    pub irradiance: L,
+}
+
+impl<S: Float> Emitter<S> {
+    /// Compiles `light` for a scene translated by -`origin`. The surface is lifted by `lift`, at
+    /// most 1e-4 of its size, so that rounding does not hide an emitter that touches an object: a
+    /// flat one is moved to the side that shines, a sphere grows and keeps its power. Returns
+    /// `None` if the light has no size or no direction.
+    pub fn new(light: &Light, origin: DVec3, lift: f64) -> Option<Self> {
+        let surface = light.surface()?;
+        let frame = surface.frame()?;
+        let vector = |v: DVec3| v.to_array().map(S::from_f64);
+        let lift = lift.min(1e-4 * surface.thickness());
+        let mut radiance = match light.unit {
+            LightUnit::Radiance => 1.0,
+            LightUnit::Power => 1.0 / (PI * surface.area()),
+        };
+        let mut area = surface.area();
+        let mut center = surface.center() - origin;
+        let axes = frame.map(vector);
+        let surface = match surface {
+            EmitterSurface::Sphere(sphere) => {
+                let radius = sphere.radius + lift;
+                let growth = (radius / sphere.radius).powi(2);
+                (area, radiance) = (area * growth, radiance / growth);
+                Surface::Sphere { radius: S::from_f64(radius) }
+            }
+            EmitterSurface::Rectangle(rectangle) => {
+                center += frame[2] * lift;
+                Surface::Rectangle { axes, size: rectangle.size.map(S::from_f64) }
+            }
+            EmitterSurface::Disk(disk) => {
+                center += frame[2] * lift;
+                Surface::Disk { axes, radius: S::from_f64(disk.radius) }
+            }
+        };
+        Some(Self {
+            surface,
+            center: vector(center),
+            area: S::from_f64(area),
+            radiance: S::from_f64(radiance),
+        })
+    }
+
+    /// Centre, in coordinates relative to the scene's centre.
+    pub fn center(&self) -> DVec3 {
+        DVec3::from(self.center.map(S::to_f64))
+    }
+
+    /// Radius of a ball around the centre that contains the surface.
+    pub fn radius(&self) -> f64 {
+        match &self.surface {
+            Surface::Sphere { radius } | Surface::Disk { radius, .. } => radius.to_f64(),
+            Surface::Rectangle { size: [width, height], .. } => {
+                0.5 * width.to_f64().hypot(height.to_f64())
+            }
+        }
+    }
+
+    /// Area that shines.
+    pub fn area(&self) -> f64 {
+        self.area.to_f64()
+    }
+
+    /// Radiance, the same at every point and in every direction.
+    pub fn radiance(&self) -> S {
+        self.radiance
+    }
+
+    /// Returns the distance at which each ray reaches the side that shines; the largest finite
+    /// number for rays that miss it. `direction` is a unit vector.
+    #[inline(always)]
+    pub fn hit<L: SimdFloat<Scalar = S>>(&self, origin: Vec3<L>, direction: Vec3<L>) -> L {
+        let to_center = Vec3::splat(self.center) - origin;
+        let missed = L::from_f64(L::MAX);
+        match &self.surface {
+            Surface::Sphere { radius } => {
+                let radius2 = L::splat(*radius) * L::splat(*radius);
+                let along = to_center.dot(direction);
+                let across = to_center - direction * along;
+                let root2 = radius2 - across.length_squared();
+                let root = root2.max(L::zero()).sqrt();
+                // Power of the origin: positive outside of the sphere.
+                let power = to_center.length_squared() - radius2;
+                let outside = power.gt(L::zero());
+                let t = L::select(outside, power / (along + root), along + root);
+                let hits = root2.ge(L::zero()) & (!outside | along.gt(L::zero()));
+                L::select(hits & t.ge(L::zero()), t, missed)
+            }
+            Surface::Rectangle { axes, size } => {
+                let (t, [x, y]) = plane_hit(axes, to_center, direction);
+                let half = L::from_f64(0.5);
+                let inside = x.abs().le(L::splat(size[0]) * half)
+                    & y.abs().le(L::splat(size[1]) * half)
+                    & t.ge(L::zero());
+                L::select(inside, t, missed)
+            }
+            Surface::Disk { axes, radius } => {
+                let (t, [x, y]) = plane_hit(axes, to_center, direction);
+                let radius = L::splat(*radius);
+                let inside = (x * x + y * y).le(radius * radius) & t.ge(L::zero());
+                L::select(inside, t, missed)
+            }
+        }
+    }
+
+    /// Samples a point of the emitter for each of the surface points `origin`. `u` and `v` are
+    /// uniform in [0, 1). A sphere is sampled by the cone that it subtends, a rectangle by solid
+    /// angle unless this is tiny, a disk by area.
+    #[inline(always)]
+    pub fn sample<L: SimdFloat<Scalar = S>>(
+        &self,
+        origin: Vec3<L>,
+        (u, v): (L, L),
+    ) -> EmitterSample<L> {
+        let to_center = Vec3::splat(self.center) - origin;
+        match &self.surface {
+            Surface::Sphere { radius } => {
+                let radius = L::splat(*radius);
+                let cone = Cone::new(to_center, radius);
+                let local = warp::cone(u, v, cone.one_minus_cos);
+                let wi = Frame::around(cone.axis).to_world(local).renormalize();
+                let sin2 = local.x * local.x + local.y * local.y;
+                let root2 = radius * radius - cone.distance2 * sin2;
+                let near = cone.distance2.sqrt() * local.z - root2.max(L::zero()).sqrt();
+                let distance = if cone.inside.any() {
+                    let along = to_center.dot(wi);
+                    let root2 = along * along + radius * radius - cone.distance2;
+                    L::select(cone.inside, along + root2.max(L::zero()).sqrt(), near)
+                } else {
+                    near
+                };
+                self.with_density(wi, distance, cone.density())
+            }
+            Surface::Rectangle { axes, size } => {
+                let size = size.map(L::splat);
+                let rectangle = SphericalRectangle::new(axes, size, to_center);
+                let [x, y] = rectangle.sample(u, v);
+                let (wi, distance) = towards(axes, [x, y, rectangle.height]);
+                let density = rectangle.density(distance);
+                self.with_density(wi, distance, density)
+            }
+            Surface::Disk { axes, radius } => {
+                let local = local_of(axes, to_center);
+                let (x, y, _) = warp::disk(u, v);
+                let radius = L::splat(*radius);
+                let (x, y) = (x.mul_add(radius, local[0]), y.mul_add(radius, local[1]));
+                let (wi, distance) = towards(axes, [x, y, local[2]]);
+                let density = density_of_area(L::splat(self.area), distance, local[2]);
+                self.with_density(wi, distance, density)
+            }
+        }
+    }
+
+    /// Returns the density \[1/sr\] with which [`Emitter::sample`] draws the direction in which
+    /// the emitter is hit at `distance`.
+    #[inline(always)]
+    pub fn density<L: SimdFloat<Scalar = S>>(&self, origin: Vec3<L>, distance: L) -> L {
+        let to_center = Vec3::splat(self.center) - origin;
+        match &self.surface {
+            Surface::Sphere { radius } => Cone::new(to_center, L::splat(*radius)).density(),
+            Surface::Rectangle { axes, size } => {
+                SphericalRectangle::new(axes, size.map(L::splat), to_center).density(distance)
+            }
+            Surface::Disk { axes, .. } => {
+                let [_, _, height] = local_of(axes, to_center);
+                density_of_area(L::splat(self.area), distance, height)
+            }
+        }
+    }
+
+    /// Creates a sample with finite irradiance, because infinity times black would be NaN.
+    #[inline(always)]
+    fn with_density<L: SimdFloat<Scalar = S>>(
+        &self,
+        wi: Vec3<L>,
+        distance: L,
+        density: L,
+    ) -> EmitterSample<L> {
+        let arrives = density.gt(L::zero());
+        let irradiance = (L::splat(self.radiance) / density).min(L::from_f64(L::MAX));
+        EmitterSample { wi, distance, density, irradiance: irradiance.masked(arrives) }
+    }
+}
+
+/// Returns the components of `v` along the axes.
+#[inline(always)]
+fn local_of<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> [L; 3] {
+    axes.map(|axis| Vec3::splat(axis).dot(v))
+}
+
+/// Returns the unit vector with the given local components, and their length.
+#[inline(always)]
+fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3]) -> (Vec3<L>, L) {
+    let distance = (x * x + y * y + z * z).sqrt();
+    let [across, up, normal] = axes.map(Vec3::splat);
+    let inverse = L::one() / distance;
+    ((across * x + up * y + normal * z) * inverse, distance)
+}
+
+/// Returns the distance to the plane through the centre, which is at `to_center`, and the local
+/// coordinates of the intersection. The distance is negative for rays that miss the front.
+#[inline(always)]
+fn plane_hit<L: SimdFloat>(
+    axes: &[[L::Scalar; 3]; 3],
+    to_center: Vec3<L>,
+    direction: Vec3<L>,
+) -> (L, [L; 2]) {
+    let [center_x, center_y, height] = local_of(axes, to_center);
+    let [x, y, slope] = local_of(axes, direction);
+    let meets_front = slope.lt(L::zero()) & height.lt(L::zero());
+    let t = L::select(meets_front, height / slope, -L::one());
+    (t, [x.mul_add(t, -center_x), y.mul_add(t, -center_y)])
+}
+
+/// Returns the density \[1/sr\] of directions to uniform points of a surface of the given area at
+/// `distance`: distance^2 / (area cos). `height` is the coordinate of the surface along its normal;
+/// it is negative in front of the surface.
+#[inline(always)]
+fn density_of_area<L: SimdFloat>(area: L, distance: L, height: L) -> L {
+    let density = distance * distance * distance / (area * -height);
+    density.min(L::from_f64(L::MAX)).masked(height.lt(L::zero()))
+}
+
+/// Cone of the directions in which a sphere is seen; all directions from its inside.
+struct Cone<L: SimdFloat> {
+    axis: Vec3<L>,
+    one_minus_cos: L,
+    /// Squared distance to the centre.
+    distance2: L,
+    /// Lanes whose origin is inside of the sphere.
+    inside: L::Mask,
+}
+
+impl<L: SimdFloat> Cone<L> {
+    #[inline(always)]
+    fn new(to_center: Vec3<L>, radius: L) -> Self {
+        let distance2 = to_center.length_squared();
+        let sin2 = radius * radius / distance2;
+        let inside = sin2.ge(L::one()) | !distance2.gt(L::zero());
+        // 1 - cos without cancellation.
+        let drop = sin2 / ((L::one() - sin2).max(L::zero()).sqrt() + L::one());
+        let z = Vec3::of([0.0, 0.0, 1.0]);
+        Self {
+            axis: Vec3::select(inside, z, to_center * (L::one() / distance2.sqrt())),
+            one_minus_cos: L::select(inside, L::from_f64(2.0), drop),
+            distance2,
+            inside,
+        }
+    }
+
+    /// Density of uniform directions in the cone \[1/sr\].
+    #[inline(always)]
+    fn density(&self) -> L {
+        (L::one() / (self.one_minus_cos * L::from_f64(TAU))).min(L::from_f64(L::MAX))
+    }
+}
+
+/// Rectangle seen from a point, sampled by solid angle.
+///
+/// Ureña, Fajardo, King 2013, *An Area-Preserving Parametrization for Spherical Rectangles*.
+struct SphericalRectangle<L: SimdFloat> {
+    /// Local coordinates of the sides, relative to the point.
+    x: [L; 2],
+    y: [L; 2],
+    /// Coordinate of the plane along the normal, relative to the point; negative in front of it.
+    height: L,
+    area: L,
+    solid_angle: L,
+    /// Lanes in which the solid angle is large enough for the parametrization.
+    by_angle: L::Mask,
+}
+
+impl<L: SimdFloat> SphericalRectangle<L> {
+    #[inline(always)]
+    fn new(axes: &[[L::Scalar; 3]; 3], [width, height]: [L; 2], to_center: Vec3<L>) -> Self {
+        let half = L::from_f64(0.5);
+        let [center_x, center_y, z] = local_of(axes, to_center);
+        let (a, b) = (width * half, height * half);
+        let (x, y) = ([center_x - a, center_x + a], [center_y - b, center_y + b]);
+        let area = width * height;
+        let solid_angle = solid_angle(x, y, z, area);
+        let by_angle = solid_angle.ge(L::from_f64(MIN_SOLID_ANGLE * L::EPSILON));
+        Self { x, y, height: z, area, solid_angle, by_angle }
+    }
+
+    /// Samples a point, as local coordinates relative to the origin.
+    #[inline(always)]
+    fn sample(&self, u: L, v: L) -> [L; 2] {
+        let ([x0, x1], [y0, y1]) = (self.x, self.y);
+        let by_area = [u.mul_add(x1 - x0, x0), v.mul_add(y1 - y0, y0)];
+        if self.by_angle.none() {
+            return by_area;
+        }
+        let one = L::one();
+        let h2 = self.height * self.height;
+        // Components along the normal of the unit normals of the planes through the point and a
+        // side; those of the lower and the upper side are b0 and b1.
+        let b0 = -y0 / (h2 + y0 * y0).sqrt();
+        let b1 = y1 / (h2 + y1 * y1).sqrt();
+        let left = -x0 / (h2 + x0 * x0).sqrt();
+        let angle = |cos: L| (one - cos * cos).max(L::zero()).sqrt().atan2(cos);
+        let k = L::from_f64(TAU) - angle(-(b1 * left)) - angle(-(left * b0));
+        let (sin, cos) = u.mul_add(self.solid_angle, k).sin_cos();
+        let f = (cos * b0 - b1) / sin;
+        let c2 = one / (f * f + b0 * b0);
+        // Smallest 1 - cos^2 that is not a rounding error.
+        let tiny = L::from_f64(L::EPSILON * L::EPSILON);
+        let x = (c2 * h2 / (one - c2).max(tiny)).sqrt().copysign(f).max(x0).min(x1);
+        let d2 = x * x + h2;
+        let [s0, s1] = [y0, y1].map(|y| y / (d2 + y * y).sqrt());
+        let s = v.mul_add(s1 - s0, s0);
+        let y = (s * (d2 / (one - s * s).max(tiny)).sqrt()).max(y0).min(y1);
+        [L::select(self.by_angle, x, by_area[0]), L::select(self.by_angle, y, by_area[1])]
+    }
+
+    /// Density of the direction \[1/sr\] in which the rectangle is at `distance`.
+    #[inline(always)]
+    fn density(&self, distance: L) -> L {
+        let by_area = density_of_area(self.area, distance, self.height);
+        let in_front = self.height.lt(L::zero());
+        L::select(self.by_angle, (L::one() / self.solid_angle).masked(in_front), by_area)
+    }
+}
+
+/// Returns the solid angle of a rectangle: that of two triangles, each by the arc tangent of a
+/// quotient without cancellation for small angles (Van Oosterom and Strackee 1983).
+#[inline(always)]
+fn solid_angle<L: SimdFloat>([x0, x1]: [L; 2], [y0, y1]: [L; 2], z: L, area: L) -> L {
+    let corner = |x: L, y: L| {
+        let inverse = L::one() / (x * x + y * y + z * z).sqrt();
+        (Vec3::new(x, y, z) * inverse, inverse)
+    };
+    let [a, b, c, d] = [corner(x0, y0), corner(x1, y0), corner(x1, y1), corner(x0, y1)];
+    let diagonal = a.0.dot(c.0);
+    let volume = z.abs() * area * a.1 * c.1;
+    let triangle = |third: (Vec3<L>, L)| {
+        let below = L::one() + diagonal + a.0.dot(third.0) + c.0.dot(third.0);
+        let half = (volume * third.1).atan2(below);
+        half + half
+    };
+    triangle(b) + triangle(d)
+}

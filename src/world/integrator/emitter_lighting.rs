@@ -1,0 +1,199 @@
+//! Light of emitters with a size, by multiple importance sampling (Veach and Guibas 1995, *Optimally
+//! Combining Sampling Techniques for Monte Carlo Rendering*).
+//!
+//! Two samples find the light that a glossy lobe reflects: a point of the emitter, and the
+//! direction of the reflected ray. Each is weighted by the power heuristic with exponent 2. Matt
+//! surfaces and highlights of lights use the point alone, mirrors and the camera the ray alone.
+
+use crate::bvh::Ray;
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::light::Emitter;
+use crate::material::ReflectionLobe;
+use crate::sampling::PacketSampler;
+use crate::world::culling::tile::TileCandidates;
+use crate::world::integrator::interaction::SurfaceInteraction;
+use crate::world::integrator::path::{Counts, Path, Radiance};
+use crate::world::world::World;
+use std::f64::consts::FRAC_1_PI;
+
+/// An emitter of the world, with its light group.
+pub(crate) struct EmitterSource<S> {
+    pub emitter: Emitter<S>,
+    /// Index of the light group.
+    pub group: usize,
+    /// Emission that is multiplied into the samples of the group. `None` means 1 in every channel.
+    pub emission: Option<[S; 3]>,
+    /// `true` if the camera and reflected rays see the emitter.
+    pub visible: bool,
+}
+
+impl<S: Float> EmitterSource<S> {
+    /// Returns `value` times the emission that the group's samples contain.
+    #[inline(always)]
+    fn emitted<L: SimdFloat<Scalar = S>>(&self, value: Vec3<L>) -> Vec3<L> {
+        match self.emission {
+            Some(emission) => value.component_mul(Vec3::splat(emission)),
+            None => value,
+        }
+    }
+}
+
+/// Weight of a sample by the power heuristic: p^2 / (p^2 + q^2) for its density `p` and the density
+/// `q` of the other technique. It is 1 for the largest finite `p`.
+#[inline(always)]
+pub(crate) fn power_heuristic<L: SimdFloat>(p: L, q: L) -> L {
+    let ratio = q / p;
+    L::one() / (ratio * ratio + L::one())
+}
+
+/// Adds the radiance of the visible emitters that the rays of `lanes` reach before the distance
+/// `t_max`.
+#[inline(never)]
+pub(crate) fn visible_emitters<L: SimdFloat>(
+    world: &World<L>,
+    path: &Path<L>,
+    t_max: L,
+    lanes: L::Mask,
+    out: &mut Radiance<L>,
+) {
+    for source in world.emitters.iter().filter(|source| source.visible) {
+        let Ray { origin, direction } = path.ray;
+        let t = source.emitter.hit(origin, direction);
+        let seen = lanes & t.lt(t_max);
+        if seen.none() {
+            continue;
+        }
+        let mut radiance = path.throughput * L::splat(source.emitter.radiance());
+        if path.lobe_density.lt(L::from_f64(L::MAX)).any() {
+            let density = source.emitter.density(origin, t);
+            radiance = radiance * power_heuristic(path.lobe_density, density);
+        }
+        out.groups[source.group] += source.emitted(radiance).masked(seen);
+    }
+}
+
+/// Reflection lobes in the direction of an emitter.
+pub(crate) struct ReflectingLobes<L: SimdFloat> {
+    /// Lanes whose reflected rays the integrator follows.
+    pub lanes: L::Mask,
+    /// Fraction of the light that the surface reflects instead of transmitting it, by lane.
+    pub share: L,
+}
+
+/// Adds the light of all emitters that the surfaces reflect. `bounce` is the number of earlier
+/// surfaces of the path.
+#[inline(never)]
+pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    path: &Path<L>,
+    interaction: &SurfaceInteraction<L>,
+    candidates: &TileCandidates,
+    (sampler, bounce): (&PacketSampler<'_, L>, u32),
+    lobes: &ReflectingLobes<L>,
+    (out, counts): (&mut Radiance<L>, &mut Counts),
+) {
+    let mut glossy = L::mask(false);
+    for (index, lanes) in interaction.bsdfs(lobes.lanes) {
+        if !matches!(&world.bsdfs[index].reflection, None | Some((_, ReflectionLobe::Mirror))) {
+            glossy = glossy | lanes;
+        }
+    }
+    if (interaction.direct_mask | glossy).none() {
+        return;
+    }
+    let origin = interaction.ray_origin();
+    let view = -path.ray.direction;
+    let occluders = &candidates.occluders[world.sources.len()..];
+    for (index, (source, occluders)) in world.emitters.iter().zip(occluders).enumerate() {
+        let light = source.emitter.sample(origin, sampler.light_2d(bounce, index as u32));
+        let arrives = light.irradiance.gt(L::zero());
+        let arrives = arrives & interaction.geometric.dot(light.wi).gt(L::zero());
+        let cos_light = interaction.normal.dot(light.wi);
+        let direct = interaction.direct_mask & arrives & cos_light.gt(L::zero());
+        let mut value = Vec3::zero();
+        if direct.any() {
+            value = interaction.diffuse * (cos_light * L::from_f64(FRAC_1_PI));
+            for (index, lanes) in interaction.bsdfs(interaction.highlight_mask & direct) {
+                let (bsdf, cos_view) = (&world.bsdfs[index], interaction.normal.dot(view));
+                let normal = interaction.normal;
+                let highlight = bsdf.highlight(normal, view, light.wi, cos_light, cos_view);
+                value += highlight.masked(lanes);
+            }
+            value = value.masked(direct);
+        }
+        if source.visible {
+            for (index, lanes) in interaction.bsdfs(glossy & arrives) {
+                let lobe = lobe_value::<_, SIMPLE>(world, path, interaction, index, light.wi);
+                let (lobe, density) = lobe;
+                let weight = power_heuristic(light.density, density) * lobes.share;
+                value += (lobe * weight).masked(lanes);
+            }
+        }
+        counts.glossy = true;
+        let mut lit = value.max_element().gt(L::zero());
+        if lit.none() {
+            continue;
+        }
+        if world.shadows {
+            counts.rays += u64::from(lit.bits().count_ones());
+            let ray = Ray { origin, direction: light.wi };
+            let occluded = if SIMPLE {
+                world.geometry.occluded_linear(&ray, light.distance, lit, occluders)
+            } else {
+                world.geometry.occluded(&ray, light.distance, lit, occluders)
+            };
+            lit = lit.and_not(occluded);
+            if lit.none() {
+                continue;
+            }
+        }
+        let radiance = path.throughput.component_mul(value) * light.irradiance;
+        out.groups[source.group] += source.emitted(radiance).masked(lit);
+    }
+}
+
+/// Returns the value of the reflection lobe of BSDF `index` in the given direction, with the cosine
+/// of the light, and the density \[1/sr\] of the reflected ray in this direction.
+#[inline(always)]
+fn lobe_value<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    path: &Path<L>,
+    interaction: &SurfaceInteraction<L>,
+    index: usize,
+    direction: Vec3<L>,
+) -> (Vec3<L>, L) {
+    let bsdf = &world.bsdfs[index];
+    let Some((strength, lobe)) = &bsdf.reflection else {
+        return (Vec3::zero(), L::zero());
+    };
+    let evaluate = |direction: Vec3<L>| {
+        let incident = path.ray.direction;
+        let normal = interaction.normal;
+        bsdf.evaluate_lobe(*strength, lobe, incident, normal, direction, world.fold)
+    };
+    let (value, density) = evaluate(direction);
+    if SIMPLE || !world.smooth {
+        return (value, density);
+    }
+    // Reflected rays that point into the surface are mirrored out of it.
+    let height = direction.dot(interaction.geometric);
+    let mirrored = interaction.geometric.mul_add(height * L::from_f64(-2.0), direction);
+    let (mirrored_value, mirrored_density) = evaluate(mirrored);
+    (value + mirrored_value, density + mirrored_density)
+}
+
+/// Returns the density \[1/sr\] of reflected rays of BSDF `index` in their directions; the largest
+/// finite number for a mirror.
+#[inline(always)]
+pub(crate) fn reflected_density<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    path: &Path<L>,
+    interaction: &SurfaceInteraction<L>,
+    index: usize,
+    direction: Vec3<L>,
+) -> L {
+    match &world.bsdfs[index].reflection {
+        None | Some((_, ReflectionLobe::Mirror)) => L::from_f64(L::MAX),
+        Some(_) => lobe_value::<_, SIMPLE>(world, path, interaction, index, direction).1,
+    }
+}

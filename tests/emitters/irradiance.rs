@@ -1,0 +1,221 @@
+//! Irradiance of spheres, rectangles and disks on matt surfaces, with and without an occluder.
+
+use crate::forms;
+use crate::setup::{array, check, scene};
+use glam::DVec3;
+use std::f64::consts::PI;
+use zerkalo::scene::Scene;
+
+/// Rounding errors that the comparison allows: the surface is lifted, and rays start above theirs.
+const ROUNDING: [f64; 2] = [1e-4, 1e-9];
+
+/// Creates the scene of a camera that looks at a white matt receiver at the origin, lit by a light
+/// that the camera does not see.
+fn receiver(normal: DVec3, light: &str, rest: &str) -> Scene {
+    scene(&format!(
+        "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
+         [camera]\neye = {eye}\ndirection = {direction}\nup = {up}\nview_angle.vertical = 0.1\n\
+         [materials.white]\ncolor = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0\nspecular = 0.0\n\
+         [materials.black]\ndiffuse = 0.0\nspecular = 0.0\nambient = 0.0\n\
+         [[light]]\nvisible = false\n{light}\n\
+         [[object]]\nmaterial = \"white\"\n\
+         shape.rectangle = {{ center = [0.0, 0.0, 0.0], size = [0.01, 0.01], normal = {normal}, up = {up} }}\n{rest}",
+        eye = array(normal * 0.01),
+        direction = array(-normal),
+        up = array(normal.any_orthonormal_vector()),
+        normal = array(normal),
+    ))
+}
+
+/// Expected radiance of the receiver: irradiance / pi.
+fn case(name: String, scene: Scene, irradiance: f64) -> (String, Scene, f64) {
+    (name, scene, irradiance / PI)
+}
+
+#[test]
+fn irradiance_of_a_sphere_light_is_the_closed_form() {
+    let mut cases = Vec::new();
+    for distance in [1.001, 1.1, 2.0, 10.0, 1000.0] {
+        // Angle between the normal and the centre; at 90 degrees the receiver is half below its
+        // horizon.
+        for degrees in [0.0, 40.0, 80.0, 90.0, 95.0, 120.0f64] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let (normal, radius) = (DVec3::new(0.36, 0.48, 0.8), 0.5);
+            let center = (normal * cos + normal.any_orthonormal_vector() * sin) * distance * radius;
+            let light = format!("sphere = {{ center = {}, radius = {radius} }}", array(center));
+            cases.push(case(
+                format!("{distance} radii away at {degrees} degrees"),
+                receiver(normal, &light, ""),
+                forms::sphere(center, radius, normal),
+            ));
+        }
+    }
+    check(&cases, 1 << 15, ROUNDING);
+}
+
+#[test]
+fn receiver_inside_a_sphere_light_is_lit_from_all_sides() {
+    let normal = DVec3::Y;
+    let light = |center: DVec3| format!("sphere = {{ center = {}, radius = 0.5 }}", array(center));
+    let cases: Vec<_> = [DVec3::ZERO, DVec3::new(0.3, 0.2, 0.1), DVec3::Y * -0.499]
+        .map(|center| case(format!("{center}"), receiver(normal, &light(center), ""), PI))
+        .into();
+    check(&cases, 1 << 15, ROUNDING);
+}
+
+/// Corners of the rectangle in the light description that this returns.
+fn rectangle(center: DVec3, size: [f64; 2], normal: DVec3) -> (String, Vec<DVec3>) {
+    let up = normal.any_orthonormal_vector();
+    let across = up.cross(normal);
+    let corner = |x: f64, y: f64| center + across * (x * size[0]) + up * (y * size[1]);
+    let text = format!(
+        "rectangle = {{ center = {}, size = {size:?}, normal = {}, up = {} }}",
+        array(center),
+        array(normal),
+        array(up)
+    );
+    (text, [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, y)| corner(x, y)).into())
+}
+
+#[test]
+fn irradiance_of_a_rectangle_light_is_lamberts_formula() {
+    let mut cases = Vec::new();
+    let normal = DVec3::new(0.48, 0.6, 0.64);
+    let across = normal.any_orthonormal_vector();
+    for (center, size) in [
+        (normal * 0.5, [1.0, 1.0]),
+        (normal * 0.001, [1.0, 3.0]),
+        (normal + across * 2.0, [2.0, 0.5]),
+        (normal * 30.0 + across * 5.0, [1.0, 1.0]),
+        (normal * 0.4 + across * 3.0, [4.0, 4.0]),
+        // Half below the horizon.
+        (across * 0.7, [1.0, 0.6]),
+        (normal * 2.0, [1e4, 1e4]),
+    ] {
+        for tilt in [0.0, 0.7, 2.0f64] {
+            let towards = -normal * tilt.cos() - across * tilt.sin();
+            if center.dot(towards) >= 0.0 {
+                continue;
+            }
+            let (light, corners) = rectangle(center, size, towards);
+            cases.push(case(
+                format!("{center}, {size:?}, tilt {tilt}"),
+                receiver(normal, &light, ""),
+                forms::polygon(&corners, normal),
+            ));
+        }
+    }
+    assert!(cases.len() > 12);
+    check(&cases, 1 << 15, ROUNDING);
+}
+
+#[test]
+fn irradiance_of_a_disk_light_is_the_closed_form() {
+    let mut cases = Vec::new();
+    for height in [0.3, 1.0, 20.0] {
+        for aside in [0.0, 0.5, 1.0, 4.0] {
+            let (normal, radius) = (DVec3::Y, 0.8);
+            let center = DVec3::new(aside, height, 0.0);
+            let light = format!(
+                "disk = {{ center = {}, radius = {radius}, normal = [0.0, -1.0, 0.0] }}",
+                array(center)
+            );
+            let expected = forms::parallel_disk(radius, height, aside);
+            let name = format!("height {height}, {aside} aside");
+            cases.push(case(name, receiver(normal, &light, ""), expected));
+        }
+    }
+    check(&cases, 1 << 15, ROUNDING);
+}
+
+#[test]
+fn flat_lights_shine_from_one_side_only() {
+    for shape in ["rectangle = { size = [1.0, 1.0], ", "disk = { radius = 1.0, "] {
+        for (normal, lit) in [(-1.0, true), (1.0, false)] {
+            let light =
+                format!("{shape}center = [0.0, 1.0, 0.0], normal = [0.0, {normal:?}, 0.0] }}");
+            let scene = receiver(DVec3::Y, &light, "");
+            let (mean, _) = crate::setup::radiance::<zerkalo::lanes::Single>(&scene, 64, 1);
+            assert_eq!(mean > 0.0, lit, "{light}");
+        }
+    }
+}
+
+/// A black half-plane at height 1 covers the part of the light beyond its straight edge. The
+/// visible part is the polygon on one side of the plane through the receiver and the edge.
+#[test]
+fn penumbra_of_a_straight_edge_is_the_visible_part_of_the_light() {
+    let (light, corners) = rectangle(DVec3::Y * 2.0, [1.0, 0.7], -DVec3::Y);
+    let cases: Vec<_> = [-0.45, -0.3, -0.15, 0.0, 0.1, 0.24, 0.4]
+        .map(|edge| {
+            let cover = format!(
+                "[[object]]\nmaterial = \"black\"\n\
+                 shape.platform = {{ center = [{:?}, 1.0, 0.0], size = [20.0, 20.0] }}\n",
+                edge - 10.0
+            );
+            // Directions to the light with x / y > edge pass.
+            let plane = DVec3::new(1.0, -edge, 0.0);
+            let expected = forms::polygon(&forms::clipped(&corners, plane), DVec3::Y);
+            case(format!("edge at {edge}"), receiver(DVec3::Y, &light, &cover), expected)
+        })
+        .into();
+    check(&cases, 1 << 15, ROUNDING);
+}
+
+/// Power of 1 W gives the irradiance of a point light of 1 / (4 pi) W/sr on a faraway sphere, and
+/// of 1 / pi W/sr along the normal of a flat light.
+#[test]
+fn power_is_independent_of_the_size() {
+    let mut cases = Vec::new();
+    for radius in [0.001, 0.1, 1.0] {
+        for (kind, intensity) in
+            [("sphere = { ", 0.25 / PI), ("disk = { normal = [0.0, -1.0, 0.0], ", 1.0 / PI)]
+        {
+            let light = format!(
+                "unit = \"power\"\n{kind}center = [0.0, 1000.0, 0.0], radius = {radius:?} }}"
+            );
+            let name = format!("{kind} {radius}");
+            cases.push(case(name, receiver(DVec3::Y, &light, ""), intensity * 1e-6));
+        }
+    }
+    check(&cases, 1 << 10, [1e-4, 1e-5]);
+}
+
+/// Lights that touch the receiver's surface, or are far larger or smaller than the scene.
+#[test]
+fn extreme_lights_keep_their_irradiance() {
+    let mut cases = Vec::new();
+    for radius in [1e-7, 1e-6, 1e-3, 1e3, 1e6] {
+        let center = DVec3::Y * f64::max(2.0 * radius, 1.0);
+        let light = format!("sphere = {{ center = {}, radius = {radius:?} }}", array(center));
+        let expected = forms::sphere(center, radius, DVec3::Y);
+        cases.push(case(
+            format!("sphere of radius {radius}"),
+            receiver(DVec3::Y, &light, ""),
+            expected,
+        ));
+        let (light, corners) = rectangle(DVec3::Y, [radius, radius], -DVec3::Y);
+        let expected = forms::polygon(&corners, DVec3::Y);
+        let name = format!("square of side {radius}");
+        cases.push(case(name, receiver(DVec3::Y, &light, ""), expected));
+    }
+    // A sphere that rests on the receiver, and a vertical rectangle that stands on it.
+    let center = DVec3::new(0.3, 0.25, 0.0);
+    let light = format!("sphere = {{ center = {}, radius = 0.25 }}", array(center));
+    let expected = forms::sphere(center, 0.25, DVec3::Y);
+    cases.push(case("resting sphere".into(), receiver(DVec3::Y, &light, ""), expected));
+    let (light, corners) = rectangle(DVec3::new(0.2, 0.5, 0.0), [1.0, 1.0], -DVec3::X);
+    let expected = forms::polygon(&corners, DVec3::Y);
+    cases.push(case("standing rectangle".into(), receiver(DVec3::Y, &light, ""), expected));
+    check(&cases, 1 << 15, [1e-3, 1e-6]);
+}
+
+/// A light that lies in the surface of an object shines, and the surface beside it stays dark.
+#[test]
+fn light_in_a_ceiling_shines_into_the_room() {
+    let (light, corners) = rectangle(DVec3::Y * 2.0, [1.0, 0.7], -DVec3::Y);
+    let ceiling = "[[object]]\nmaterial = \"black\"\n\
+                   shape.platform = { center = [0.0, 2.0, 0.0], size = [20.0, 20.0] }\n";
+    let scene = receiver(DVec3::Y, &light, ceiling);
+    check(&[case("lit".into(), scene, forms::polygon(&corners, DVec3::Y))], 1 << 15, ROUNDING);
+}

@@ -1,0 +1,64 @@
+//! Scenes with one receiver and one light, and their radiance with its standard error.
+
+use crate::normal::two_sided_z;
+use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
+use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo::scene::Scene;
+use zerkalo::world::{MAX_GROUPS, Radiance, World};
+
+/// Writes three numbers as a TOML array.
+pub fn array(v: glam::DVec3) -> String {
+    format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
+}
+
+pub fn scene(text: &str) -> Scene {
+    Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+/// Mean and its standard error of the red radiance of the pixel (0, 0) over `count` independent
+/// samples, all light groups together. The lights have unit intensity.
+pub fn radiance<L: SimdFloat>(scene: &Scene, count: u32, seed: u64) -> (f64, f64) {
+    let world = World::<L>::new(scene);
+    let settings = SampleSettings { seed, kind: SamplerKind::Random };
+    let sampler = Sampler::<L>::new(settings, world.jitter());
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for first in (0..count).step_by(L::WIDTH) {
+        let points = sampler.block(first, L::WIDTH);
+        let draws = points.for_pixel(sampler.key((0, 0), 0));
+        let half = L::from_f64(0.5);
+        let offset = if world.jitter() { draws.pixel() } else { (half, half) };
+        let corner = Vec3::splat(world.camera().pixel_corner_direction((0, 0)));
+        let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
+        let rays = world.camera().rays(corner, offset);
+        world.trace(rays, None, &draws, L::mask(true), &mut radiance);
+        for lane in 0..L::WIDTH {
+            let groups = &radiance.groups[..world.groups()];
+            let sample: f64 = groups.iter().map(|g| g.x.lane(lane).to_f64()).sum();
+            assert!(sample.is_finite(), "seed {seed}, sample {first} + {lane}: {sample}");
+            sum += sample;
+            squares += sample * sample;
+        }
+    }
+    let n = f64::from(count);
+    let mean = sum / n;
+    (mean, ((squares / n - mean * mean).max(0.0) / (n - 1.0)).sqrt())
+}
+
+/// Checks the mean radiance of each scene against its expected value by z-test in both precisions.
+/// `level` is the probability that any correct case fails. Rounding errors of the relative size
+/// `rounding` (single, double) are allowed.
+pub fn check(cases: &[(String, Scene, f64)], count: u32, rounding: [f64; 2]) {
+    let level = 1e-3;
+    let limit = two_sided_z(level / (2.0 * cases.len() as f64));
+    for (seed, (name, scene, expected)) in (1..).zip(cases) {
+        let found =
+            [radiance::<Single>(scene, count, seed), radiance::<Double>(scene, count, seed)];
+        for ((mean, error), rounding) in found.into_iter().zip(rounding) {
+            let off = (mean - expected).abs() - rounding * expected;
+            assert!(
+                off <= limit * error,
+                "{name}, seed {seed}, rounding {rounding:e}: {mean} ± {error}, expected {expected}"
+            );
+        }
+    }
+}
