@@ -13,7 +13,7 @@ use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo::primitive::{Aggregate, Form, SphereForm};
 use zerkalo::render::pass::{self, PassContext};
 use zerkalo::render::wave::{Job, Wave};
-use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision, World};
 
@@ -146,7 +146,10 @@ fn sampler(c: &mut Criterion) {
     let mut group = c.benchmark_group("sampler, 4 dimensions of a packet");
     group.throughput(Throughput::Elements(Single::WIDTH as u64));
     for kind in [SamplerKind::Sobol, SamplerKind::Random] {
-        let sampler = Sampler::<Single>::new(SampleSettings { seed: 1, kind }, true);
+        let sampler = Sampler::<Single>::new(
+            SampleSettings { seed: 1, kind },
+            CameraDimensions { pixel: true, lens: false },
+        );
         group.bench_function(kind.name(), |b| {
             b.iter(|| {
                 let points = sampler.block(64, Single::WIDTH);

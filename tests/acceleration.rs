@@ -9,7 +9,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 use support::{accelerated, all_shipped, parsed, sized};
-use zerkalo::camera::ViewAngle;
+use zerkalo::camera::{Aperture, Focus, ViewAngle};
 use zerkalo::scene::{Acceleration, Scene};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
@@ -124,6 +124,51 @@ fn view_angles_are_equal_under_every_acceleration() {
             let name = format!("{angle} degrees, {size:?}, {count} objects, {precision:?}");
             same(&name, &sized(scene, size), precision, 3);
         }
+    }
+}
+
+/// Lenses from tiny to larger than the scene, focused anywhere, on cameras of every view angle, also
+/// inside of objects.
+#[test]
+fn lenses_are_equal_under_every_acceleration() {
+    check_lenses(0..96);
+}
+
+#[test]
+#[ignore = "long: thousands of scenes"]
+fn lenses_are_equal_under_every_acceleration_in_many_scenes() {
+    check_lenses(1000..4000);
+}
+
+fn check_lenses(seeds: std::ops::Range<u64>) {
+    for seed in seeds {
+        let mut numbers = Numbers::new(seed);
+        let count = [1, 3, 6, 24, 130][numbers.below(5)];
+        let mut scene = crowd(&mut numbers, count);
+        if numbers.below(2) == 0 {
+            // A floor and walls, some of them in front of the lens, some behind it.
+            let mut wall = || {
+                let [a, b, c] = numbers.direction().to_array();
+                let [x, y, z] = (DVec3::from(scene.camera.eye) + numbers.in_cube(4.0)).to_array();
+                format!(
+                    "[[object]]\nshape.plane = {{ point = [{x}, {y}, {z}], normal = [{a}, {b}, {c}] }}\n\
+                     [[object]]\nshape.rectangle = {{ center = [{x}, {y}, {z}], size = [3.0, 5.0], \
+                     normal = [{c}, {b}, {a}] }}\n"
+                )
+            };
+            let walls = parsed(&(wall() + &wall()));
+            scene.objects.extend(walls.objects);
+        }
+        scene.camera.aperture = Some(Aperture::Radius(numbers.log_uniform(1e-3, 30.0)));
+        let focus = match numbers.below(3) {
+            0 => numbers.log_uniform(1e-3, 1e4),
+            _ => numbers.log_uniform(0.5, 10.0),
+        };
+        scene.camera.focus = Some(Focus::Distance(focus));
+        let size = [[41, 29], [20, 20], [57, 3], [100, 1]][numbers.below(4)];
+        let precision = if seed % 3 == 2 { Precision::Double } else { Precision::Single };
+        let name = format!("seed {seed}, {count} objects, {precision:?}, focus {focus}");
+        same(&name, &sized(scene, size), precision, 5);
     }
 }
 

@@ -24,8 +24,8 @@ const SEED: u64 = 29;
 /// Film size that is not a multiple of the tile size; tiles at the edges are narrower than a packet.
 const SIZE: [u32; 2] = [37, 35];
 
-/// Scenes that together contain every lobe, highlight and kind of light, several light groups, and paths
-/// that branch.
+/// Scenes that together contain every lobe, highlight and kind of light, several light groups, a lens,
+/// and paths that branch.
 fn scenes() -> Vec<(String, Scene)> {
     [
         "mirror-room.toml",
@@ -33,6 +33,7 @@ fn scenes() -> Vec<(String, Scene)> {
         "light-groups.toml",
         "lobe-ggx.toml",
         "glass.toml",
+        "depth-of-field.toml",
     ]
     .map(|name| (name.to_string(), sized(shipped(name), SIZE)))
     .into()

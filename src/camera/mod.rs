@@ -1,9 +1,11 @@
-//! Pinhole camera: description, navigation, compiled form.
+//! Camera: description, lens, navigation, compiled form.
 
+mod lens;
 mod navigate;
-mod pinhole;
+mod perspective;
 
-pub use pinhole::PinholeCamera;
+pub use lens::{Aperture, Focus};
+pub use perspective::{PerspectiveCamera, ThinLens};
 
 use crate::value::{
     Description, Field, FieldValue, NumberRange, ValidationError, Validator, ValueType,
@@ -13,7 +15,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 description! {
-    /// Pinhole camera.
+    /// Perspective camera: a pinhole, or a thin lens with a plane in focus.
     pub struct Camera {
         /// Position of the camera.
         eye: [f64; 3] => "eye" "[0.0, 1.0, 5.0]", in COORDINATE "scene units";
@@ -27,6 +29,10 @@ description! {
         view_angle: ViewAngle => "view_angle" "{ vertical = 40.0 }";
         /// Near plane: its distance along the view direction; surfaces in front of it are invisible.
         near: f64 = 0.0, in closed(0.0, 1e9) "scene units";
+        /// Opening of the lens, for depth of field.
+        aperture: Option<Aperture>, or "a pinhole: everything is in focus";
+        /// Plane in focus, perpendicular to the view direction.
+        focus: Option<Focus>, or "the plane through `target`";
     }
 }
 
@@ -63,6 +69,8 @@ impl Default for Camera {
             up: up(),
             view_angle: view_angle(),
             near: 0.0,
+            aperture: None,
+            focus: None,
         }
     }
 }
@@ -86,11 +94,7 @@ impl FieldValue for ViewAngle {
 
     fn errors(&self, field: &Field) -> Vec<ValidationError> {
         let (key, degrees) = self.key_degrees();
-        let mut errors = Validator::new(VIEW_ANGLES).field(key, &degrees).errors();
-        for error in &mut errors {
-            error.found = format!("{}.{}", field.name, error.found);
-        }
-        errors.into_iter().map(|error| error.prefixed(field.name)).collect()
+        lens::inside(field, Validator::new(VIEW_ANGLES).field(key, &degrees))
     }
 }
 
@@ -132,8 +136,10 @@ impl Camera {
             _ => None,
         };
         let checks = self.validator().and(given);
-        let degenerate = if checks.is_clean() { self.orientation_error() } else { None };
-        checks.and(degenerate).errors()
+        if !checks.is_clean() {
+            return checks.errors();
+        }
+        checks.and(self.orientation_error()).and(self.focus_error()).errors()
     }
 
     /// Returns the error of a camera whose numbers are all in range but do not define the axes of
@@ -176,6 +182,8 @@ mod tests {
             up: [0.0; 3],
             view_angle: ViewAngle::Vertical(180.0),
             near: -1.0,
+            aperture: None,
+            focus: None,
         };
         assert_eq!(
             keys(&camera),

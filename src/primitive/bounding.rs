@@ -27,23 +27,56 @@ pub enum LightTarget {
     Direction(DVec3),
 }
 
-/// Lines from one point through a convex quadrilateral.
+/// Lines from one point through a convex quadrilateral, and the lines through a lens around that
+/// point.
+///
+/// A line through the apex has the direction d, of unit length along `forward`. The lines through
+/// the point apex + o of the lens have the directions d - o / f: at the depth z they are displaced
+/// by o (1 - z / f), which is largest at one end of an interval of depths.
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
-    /// Common point of the lines.
+    /// Common point of the lines: the centre of the lens.
     pub apex: DVec3,
-    /// Forward direction, of unit length.
+    /// Forward direction, of unit length, perpendicular to the lens.
     pub forward: DVec3,
     /// Vectors from the apex to the corners of the quadrilateral, at distance 1 along `forward`.
     pub corners: [DVec3; 4],
+    /// Radius of the lens; 0 if all lines meet in the apex.
+    pub lens_radius: f64,
+    /// Depth f at which the lines through one point of the quadrilateral meet, greater than 0.
+    pub focus: f64,
 }
 
 impl Frustum {
+    /// Returns the largest displacement of lines by the lens between two depths.
+    fn blur(&self, near: f64, far: f64) -> f64 {
+        if self.lens_radius == 0.0 {
+            return 0.0;
+        }
+        let at = |depth: f64| (1.0 - depth / self.focus).abs();
+        self.lens_radius * at(near.max(0.0)).max(at(far.max(0.0))) * (1.0 + F32_RAY_ERROR)
+    }
+
+    /// Returns the rounding error of the origins of rays.
+    fn origin_error(&self) -> f64 {
+        ray_error(self.apex) + F32_RAY_ERROR * self.lens_radius
+    }
+
+    /// Returns the ball, grown by the displacement of lines inside of it and by the rounding errors
+    /// of rays.
+    fn blurred(&self, ball: &BoundingSphere) -> BoundingSphere {
+        let depth = (ball.center - self.apex).dot(self.forward);
+        let radius = ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center);
+        let blur = self.blur(depth - radius, depth + radius);
+        BoundingSphere { radius: ball.radius + blur + F32_RAY_ERROR * self.lens_radius, ..*ball }
+    }
+
     /// Returns `true` if a ball may reach between the lines. The test is against the cone around
     /// the lines if it is narrower than a half-space; otherwise, as no wider cone is convex,
     /// against the inner side of the four planes through the apex and neighbouring corners.
     fn meets(&self, ball: &BoundingSphere) -> bool {
-        let Self { apex, forward, corners } = self;
+        let ball = &self.blurred(ball);
+        let Self { apex, forward, corners, .. } = self;
         let axis = corners.iter().sum::<DVec3>().normalize();
         let cos = corners.iter().map(|c| c.normalize().dot(axis)).fold(1.0, f64::min);
         if cos > 0.0 {
@@ -80,9 +113,12 @@ impl BoundingSphere {
         Self { center, radius }
     }
 
-    /// Returns `true` if `point` lies inside or near the surface.
-    pub fn contains(&self, point: DVec3) -> bool {
-        self.center.distance(point) <= self.radius + ray_error(self.center) + ray_error(point)
+    /// Returns `true` if the balls overlap, with room for the roundings of rays that start in
+    /// `other`.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let errors = ray_error(self.center) + ray_error(other.center);
+        self.center.distance(other.center)
+            <= self.radius + errors + other.radius * (1.0 + F32_RAY_ERROR)
     }
 
     /// Returns the radius with room for the roundings of rays from `apex`.
@@ -121,23 +157,26 @@ impl BoundingVolume {
     /// Returns a ball around the part of the form that the pencil's lines can hit in front of the
     /// apex; `None` if there is none.
     pub fn clip_to(&self, pencil: &Frustum) -> Option<BoundingSphere> {
-        let Frustum { apex, forward, corners } = pencil;
+        let Frustum { apex, forward, corners, .. } = pencil;
         let ball = self.ball;
         if ball.radius.is_finite() && !pencil.meets(&ball) {
             return None;
         }
-        let room = ray_error(*apex) + ray_error(ball.center);
+        let room = pencil.origin_error() + ray_error(ball.center);
         // Depths along `forward` between which the form lies.
         let middle = (ball.center - *apex).dot(*forward);
         let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
         if let Some((normal, offset)) = self.plane {
             // 1 / depth of a plane is linear along lines of equal length in depth: its extremes are
             // at the corners if all four cross the plane in front. The slacks allow for rounding of
-            // the plane's height above the apex and of the slopes of the lines.
+            // the plane's height above the apex and of the slopes of the lines, and for the tilt of
+            // the lens towards the plane.
+            let tilt = pencil.lens_radius * normal.reject_from_normalized(*forward).length();
             let height = offset - normal.dot(*apex);
             let (height, toward) = (height.abs(), normal * height.signum());
-            let slack = self.ray_error(*apex);
-            let slopes = corners.map(|c| (toward.dot(c), F32_RAY_ERROR * c.length()));
+            let slack = self.ray_error(*apex) + F32_RAY_ERROR * pencil.lens_radius + tilt;
+            let slope_error = (tilt + F32_RAY_ERROR * pencil.lens_radius) / pencil.focus;
+            let slopes = corners.map(|c| (toward.dot(c), F32_RAY_ERROR * c.length() + slope_error));
             if height <= slack {
                 // The apex may be on either side.
             } else if slopes.iter().all(|(slope, ray_error)| slope > ray_error) {
@@ -159,7 +198,8 @@ impl BoundingVolume {
         let ends: [DVec3; 8] =
             std::array::from_fn(|i| *apex + corners[i % 4] * if i < 4 { near } else { far });
         let part = BoundingSphere::around(&ends);
-        let part = BoundingSphere { radius: part.radius + room, ..part };
+        let blur = pencil.blur(near, far);
+        let part = BoundingSphere { radius: part.radius + room + blur, ..part };
         Some(if part.radius < ball.radius { part } else { ball })
     }
 
@@ -312,6 +352,8 @@ mod tests {
             apex: DVec3::Z * 5.0,
             forward: DVec3::NEG_Z,
             corners: corners.map(|(x, y)| DVec3::new(x, y, -1.0)),
+            lens_radius: 0.0,
+            focus: 1.0,
         }
     }
 
@@ -397,7 +439,7 @@ mod tests {
         let ends =
             [(-edge, edge), (0.6 * edge, edge), (0.6 * edge, -0.6 * edge), (-edge, -0.6 * edge)];
         let corners = ends.map(|(x, y)| DVec3::new(x, y, -1.0));
-        let pencil = Frustum { apex, forward: DVec3::NEG_Z, corners };
+        let pencil = Frustum { apex, forward: DVec3::NEG_Z, corners, lens_radius: 0.0, focus: 1.0 };
         let meets = |center: DVec3, radius: f64| {
             BoundingVolume::new(&Form::Sphere(SphereForm { center, radius }))
                 .clip_to(&pencil)
@@ -446,7 +488,8 @@ mod tests {
         for _ in 0..1000 {
             let toward = DVec3::new(0.2 * unit() - 0.1, 0.2 * unit() - 0.1, -1.0);
             let t = (offset - normal.dot(pencil().apex)) / normal.dot(toward);
-            assert!(t > 0.0 && part.contains(pencil().apex + toward * t));
+            let hit = BoundingSphere { center: pencil().apex + toward * t, radius: 0.0 };
+            assert!(t > 0.0 && part.overlaps(&hit));
         }
     }
 }

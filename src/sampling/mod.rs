@@ -6,4 +6,6 @@ mod packet_sampler;
 mod sobol;
 pub mod warp;
 
-pub use packet_sampler::{PacketSampler, SampleBlock, SampleSettings, Sampler, SamplerKind};
+pub use packet_sampler::{
+    CameraDimensions, PacketSampler, SampleBlock, SampleSettings, Sampler, SamplerKind,
+};

@@ -41,18 +41,34 @@ pub struct SampleSettings {
 /// of a path (reflection or transmission).
 const CHOICES: u32 = 2;
 
+/// Largest number of lobes in the joint set.
+const MAX_JOINT_LOBES: u32 = 2;
+
 /// Number of powers of two up to the widest packet: the possible numbers of samples of one pixel in
 /// a packet.
 const PACKET_SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
+
+/// Dimensions of the joint set that camera rays use, two each. Lobes use the following ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CameraDimensions {
+    /// `true` if samples are distributed over the area of their pixel.
+    pub pixel: bool,
+    /// `true` if samples are distributed over a lens.
+    pub lens: bool,
+}
 
 /// Sampler of a picture: tables and constants that all packets share.
 pub struct Sampler<L: SimdFloat> {
     settings: SampleSettings,
     /// Two words per replicate, hashed from the seed.
     seeds: [[u32; 2]; 2],
-    /// First dimension of the first lobe. If samples are jittered, the first two dimensions are the
-    /// position in the pixel.
+    /// First dimension of the position on the lens. If samples are jittered, the first two
+    /// dimensions are the position in the pixel.
+    lens: usize,
+    /// First dimension of the first lobe.
     first_lobe: usize,
+    /// Number of lobes in the joint set. Further lobes belong to the padded sets.
+    joint_lobes: u32,
     /// `low_bits[k][d]` holds the Sobol points 0..2^k in dimension d, repeated over the lanes.
     low_bits: [[L::SimdU32; DIMENSIONS]; PACKET_SHAPES],
     /// Lane indices 0, 1, 2 and so on.
@@ -72,9 +88,11 @@ pub struct SampleBlock<'a, L: SimdFloat> {
 }
 
 impl<L: SimdFloat> Sampler<L> {
-    /// Creates the sampler of a picture. With `jitter` the first two dimensions distribute samples
-    /// over their pixel, otherwise they belong to the lobes.
-    pub fn new(settings: SampleSettings, jitter: bool) -> Self {
+    /// Creates the sampler of a picture. `camera` are the dimensions that its camera rays use.
+    pub fn new(settings: SampleSettings, camera: CameraDimensions) -> Self {
+        let lens = if camera.pixel { 2 } else { 0 };
+        let first_lobe = lens + if camera.lens { 2 } else { 0 };
+        let free = DIMENSIONS - CHOICES as usize - first_lobe;
         let word = |replicate: u32, purpose: u32| {
             hash_words(&[settings.seed as u32, (settings.seed >> 32) as u32, replicate, purpose])
         };
@@ -84,7 +102,9 @@ impl<L: SimdFloat> Sampler<L> {
         Self {
             settings,
             seeds: [0, 1].map(|replicate| [word(replicate, 0), word(replicate, 1)]),
-            first_lobe: if jitter { 2 } else { 0 },
+            lens,
+            first_lobe,
+            joint_lobes: (free as u32 / 2).min(MAX_JOINT_LOBES),
             low_bits: std::array::from_fn(|k| std::array::from_fn(|d| low_bits(k, d))),
             ramp: L::SimdU32::from_fn(|lane| lane as u32),
             dimension_salt: std::array::from_fn(|d| hash_scalar(d as u32 + 1)),
@@ -145,6 +165,13 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         (self.joint(0, 0), self.joint(1, 0))
     }
 
+    /// Returns two numbers in [0, 1) for the position of each sample on the lens.
+    #[inline(always)]
+    pub fn lens(&self) -> (L, L) {
+        let d = self.points.sampler.lens;
+        (self.joint(d, 0), self.joint(d + 1, 0))
+    }
+
     /// Returns two numbers in [0, 1) for the lobe of the surface that a path hits after `bounce`
     /// reflections.
     #[inline(always)]
@@ -165,11 +192,11 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Returns the two dimensions of the surface after `bounce` reflections, scrambled with `salt`.
     #[inline(always)]
     fn pair_2d(&self, bounce: u32, salt: u32) -> (L, L) {
-        let d = self.points.sampler.first_lobe + 2 * bounce as usize;
-        if bounce < 2 {
-            (self.joint(d, salt), self.joint(d + 1, salt))
-        } else {
-            self.padded(bounce - 2, salt)
+        let Sampler { first_lobe, joint_lobes, .. } = self.points.sampler;
+        let d = first_lobe + 2 * bounce as usize;
+        match bounce.checked_sub(*joint_lobes) {
+            None => (self.joint(d, salt), self.joint(d + 1, salt)),
+            Some(further) => self.padded(further, salt),
         }
     }
 

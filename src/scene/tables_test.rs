@@ -75,6 +75,8 @@ fn field_tables_match_deserialised_keys() {
     same_keys::<Ambient>("ambient", AMBIENT_FIELDS);
     same_keys::<Camera>("camera", crate::camera::FIELDS);
     same_keys::<crate::camera::ViewAngle>("view_angle", inner(crate::camera::FIELDS, "view_angle"));
+    same_keys::<crate::camera::Aperture>("aperture", inner(crate::camera::FIELDS, "aperture"));
+    same_keys::<crate::camera::Focus>("focus", inner(crate::camera::FIELDS, "focus"));
     same_keys::<Light>("light", crate::light::FIELDS);
     same_keys::<crate::light::Point>("point", inner(crate::light::FIELDS, "point"));
     same_keys::<crate::light::Directional>(

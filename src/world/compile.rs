@@ -1,11 +1,13 @@
 //! Compilation of a scene into a world, step by step: recentred geometry, materials, lights,
 //! transmission, culling.
 
-use crate::camera::PinholeCamera;
+use crate::camera::PerspectiveCamera;
 use crate::lanes::{Float, SimdFloat};
 use crate::light::{DeltaLight, Emitter};
 use crate::material::{Bsdf, Material};
-use crate::primitive::{Acceleration, Aggregate, BoundingSphere, Form, LightTarget, PrimitiveId};
+use crate::primitive::{
+    Acceleration, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
+};
 use crate::scene::{BelowHorizon, Filter, RayTypes, Scene};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
@@ -28,7 +30,7 @@ pub(super) struct RecenteredGeometry {
     pub origin: DVec3,
     /// Shape of each object, with its transform applied.
     pub forms: Vec<Form>,
-    /// Largest magnitude of a coordinate of the bounded forms and the eye.
+    /// Largest magnitude of a coordinate of the bounded forms and the lens.
     pub extent: f64,
 }
 
@@ -51,8 +53,8 @@ impl RecenteredGeometry {
         let forms: Vec<Form> = forms.into_iter().map(|f| f.transformed(&to_origin)).collect();
         let farthest_corners =
             forms.iter().filter_map(Form::bounds).map(|(low, high)| low.abs().max(high.abs()));
-        let eye = scene_eye - origin;
-        let extent = farthest_corners.fold(eye.abs(), DVec3::max).max_element();
+        let lens = (scene_eye - origin).abs() + DVec3::splat(scene.camera.lens_radius());
+        let extent = farthest_corners.fold(lens, DVec3::max).max_element();
         Self { origin, forms, extent }
     }
 
@@ -150,7 +152,7 @@ impl<S: Float> CompiledLights<S> {
         scene: &Scene,
         geometry: &RecenteredGeometry,
         materials: &CompiledMaterials<S>,
-        camera: &PinholeCamera,
+        camera: &PerspectiveCamera,
     ) -> Self {
         let groups = LightGroups::new(scene, materials.has_direct(), materials.has_ambient());
         let lift = emitter_lift::<S>(geometry);
@@ -232,7 +234,7 @@ impl<S: Float> CompiledCulling<S> {
         scene: &Scene,
         recentered: &RecenteredGeometry,
         geometry: &Aggregate<L>,
-        camera: &PinholeCamera,
+        camera: &PerspectiveCamera,
         lights: &CompiledLights<S>,
         entered: &[bool],
     ) -> Self {
@@ -243,11 +245,12 @@ impl<S: Float> CompiledCulling<S> {
         let mode = match scene.trace.acceleration {
             Acceleration::Auto => {
                 // Rays that start on a near plane may start inside a primitive.
-                let eye = (scene.camera.near == 0.0).then(|| camera.eye());
+                let lens = BoundingSphere { center: camera.eye(), radius: camera.lens_radius() };
+                let start = (scene.camera.near == 0.0).then_some(lens);
                 let light_targets = (lights.targets(), lights.max_end_offset());
                 let emitters = lights.emitter_bounds();
                 let culler =
-                    FrustumCuller::new(forms().collect(), eye, entered, light_targets, emitters);
+                    FrustumCuller::new(forms().collect(), start, entered, light_targets, emitters);
                 all_candidates = culler.candidates(geometry, None);
                 if geometry.has_tree() {
                     if scene.trace.ray_types >= RayTypes::Shadows {
@@ -273,13 +276,19 @@ impl<S: Float> CompiledCulling<S> {
     }
 }
 
-/// Returns the region in which camera rays start: a ball around the eye that reaches to the
-/// farthest corner of the near plane.
-fn start_region(scene: &Scene, camera: &PinholeCamera) -> StartRegion {
+/// Returns the region in which camera rays start: a ball around the eye that contains the lens, and
+/// that reaches to the farthest ray on the near plane.
+fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
     let size = scene.film.size.map(|n| n as usize);
     let corner_distances = camera.corners([0, 0], size).map(DVec3::length);
     let farthest_corner = corner_distances.into_iter().fold(0.0, f64::max);
-    StartRegion { eye: camera.eye(), radius: scene.camera.near * farthest_corner }
+    let near = scene.camera.near;
+    let lens = camera.lens().map_or(0.0, |lens| {
+        // With room for the roundings of origins on the lens.
+        let error = F32_RAY_ERROR * (lens.radius + camera.eye().abs().max_element());
+        lens.blur(near) + error
+    });
+    StartRegion { eye: camera.eye(), radius: near * farthest_corner + lens }
 }
 
 impl<L: SimdFloat> World<L> {
@@ -291,7 +300,7 @@ impl<L: SimdFloat> World<L> {
     pub(super) fn compile(scene: &Scene, recentered: &RecenteredGeometry) -> Self {
         let level = scene.trace.ray_types;
         let default_material = Material::default();
-        let camera = PinholeCamera::new(&scene.camera, scene.film.size, recentered.origin);
+        let camera = PerspectiveCamera::new(&scene.camera, scene.film.size, recentered.origin);
         let materials = CompiledMaterials::<L::Scalar>::new(scene, &default_material);
         let geometry = Aggregate::accelerated(&recentered.forms, scene.trace.acceleration);
         let primitives = geometry.sources();

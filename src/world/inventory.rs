@@ -91,6 +91,7 @@ impl Inventory {
             }
         };
         let is_shared = |source: &LightGroupSource| matches!(source, LightGroupSource::Shared(_));
+        add_if(scene.camera.lens_radius() > 0.0, "thin lens");
         add_if(groups.iter().any(is_shared), "shared light group");
         add_if(groups.contains(&LightGroupSource::Ambient), "ambient");
         add_if(groups.contains(&LightGroupSource::Background), "background");

@@ -1,7 +1,7 @@
 //! State of pixels that is the same for all their samples, computed once per tile: coordinates,
 //! sampler keys, corner directions.
 
-use crate::camera::PinholeCamera;
+use crate::camera::PerspectiveCamera;
 use crate::lanes::{Float, SimdFloat, SimdU32, Vec3};
 use crate::sampling::Sampler;
 use std::ops::Range;
@@ -27,7 +27,7 @@ pub(super) struct PixelBlock<S> {
 impl<S: Float> PixelBlock<S> {
     /// Creates the block of `pixels`, given as column and row, in one replicate.
     pub fn new<L: SimdFloat<Scalar = S>>(
-        camera: &PinholeCamera,
+        camera: &PerspectiveCamera,
         sampler: &Sampler<L>,
         replicate: usize,
         mut pixels: impl Iterator<Item = (u32, u32)>,

@@ -8,7 +8,7 @@
 //! extent to its size below. `tests/extremes/precision.rs` measures the errors of single precision
 //! at each ratio.
 
-use crate::camera::PinholeCamera;
+use crate::camera::PerspectiveCamera;
 use crate::primitive::{BoundingSphere, Form, HalfSpace, Proxy, ProxyFace};
 use crate::scene::Scene;
 use crate::world::clearance::clearance;
@@ -36,7 +36,8 @@ const FLAT: f64 = 8.0;
 const MAX_EXTENT_PER_LIGHT_DISTANCE: f64 = 2048.0;
 
 /// Smallest angle between the rays of neighbouring pixels \[radians\]: 64 times the rounding error
-/// of a direction.
+/// of a direction. The slope of rays through the edge of a lens towards the plane in focus
+/// multiplies that error.
 const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 
 /// Ratio of a gap to the scene extent, 2^-44, below which two surfaces are regarded as coincident.
@@ -50,19 +51,22 @@ const MOST_PAIRS: usize = 1 << 20;
 
 /// Returns `true` if the proportions of `scene` let single precision render it as well as double
 /// precision. `forms` are all objects, in coordinates relative to `origin`. `extent` is the largest
-/// magnitude of a coordinate of the objects and the eye in that frame.
+/// magnitude of a coordinate of the objects and the lens in that frame.
 pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
     let thinnest = forms.iter().map(Form::thickness).fold(f64::INFINITY, f64::min);
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
         return false;
     }
-    let view = PinholeCamera::new(&scene.camera, scene.film.size, origin);
+    let view = PerspectiveCamera::new(&scene.camera, scene.film.size, origin);
     let angle = view.pixel_angle();
+    // An object closer to a point of the lens than to the eye is blurred by more than a pixel.
     let distance =
         |form: &Form| Some(form.clearance(view.eye())? * if form.is_flat() { FLAT } else { 1.0 });
     let seen_from =
         forms.iter().filter_map(distance).fold(f64::INFINITY, f64::min).max(scene.camera.near);
-    if angle < LEAST_ANGLE || extent > MAX_EXTENT_PER_PIXEL * angle * seen_from {
+    let lens_slope = view.lens().map_or(0.0, |lens| lens.radius / lens.focus);
+    if angle < LEAST_ANGLE * (1.0 + lens_slope) || extent > MAX_EXTENT_PER_PIXEL * angle * seen_from
+    {
         return false;
     }
     let lamps = scene.lights.iter().filter(|l| l.on).filter_map(|l| l.point);

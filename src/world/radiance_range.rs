@@ -20,7 +20,7 @@
 //! over two kinds of bright light: spots smaller than a pixel, and light amplified by mirrors. Such
 //! samples may saturate; the film counts saturated samples.
 
-use crate::camera::PinholeCamera;
+use crate::camera::PerspectiveCamera;
 use crate::lanes::Float;
 use crate::light::{DeltaLight, Emitter};
 use crate::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
@@ -181,7 +181,7 @@ impl<'a> SceneDistances<'a> {
         scene: &Scene,
         geometry: &'a RecenteredGeometry,
         materials_of: impl Fn(usize) -> Vec<&'a Material>,
-        camera: &PinholeCamera,
+        camera: &PerspectiveCamera,
         epsilon: f64,
     ) -> Self {
         let (forms, extent) = (&geometry.forms[..], geometry.extent);

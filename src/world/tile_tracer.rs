@@ -1,6 +1,7 @@
 //! Tracing of camera samples for the pixels of a tile. The renderer gets radiance only from here.
 
 use crate::lanes::{Float, SimdFloat, Vec3};
+use crate::sampling::warp::disk;
 use crate::sampling::{PacketSampler, SampleSettings, Sampler};
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::path::{Counts, Radiance};
@@ -17,7 +18,7 @@ pub struct CameraTracer<'a, L: SimdFloat> {
 
 impl<'a, L: SimdFloat> CameraTracer<'a, L> {
     pub(super) fn new(world: &'a World<L>, sampling: &SampleSettings) -> Self {
-        Self { world, sampler: Sampler::new(*sampling, world.jitter()) }
+        Self { world, sampler: Sampler::new(*sampling, world.camera_dimensions()) }
     }
 
     /// Creates the tracer of `pixels`, at most [`MAX_BLOCK_PIXELS`](crate::world::MAX_BLOCK_PIXELS)
@@ -124,7 +125,15 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         let world = self.world;
         let center = L::from_f64(0.5);
         let offset = if world.jitter() { sampler.pixel() } else { (center, center) };
-        let rays = world.camera().rays(corner_directions, offset);
+        let camera = world.camera();
+        let rays = match camera.lens() {
+            None => camera.rays(corner_directions, offset),
+            Some(lens) => {
+                let (u, v) = sampler.lens();
+                let (x, y, _) = disk(u, v);
+                camera.lens_rays(lens, corner_directions, offset, (x, y))
+            }
+        };
         let candidates = self.candidates.as_ref();
         let counts = world.trace(rays, candidates, sampler, active, &mut self.radiance);
         self.counts.rays += counts.rays;

@@ -40,9 +40,10 @@ impl ObjectTraits {
         let form = object.form();
         let flat = form.is_flat();
         let eye = DVec3::from(scene.camera.eye);
+        let lens_radius = scene.camera.lens_radius();
         let within = form.bounds().is_some_and(|(low, high)| {
             let extent = low.abs().max(high.abs()).max(eye.abs()).max_element();
-            let room = DVec3::splat(ROUNDING * extent);
+            let room = DVec3::splat(ROUNDING * (extent + lens_radius) + lens_radius);
             (low - room).cmple(eye).all() && (high + room).cmpge(eye).all()
         });
         Self {

@@ -1,12 +1,12 @@
 //! `World`: the scene as the integrators read it.
 
 use crate::bvh::Ray;
-use crate::camera::PinholeCamera;
+use crate::camera::PerspectiveCamera;
 use crate::lanes::{SimdFloat, Vec3};
 use crate::light::DeltaLight;
 use crate::material::Bsdf;
 use crate::primitive::Aggregate;
-use crate::sampling::{PacketSampler, SampleSettings};
+use crate::sampling::{CameraDimensions, PacketSampler, SampleSettings};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::tile::{CullingMode, TileCandidates};
 use crate::world::integrator::emitter_lighting::EmitterSource;
@@ -66,7 +66,7 @@ pub struct World<L: SimdFloat> {
     pub(super) min_weight: f64,
     /// `true` if sampled lobe directions that point into the surface are mirrored out of it.
     pub(super) fold: bool,
-    pub(super) camera: PinholeCamera,
+    pub(super) camera: PerspectiveCamera,
     /// Candidates of rays for which no culling is possible.
     pub(super) all_candidates: TileCandidates,
     /// Light buffer of each light: its possible occluders by direction. The list is empty, or the
@@ -102,8 +102,13 @@ impl<L: SimdFloat> World<L> {
         self.jitter
     }
 
+    /// Sample dimensions that camera rays use.
+    pub fn camera_dimensions(&self) -> CameraDimensions {
+        CameraDimensions { pixel: self.jitter, lens: self.camera.lens().is_some() }
+    }
+
     /// The camera, in coordinates relative to the scene's centre.
-    pub fn camera(&self) -> &PinholeCamera {
+    pub fn camera(&self) -> &PerspectiveCamera {
         &self.camera
     }
 
@@ -134,7 +139,7 @@ impl<L: SimdFloat> World<L> {
     }
 
     /// Traces one packet of paths. `origin` and `direction` are those of camera rays, as
-    /// [`PinholeCamera::rays`] returns them. Lanes outside of `active` stay black. `candidates` are
+    /// [`PerspectiveCamera::rays`] or [`PerspectiveCamera::lens_rays`] returns them. Lanes outside of `active` stay black. `candidates` are
     /// the candidates of the camera rays and of the shadow rays from their hit points; `None` if
     /// they are unknown.
     #[inline(always)]

@@ -8,6 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::fmt;
 use std::path::PathBuf;
+use zerkalo::camera::ViewAngle;
 use zerkalo::film::Replicates;
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
@@ -112,6 +113,15 @@ fn chi2_quantile(n: f64, z: f64) -> f64 {
 /// Returns the scene with the picture size of the comparison.
 pub fn small(scene: Scene) -> Scene {
     sized(scene, SIZE)
+}
+
+/// Returns the scene seen by a camera that is turned to `point`, with a vertical view angle of
+/// `degrees`. The plane in focus is a plane through the point in focus.
+pub fn zoomed(scene: &Scene, point: [f64; 3], degrees: f64) -> Scene {
+    let mut scene = scene.clone();
+    scene.camera.target = Some(point);
+    scene.camera.view_angle = ViewAngle::Vertical(degrees);
+    scene
 }
 
 /// Estimates every pixel with the reference tracer.

@@ -20,6 +20,7 @@ mod tracer;
 use compare::{Picture, keep, reference, rendered, small, variances_differ_by};
 use support::{all_shipped, parsed, shipped};
 use tracer::{Mutation, Tracer};
+use zerkalo::camera::{Aperture, Focus};
 use zerkalo::material::Lobe;
 use zerkalo::sampling::SamplerKind;
 use zerkalo::scene::{Scale, Scene, TransformOp};
@@ -30,7 +31,7 @@ const REFERENCE_SAMPLES: u32 = 96;
 const SAMPLES: u32 = 512;
 
 /// Scenes that must be compared.
-const GALLERY: [&str; 9] = [
+const GALLERY: [&str; 10] = [
     "mirror-room.toml",
     "gallery-triptych.toml",
     "gallery-metals.toml",
@@ -40,6 +41,7 @@ const GALLERY: [&str; 9] = [
     "texture-mapping.toml",
     "texture-uv.toml",
     "bump.toml",
+    "depth-of-field.toml",
 ];
 
 #[test]
@@ -114,11 +116,43 @@ fn deliberate_errors_are_detected() {
     ] {
         check_detection(mutation, name, &scene(name), 8 * REFERENCE_SAMPLES);
     }
+    for mutation in [Mutation::SquareLens, Mutation::UnfocusedLens] {
+        let name = "depth-of-field.toml";
+        let scene = compare::zoomed(&scene(name), [0.9, 1.5, -6.5], 6.0);
+        check_detection(mutation, name, &scene, 16 * REFERENCE_SAMPLES);
+    }
     for lobe in [Lobe::Cone, Lobe::Beckmann] {
         let mut scene = scene("roughness-0.3.toml");
         scene.materials.values_mut().for_each(|material| material.lobe = lobe);
         check_detection(Mutation::WiderLobe, &format!("{lobe:?}"), &scene, 32 * REFERENCE_SAMPLES);
         check_detection(Mutation::LobeDensity, &format!("{lobe:?}"), &scene, REFERENCE_SAMPLES);
+    }
+}
+
+/// Apertures by radius and by f-number, from tiny to larger than the room, focused by distance, by
+/// point and on the target, with and without near plane.
+#[test]
+fn lenses_agree_with_reference_tracer() {
+    let number = Aperture::FNumber;
+    for (name, aperture, focus, near) in [
+        ("mirror-room.toml", Aperture::Radius(1e-9), None, 0.0),
+        ("mirror-room.toml", number(0.05), None, 0.0),
+        ("mirror-room.toml", Aperture::Radius(4.0), Some(Focus::Distance(6.0)), 0.0),
+        ("mirror-room.toml", Aperture::Radius(0.3), Some(Focus::Point([0.0, 0.0, 2.0])), 2.5),
+        ("gallery-glass.toml", Aperture::Radius(0.1), None, 0.0),
+        ("reflecting-tracks-lit.toml", Aperture::Radius(1.0), Some(Focus::Distance(5.0)), 0.0),
+    ] {
+        let mut scene = small(shipped(name));
+        (scene.camera.aperture, scene.camera.focus) = (Some(aperture), focus);
+        scene.camera.near = near;
+        if scene.camera.target.is_none() && focus.is_none() {
+            scene.camera.focus = Some(Focus::Distance(5.0));
+        }
+        assert_eq!(scene.faults(), []);
+        let reference = reference(&scene, REFERENCE_SAMPLES, Mutation::None).unwrap();
+        let verdict = Picture::new(&scene, SAMPLES).beside(&reference, REFERENCE_SAMPLES);
+        println!("{name}, {aperture:?}, {focus:?}: {verdict}");
+        assert!(verdict.agree(), "{name}, {aperture:?}, {focus:?}, near {near}: {verdict}");
     }
 }
 

@@ -9,7 +9,7 @@ use crate::through::Way;
 use glam::DVec3;
 use std::collections::HashMap;
 use std::f64::consts::PI;
-use zerkalo::camera::ViewAngle;
+use zerkalo::camera::{Aperture, Focus, ViewAngle};
 use zerkalo::light::{Falloff, Light};
 use zerkalo::material::Material;
 use zerkalo::scene::{Filter, RayTypes, Scene};
@@ -35,6 +35,10 @@ pub enum Mutation {
     SidewaysTexture,
     /// Bump heights are negated.
     SunkenBumps,
+    /// Points of the lens are distributed over the square around it.
+    SquareLens,
+    /// Rays through the lens keep the direction of the ray through its centre.
+    UnfocusedLens,
 }
 
 /// A scene to trace.
@@ -115,7 +119,8 @@ impl<'a> Tracer<'a> {
             Filter::Box => (numbers.unit(), numbers.unit()),
             Filter::Point => (0.5, 0.5),
         };
-        let (mut origin, mut direction) = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy);
+        let (mut origin, mut direction) =
+            self.camera_ray(f64::from(x) + dx, f64::from(y) + dy, numbers);
         let trace = &self.scene.trace;
         let mut weight = DVec3::ONE;
         let mut radiance = DVec3::ZERO;
@@ -168,8 +173,9 @@ impl<'a> Tracer<'a> {
         unreachable!("the depth ends every path");
     }
 
-    /// Ray through the point `x`, `y` of the raster, in pixels from the upper left corner.
-    fn camera_ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
+    /// Ray through the point `x`, `y` of the raster, in pixels from the upper left corner, and through
+    /// a random point of the lens.
+    fn camera_ray(&self, x: f64, y: f64, numbers: &mut Numbers) -> (DVec3, DVec3) {
         let camera = &self.scene.camera;
         let eye = DVec3::from(camera.eye);
         let forward = match (camera.target, camera.direction) {
@@ -187,7 +193,40 @@ impl<'a> Tracer<'a> {
         };
         let toward =
             forward + right * ((x - 0.5 * width) * pixel) - up * ((y - 0.5 * height) * pixel);
-        (eye + toward * camera.near, toward.normalize())
+        let radius = match camera.aperture {
+            None => 0.0,
+            Some(Aperture::Radius(radius)) => radius,
+            Some(Aperture::FNumber(number)) => {
+                // Film of 36 x 24 mm behind the eye, seen under the view angle.
+                let (film, pixels) = match camera.view_angle {
+                    ViewAngle::Vertical(_) => (0.024, height),
+                    ViewAngle::Horizontal(_) => (0.036, width),
+                };
+                let focal_length = film / (pixels * pixel);
+                0.5 * focal_length / number
+            }
+        };
+        if radius == 0.0 {
+            return (eye + toward * camera.near, toward.normalize());
+        }
+        let ahead = |point: [f64; 3]| (DVec3::from(point) - eye).dot(forward);
+        let focus = match (camera.focus, camera.target) {
+            (Some(Focus::Distance(distance)), _) => distance,
+            (Some(Focus::Point(point)), _) | (None, Some(point)) => ahead(point),
+            (None, None) => panic!("a lens has a focus"),
+        };
+        let on_lens = loop {
+            let [a, b] = [numbers.between(-1.0, 1.0), numbers.between(-1.0, 1.0)];
+            if a * a + b * b <= 1.0 || self.mutation == Mutation::SquareLens {
+                break right * (a * radius) + up * (b * radius);
+            }
+        };
+        // All rays of one point of the picture meet in the plane in focus.
+        let mut onward = eye + toward * focus - (eye + on_lens);
+        if self.mutation == Mutation::UnfocusedLens {
+            onward = toward * focus;
+        }
+        (eye + on_lens + onward * (camera.near / focus), onward.normalize())
     }
 
     /// Smallest distance of hits from the origin, more than the rounding of its coordinates.

@@ -148,7 +148,7 @@ impl Traced {
 
     fn radiance_in<L: SimdFloat>(&self, world: &World<L>, lines: &[Line]) -> Vec<[f64; 3]> {
         let settings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
-        let sampler = Sampler::new(settings, world.jitter());
+        let sampler = Sampler::new(settings, world.camera_dimensions());
         let mut out = Vec::with_capacity(lines.len());
         let points = sampler.block(0, L::WIDTH);
         let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };

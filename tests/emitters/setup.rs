@@ -20,7 +20,7 @@ pub fn scene(text: &str) -> Scene {
 pub fn radiance<L: SimdFloat>(scene: &Scene, count: u32, seed: u64) -> (f64, f64) {
     let world = World::<L>::new(scene);
     let settings = SampleSettings { seed, kind: SamplerKind::Random };
-    let sampler = Sampler::<L>::new(settings, world.jitter());
+    let sampler = Sampler::<L>::new(settings, world.camera_dimensions());
     let (mut sum, mut squares) = (0.0, 0.0);
     for first in (0..count).step_by(L::WIDTH) {
         let points = sampler.block(first, L::WIDTH);

@@ -4,12 +4,12 @@ use crate::common::Numbers;
 use crate::rays::to_dvec3;
 use crate::report::{precision, report};
 use glam::DVec3;
-use zerkalo::camera::{Camera, PinholeCamera, ViewAngle};
+use zerkalo::camera::{Camera, PerspectiveCamera, ViewAngle};
 use zerkalo::lanes::{Double, Frame, SimdFloat, Single, Vec3};
 use zerkalo::scene::Scene;
 
 fn check_finite<L: SimdFloat>(camera: &Camera, size: [u32; 2], name: &str) {
-    let view = PinholeCamera::new(camera, size, DVec3::ZERO);
+    let view = PerspectiveCamera::new(camera, size, DVec3::ZERO);
     let [u, v, w] = view.frame();
     for (a, b, expected) in
         [(u, u, 1.0), (v, v, 1.0), (w, w, 1.0), (u, v, 0.0), (v, w, 0.0), (w, u, 0.0)]
@@ -64,7 +64,7 @@ fn extreme_17_narrow_and_wide_angles_are_right() {
     let mut worst = 0f64;
     for degrees in [1e-3f64, 1.0, 90.0, 179.9] {
         let camera = Camera { view_angle: ViewAngle::Horizontal(degrees), ..Camera::default() };
-        let view = PinholeCamera::new(&camera, [1000, 1], DVec3::ZERO);
+        let view = PerspectiveCamera::new(&camera, [1000, 1], DVec3::ZERO);
         let angle = |y: f64| {
             let (_, left) =
                 view.rays(Vec3::<f64>::splat(view.pixel_corner_direction((0, 0))), (0.0, y));

@@ -23,6 +23,7 @@ mod compound;
 mod contact;
 mod degenerate;
 mod lengths;
+mod lens;
 mod mesh;
 mod on_surface;
 mod precision;

@@ -1,6 +1,7 @@
 //! Convergence rate: the slope of the error against the number of samples, in scenes made for it.
 
 use crate::support::{begin_with, pool, shipped, sized, uniform};
+use zerkalo::camera::Aperture;
 use zerkalo::film::Display;
 use zerkalo::measure::{Reference, Slope};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
@@ -41,18 +42,21 @@ fn slope(scene: &Scene, kind: SamplerKind, reference: &Reference) -> Slope {
 }
 
 /// Returns the slopes with Sobol points and with random numbers.
-fn slopes(name: &str) -> [Slope; 2] {
-    let scene = sized(shipped(name), SIZE);
+fn slopes(name: &str, scene: &Scene) -> [Slope; 2] {
     let settings = SampleSettings { seed: 77, kind: SamplerKind::Sobol };
-    let mut best = begin_with(&scene, settings, Precision::Auto);
+    let mut best = begin_with(scene, settings, Precision::Auto);
     uniform(&mut best, 0, REFERENCE * LAST / 2, &pool(2));
     let reference = Reference::of_film(&best.film, &best.mix, &Display::default());
     println!("{name}: the RMSE of the reference is {:.1e}", reference.noise_linear());
-    [SamplerKind::Sobol, SamplerKind::Random].map(|kind| slope(&scene, kind, &reference))
+    [SamplerKind::Sobol, SamplerKind::Random].map(|kind| slope(scene, kind, &reference))
 }
 
 fn check(name: &str, at_most: f64) {
-    let [sobol, random] = slopes(name);
+    check_scene(name, &sized(shipped(name), SIZE), at_most);
+}
+
+fn check_scene(name: &str, scene: &Scene, at_most: f64) {
+    let [sobol, random] = slopes(name, scene);
     assert!(sobol.value + 2.0 * sobol.standard_error <= at_most, "{name}: {sobol:?}");
     // Six points leave four degrees of freedom: three standard errors are 96 %.
     let error = 3.0 * random.standard_error;
@@ -63,6 +67,15 @@ fn check(name: &str, at_most: f64) {
 #[test]
 fn lobe_error_converges_like_two_dimensions() {
     check("slope-lobe.toml", -0.70);
+}
+
+/// Samples have four dimensions: the positions in the pixel and on the lens.
+#[test]
+fn lens_error_converges_like_four_dimensions() {
+    let mut scene = sized(shipped("slope-aa.toml"), SIZE);
+    scene.camera.aperture = Some(Aperture::Radius(0.15));
+    scene.materials.values_mut().for_each(|material| material.roughness = 0.0);
+    check_scene("slope-aa.toml through a lens", &scene, -0.58);
 }
 
 /// Samples have four dimensions: the position in the pixel and the direction in the lobe.

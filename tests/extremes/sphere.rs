@@ -5,7 +5,7 @@ use crate::rays::{Line, Traced, closest, scene};
 use crate::report::{LEFT_TO_DOUBLE, precision, report};
 use glam::DVec3;
 use std::f64::consts::PI;
-use zerkalo::camera::{Camera, PinholeCamera, ViewAngle};
+use zerkalo::camera::{Camera, PerspectiveCamera, ViewAngle};
 use zerkalo::lanes::{Double, SimdFloat, Single, Vec3};
 use zerkalo::primitive::{Aggregate, Form, SphereForm};
 use zerkalo::world::{AnyWorld, Options, Precision};
@@ -166,7 +166,7 @@ fn extreme_02_sphere_as_ground() {
         let auto = AnyWorld::compile(&scene, &Options::default());
         assert!(matches!(auto, AnyWorld::Double(_)));
         let traced = Traced::new(&scene, Precision::Double);
-        let view = PinholeCamera::new(&scene.camera, scene.film.size, DVec3::ZERO);
+        let view = PerspectiveCamera::new(&scene.camera, scene.film.size, DVec3::ZERO);
         let pixels: Vec<(u32, u32)> =
             (242..480).flat_map(|y| (0..64).map(move |x| (x, y))).collect();
         let lines: Vec<Line> = pixels
@@ -255,7 +255,7 @@ fn closed_form_10_every_pixel_of_a_sphere() {
         ..Camera::default()
     };
     let (center, radius) = (DVec3::new(0.4, 0.1, -0.5), 1.3);
-    let view = PinholeCamera::new(&camera, [320, 200], DVec3::ZERO);
+    let view = PerspectiveCamera::new(&camera, [320, 200], DVec3::ZERO);
     let geometry = Aggregate::<Double>::new(&[Form::Sphere(SphereForm { center, radius })]);
     let eye = DVec3::from(camera.eye);
     let [u, v, w] = view.frame();

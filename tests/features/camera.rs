@@ -1,10 +1,12 @@
 //! The camera's frame and navigation.
 
+use crate::compare::zoomed;
 use crate::first_hits::hits_agree;
+use crate::plain_tracer::agrees;
 use crate::row::{Verdict, ensure, row};
 use crate::support::shipped;
 use glam::DVec3;
-use zerkalo::camera::{Camera, ViewAngle};
+use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
 use zerkalo::scene::Scene;
 
 fn target(camera: &Camera) -> DVec3 {
@@ -118,4 +120,37 @@ fn b3_camera_frame() {
             ("looking elsewhere", &|s| s.camera.target = Some([0.0, 0.61, 0.0])),
         ],
     );
+}
+
+/// The picture of `tested` shows the discs of the lens and their images like that of `original`: the
+/// bright bead on the right, and the ball in front of it.
+fn discs_agree(original: &Scene, tested: &Scene) -> Verdict {
+    [[0.9, 1.5, -6.5], [0.7, 0.35, 2.3]].into_iter().try_for_each(|point| {
+        agrees(&zoomed(original, point, 6.0), &zoomed(tested, point, 6.0), 1536)
+    })
+}
+
+#[test]
+fn d1_thin_lens() {
+    let original = shipped("depth-of-field.toml");
+    let f_number = original.camera.focal_length() / (2.0 * original.camera.lens_radius());
+    row(
+        "depth-of-field.toml",
+        |tested| discs_agree(&original, tested),
+        &[
+            ("a pinhole", &|s| s.camera.aperture = None),
+            ("a smaller lens", &|s| s.camera.aperture = Some(Aperture::Radius(0.10))),
+            ("a larger lens", &|s| s.camera.aperture = Some(Aperture::Radius(0.14))),
+            ("an f-number", &|s| s.camera.aperture = Some(Aperture::FNumber(f_number))),
+            ("focus behind", &|s| s.camera.focus = Some(Focus::Distance(6.0))),
+            ("focus in front", &|s| s.camera.focus = Some(Focus::Point([0.7, 0.35, 2.3]))),
+        ],
+    );
+    // The same lens in other words.
+    let zoomed = zoomed(&original, [0.9, 1.5, -6.5], 6.0);
+    let f_number = zoomed.camera.focal_length() / (2.0 * zoomed.camera.lens_radius());
+    let mut reworded = zoomed.clone();
+    reworded.camera.aperture = Some(Aperture::FNumber(f_number));
+    reworded.camera.focus = Some(Focus::Distance(zoomed.camera.focus_depth()));
+    agrees(&zoomed, &reworded, 1536).unwrap();
 }

@@ -193,7 +193,7 @@ fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
         );
         let world = World::<f64>::new(&scene(&text));
         let settings = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
-        trace(&world, &Sampler::new(settings, false), (0, 0), 0, 0)[0][0][0]
+        trace(&world, &Sampler::new(settings, world.camera_dimensions()), (0, 0), 0, 0)[0][0][0]
     };
     for (v, l) in pairs().into_iter().filter(|(v, l)| dot(*v, n).min(dot(*l, n)) > 0.1) {
         // The irradiance of a surface that faces the light is pi: f = L / (pi cos).

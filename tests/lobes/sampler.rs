@@ -3,10 +3,11 @@
 use crate::stats::slope;
 use std::f64::consts::PI;
 use zerkalo::lanes::{Double, Float, SimdFloat, SimdU32, Single};
-use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
 
 fn sampler<L: SimdFloat>(kind: SamplerKind, seed: u64, jitter: bool) -> Sampler<L> {
-    Sampler::new(SampleSettings { seed, kind }, jitter)
+    let camera = CameraDimensions { pixel: jitter, lens: false };
+    Sampler::new(SampleSettings { seed, kind }, camera)
 }
 
 /// Returns pairs of numbers of `count` samples of a pixel: those of the film plane for `None`, else those

@@ -2,7 +2,7 @@
 
 use zerkalo::lanes::{Float, Mask, SimdFloat, Vec3};
 use zerkalo::material::{Bsdf, Lobe, Masking, Material, ReflectionLobe};
-use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
+use zerkalo::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::world::{MAX_GROUPS, Radiance, World};
 
@@ -103,7 +103,7 @@ pub fn each_reflection<L: SimdFloat>(
     let (strength, spread) = finish.reflection.unwrap();
     let (incident, n) = (Vec3::<L>::of(incident), Vec3::<L>::of(n));
     let settings = SampleSettings { seed: numbers.seed, kind: numbers.kind };
-    let sampler = Sampler::<L>::new(settings, false);
+    let sampler = Sampler::<L>::new(settings, CameraDimensions { pixel: false, lens: false });
     for first in (0..count).step_by(L::WIDTH) {
         let key = sampler.key(numbers.pixel, 0);
         let uv = sampler.block(first, L::WIDTH).for_pixel(key).lobe_2d(0);
@@ -146,7 +146,7 @@ const SETTINGS: SampleSettings = SampleSettings { seed: 3, kind: SamplerKind::So
 /// Returns sums over groups of the samples `0..count` of every pixel, white lights.
 pub fn samples<L: SimdFloat>(scene: &Scene, count: u32) -> Vec<Vector> {
     let world = World::<L>::new(scene);
-    let sampler = Sampler::<L>::new(SETTINGS, world.jitter());
+    let sampler = Sampler::<L>::new(SETTINGS, world.camera_dimensions());
     let [width, height] = scene.film.size;
     let mut out = Vec::new();
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {

@@ -8,7 +8,7 @@ use glam::DVec3;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::{Table, Value};
-use zerkalo::camera::{Camera, ViewAngle};
+use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
 use zerkalo::light::{Directional, Falloff, Light, Point};
 use zerkalo::primitive::{ConvexPolyhedronForm, Form, ParallelogramForm, PlaneForm, SphereForm};
 use zerkalo::scene::{
@@ -184,6 +184,7 @@ fn camera(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Camera {
     let first = numbers.below(ups.len());
     let up = ups[first..].iter().chain(&ups).find(aims).copied().unwrap_or(DVec3::X);
     let near = if chance(numbers, 1, 8) { spots.radius * log(numbers, 1e-3, 2.0) } else { 0.0 };
+    let (aperture, focus) = lens(eye, spots);
     Camera {
         eye: eye.to_array(),
         target: None,
@@ -194,7 +195,31 @@ fn camera(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Camera {
             _ => ViewAngle::Vertical(angle),
         },
         near,
+        aperture,
+        focus,
     }
+}
+
+/// Lens of one camera in three. The numbers depend on the eye alone, so that the scene is otherwise
+/// the same without a lens.
+fn lens(eye: DVec3, spots: &Spots) -> (Option<Aperture>, Option<Focus>) {
+    let mut numbers =
+        Numbers::new(eye.to_array().map(f64::to_bits).into_iter().fold(0, u64::wrapping_add));
+    if !chance(&mut numbers, 1, 3) {
+        return (None, None);
+    }
+    let aperture = match numbers.below(4) {
+        0 => Aperture::FNumber(log(&mut numbers, 0.1, 10.0)),
+        1 => Aperture::Radius(spots.radius * log(&mut numbers, 1e-9, 1e-3)),
+        _ => Aperture::Radius(spots.radius * log(&mut numbers, 1e-3, 1.0)),
+    };
+    let focus = match numbers.below(3) {
+        0 => Focus::Point(pick(&mut numbers, &spots.on).to_array()),
+        1 => Focus::Point(pick(&mut numbers, &spots.inside).to_array()),
+        _ => Focus::Distance(spots.radius * log(&mut numbers, 1e-2, 1e2)),
+    };
+    let aims = focus != Focus::Point(eye.to_array());
+    (aims.then_some(aperture), aims.then_some(focus))
 }
 
 fn lights(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Vec<Light> {

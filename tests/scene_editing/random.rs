@@ -1,7 +1,7 @@
 //! Random valid scenes and random edits.
 
 use proptest::prelude::*;
-use zerkalo::camera::{Camera, ViewAngle};
+use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
 use zerkalo::light::{Directional, Falloff, Light, Point};
 use zerkalo::material::{Fresnel, Highlight, Lobe, Material, Metal};
 use zerkalo::scene::{Filter, Object, Rotate, Scale, Scene, TransformOp};
@@ -211,8 +211,8 @@ fn material() -> impl Strategy<Value = Material> {
 }
 
 pub fn camera() -> impl Strategy<Value = Camera> {
-    (point(), direction(), 1.0..179.0f64, any::<(bool, bool)>())
-        .prop_map(|(eye, direction, degrees, (aim, across))| {
+    (point(), direction(), 1.0..179.0f64, any::<(bool, bool, bool, u8)>())
+        .prop_map(|(eye, direction, degrees, (aim, across, open, focus))| {
             let [x, y, z] = eye;
             Camera {
                 eye,
@@ -224,7 +224,13 @@ pub fn camera() -> impl Strategy<Value = Camera> {
                 } else {
                     ViewAngle::Vertical(degrees)
                 },
-                near: 0.0,
+                aperture: open.then_some(Aperture::FNumber(degrees)),
+                focus: match focus {
+                    0 => Some(Focus::Distance(degrees)),
+                    1 => Some(Focus::Point([x, y + 1.0, z])),
+                    _ => None,
+                },
+                ..Camera::default()
             }
         })
         .prop_filter("looks along up", |camera| camera.faults().is_empty())

@@ -3,7 +3,7 @@
 use crate::desk::{Desk, FILE, ROOM};
 use std::collections::HashSet;
 use std::path::Path;
-use zerkalo::camera::Camera;
+use zerkalo::camera::{Camera, Focus as LensFocus};
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{DisplayChannel, Effect, Format};
 use zerkalo::dashboard::model::{Colors, CompareView, Mode};
@@ -142,6 +142,18 @@ fn camera_stories() -> Vec<Story> {
         story("fly down", c(), "w f", |_, d| eye(d.scene())[1] < 1.0),
         story("frame the selection", BALL, "f", |_, d| {
             target(d.scene()) == [0.0, 1.0, 0.0] && eye(d.scene())[2] < 3.0
+        }),
+        story("open the aperture", c(), "* *", |_, d| {
+            let notice = d.notice();
+            d.scene().camera.lens_radius() == 0.12 && notice.contains("aperture 0.12")
+        }),
+        story("close the aperture", c(), "* * /", |_, d| d.scene().camera.lens_radius() == 0.088),
+        story("focus on the probe or the selection", BALL, "F", |_, d| {
+            d.scene().camera.focus == Some(LensFocus::Point([0.0, 1.0, 0.0]))
+        }),
+        story("focus on the probe or the selection", BALL, "i F", |_, d| {
+            // The front of the ball.
+            (d.scene().camera.focus_depth() - 4.5).abs() < 0.01
         }),
         story("camera as in the file", c(), "Left Up Home", |a, d| camera(a) == camera(d.scene())),
         story("store this viewpoint", c(), "n Ctrl-u `door` Enter", |a, d| {

@@ -2,12 +2,12 @@
 
 use crate::desk::{Desk, ROOM};
 use zerkalo::dashboard::layout::Focus;
-use zerkalo::dashboard::message::Effect;
+use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::panel_lines::{OutlineLine, outline};
 use zerkalo::scene::edit::Target;
 use zerkalo::shape::Shape;
-use zerkalo::terminal::event::{Button, MouseKind};
+use zerkalo::terminal::event::{Button, Mouse, MouseKind};
 
 /// The cell at the centre of the picture, which shows the ball.
 fn middle(desk: &Desk) -> [u16; 2] {
@@ -34,6 +34,32 @@ fn click_selects_visible_object() {
     desk.click(x, image.y);
     assert_eq!(desk.model.selection, Target::Background);
     assert_eq!(desk.text(), ROOM);
+}
+
+#[test]
+fn right_or_modified_click_focuses_lens() {
+    for modified in [false, true] {
+        let mut desk = Desk::new(ROOM);
+        let [x, y] = middle(&desk);
+        let press = |desk: &mut Desk, column, row| {
+            let button = if modified { Button::Left } else { Button::Right };
+            for kind in [MouseKind::Press(button), MouseKind::Release(button)] {
+                desk.send(Message::Mouse(Mouse { kind, column, row, modified }));
+            }
+        };
+        press(&mut desk, x, y);
+        // The front of the ball.
+        assert!((desk.scene().camera.focus_depth() - 4.5).abs() < 0.01);
+        assert!(desk.notice().contains("pinhole"), "{:?}", desk.notice());
+        assert_eq!(desk.model.selection, Target::Camera, "it selects nothing");
+        desk.keys("*");
+        assert!(desk.notice().contains("focus at 4.5"), "{:?}", desk.notice());
+        let image = desk.model.layout().unwrap().image;
+        press(&mut desk, x, image.y);
+        assert!(desk.notice().contains("no object"), "{:?}", desk.notice());
+        desk.keys("u u");
+        assert_eq!(desk.text(), ROOM);
+    }
 }
 
 #[test]

@@ -98,10 +98,11 @@ pub fn accelerated(
     rendering
 }
 
-/// Removes all random choices from a scene: anti-aliasing, blurred lobes, and the choice between
+/// Removes all random choices from a scene: anti-aliasing, the lens, blurred lobes, and the choice between
 /// reflection and refraction, which begins behind the second transmitting surface.
 pub fn without_chance(scene: &mut Scene) {
     scene.film.filter = Filter::Point;
+    scene.camera.aperture = None;
     for material in scene.materials.values_mut() {
         (material.roughness, material.alpha) = (0.0, None);
         if material.transmission > 0.0 {

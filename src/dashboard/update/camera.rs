@@ -4,7 +4,7 @@ use crate::camera::Camera;
 use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
 use crate::scene::Scene;
 use crate::scene::edit::{
-    Edit, EditError, Target, bounds, focus_distance, recall_view, scene_bounds, step_length,
+    Edit, EditError, Target, bounds, pivot_distance, recall_view, scene_bounds, step_length,
 };
 
 /// Degrees per step of an orbit or a roll.
@@ -38,7 +38,7 @@ impl UpdateContext<'_> {
     /// one undo step.
     pub(super) fn set_camera(&mut self, coalesce: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
         let scene = self.scene();
-        let camera = f(&scene.camera, focus_distance(scene));
+        let camera = f(&scene.camera, pivot_distance(scene));
         if camera == scene.camera {
             return;
         }

@@ -10,6 +10,7 @@ mod focus;
 mod form;
 mod image_viewer;
 mod keys;
+mod lens;
 mod light;
 mod lists;
 mod mirror;

@@ -1,4 +1,4 @@
-//! Mouse handling: clicks select, drags orbit or move, the wheel dollies or scrolls.
+//! Mouse handling: clicks select or focus, drags orbit or move, the wheel dollies or scrolls.
 
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{Drag, Mode};
@@ -172,17 +172,18 @@ impl UpdateContext<'_> {
     }
 
     fn click(&mut self, drag: Drag, mouse: Mouse) {
-        if drag.button != Button::Left {
-            return;
-        }
-        if self.model.mode == Mode::Probe {
+        if self.model.mode == Mode::Probe && drag.button == Button::Left && !drag.modified {
             self.probe_at(mouse);
             return;
         }
         let film = self.scene().film.size;
         let pixel = self.model.layout().and_then(|l| l.film_pixel(film, mouse.column, mouse.row));
         if let Some(pixel) = pixel {
-            let seen = seen_at(self.scene(), pixel).map_or(Target::Background, Target::Object);
+            if drag.button != Button::Left || drag.modified {
+                return self.focus_on_pixel(pixel);
+            }
+            let hit = first_hit(self.scene(), pixel);
+            let seen = hit.map_or(Target::Background, |(object, _)| Target::Object(object));
             if seen != self.model.selection {
                 self.end_mode();
             }
@@ -238,9 +239,10 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns the index of the object that is visible at the centre of a film pixel (column, row).
-/// Returns `None` if the camera ray hits no object.
-fn seen_at(scene: &Scene, [x, y]: [usize; 2]) -> Option<usize> {
+/// Returns the index of the object that is visible at the centre of a film pixel (column, row)
+/// through the centre of the lens, and the visible point. Returns `None` if the camera ray hits no
+/// object.
+pub(super) fn first_hit(scene: &Scene, [x, y]: [usize; 2]) -> Option<(usize, DVec3)> {
     let camera = &scene.camera;
     let [width, height] = scene.film.size.map(f64::from);
     let half = camera.half_size(width / height);
@@ -254,5 +256,5 @@ fn seen_at(scene: &Scene, [x, y]: [usize; 2]) -> Option<usize> {
         .iter()
         .enumerate()
         .filter_map(|(i, object)| Some((i, object.form().cast(origin, direction)?)));
-    hits.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+    hits.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, t)| (i, origin + direction * t))
 }

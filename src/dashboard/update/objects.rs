@@ -74,9 +74,9 @@ impl UpdateContext<'_> {
         let eye = DVec3::from_array(scene.camera.eye);
         let distance = match bounds(scene, &self.model.selection) {
             Some(ball) => forward.dot(DVec3::from_array(ball.center) - eye),
-            None => edit::focus_distance(scene),
+            None => edit::pivot_distance(scene),
         };
-        let distance = if distance > 0.0 { distance } else { edit::focus_distance(scene) };
+        let distance = if distance > 0.0 { distance } else { edit::pivot_distance(scene) };
         let unit = distance * self.per_half_cell(2.0 * self.half_width());
         let flat = |v: DVec3| DVec2::new(v.x, v.z).try_normalize();
         let by = if upright {

@@ -83,7 +83,7 @@ pub fn step_length(scene: &Scene) -> f64 {
 /// Returns the distance from the eye to the pivot of camera movements, greater than 0. The pivot is
 /// the camera's target. A camera that has only a direction has as pivot the point of the view axis
 /// nearest to the centre of the scene.
-pub fn focus_distance(scene: &Scene) -> f64 {
+pub fn pivot_distance(scene: &Scene) -> f64 {
     let eye = DVec3::from_array(scene.camera.eye);
     if let Some(target) = scene.camera.target {
         return (DVec3::from_array(target) - eye).length();
@@ -116,14 +116,14 @@ mod tests {
     }
 
     #[test]
-    fn focus_distance_is_positive() {
+    fn pivot_distance_is_positive() {
         let mut scene = built_in();
-        let target = focus_distance(&scene);
+        let target = pivot_distance(&scene);
         let w = scene.camera.view().unwrap();
         scene.camera.target = None;
         scene.camera.direction = Some(w.to_array());
-        assert!((focus_distance(&scene) / target - 1.0).abs() < 0.3);
+        assert!((pivot_distance(&scene) / target - 1.0).abs() < 0.3);
         scene.camera.direction = Some((-w).to_array());
-        assert!(focus_distance(&scene) > 0.0);
+        assert!(pivot_distance(&scene) > 0.0);
     }
 }

@@ -1,11 +1,12 @@
 //! Conversion of shapes, lights, textures and cameras between kinds; position, size, direction and
 //! brightness are kept where possible.
 
-use crate::camera::{Camera, ViewAngle};
+use crate::camera::{Camera, Focus, ViewAngle};
 use crate::light::{Directional, Falloff, Light, Point};
 use crate::material::{Bump, Material, Texture};
 use crate::scene::Scene;
 use crate::scene::edit::bounds::scene_bounds;
+use crate::scene::edit::lens;
 use crate::scene::edit::set::{finish, replace};
 use crate::scene::edit::toml_view::{insert_value, read};
 use crate::scene::edit::{Edit, EditError, Target};
@@ -225,16 +226,24 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
         };
         return;
     }
+    if matches!(key, "aperture" | "focus") {
+        return lens::switch(camera, scene, key, name);
+    }
     let eye = DVec3::from_array(camera.eye);
     match (name, camera.target, camera.direction) {
         ("direction", Some(_), _) => {
             let view = camera.view().unwrap_or(DVec3::NEG_Z);
+            if camera.lens_radius() > 0.0 && camera.focus.is_none() {
+                // The target is in focus.
+                let distance = round_significant(camera.focus_depth(), 5);
+                camera.focus = Some(Focus::Distance(distance));
+            }
             camera.direction = Some(view.map(|x| rounded_to(x, -6)).to_array());
             camera.target = None;
         }
         ("target", _, Some(_)) => {
             let seen = Scene { camera: camera.clone(), ..scene.clone() };
-            let distance = crate::scene::edit::focus_distance(&seen);
+            let distance = crate::scene::edit::pivot_distance(&seen);
             if let Some(view) = camera.view() {
                 let target = eye + view * distance;
                 camera.target = Some(target.map(|x| rounded(x, distance)).to_array());

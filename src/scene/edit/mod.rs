@@ -11,6 +11,7 @@ mod copy;
 mod increment;
 #[cfg(test)]
 mod increment_test;
+mod lens;
 mod mirror;
 mod parse_value;
 mod placement;
@@ -24,9 +25,10 @@ mod unique_name;
 mod viewpoints;
 
 pub use add::{add_light, add_material, add_object, light_kinds, object_kinds};
-pub use bounds::{BoundingSphere, bounds, focus_distance, scene_bounds, step_length};
+pub use bounds::{BoundingSphere, bounds, pivot_distance, scene_bounds, step_length};
 pub use copy::{delete, duplicate, own_material, rename};
 pub use increment::{step, toggle};
+pub use lens::{change_aperture, focus_on};
 pub use mirror::{adjust_roughness, mirror, next_lobe, reflect};
 pub use placement::snap_to_ground;
 pub use properties::{Property, Widget, Word, rows};

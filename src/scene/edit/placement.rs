@@ -99,7 +99,7 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let eye = DVec3::from_array(scene.camera.eye);
     let forward = scene.camera.view().unwrap_or(DVec3::NEG_Z);
     let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
-    let aim = eye + forward * crate::scene::edit::focus_distance(scene);
+    let aim = eye + forward * crate::scene::edit::pivot_distance(scene);
     let solids: Vec<Extent> =
         forms.iter().filter(|f| f.is_solid()).filter_map(Form::bounds).collect();
     let walls: Vec<&Form> = forms.iter().filter(|form| !form.is_solid()).collect();

@@ -284,7 +284,17 @@ mod tests {
         assert_eq!(keys(&Target::Object(2))[..5], ball);
         assert_eq!(
             keys(&Target::Camera),
-            ["eye", "aim", "target", "up", "view_angle", "view_angle.vertical", "near"]
+            [
+                "eye",
+                "aim",
+                "target",
+                "up",
+                "view_angle",
+                "view_angle.vertical",
+                "near",
+                "aperture",
+                "focus"
+            ]
         );
         assert_eq!(keys(&Target::Light(0))[..3], ["name", "kind", "point.position"]);
         let radius = row(&scene, &Target::Object(2), "shape.sphere.radius");

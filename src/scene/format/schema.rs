@@ -21,7 +21,7 @@ pub const FIELDS: &[Field] = &[
         ValueType::Table(camera::FIELDS),
         "",
         "at [0.0, 1.0, 5.0], directed at the origin",
-        "Pinhole camera that the picture is taken from.",
+        "Camera that the picture is taken from.",
     ),
     Field::optional(
         "cameras",

@@ -1,6 +1,6 @@
 //! Screen-space culling: bounds of the projected primitives, and a grid of candidate lists.
 
-use crate::camera::PinholeCamera;
+use crate::camera::PerspectiveCamera;
 use crate::primitive::{F32_RAY_ERROR, Form};
 use glam::DVec3;
 
@@ -21,12 +21,15 @@ const MAX_SLANT_ERROR: f64 = 5e-7;
 
 impl ScreenBounds {
     /// Projects the corners of a form's bounding box. The result is infinite if a corner is not in
-    /// front of the eye.
-    pub fn project(form: &Form, camera: &PinholeCamera) -> Self {
+    /// front of the eye. A lens widens the bounds by the largest blur of a point in the box.
+    pub fn project(form: &Form, camera: &PerspectiveCamera) -> Self {
         let infinite = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
         let Some((low, high)) = form.bounds() else { return infinite };
         let [_, _, forward] = camera.frame();
-        let max_coordinate = low.abs().max(high.abs()).max(camera.eye().abs()).max_element();
+        let lens_radius = camera.lens_radius();
+        let eye = camera.eye().abs() + DVec3::splat(lens_radius);
+        let max_coordinate = low.abs().max(high.abs()).max(eye).max_element();
+        let (mut nearest, mut farthest) = (f64::INFINITY, 0.0f64);
         let mut out = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
         for corner in 0..8 {
             let coordinate =
@@ -38,6 +41,7 @@ impl ScreenBounds {
             if depth <= 2.0 * ray_error {
                 return infinite;
             }
+            (nearest, farthest) = (nearest.min(depth - ray_error), farthest.max(depth + ray_error));
             // If a point at distance l from the origin of the picture plane is displaced by
             // `ray_error`, its projection moves by at most (1 + l) ray_error / (depth - ray_error).
             let length = from_eye.length() / depth;
@@ -47,6 +51,14 @@ impl ScreenBounds {
                 (camera.project(point), MARGIN_PX + plane_error / camera.pixel());
             out.low = std::array::from_fn(|axis| out.low[axis].min(position[axis] - margin));
             out.high = std::array::from_fn(|axis| out.high[axis].max(position[axis] + margin));
+        }
+        if let Some(lens) = camera.lens() {
+            // Blur divided by depth, on the picture plane: r |1 / z - 1 / f|. It is largest at one
+            // end of the interval of depths.
+            let blur = [nearest, farthest].map(|depth| lens.blur(depth) / depth);
+            let margin = blur[0].max(blur[1]) * (1.0 + F32_RAY_ERROR) / camera.pixel();
+            out.low = out.low.map(|x| x - margin);
+            out.high = out.high.map(|x| x + margin);
         }
         out
     }

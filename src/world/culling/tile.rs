@@ -2,14 +2,13 @@
 //! primitives that can occlude each light from their hit points. Most tiles have one or two visible
 //! primitives and no occluder.
 
-use crate::camera::PinholeCamera;
+use crate::camera::PerspectiveCamera;
 use crate::lanes::SimdFloat;
 use crate::primitive::{
     Aggregate, BoundingSphere, BoundingVolume, Form, Frustum, LightTarget, PrimitiveSet,
 };
 use crate::world::culling::light_buffer::{LightBuffer, Occluder};
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
-use glam::DVec3;
 
 /// Candidates (primitives that have to be tested) of some camera rays, and of the shadow rays from
 /// their hit points.
@@ -51,14 +50,21 @@ impl CullingMode {
         &self,
         geometry: &Aggregate<L>,
         lights: usize,
-        camera: &PinholeCamera,
+        camera: &PerspectiveCamera,
         (origin, extent): ([usize; 2], [usize; 2]),
     ) -> Option<TileCandidates> {
         match self {
             Self::Frusta(culler) => {
                 let [_, _, forward] = camera.frame();
                 let corners = camera.corners(origin, extent);
-                let frustum = Frustum { apex: camera.eye(), forward, corners };
+                let lens = camera.lens();
+                let frustum = Frustum {
+                    apex: camera.eye(),
+                    forward,
+                    corners,
+                    lens_radius: camera.lens_radius(),
+                    focus: lens.map_or(1.0, |lens| lens.focus),
+                };
                 Some(culler.candidates(geometry, Some(&frustum)))
             }
             Self::ScreenBounds(bounds) => {
@@ -89,13 +95,13 @@ pub(crate) struct FrustumCuller {
 }
 
 impl FrustumCuller {
-    /// Creates the culler of `forms`, one for each primitive. `eye` is the common origin of all
+    /// Creates the culler of `forms`, one for each primitive. `start` contains the origins of all
     /// camera rays; `None` if they start on a near plane. `entered` holds `true` for each primitive
     /// that paths can be inside of. `max_end_offset` is the largest distance between a light and
     /// the end point of its shadow rays. `emitters` are the bounding spheres of the emitters.
     pub fn new(
         forms: Vec<&Form>,
-        eye: Option<DVec3>,
+        start: Option<BoundingSphere>,
         entered: &[bool],
         (lights, max_end_offset): (Vec<LightTarget>, f64),
         emitters: Vec<BoundingSphere>,
@@ -105,8 +111,8 @@ impl FrustumCuller {
         // A shadow ray that leaves the outside of a convex primitive cannot hit it again. Paths are
         // inside of a primitive only if they start there or are transmitted.
         let self_shadowing = |(b, entered): (&BoundingVolume, &bool)| {
-            let contains_eye = || eye.is_none_or(|eye| b.ball().contains(eye));
-            !b.is_convex() || !b.is_flat() && (*entered || contains_eye())
+            let contains_start = || start.is_none_or(|start| b.ball().overlaps(&start));
+            !b.is_convex() || !b.is_flat() && (*entered || contains_start())
         };
         let self_shadowing = bounds.iter().zip(entered).map(self_shadowing).collect();
         Self { lights, emitters, self_shadowing, bounds }

@@ -5,10 +5,10 @@ use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::value::unit;
 use glam::DVec3;
 
-/// A pinhole camera with its raster. Directions of pixel corners are computed in double precision and
+/// A perspective camera with its raster. Directions of pixel corners are computed in double precision and
 /// rounded once; only the offset inside the pixel is computed in the precision of the kernel.
 #[derive(Clone, Copy, Debug)]
-pub struct PinholeCamera {
+pub struct PerspectiveCamera {
     eye: DVec3,
     /// `u`, `v` and `w`: orthonormal vectors to the right, up and forward.
     u: DVec3,
@@ -21,9 +21,31 @@ pub struct PinholeCamera {
     /// Vector from the eye to the picture plane's corner at pixel (0, 0).
     raster_corner: DVec3,
     near: f64,
+    /// The lens; `None` for a pinhole.
+    lens: Option<ThinLens>,
 }
 
-impl PinholeCamera {
+/// A thin lens: a disk of uniform transmission around the eye, perpendicular to the view direction.
+/// It refracts rays so that those from one point of the plane in focus meet in one point of the
+/// picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThinLens {
+    /// Radius of the disk, greater than 0.
+    pub radius: f64,
+    /// Distance of the plane in focus from the eye along the view direction, greater than 0.
+    pub focus: f64,
+}
+
+impl ThinLens {
+    /// Returns the largest distance at which rays through the lens and the ray through its centre,
+    /// all of one point of the picture, cross a plane perpendicular to the view direction. The
+    /// planes are at `depth` from the eye. This is the radius of the circle of confusion.
+    pub fn blur(&self, depth: f64) -> f64 {
+        self.radius * (1.0 - depth / self.focus).abs()
+    }
+}
+
+impl PerspectiveCamera {
     /// Compiles `camera` for a film of `width` x `height` pixels, in a scene translated by
     /// -`origin`.
     ///
@@ -73,7 +95,21 @@ impl PinholeCamera {
             dy_axis: -v * (2.0 * half_height / height),
             raster_corner: w - u * half_width + v * half_height,
             near: camera.near,
+            lens: {
+                let (radius, focus) = (camera.lens_radius(), camera.focus_depth());
+                (radius > 0.0).then_some(ThinLens { radius, focus })
+            },
         }
+    }
+
+    /// Returns the lens; `None` for a pinhole.
+    pub fn lens(&self) -> Option<&ThinLens> {
+        self.lens.as_ref()
+    }
+
+    /// Returns the radius of the lens; 0 for a pinhole.
+    pub fn lens_radius(&self) -> f64 {
+        self.lens.map_or(0.0, |lens| lens.radius)
     }
 
     /// Returns the position of the eye in the translated scene.
@@ -122,8 +158,8 @@ impl PinholeCamera {
         corner.to_array().map(S::from_f64)
     }
 
-    /// Returns origins and unit directions of rays through points of pixels. The origins are on the
-    /// near plane. `base` is the result of [`PinholeCamera::pixel_corner_direction`]; `(dx, dy)` is
+    /// Returns origins and unit directions of rays through the eye and through points of pixels. The
+    /// origins are on the near plane. `base` is the result of [`PerspectiveCamera::pixel_corner_direction`]; `(dx, dy)` is
     /// the offset from the corner to the right and downward \[pixels\].
     #[inline(always)]
     pub fn rays<L: SimdFloat>(&self, base: Vec3<L>, (dx, dy): (L, L)) -> (Vec3<L>, Vec3<L>) {
@@ -134,6 +170,35 @@ impl PinholeCamera {
         // `direction` has unit length along w: `near` times `direction` reaches the near plane.
         let origin =
             if self.near > 0.0 { direction.mul_add(L::from_f64(self.near), eye) } else { eye };
+        (origin, direction.normalize())
+    }
+
+    /// Returns origins and unit directions of rays through points of the lens. `base` and the offset
+    /// are those of [`PerspectiveCamera::rays`]. `(x, y)` is the point of the lens, to the right and
+    /// upward, in the unit disk.
+    ///
+    /// With d the direction through the eye, of unit length along w, and o the vector from the eye
+    /// to the point of the lens, the ray leaves eye + o in the direction d - o / f: at the distance
+    /// f of the plane in focus it crosses the ray through the eye (Cook, Porter and Carpenter 1984,
+    /// *Distributed Ray Tracing*, section 4.2).
+    #[inline(never)]
+    pub fn lens_rays<L: SimdFloat>(
+        &self,
+        lens: &ThinLens,
+        base: Vec3<L>,
+        (dx, dy): (L, L),
+        (x, y): (L, L),
+    ) -> (Vec3<L>, Vec3<L>) {
+        let axis = |v: DVec3| Vec3::of(v.to_array());
+        let (u, v) = (axis(self.u), axis(self.v));
+        let across = u.mul_add(x, v * y);
+        let through_eye = axis(self.dx_axis).mul_add(dx, axis(self.dy_axis).mul_add(dy, base));
+        let slope = L::from_f64(-lens.radius / lens.focus);
+        let direction = across.mul_add(slope, through_eye);
+        let mut origin = across.mul_add(L::from_f64(lens.radius), axis(self.eye));
+        if self.near > 0.0 {
+            origin = direction.mul_add(L::from_f64(self.near), origin);
+        }
         (origin, direction.normalize())
     }
 }

@@ -1,0 +1,254 @@
+//! Description of a thin lens: its aperture and the plane in focus.
+
+use crate::camera::{Camera, ViewAngle};
+use crate::value::{Field, FieldValue, NumberRange, ValidationError, Validator, ValueType};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Opening of a lens. Objects outside of the plane in focus are blurred in proportion to it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Aperture {
+    /// Radius of the lens; 0 is a pinhole.
+    Radius(f64),
+    /// Focal length divided by the lens diameter, for a picture of 36 x 24 mm and scene units of
+    /// one metre.
+    FNumber(f64),
+}
+
+/// Plane in focus, perpendicular to the view direction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Focus {
+    /// Distance of the plane from the eye, along the view direction.
+    Distance(f64),
+    /// A point of the plane.
+    Point([f64; 3]),
+}
+
+/// Largest lens radius.
+const MAX_RADIUS: f64 = 1e9;
+
+/// Smallest distance of the plane in focus, as a fraction of the lens radius.
+const MIN_FOCUS_PER_RADIUS: f64 = 1e-6;
+
+/// Half the height and half the width of the picture on film \[m\].
+const HALF_FILM_HEIGHT: f64 = 0.012;
+const HALF_FILM_WIDTH: f64 = 0.018;
+
+const APERTURES: &[Field] = &[
+    Field::required(
+        "radius",
+        ValueType::Number(NumberRange::closed(0.0, MAX_RADIUS)),
+        "scene units",
+        "Radius of the lens; 0 is a pinhole.",
+    ),
+    Field::required(
+        "f_number",
+        ValueType::Number(NumberRange::closed(0.01, 1e9)),
+        "",
+        "Focal length divided by the lens diameter: picture on film of 36 x 24 mm, scene units of 1 m.",
+    ),
+];
+
+const FOCI: &[Field] = &[
+    Field::required(
+        "distance",
+        ValueType::Number(NumberRange::SIZE),
+        "scene units",
+        "Distance from the eye along the view direction.",
+    ),
+    Field::required(
+        "point",
+        ValueType::Numbers(3, NumberRange::COORDINATE),
+        "scene units",
+        "A point that is in focus; the plane contains it.",
+    ),
+];
+
+/// Adds the key `outer` to errors in the value of one of several exclusive keys.
+pub(super) fn inside(outer: &Field, inner: Validator) -> Vec<ValidationError> {
+    let mut errors = inner.errors();
+    for error in &mut errors {
+        error.found = format!("{}.{}", outer.name, error.found);
+    }
+    errors.into_iter().map(|error| error.prefixed(outer.name)).collect()
+}
+
+impl FieldValue for Aperture {
+    type Written = Self;
+    const TYPE: ValueType = ValueType::OneOf(APERTURES);
+
+    fn from_written(written: Self) -> Self {
+        written
+    }
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        let validator = Validator::new(APERTURES);
+        inside(
+            field,
+            match self {
+                Self::Radius(radius) => validator.field("radius", radius),
+                Self::FNumber(number) => validator.field("f_number", number),
+            },
+        )
+    }
+}
+
+impl FieldValue for Focus {
+    type Written = Self;
+    const TYPE: ValueType = ValueType::OneOf(FOCI);
+
+    fn from_written(written: Self) -> Self {
+        written
+    }
+
+    fn errors(&self, field: &Field) -> Vec<ValidationError> {
+        let validator = Validator::new(FOCI);
+        inside(
+            field,
+            match self {
+                Self::Distance(distance) => validator.field("distance", distance),
+                Self::Point(point) => validator.field("point", point),
+            },
+        )
+    }
+}
+
+impl Camera {
+    /// Returns the radius of the lens in scene units, 0 to 1e9; 0 is a pinhole.
+    ///
+    /// The f-number N determines the radius f / (2 N) of a lens with the focal length
+    /// f = h / tan(angle / 2). Here h is 12 mm for a vertical view angle (half the height of the
+    /// film) and 18 mm for a horizontal one (half its width).
+    pub fn lens_radius(&self) -> f64 {
+        match self.aperture {
+            None => 0.0,
+            Some(Aperture::Radius(radius)) => radius,
+            Some(Aperture::FNumber(number)) => {
+                (self.focal_length() / (2.0 * number)).min(MAX_RADIUS)
+            }
+        }
+    }
+
+    /// Returns the focal length of the lens, for film of 36 x 24 mm \[m\].
+    pub fn focal_length(&self) -> f64 {
+        let half = match self.view_angle {
+            ViewAngle::Vertical(_) => HALF_FILM_HEIGHT,
+            ViewAngle::Horizontal(_) => HALF_FILM_WIDTH,
+        };
+        half / (0.5 * self.view_angle.key_degrees().1).to_radians().tan()
+    }
+
+    /// Returns the distance of the plane in focus from the eye along the view direction, greater
+    /// than 0. Without `focus` the target is in focus. A plane behind the eye is replaced by its
+    /// mirror image in front. The distance is at least a millionth of the lens radius, and of the
+    /// distance of the point in focus.
+    pub fn focus_depth(&self) -> f64 {
+        let point = match (self.focus, self.target) {
+            (Some(Focus::Distance(distance)), _) => Err(distance),
+            (Some(Focus::Point(point)), _) | (None, Some(point)) => Ok(point),
+            // Without an aperture the distance has no effect.
+            (None, None) => Err(1.0),
+        };
+        let depth = point.map_or_else(
+            |distance| distance,
+            |point| {
+                let from_eye = DVec3::from_array(point) - DVec3::from_array(self.eye);
+                let along = from_eye.dot(self.view().unwrap_or(DVec3::NEG_Z)).abs();
+                along.max(1e-6 * from_eye.length())
+            },
+        );
+        depth.max(MIN_FOCUS_PER_RADIUS * self.lens_radius()).max(f64::MIN_POSITIVE)
+    }
+
+    /// Returns the error of a lens without a plane in focus.
+    pub(super) fn focus_error(&self) -> Option<ValidationError> {
+        if self.focus == Some(Focus::Point(self.eye)) {
+            return Some(ValidationError::new(
+                "focus.point",
+                "focus.point is the eye itself",
+                "a point away from the eye",
+            ));
+        }
+        let blurs = self.lens_radius() > 0.0 && self.focus.is_none() && self.target.is_none();
+        blurs.then(|| {
+            ValidationError::new(
+                "aperture",
+                "aperture is open, but neither target nor focus gives a plane in focus",
+                "focus.distance, such as focus.distance = 5.0, or focus.point",
+            )
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn errors(camera: &Camera) -> Vec<String> {
+        camera.faults().into_iter().map(|error| error.key).collect()
+    }
+
+    #[test]
+    fn lens_radius_follows_from_f_number_and_view_angle() {
+        let with = |view_angle, aperture| Camera {
+            view_angle,
+            aperture: Some(aperture),
+            ..Camera::default()
+        };
+        // 50 mm at f/2: 12.5 mm. The view angles are those of the 24 and the 36 mm side.
+        let degrees = |half: f64| 2.0 * (half / 0.05f64).atan().to_degrees();
+        for view_angle in
+            [ViewAngle::Vertical(degrees(0.012)), ViewAngle::Horizontal(degrees(0.018))]
+        {
+            let camera = with(view_angle, Aperture::FNumber(2.0));
+            assert!((camera.lens_radius() - 0.0125).abs() < 1e-15, "{}", camera.lens_radius());
+        }
+        assert_eq!(with(ViewAngle::Vertical(40.0), Aperture::Radius(0.3)).lens_radius(), 0.3);
+        assert_eq!(Camera::default().lens_radius(), 0.0);
+        let tele = with(ViewAngle::Vertical(1e-300), Aperture::FNumber(1.0));
+        assert_eq!(tele.lens_radius(), 1e9);
+    }
+
+    #[test]
+    fn plane_in_focus_is_perpendicular_to_the_view() {
+        let camera = Camera {
+            eye: [1.0, 2.0, 3.0],
+            target: Some([1.0, 2.0, -1.0]),
+            aperture: Some(Aperture::Radius(0.1)),
+            ..Camera::default()
+        };
+        let focused = |focus| Camera { focus: Some(focus), ..camera.clone() }.focus_depth();
+        assert_eq!(camera.focus_depth(), 4.0);
+        assert_eq!(focused(Focus::Distance(7.0)), 7.0);
+        assert_eq!(focused(Focus::Point([9.0, -5.0, 1.0])), 2.0);
+        assert_eq!(focused(Focus::Point([0.0, 0.0, 5.5])), 2.5);
+        assert!((focused(Focus::Point([1.0, 7.0, 3.0])) - 5e-6).abs() < 1e-12);
+        assert_eq!(focused(Focus::Distance(1e-300)), 1e-7);
+    }
+
+    #[test]
+    fn lens_ranges_are_checked() {
+        let camera = Camera { aperture: Some(Aperture::Radius(0.1)), ..Camera::default() };
+        assert_eq!(errors(&camera), [""; 0]);
+        let unfocused =
+            Camera { target: None, direction: Some([0.0, 0.0, -1.0]), ..camera.clone() };
+        assert_eq!(errors(&unfocused), ["aperture"]);
+        let pinhole = Camera { aperture: Some(Aperture::Radius(0.0)), ..unfocused.clone() };
+        assert_eq!(errors(&pinhole), [""; 0]);
+        let distance = Some(Focus::Distance(2.0));
+        assert_eq!(errors(&Camera { focus: distance, ..unfocused }), [""; 0]);
+        for (aperture, focus, key) in [
+            (Aperture::Radius(-1.0), None, "aperture.radius"),
+            (Aperture::Radius(f64::NAN), None, "aperture.radius"),
+            (Aperture::FNumber(0.0), None, "aperture.f_number"),
+            (Aperture::Radius(0.1), Some(Focus::Distance(0.0)), "focus.distance"),
+            (Aperture::Radius(0.1), Some(Focus::Point([f64::INFINITY; 3])), "focus.point"),
+            (Aperture::Radius(0.1), Some(Focus::Point(camera.eye)), "focus.point"),
+        ] {
+            let camera = Camera { aperture: Some(aperture), focus, ..camera.clone() };
+            assert_eq!(errors(&camera), [key], "{aperture:?} {focus:?}");
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Commands on the lens of the camera: focus and aperture.
+
+use crate::camera::{Aperture, Camera};
+use crate::dashboard::update::mouse::first_hit;
+use crate::dashboard::update::{Coalesce, UpdateContext};
+use crate::scene::edit::{self, EditError, bounds};
+use crate::value::{number, round_significant};
+
+impl UpdateContext<'_> {
+    /// Opens the lens by `stops`; negative stops close it.
+    pub(super) fn aperture(&mut self, stops: f64) {
+        let edit = edit::change_aperture(self.scene(), stops);
+        self.commit(edit, Coalesce::Repeat);
+        self.say_lens();
+    }
+
+    /// Focuses on the probed pixel. Without a probe, focuses on the middle of the selection, or
+    /// else on the middle of the picture.
+    pub(super) fn focus(&mut self) {
+        let [width, height] = self.scene().film.size.map(|n| n as usize);
+        let selection = bounds(self.scene(), &self.model.selection);
+        match (self.model.probe, selection) {
+            (Some(pixel), _) => self.focus_on_pixel(pixel),
+            (None, Some(ball)) => self.focus_on(ball.center),
+            (None, None) => self.focus_on_pixel([width / 2, height / 2]),
+        }
+    }
+
+    /// Focuses on the object that is visible at the centre of a film pixel.
+    pub(super) fn focus_on_pixel(&mut self, pixel: [usize; 2]) {
+        match first_hit(self.scene(), pixel) {
+            Some((_, point)) => self.focus_on(point.to_array()),
+            None => self.commit_lens(Err(EditError {
+                found: "There is no object to focus on here".to_string(),
+                help: String::new(),
+            })),
+        }
+    }
+
+    fn focus_on(&mut self, point: [f64; 3]) {
+        let edit = edit::focus_on(self.scene(), point);
+        self.commit_lens(edit);
+    }
+
+    fn commit_lens(&mut self, edit: Result<edit::Edit, EditError>) {
+        let is_ok = edit.is_ok();
+        self.commit(edit, Coalesce::Single);
+        if is_ok {
+            self.say_lens();
+        }
+    }
+
+    fn say_lens(&mut self) {
+        let text = lens_text(&self.scene().camera);
+        self.say(text);
+    }
+}
+
+/// Returns a description of aperture and focus for the status line.
+fn lens_text(camera: &Camera) -> String {
+    let distance = number(round_significant(camera.focus_depth(), 4));
+    match camera.aperture {
+        Some(Aperture::FNumber(f)) => {
+            format!("focus at {distance} · f/{} · / * close, open · right click focuses", number(f))
+        }
+        Some(Aperture::Radius(radius)) if radius > 0.0 => format!(
+            "focus at {distance} · aperture {} · / * close, open · right click focuses",
+            number(radius)
+        ),
+        _ => format!("focus at {distance} · pinhole, all in focus · * opens the aperture"),
+    }
+}
