@@ -1,6 +1,7 @@
 //! Every scene of the folder `scenes`: its inventory and its picture.
 //!
-//! `ZERKALO_BLESS=1 cargo test --test scenes` writes the expected values.
+//! `ZERKALO_BLESS=1 cargo test --test scenes` writes the expected values, `ZERKALO_BLESS=NAME.toml` those of
+//! one scene and the stored ones of all others.
 
 #[path = "common/normal.rs"]
 mod normal;
@@ -138,7 +139,14 @@ fn every_scene_renders_its_golden_picture() {
     let scenes: Vec<_> =
         all_shipped().into_iter().map(|(name, scene)| (name, sized(scene, SIZE))).collect();
     let text = expected("scenes.txt", || {
-        let one = |(name, scene): &(String, Scene)| format!("# {name}\n{}", reference(scene));
+        let stored = fs::read_to_string(golden("scenes.txt")).unwrap();
+        let stored: BTreeMap<_, _> =
+            stored.split("# ").filter_map(|s| s.split_once('\n')).collect();
+        let wanted = std::env::var("ZERKALO_BLESS").unwrap_or_default();
+        let one = |(name, scene): &(String, Scene)| match stored.get(name.as_str()) {
+            Some(values) if wanted != "1" && wanted != *name => format!("# {name}\n{values}"),
+            _ => format!("# {name}\n{}", reference(scene)),
+        };
         scenes.iter().map(one).collect()
     });
     let references = parse_references(&text);

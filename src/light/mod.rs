@@ -1,26 +1,28 @@
-//! Lights: points, directions, and surfaces with a size.
+//! Lights: points, directions, cones, and surfaces with a size.
 
 mod area;
 mod delta;
 mod emitter;
 
 pub use area::{DiskLight, EmitterSurface, RectangleLight, SphereLight};
-pub use delta::{DeltaLight, LightSample};
+pub use delta::{DeltaLight, LightSample, SpotCone};
 pub use emitter::{Emitter, EmitterSample};
 
 use crate::value::{Color, Description, Field, ValidationError, choices, description};
 
 description! {
-    /// A light: exactly one of `point`, `directional`, `sphere`, `rectangle` and `disk`, a colour, an
-    /// intensity.
+    /// A light: exactly one of `point`, `directional`, `spot`, `sphere`, `rectangle` and `disk`, a
+    /// colour, an intensity.
     pub struct Light: Default {
         /// Name; no two lights have the same.
         name: String, or "a number";
-        /// Light from one point. A light has exactly one of `point`, `directional`, `sphere`,
+        /// Light from one point. A light has exactly one of `point`, `directional`, `spot`, `sphere`,
         /// `rectangle` and `disk`.
         point: Option<Point>, or "another kind is needed";
         /// Light from infinitely far away.
         directional: Option<Directional>, or "another kind is needed";
+        /// Light from one point into a cone.
+        spot: Option<Spot>, or "another kind is needed";
         /// Light from a sphere.
         sphere: Option<SphereLight>, or "another kind is needed";
         /// Light from one side of a rectangle.
@@ -30,12 +32,12 @@ description! {
         /// Colour; multiplies the intensity.
         color: Color = [1.0, 1.0, 1.0], in LIGHT;
         /// Radiance or power of a sphere, rectangle or disk, by `unit`. Radiant intensity [W/sr] of
-        /// a point with falloff `inverse-square`. With `none`, and for a directional light, the
-        /// brightness of a white matt surface that faces the light.
+        /// a point, or of a spot inside its inner cone, with falloff `inverse-square`. With `none`,
+        /// and for a directional light, the brightness of a white matt surface that faces the light.
         intensity: f64 = 1.0, in LIGHT "W/(sr m²), W, W/sr, or irradiance / π";
         /// Unit of the intensity of a sphere, rectangle or disk.
         unit: LightUnit = "radiance";
-        /// Falloff of a point light with the distance.
+        /// Falloff of a point or spot light with the distance.
         falloff: Falloff = "none";
         /// `false` hides the surface of a sphere, rectangle or disk from the camera and from
         /// mirrors. It still lights matt surfaces and makes highlights.
@@ -61,8 +63,24 @@ description! {
     }
 }
 
+description! {
+    /// Light from one point into a cone. Between the inner and the outer cone it decreases smoothly
+    /// to zero.
+    pub struct Spot: Copy {
+        /// Position of the light: the apex of the cone.
+        position: [f64; 3], in COORDINATE "scene units";
+        /// Direction of the cone's axis, in which the light travels.
+        direction: [f64; 3], as Direction;
+        /// Angle between the axis and the edge of the cone, outside of which there is no light.
+        outer_angle: f64, in above(0.0, 180.0) "degrees";
+        /// Angle between the axis and the edge of the inner cone, inside of which the light has
+        /// its full intensity; at most `outer_angle`.
+        inner_angle: f64 = 0.0, in closed(0.0, 180.0) "degrees";
+    }
+}
+
 choices! {
-    /// Falloff of a point light with the distance.
+    /// Falloff of a point or spot light with the distance.
     pub enum Falloff {
         /// not at all
         None = "none",
@@ -85,6 +103,23 @@ choices! {
 pub const FIELDS: &[Field] = Light::FIELDS;
 
 impl Light {
+    /// Position of a point or spot light; `None` for any other light.
+    pub fn apex(&self) -> Option<[f64; 3]> {
+        self.point.map(|point| point.position).or(self.spot.map(|spot| spot.position))
+    }
+
+    /// Direction in which a directional light travels, or the axis of a spot light; `None` for any
+    /// other light.
+    pub fn direction(&self) -> Option<[f64; 3]> {
+        self.directional.map(|sun| sun.direction).or(self.spot.map(|spot| spot.direction))
+    }
+
+    /// [`Light::direction`], to be changed.
+    pub fn direction_mut(&mut self) -> Option<&mut [f64; 3]> {
+        let directional = self.directional.as_mut().map(|sun| &mut sun.direction);
+        directional.or(self.spot.as_mut().map(|spot| &mut spot.direction))
+    }
+
     /// Returns the validation errors of the light.
     pub fn faults(&self) -> Vec<ValidationError> {
         let kinds = self.kinds();
@@ -93,7 +128,7 @@ impl Light {
             [] => Some(ValidationError::new(
                 "",
                 "the light has no kind",
-                "one of point, directional, sphere, rectangle and disk, such as \
+                "one of point, directional, spot, sphere, rectangle and disk, such as \
                  point = { position = [2.0, 4.0, 3.0] }",
             )),
             [first, second, ..] => Some(ValidationError::new(
@@ -102,15 +137,15 @@ impl Light {
                 "exactly one kind; a second light needs its own [[light]]",
             )),
         };
-        let is_point = kinds == ["point"];
+        let falls_off = kinds == ["point"] || kinds == ["spot"];
         let has_size = self.surface().is_some();
         let other_fault = if kind_fault.is_some() {
             None
-        } else if self.falloff == Falloff::InverseSquare && !is_point {
+        } else if self.falloff == Falloff::InverseSquare && !falls_off {
             Some(ValidationError::new(
                 "falloff",
-                "falloff is \"inverse-square\", but only a point light has a falloff",
-                "falloff \"none\", or a point light",
+                "falloff is \"inverse-square\", but only a point or spot light has a falloff",
+                "falloff \"none\", or a point or spot light",
             ))
         } else if self.unit == LightUnit::Power && !has_size {
             Some(ValidationError::new(
@@ -124,6 +159,14 @@ impl Light {
                 "visible is false, but only a sphere, rectangle or disk is visible",
                 "visible = true, or a light with a size",
             ))
+        } else if let Some(Spot { inner_angle, outer_angle, .. }) =
+            self.spot.filter(|spot| spot.inner_angle > spot.outer_angle)
+        {
+            Some(ValidationError::new(
+                "spot.inner_angle",
+                format!("inner_angle is {inner_angle}, but outer_angle is only {outer_angle}"),
+                "an inner_angle of at most outer_angle; both are measured from the axis",
+            ))
         } else {
             None
         };
@@ -135,6 +178,7 @@ impl Light {
         let given = [
             ("point", self.point.is_some()),
             ("directional", self.directional.is_some()),
+            ("spot", self.spot.is_some()),
             ("sphere", self.sphere.is_some()),
             ("rectangle", self.rectangle.is_some()),
             ("disk", self.disk.is_some()),
@@ -152,14 +196,14 @@ impl Light {
     /// Position of the light: the point, or the centre of the surface. `None` for a directional
     /// light.
     pub fn position(&self) -> Option<[f64; 3]> {
-        let point = self.point.map(|point| point.position);
-        point.or(self.surface().map(|surface| surface.center().to_array()))
+        self.apex().or(self.surface().map(|surface| surface.center().to_array()))
     }
 
     /// Position of the light, for edits. `None` for a directional light.
     pub fn position_mut(&mut self) -> Option<&mut [f64; 3]> {
-        let Self { point, sphere, rectangle, disk, .. } = self;
+        let Self { point, spot, sphere, rectangle, disk, .. } = self;
         let point = point.as_mut().map(|point| &mut point.position);
+        let point = point.or(spot.as_mut().map(|spot| &mut spot.position));
         let sphere = sphere.as_mut().map(|sphere| &mut sphere.center);
         let rectangle = rectangle.as_mut().map(|rectangle| &mut rectangle.center);
         point.or(sphere).or(rectangle).or(disk.as_mut().map(|disk| &mut disk.center))
@@ -168,7 +212,7 @@ impl Light {
 
 #[cfg(test)]
 mod tests {
-    use super::{Directional, Falloff, Light, Point};
+    use super::{Directional, Falloff, Light, Point, Spot};
     use crate::value::Color;
 
     fn keys(light: &Light) -> Vec<String> {
@@ -189,6 +233,29 @@ mod tests {
         assert_eq!(keys(&light), ["falloff"]);
         light.falloff = Falloff::None;
         assert!(keys(&light).is_empty());
+        light.spot = Some(SPOT);
+        assert_eq!(keys(&light), ["spot"]);
+        light.directional = None;
+        light.falloff = Falloff::InverseSquare;
+        assert!(keys(&light).is_empty());
+    }
+
+    const SPOT: Spot = Spot {
+        position: [0.0, 2.0, 0.0],
+        direction: [0.0, -1.0, 0.0],
+        outer_angle: 30.0,
+        inner_angle: 30.0,
+    };
+
+    #[test]
+    fn inner_cone_of_spot_is_inside_the_outer_cone() {
+        let faults = |spot| keys(&Light { spot: Some(spot), ..Light::default() });
+        assert!(faults(SPOT).is_empty());
+        assert_eq!(faults(Spot { inner_angle: 30.1, ..SPOT }), ["spot.inner_angle"]);
+        let pointed = Spot { outer_angle: 0.0, inner_angle: 0.0, ..SPOT };
+        assert_eq!(faults(pointed), ["spot.outer_angle"]);
+        assert_eq!(faults(Spot { outer_angle: 181.0, ..SPOT }), ["spot.outer_angle"]);
+        assert_eq!(faults(Spot { direction: [0.0; 3], ..SPOT }), ["spot.direction"]);
     }
 
     #[test]

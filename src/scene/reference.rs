@@ -67,6 +67,9 @@ and every key with a default may be left out. Unknown keys are errors.
   are read, so that no device or pipe blocks; their content goes into the picture and into messages
   only. A file that a mesh file names in turn lies in the folder of that mesh file or below: such a
   name has no `..`, is not absolute, and is no URL.
+- A spot light has its full intensity inside the cone of `inner_angle` about its axis and none outside the
+  cone of `outer_angle`. Between them the factor is t^2 (3 - 2t), where t rises linearly with the cosine of
+  the angle from 0 at the outer to 1 at the inner cone. Equal angles make a sharp edge.
 - A light with falloff `none` gives a white matt surface that faces it the radiance `intensity` at any
   distance. With `inverse-square` the intensity is a radiant intensity [W/sr]: the
   irradiance is intensity x cosine / distance squared.

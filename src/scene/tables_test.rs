@@ -83,6 +83,7 @@ fn field_tables_match_deserialised_keys() {
         "directional",
         inner(crate::light::FIELDS, "directional"),
     );
+    same_keys::<crate::light::Spot>("spot", inner(crate::light::FIELDS, "spot"));
     same_keys::<Material>("material", crate::material::FIELDS);
     same_keys::<Texture>("texture", inner(crate::material::FIELDS, "texture"));
     same_keys::<Bump>("bump", inner(crate::material::FIELDS, "bump"));

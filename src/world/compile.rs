@@ -165,9 +165,9 @@ impl<S: Float> CompiledLights<S> {
             .filter_map(|(index, group, emission)| {
                 let light = DeltaLight::new(&scene.lights[index], geometry.origin)?;
                 let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
-                let on_surface = scene.lights[index].point.and_then(|point| {
+                let on_surface = scene.lights[index].apex().and_then(|position| {
                     let origin = geometry.origin;
-                    let position = DVec3::from(point.position) - origin;
+                    let position = DVec3::from(position) - origin;
                     OnSurface::new(&geometry.forms, position, origin, S::EPSILON)
                 });
                 Some(LightSource { light, group, emission, on_surface })
@@ -190,9 +190,9 @@ impl<S: Float> CompiledLights<S> {
     fn targets(&self) -> Vec<LightTarget> {
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let target_of_source = |source: &LightSource<S>| match &source.light {
-            DeltaLight::InverseSquare { position } | DeltaLight::Constant { position } => {
-                LightTarget::Point(vector(position))
-            }
+            DeltaLight::InverseSquare { position }
+            | DeltaLight::Constant { position }
+            | DeltaLight::Spot { position, .. } => LightTarget::Point(vector(position)),
             DeltaLight::Directional { wi } => LightTarget::Direction(vector(wi)),
         };
         self.sources.iter().map(target_of_source).collect()

@@ -69,8 +69,8 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     {
         return false;
     }
-    let lamps = scene.lights.iter().filter(|l| l.on).filter_map(|l| l.point);
-    let mut distances = lamps.map(|lamp| clearance(forms, DVec3::from(lamp.position) - origin));
+    let lamps = scene.lights.iter().filter(|l| l.on).filter_map(|l| l.apex());
+    let mut distances = lamps.map(|lamp| clearance(forms, DVec3::from(lamp) - origin));
     if distances.any(|distance| extent > MAX_EXTENT_PER_LIGHT_DISTANCE * distance) {
         return false;
     }

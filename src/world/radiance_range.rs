@@ -236,13 +236,12 @@ impl<'a> SceneDistances<'a> {
     /// Range of a light of unit intensity.
     pub fn light<S: Float>(&self, light: &DeltaLight<S>) -> RadianceRange {
         let typical = light.typical_irradiance(self.radius) * FRAC_1_PI;
-        let DeltaLight::InverseSquare { position } = light else {
+        let Some(position) = light.position().filter(|_| light.is_inverse_square()) else {
             let all = self.responses.iter().flatten().copied().reduce(Response::or);
             let Response { least, most, peak } =
                 all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 });
             return self.range_of(typical, (least, most, peak));
         };
-        let position = DVec3::from(position.map(S::to_f64));
         let radiance_at = |distance: f64| (distance * distance * PI).recip();
         let (eye, pixel) = self.eye;
         // The bright spot below a light has about the size of the distance between light and

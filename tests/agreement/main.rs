@@ -21,6 +21,7 @@ use compare::{Picture, keep, reference, rendered, small, variances_differ_by};
 use support::{all_shipped, parsed, shipped};
 use tracer::{Mutation, Tracer};
 use zerkalo::camera::{Aperture, Focus};
+use zerkalo::light::Light;
 use zerkalo::material::Lobe;
 use zerkalo::sampling::SamplerKind;
 use zerkalo::scene::{Scale, Scene, TransformOp};
@@ -93,7 +94,7 @@ fn shrunk(mut scene: Scene) -> Scene {
     let shrink = |v: &mut [f64; 3]| *v = v.map(|x| x * FACTOR);
     shrink(&mut scene.camera.eye);
     scene.camera.target.as_mut().map(shrink);
-    scene.lights.iter_mut().filter_map(|l| l.point.as_mut()).for_each(|p| shrink(&mut p.position));
+    scene.lights.iter_mut().filter_map(Light::position_mut).for_each(shrink);
     let step = TransformOp::Scale(Scale([FACTOR; 3]));
     scene.objects.iter_mut().for_each(|object| object.transform.push(step));
     scene
@@ -106,6 +107,7 @@ fn deliberate_errors_are_detected() {
         (Mutation::ShadowOffset, "a small mirror room", shrunk(scene("mirror-room.toml"))),
         (Mutation::Absorb, "horizon-fold.toml", scene("horizon-fold.toml")),
         (Mutation::NoCosine, "mirror-room-physical.toml", scene("mirror-room-physical.toml")),
+        (Mutation::LinearCone, "spot-light.toml", scene("spot-light.toml")),
     ] {
         check_detection(mutation, name, &scene, 4 * REFERENCE_SAMPLES);
     }

@@ -10,7 +10,7 @@ use glam::DVec3;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use zerkalo::camera::{Aperture, Focus, ViewAngle};
-use zerkalo::light::{Falloff, Light};
+use zerkalo::light::{Falloff, Light, Spot};
 use zerkalo::material::Material;
 use zerkalo::scene::{Filter, RayTypes, Scene};
 
@@ -29,6 +29,8 @@ pub enum Mutation {
     Absorb,
     /// The cosine of the first light is omitted.
     NoCosine,
+    /// Spot lights decrease linearly between the inner and the outer cone.
+    LinearCone,
     /// Light that enters a solid is not refracted.
     NoBending,
     /// Texture coordinates u and v are exchanged.
@@ -274,7 +276,7 @@ impl<'a> Tracer<'a> {
         let color = DVec3::from(m.color.0) * hit.tint;
         let mut sum = color * m.ambient * DVec3::from(self.scene.ambient.color.0);
         for (i, light) in self.scene.lights.iter().enumerate().filter(|(_, l)| l.on) {
-            let (towards, distance, irradiance) = arrival(light, hit.point);
+            let (towards, distance, irradiance) = arrival(light, hit.point, self.mutation);
             let mut cos = hit.seen.dot(towards);
             let behind = cos <= 0.0 || hit.normal.dot(towards) <= 0.0;
             if behind || self.in_shadow(hit.point, towards, distance) {
@@ -302,19 +304,40 @@ impl<'a> Tracer<'a> {
 }
 
 /// Direction to the light, distance, and irradiance of a surface that faces it.
-fn arrival(light: &Light, point: DVec3) -> (DVec3, f64, DVec3) {
+fn arrival(light: &Light, point: DVec3, mutation: Mutation) -> (DVec3, f64, DVec3) {
     let strength = DVec3::from(light.color.0) * light.intensity;
     if let Some(directional) = &light.directional {
         let towards = -DVec3::from(directional.direction).normalize();
         return (towards, f64::INFINITY, strength * PI);
     }
-    let position = DVec3::from(light.point.as_ref().expect("a light of some kind").position);
+    let (position, cone) = match (light.point, light.spot) {
+        (Some(point), _) => (DVec3::from(point.position), None),
+        (None, Some(spot)) => (DVec3::from(spot.position), Some(spot)),
+        (None, None) => panic!("a light of some kind"),
+    };
     let distance = position.distance(point);
     let irradiance = match light.falloff {
         Falloff::None => strength * PI,
         Falloff::InverseSquare => strength / (distance * distance),
     };
-    ((position - point) / distance, distance, irradiance)
+    let towards = (position - point) / distance;
+    let factor = cone.map_or(1.0, |spot| spot_factor(&spot, -towards, mutation));
+    (towards, distance, irradiance * factor)
+}
+
+/// Share of a spot light's intensity in the unit direction `along`: 1 inside the inner cone, 0 outside
+/// the outer one, between them the smoothstep of the cosine.
+fn spot_factor(spot: &Spot, along: DVec3, mutation: Mutation) -> f64 {
+    let cos = DVec3::from(spot.direction).normalize().dot(along);
+    let (inner, outer) = (spot.inner_angle.to_radians().cos(), spot.outer_angle.to_radians().cos());
+    if cos <= outer {
+        return 0.0;
+    }
+    if cos >= inner {
+        return 1.0;
+    }
+    let t = (cos - outer) / (inner - outer);
+    if mutation == Mutation::LinearCone { t } else { 3.0 * t.powi(2) - 2.0 * t.powi(3) }
 }
 
 /// Material keys that this tracer supports.

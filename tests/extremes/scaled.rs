@@ -29,8 +29,8 @@ fn changed(mut scene: Scene, s: f64, by: DVec3) -> Scene {
     scene.camera.target.as_mut().map(place);
     scene.camera.near *= s;
     for light in &mut scene.lights {
-        if let Some(point) = &mut light.point {
-            place(&mut point.position);
+        if let Some(position) = light.position_mut() {
+            place(position);
             if light.falloff == Falloff::InverseSquare {
                 light.intensity *= s * s;
             }

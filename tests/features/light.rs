@@ -6,7 +6,7 @@ use crate::row::{Verdict, ensure, material, object, row};
 use crate::support::{shipped, sized};
 use glam::DVec3;
 use zerkalo::camera::ViewAngle;
-use zerkalo::light::{Directional, Falloff, Light, Point};
+use zerkalo::light::{Directional, Falloff, Light, Point, Spot};
 use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Metal};
 use zerkalo::scene::{RayTypes, Scene};
 use zerkalo::value::Color;
@@ -301,6 +301,30 @@ fn c3_what_the_tracks_lacked() {
         &[
             ("no ambient light", &|s| s.ambient.color = Color::BLACK),
             ("no directional light", &|s| s.lights[2].on = false),
+        ],
+    );
+}
+
+#[test]
+fn d2_spot_light() {
+    fn middle(scene: &mut Scene) -> &mut Light {
+        &mut scene.lights[1]
+    }
+    fn cone(scene: &mut Scene) -> &mut Spot {
+        middle(scene).spot.as_mut().expect("a spot light")
+    }
+    exact(
+        "spot-light.toml",
+        &[
+            ("a point light", &|s| {
+                let position = cone(s).position;
+                (middle(s).spot, middle(s).point) = (None, Some(Point { position }));
+            }),
+            ("another axis", &|s| cone(s).direction = [0.1, -1.0, -0.5]),
+            ("another inner angle", &|s| cone(s).inner_angle = 15.0),
+            ("another outer angle", &|s| cone(s).outer_angle = 19.0),
+            ("without falloff", &|s| s.lights[2].falloff = Falloff::None),
+            ("without shadows", &|s| s.trace.ray_types = RayTypes::Primary),
         ],
     );
 }

@@ -31,7 +31,7 @@ fn without_lights_on_surfaces(scene: &mut Scene) {
         })
     };
     for light in &mut scene.lights {
-        let position = light.point.as_ref().map(|point| DVec3::from(point.position));
+        let position = light.position().map(DVec3::from);
         light.on &= !position.is_some_and(is_on_surface);
     }
 }

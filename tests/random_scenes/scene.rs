@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::{Table, Value};
 use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
-use zerkalo::light::{Directional, Falloff, Light, Point};
+use zerkalo::light::{Directional, Falloff, Light, Point, Spot};
 use zerkalo::primitive::{ConvexPolyhedronForm, Form, ParallelogramForm, PlaneForm, SphereForm};
 use zerkalo::scene::{
     Acceleration, Document, FilmSettings, IntegratorSettings, Object, Scale, Scene, TRACE_FIELDS,
@@ -226,6 +226,7 @@ fn lights(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Vec<Light> {
     let count = pick(numbers, &[0, 1, 1, 1, 1, 2, 2, 2, 3, 14]);
     let light = |i: usize| {
         let far = chance(numbers, 1, 4);
+        let narrow = !far && chance(numbers, 1, 4);
         let position = match numbers.below(6) {
             0 => pick(numbers, &spots.on),
             1 => pick(numbers, &spots.inside),
@@ -245,16 +246,26 @@ fn lights(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Vec<Light> {
         let area = if falloff == Falloff::None { 1.0 } else { spots.radius * spots.radius };
         Light {
             name: format!("l{i}"),
-            point: (!far).then_some(Point { position: position.to_array() }),
+            point: (!far && !narrow).then_some(Point { position: position.to_array() }),
             directional: far.then(|| Directional { direction: direction(numbers).to_array() }),
             color: Color([(); 3].map(|()| numbers.unit())),
             intensity: if far { strength } else { strength * area },
             falloff: if far { Falloff::None } else { falloff },
             on: chance(numbers, 9, 10),
+            spot: narrow.then(|| spot(numbers, position, spots.middle)),
             ..Light::default()
         }
     };
     (0..count).map(light).collect()
+}
+
+/// Returns a spot light at `position`, with its axis roughly towards `target`.
+fn spot(numbers: &mut Numbers, position: DVec3, target: DVec3) -> Spot {
+    let outer_angle = pick(numbers, &[0.5, 10.0, 30.0, 60.0, 120.0, 180.0]);
+    let inner_angle = outer_angle * pick(numbers, &[0.0, 0.5, 1.0]);
+    let toward = (target - position).normalize_or(DVec3::NEG_Y);
+    let direction = (toward + 0.3 * direction(numbers)).to_array();
+    Spot { position: position.to_array(), direction, outer_angle, inner_angle }
 }
 
 /// Scales and translates some scenes as a whole.
@@ -280,8 +291,8 @@ fn displace(numbers: &mut Numbers, scene: &mut Scene) {
     scene.camera.eye = moved(scene.camera.eye);
     scene.camera.near *= scale;
     for light in &mut scene.lights {
-        if let Some(point) = &mut light.point {
-            point.position = moved(point.position);
+        if let Some(position) = light.position_mut() {
+            *position = moved(*position);
         }
         if light.falloff == Falloff::InverseSquare {
             light.intensity *= scale * scale;

@@ -57,7 +57,7 @@ fn perform(
             ("add object", edit::add_object(scene, kind, shared))
         }
         7 if scene.lights.len() < 6 => {
-            let kind = if at % 2 == 0 { "point" } else { "directional" };
+            let kind = ["point", "directional", "spot"][at % 3];
             ("add light", edit::add_light(scene, kind))
         }
         8 => ("move", edit::move_by(scene, &subject, by)),

@@ -1,9 +1,10 @@
 //! Adding objects, lights and materials, with defaults that fit the scene.
 
-use crate::light::{Directional, Falloff, Light, Point};
+use crate::light::{Directional, Falloff, Light, Point, Spot};
 use crate::material::Material;
 use crate::primitive::{Form, ParallelogramForm};
 use crate::scene::edit::bounds::{BoundingSphere, scene_bounds};
+use crate::scene::edit::convert::SPOT_ANGLE;
 use crate::scene::edit::placement::place_for;
 use crate::scene::edit::properties::Word;
 use crate::scene::edit::unique_name::{free_light, free_material, free_object};
@@ -23,6 +24,7 @@ pub fn light_kinds() -> Vec<Word> {
     let words = [
         ("point", "Light from one point, such as a lamp."),
         ("directional", "Light from infinitely far away, such as the sun."),
+        ("spot", "Light from one point into a cone, such as a spotlight."),
     ];
     words.map(|(name, doc)| Word { name: name.into(), doc: doc.into() }).to_vec()
 }
@@ -153,30 +155,35 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let [right, _, forward] = scene.camera.frame();
     let level = |v: DVec3| DVec3::new(v.x, 0.0, v.z).try_normalize().unwrap_or(DVec3::X);
     let (right, forward) = (level(right), level(forward));
-    let side = |light: &Light| match (light.point, light.directional) {
-        (Some(point), _) => (DVec3::from_array(point.position) - center).dot(right),
-        (_, Some(sun)) => unit(sun.direction).map_or(0.0, |along| -along.dot(right)),
-        _ => 0.0,
+    let side = |light: &Light| match (light.position(), light.direction()) {
+        (Some(position), _) => (DVec3::from_array(position) - center).dot(right),
+        (None, Some(direction)) => unit(direction).map_or(0.0, |along| -along.dot(right)),
+        (None, None) => 0.0,
     };
     let lit: f64 = scene.lights.iter().map(|l| side(l).signum()).sum();
     let toward = if lit > 0.0 { -right } else { right };
     let from = toward * 0.8 - forward * 0.8 + DVec3::Y * 1.4;
     let mut light = Light::default();
+    let position = (center + from * (1.5 * radius)).map(|x| round_nice(x, radius)).to_array();
+    let direction = (-from).normalize().map(|x| rounded_to(x, -2)).to_array();
     let name = match kind {
         "point" => {
-            let position = center + from * (1.5 * radius);
-            light.point =
-                Some(Point { position: position.map(|x| round_nice(x, radius)).to_array() });
+            light.point = Some(Point { position });
             "lamp"
         }
         "directional" => {
-            let direction = (-from).normalize().map(|x| rounded_to(x, -2)).to_array();
             light.directional = Some(Directional { direction });
             "sun"
         }
+        "spot" => {
+            let (outer_angle, inner_angle) = (SPOT_ANGLE, 0.5 * SPOT_ANGLE);
+            light.spot = Some(Spot { position, direction, outer_angle, inner_angle });
+            "spot"
+        }
         _ => {
             let found = format!("there is no kind of light called \"{kind}\"");
-            return Err(EditError::new(&found, "Expected \"point\" or \"directional\"."));
+            let expected = "Expected \"point\", \"directional\" or \"spot\".";
+            return Err(EditError::new(&found, expected));
         }
     };
     light.name = free_light(scene, name);
@@ -184,7 +191,7 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     light.intensity = if scene.lights.iter().any(|l| l.on) { 0.5 } else { 1.0 };
     let physical = scene.lights.iter().all(|l| l.falloff == Falloff::InverseSquare);
     let mut note = None;
-    if physical && !scene.lights.is_empty() && kind == "point" {
+    if physical && !scene.lights.is_empty() && light.position().is_some() {
         // With the inverse square, as the other lights have, the brightness in the middle stays
         // that of a light without falloff.
         let squared = (from * (1.5 * radius)).length_squared();
@@ -291,13 +298,14 @@ mod tests {
         for word in light_kinds() {
             let edit = add_light(&scene, &word.name).unwrap();
             let light = &edit.scene.lights[1];
-            let x = match (light.point, light.directional) {
-                (Some(point), _) => point.position[0],
-                (_, Some(directional)) => -directional.direction[0],
-                _ => panic!(),
+            let x = match (light.position(), light.direction()) {
+                (Some(position), _) => position[0],
+                (None, Some(direction)) => -direction[0],
+                (None, None) => panic!(),
             };
             assert!(x < 0.0, "the lamp that is there stands to the right");
-            assert_eq!(light.name, if word.name == "point" { "lamp 2" } else { "sun" });
+            let names = [("point", "lamp 2"), ("directional", "sun"), ("spot", "spot")];
+            assert!(names.contains(&(word.name.as_str(), light.name.as_str())), "{}", light.name);
         }
         assert!(add_light(&scene, "area").is_err());
         let physical = "light = [{ point.position = [3, 3, 3], intensity = 40, \

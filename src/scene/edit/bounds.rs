@@ -36,7 +36,7 @@ pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
             })
         }
         Target::Light(i) => {
-            let position = scene.lights.get(*i)?.point?.position;
+            let position = scene.lights.get(*i)?.position()?;
             Some(BoundingSphere { center: position, radius: scene_bounds(scene).radius / 10.0 })
         }
         Target::Material(name) => {

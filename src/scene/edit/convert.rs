@@ -2,7 +2,7 @@
 //! brightness are kept where possible.
 
 use crate::camera::{Camera, Focus, ViewAngle};
-use crate::light::{Directional, Falloff, Light, Point};
+use crate::light::{Directional, Falloff, Light, Point, Spot};
 use crate::material::{Bump, Material, Texture};
 use crate::scene::Scene;
 use crate::scene::edit::bounds::scene_bounds;
@@ -17,13 +17,14 @@ use crate::value::{
 use glam::DVec3;
 use toml::{Table, Value};
 
-/// Field for the choice between `point` and `directional` of a light. It is a row of the inspector;
+/// Field for the choice between the kinds of a light. It is a row of the inspector;
 /// scene files have no such key.
 pub(super) const KIND: Field = Field::required(
     "kind",
     ValueType::OneOf(&[
         Field::required("point", ValueType::Text, "", "Light from one point."),
         Field::required("directional", ValueType::Text, "", "Light from infinitely far away."),
+        Field::required("spot", ValueType::Text, "", "Light from one point into a cone."),
     ]),
     "",
     "Kind of light source.",
@@ -131,36 +132,49 @@ fn rotation(shape: &Shape) -> f64 {
     }
 }
 
-/// Converts a light. Its brightness and its direction at the centre of the scene are kept.
+/// Angle of the outer cone of spot lights that are added or converted \[degrees\].
+pub(super) const SPOT_ANGLE: f64 = 30.0;
+
+/// Converts a light. Its brightness and its direction at the centre of the scene are kept. A point
+/// light that becomes a spot light is aimed at the centre of the scene.
 fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> {
     let ball = scene_bounds(scene);
     let center = DVec3::from_array(ball.center);
-    match (name, light.point, light.directional) {
-        ("directional", Some(point), _) => {
-            let from = DVec3::from_array(point.position);
-            let direction = unit(center - from).unwrap_or(DVec3::NEG_Y);
-            let direction = direction.map(|x| rounded_to(x, -3)).to_array();
-            light.point = None;
+    let along = match (light.direction(), light.position()) {
+        (Some(direction), _) => unit(direction),
+        (None, Some(from)) => unit(center - DVec3::from_array(from)),
+        (None, None) => None,
+    };
+    let along = along.unwrap_or(DVec3::NEG_Y);
+    let direction = light.direction().unwrap_or(along.map(|x| rounded_to(x, -3)).to_array());
+    let far = || (center - along * (3.0 * ball.radius)).map(|x| round_nice(x, ball.radius));
+    let position = light.position().unwrap_or_else(|| far().to_array());
+    match name {
+        "point" if light.point.is_none() => {
+            (light.directional, light.spot) = (None, None);
+            light.point = Some(Point { position });
+            None
+        }
+        "spot" if light.spot.is_none() => {
+            (light.point, light.directional) = (None, None);
+            let (outer_angle, inner_angle) = (SPOT_ANGLE, 0.5 * SPOT_ANGLE);
+            light.spot = Some(Spot { position, direction, outer_angle, inner_angle });
+            None
+        }
+        "directional" if light.directional.is_none() => {
+            (light.point, light.spot) = (None, None);
             light.directional = Some(Directional { direction });
             (light.falloff == Falloff::InverseSquare).then(|| {
                 light.falloff = Falloff::None;
-                let squared = (center - from).length_squared();
+                let squared = (center - DVec3::from_array(position)).length_squared();
                 refit(light, 1.0 / (std::f64::consts::PI * squared))
             })
-        }
-        ("point", _, Some(Directional { direction })) => {
-            let along = unit(direction).unwrap_or(DVec3::NEG_Y);
-            let at = center - along * (3.0 * ball.radius);
-            let position = at.map(|x| round_nice(x, ball.radius)).to_array();
-            light.point = Some(Point { position });
-            light.directional = None;
-            None
         }
         _ => None,
     }
 }
 
-/// Changes the falloff of a point light. Its brightness at the centre of the scene is kept.
+/// Changes the falloff of a point or spot light. Its brightness at the centre of the scene is kept.
 pub(super) fn switch_falloff(
     scene: &Scene,
     index: usize,
@@ -171,9 +185,9 @@ pub(super) fn switch_falloff(
     let mut edit = replace(scene, &subject, "falloff", values, falloff)?;
     let old = &scene.lights[index];
     let light = &mut edit.scene.lights[index];
-    if let Some(point) = light.point.filter(|_| light.falloff != old.falloff) {
+    if let Some(position) = light.position().filter(|_| light.falloff != old.falloff) {
         let center = DVec3::from_array(scene_bounds(scene).center);
-        let squared = (DVec3::from_array(point.position) - center).length_squared();
+        let squared = (DVec3::from_array(position) - center).length_squared();
         // The irradiance at the distance d is I / d^2 with the inverse square, pi I without
         // falloff.
         let factor = std::f64::consts::PI * squared;
@@ -341,6 +355,26 @@ mod tests {
         assert!((again.lights[0].intensity / 40.0 - 1.0).abs() < 0.01);
         let keys: Vec<_> = rows(&edit.scene, &lamp).unwrap().into_iter().map(|r| r.key).collect();
         assert!(keys.contains(&"directional.direction".to_string()), "{keys:?}");
+        // A spot light keeps the position and the falloff of a point light, and gets its direction
+        // to the centre.
+        let spot = set(&scene, &lamp, "kind", "spot").unwrap().scene;
+        assert_eq!(spot.lights[0].position(), scene.lights[0].position());
+        assert_eq!(spot.lights[0].direction(), light.direction());
+        assert_eq!(spot.lights[0].falloff, Falloff::InverseSquare);
+        let keys: Vec<_> = rows(&spot, &lamp).unwrap().into_iter().map(|r| r.key).collect();
+        let expected = ["position", "direction", "outer_angle", "inner_angle"];
+        assert_eq!(keys[2..6], expected.map(|key| format!("spot.{key}")), "{keys:?}");
+        let edit = set(&spot, &lamp, "spot.outer_angle", "40").unwrap();
+        assert_eq!(edit.scene.lights[0].spot.unwrap().outer_angle, 40.0);
+        assert!(set(&spot, &lamp, "spot.outer_angle", "10").is_err(), "the inner cone has 15");
+        let point = set(&spot, &lamp, "kind", "point").unwrap().scene;
+        assert_eq!(point.lights, scene.lights);
+        let sun = set(&spot, &lamp, "kind", "directional").unwrap().scene;
+        assert_eq!(sun.lights, edit_of_kind(&scene, "directional"));
+    }
+
+    fn edit_of_kind(scene: &Scene, kind: &str) -> Vec<Light> {
+        set(scene, &Target::Light(0), "kind", kind).unwrap().scene.lights
     }
 
     #[test]

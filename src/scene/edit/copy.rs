@@ -50,10 +50,9 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
             if !copy.name.is_empty() {
                 copy.name = free_light(scene, &copy.name);
             }
-            if let Some(point) = &mut copy.point {
+            if let Some(position) = copy.position_mut() {
                 let step = crate::scene::edit::step_length(scene);
-                point.position =
-                    crate::scene::edit::translate::moved(point.position, [5.0 * step, 0.0, 0.0]);
+                *position = crate::scene::edit::translate::moved(*position, [5.0 * step, 0.0, 0.0]);
             }
             next.lights.push(copy);
             Target::Light(next.lights.len() - 1)

@@ -29,16 +29,16 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
         }
         Target::Light(i) => {
             let light = next.lights.get_mut(*i).ok_or_else(|| EditError::gone(subject))?;
-            if let Some(directional) = &mut light.directional {
-                directional.direction = turned(directional.direction, degrees);
+            if let Some(direction) = light.direction_mut() {
+                *direction = turned(*direction, degrees);
             }
-            if let Some(point) = &mut light.point {
+            if let Some(position) = light.position_mut() {
                 let pivot = scene_bounds(scene).center;
-                let offset = std::array::from_fn(|i| point.position[i] - pivot[i]);
+                let offset = std::array::from_fn(|i| position[i] - pivot[i]);
                 let offset = turned(offset, degrees);
                 let digits = floor_log10(offset[0].hypot(offset[2])) - 6;
                 let coordinate = |i| rounded_to(pivot[i] + offset[i], digits);
-                point.position = [coordinate(0), point.position[1], coordinate(2)];
+                *position = [coordinate(0), position[1], coordinate(2)];
             }
         }
         _ => {

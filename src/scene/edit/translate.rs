@@ -74,8 +74,8 @@ pub(super) fn move_object(object: &mut Object, by: [f64; 3]) {
 }
 
 fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
-    if let Some(point) = &mut light.point {
-        point.position = moved(point.position, by);
+    if let Some(position) = light.position_mut() {
+        *position = moved(*position, by);
     }
     if let Some(Directional { direction }) = &mut light.directional {
         let reach = 3.0 * scene_bounds(scene).radius;

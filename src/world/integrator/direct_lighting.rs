@@ -2,6 +2,7 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::light::DeltaLight;
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::interaction::SurfaceInteraction;
 use crate::world::integrator::path::{Counts, Path, Radiance};
@@ -39,6 +40,9 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
         let mut lit = interaction.direct_mask & cos_light.gt(L::zero());
         if !SIMPLE && world.smooth {
             lit = lit & interaction.geometric.dot(light.wi).gt(L::zero());
+        }
+        if let DeltaLight::Spot { .. } = source.light {
+            lit = lit & light.irradiance.gt(L::zero());
         }
         if lit.none() {
             continue;
