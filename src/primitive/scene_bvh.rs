@@ -3,11 +3,10 @@
 use crate::bvh::Ray;
 use crate::bvh::packet::{PacketBounds, SlabPacket, traverse_packet, with_stack};
 use crate::bvh::single::traverse_rays;
-use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Build};
+use crate::bvh::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::item_box::padded;
 use glam::DVec3;
-use obvhs::BvhBuildParams;
 
 /// Coherence limit: packets traverse together if their directions differ by no more than this for
 /// each lane, over the root of the number of items (length of the difference of unit vectors), and
@@ -36,7 +35,7 @@ impl SceneBvh {
             [low.as_vec3().to_array(), high.as_vec3().to_array()]
         };
         let Bvh8Build { bvh: boxes, order, leaves } =
-            Bvh8::build(bounds.len(), corners, 1, BvhBuildParams::medium_build());
+            Bvh8::build(bounds.len(), corners, 1, BuildQuality::MEDIUM);
         let items = leaves.iter().map(|(first, _)| order[*first as usize]).collect();
         let low = bounds.iter().map(|b| b.0).fold(DVec3::INFINITY, DVec3::min);
         let high = bounds.iter().map(|b| b.1).fold(DVec3::NEG_INFINITY, DVec3::max);

@@ -4,8 +4,7 @@
 
 use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::normals::smooth;
-use crate::bvh::build::{BVH_WIDTH, Bvh8, Bvh8Build, LEAF_FLAG};
-use obvhs::BvhBuildParams;
+use crate::bvh::build::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -71,8 +70,7 @@ impl Mesh {
         };
         // A high traversal cost gives large leaves. They are cheap, because a ray is intersected
         // with all triangles of a leaf at the cost of one.
-        let quality =
-            BvhBuildParams { collapse_traversal_cost: 8.0, ..BvhBuildParams::fast_build() };
+        let quality = BuildQuality { traversal_cost: 8.0, ..BuildQuality::FAST };
         let Bvh8Build { bvh: boxes, order, leaves } =
             Bvh8::build(mesh.triangles.len(), corners, BVH_WIDTH, quality);
         mesh.triangles = order.iter().map(|i| mesh.triangles[*i as usize]).collect();

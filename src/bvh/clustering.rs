@@ -1,0 +1,126 @@
+//! Binary BVH by locally ordered clustering (Meister and Bittner 2018, *Parallel Locally-Ordered
+//! Clustering for Bounding Volume Hierarchy Construction*), in O(n log n) for every input.
+//!
+//! A pass over the nodes, in the order of the Morton curve, merges each two nodes that are nearest
+//! to each other. With many equal distances, such as between coincident boxes, boxes in a row or
+//! the triangles of a fan, a pass finds a single such pair, and n passes would be needed. Neighbours
+//! on the curve are then merged instead.
+
+use glam::{DVec3, Vec3A};
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
+use obvhs::ploc::morton::morton_encode_u64_unorm;
+
+/// Number of node visits, for each primitive, after which slow passes merge neighbours. Boxes at
+/// random positions need 3 visits altogether.
+const PATIENT_VISITS: usize = 8;
+
+/// A pass is slow if fewer than one pair in this number of nodes would be merged.
+const SLOW: usize = 16;
+
+/// Index of the nearest node, if there is none.
+const NONE: u32 = u32::MAX;
+
+/// Number of nodes before and after a node on the curve that are compared with it.
+#[derive(Clone, Copy, Debug)]
+pub struct SearchWindow {
+    /// Number of first passes with a window of one node.
+    pub narrow_passes: usize,
+    /// Window of the other passes.
+    pub distance: usize,
+}
+
+/// Nearest node of a node: the area of the box around both, and its index.
+type Nearest = (f32, u32);
+
+/// Builds the binary BVH of primitives with these bounds, at least one. A leaf has one primitive.
+pub fn cluster(bounds: &[Aabb], window: SearchWindow) -> Bvh2 {
+    let count = bounds.len();
+    let mut nodes = sorted_leaves(bounds);
+    let mut merged = Vec::with_capacity(count);
+    let mut nearest_of = vec![(f32::INFINITY, NONE); count];
+    let mut tree = vec![Bvh2Node::default(); 2 * count - 1];
+    let (mut free, mut passes, mut visits) = (tree.len(), 0, 0);
+    while nodes.len() > 1 {
+        let distance = if passes < window.narrow_passes { 1 } else { window.distance };
+        let nearest = &mut nearest_of[..nodes.len()];
+        find_nearest(&nodes, distance, nearest);
+        visits += nodes.len();
+        if visits > PATIENT_VISITS * count && mutual_pairs(nearest) * SLOW < nodes.len() {
+            pair_neighbours(nearest);
+        }
+        for (i, node) in nodes.iter().enumerate() {
+            let partner = nearest[i].1;
+            if partner == NONE || nearest[partner as usize].1 as usize != i {
+                merged.push(*node);
+            } else if (partner as usize) < i {
+                let other = nodes[partner as usize];
+                free -= 2;
+                (tree[free], tree[free + 1]) = (*node, other);
+                merged.push(Bvh2Node::new(node.aabb().union(other.aabb()), 0, free as u32));
+            }
+        }
+        std::mem::swap(&mut nodes, &mut merged);
+        merged.clear();
+        passes += 1;
+    }
+    tree[0] = nodes[0];
+    let empty = Bvh2::default();
+    Bvh2 {
+        nodes: tree,
+        primitive_indices: (0..count as u32).collect(),
+        children_are_ordered_after_parents: true,
+        max_depth: empty.max_depth.max(passes + 1),
+        ..empty
+    }
+}
+
+/// Returns a leaf for each box, in the order of the Morton codes of the boxes' centres.
+fn sorted_leaves(bounds: &[Aabb]) -> Vec<Bvh2Node> {
+    let low = bounds.iter().map(|b| b.min).fold(Vec3A::INFINITY, Vec3A::min);
+    let high = bounds.iter().map(|b| b.max).fold(Vec3A::NEG_INFINITY, Vec3A::max);
+    let scale: DVec3 = 1.0 / (high - low).as_dvec3();
+    let offset = -low.as_dvec3() * scale;
+    let code = |aabb: &Aabb| morton_encode_u64_unorm(aabb.center().as_dvec3() * scale + offset);
+    let mut codes: Vec<(u64, u64)> =
+        bounds.iter().enumerate().map(|(i, aabb)| (code(aabb), i as u64)).collect();
+    codes.sort_unstable_by_key(|(code, _)| *code);
+    codes.iter().map(|(_, i)| Bvh2Node::new(bounds[*i as usize], 1, *i as u32)).collect()
+}
+
+/// Writes the nearest of the `distance` nodes before and after each node; the last one of equals.
+fn find_nearest(nodes: &[Bvh2Node], distance: usize, nearest: &mut [Nearest]) {
+    nearest.fill((f32::INFINITY, NONE));
+    for (i, node) in nodes.iter().enumerate() {
+        let end = nodes.len().min(i + distance + 1);
+        let mut best = nearest[i];
+        for j in i + 1..end {
+            let area = node.aabb().union(nodes[j].aabb()).half_area();
+            if area <= best.0 {
+                best = (area, j as u32);
+            }
+            if area <= nearest[j].0 {
+                nearest[j] = (area, i as u32);
+            }
+        }
+        nearest[i] = best;
+    }
+}
+
+/// Counts the pairs of nodes that are nearest to each other.
+fn mutual_pairs(nearest: &[Nearest]) -> usize {
+    let ends_pair = |(i, (_, j)): &(usize, &Nearest)| {
+        (*j as usize) < *i && nearest[*j as usize].1 as usize == *i
+    };
+    nearest.iter().enumerate().filter(ends_pair).count()
+}
+
+/// Makes each two neighbours nearest to each other. The last of an odd number of nodes has no
+/// partner.
+fn pair_neighbours(nearest: &mut [Nearest]) {
+    let paired = nearest.len() & !1;
+    for (i, (_, partner)) in nearest.iter_mut().enumerate() {
+        *partner = if i < paired { (i ^ 1) as u32 } else { NONE };
+    }
+}

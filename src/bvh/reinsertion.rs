@@ -1,0 +1,136 @@
+//! Optimisation of a binary BVH by reinsertion (Meister and Bittner 2018, *Parallel Reinsertion for
+//! Bounding Volume Hierarchy Optimization*), with a bound on the time.
+//!
+//! A subtree moves to the place where the sum of all surface areas becomes smallest. The search for
+//! this place skips subtrees that cannot improve the sum. Nested boxes allow no skipping, and the
+//! search of each node would visit all others; the optimisation then ends early.
+
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
+use obvhs::bvh2::reinsertion::reinsert_node;
+
+/// Number of node visits, for each node of the tree, after which the optimisation ends. Boxes at
+/// random positions need 1 to 3, boxes that overlap heavily up to 50.
+const MAX_VISITS: usize = 64;
+
+/// Move of the subtree `from`: it becomes the sibling of the node `to`.
+struct Reinsertion {
+    from: u32,
+    to: u32,
+    /// Decrease of the sum of all half areas, positive.
+    saved: f32,
+}
+
+/// Searches the places of subtrees.
+struct Search {
+    /// Number of nodes that may still be visited.
+    visits_left: usize,
+    /// Nodes to visit, each with the half area that is saved before the insertion there.
+    stack: Vec<(f32, u32)>,
+}
+
+/// Moves subtrees of `tree` in 16 rounds. The first round considers the share `ratio` of the nodes,
+/// those of the largest areas; round n considers 1/(2n - 1) of that.
+pub fn optimize(tree: &mut Bvh2, ratio: f32) {
+    if ratio <= 0.0 || tree.nodes[0].is_leaf() {
+        return;
+    }
+    tree.init_parents_if_uninit();
+    tree.children_are_ordered_after_parents = false;
+    let mut search =
+        Search { visits_left: MAX_VISITS.saturating_mul(tree.nodes.len()), stack: Vec::new() };
+    let mut touched = vec![false; tree.nodes.len()];
+    for round in (1..32).step_by(2) {
+        let share = ratio * tree.nodes.len() as f32;
+        let count = ((share * (1.0 / round as f32)) as usize).clamp(1, tree.nodes.len() - 1);
+        let mut found: Vec<Reinsertion> = largest_nodes(tree, count)
+            .into_iter()
+            .filter_map(|node| search.best_reinsertion(tree, node))
+            .collect();
+        found.sort_unstable_by(|a, b| b.saved.total_cmp(&a.saved));
+        touched.fill(false);
+        for Reinsertion { from, to, .. } in found {
+            let [from, to] = [from as usize, to as usize];
+            let parent = |node: usize| tree.parents[node] as usize;
+            let moved = [to, from, Bvh2Node::get_sibling_id(from), parent(to), parent(from)];
+            if moved.iter().all(|node| !touched[*node]) {
+                moved.iter().for_each(|node| touched[*node] = true);
+                reinsert_node(tree, from, to);
+            }
+        }
+        if search.visits_left == 0 {
+            break;
+        }
+    }
+}
+
+/// Returns the `count` nodes of the largest areas among the first `2 * count + 1` below the root:
+/// the nodes near the root come first in the tree.
+fn largest_nodes(tree: &Bvh2, count: usize) -> Vec<usize> {
+    let end = tree.nodes.len().min(2 * (count + 1));
+    let area = |node: usize| tree.nodes[node].aabb().half_area();
+    let mut nodes: Vec<(f32, usize)> = (1..end).map(|node| (area(node), node)).collect();
+    nodes.sort_by(|a, b| b.0.total_cmp(&a.0));
+    nodes.into_iter().take(count).map(|(_, node)| node).collect()
+}
+
+impl Search {
+    /// Counts a visit. Returns `false` if the visits are used up.
+    fn visit(&mut self) -> bool {
+        self.visits_left = self.visits_left.saturating_sub(1);
+        self.visits_left > 0
+    }
+
+    /// Returns the best move of `node`, which is not the root. Returns `None` if no move saves area,
+    /// or if the visits are used up.
+    fn best_reinsertion(&mut self, tree: &Bvh2, node: usize) -> Option<Reinsertion> {
+        let nodes = &tree.nodes;
+        let area = |aabb: &Aabb| aabb.half_area();
+        let aabb = nodes[node].aabb();
+        let parent = tree.parents[node] as usize;
+        let (mut best, mut best_saved) = (0, 0.0);
+        // The removal of `node` shrinks its ancestors up to `pivot`, which then encloses
+        // `pivot_box`; `removed` is the area that this saves.
+        let mut removed = area(nodes[parent].aabb());
+        let mut sibling = Bvh2Node::get_sibling_id(node);
+        let mut pivot_box = *nodes[sibling].aabb();
+        let mut pivot = parent;
+        loop {
+            self.stack.clear();
+            self.stack.push((removed, sibling as u32));
+            while let Some((saved, place)) = self.stack.pop() {
+                if saved - area(aabb) <= best_saved {
+                    continue;
+                }
+                if !self.visit() {
+                    return None;
+                }
+                let place_node = &nodes[place as usize];
+                let saved = saved - area(&place_node.aabb().union(aabb));
+                if saved > best_saved {
+                    (best, best_saved) = (place, saved);
+                }
+                if !place_node.is_leaf() {
+                    let below = saved + area(place_node.aabb());
+                    self.stack.extend([0, 1].map(|i| (below, place_node.first_index + i)));
+                }
+            }
+            if pivot != parent {
+                pivot_box = pivot_box.union(nodes[sibling].aabb());
+                removed += area(nodes[pivot].aabb()) - area(&pivot_box);
+            }
+            if pivot == 0 {
+                break;
+            }
+            if !self.visit() {
+                return None;
+            }
+            sibling = Bvh2Node::get_sibling_id(pivot);
+            pivot = tree.parents[pivot] as usize;
+        }
+        let is_there = best as usize == Bvh2Node::get_sibling_id(node) || best as usize == parent;
+        let moves = best_saved > 0.0 && !is_there;
+        moves.then_some(Reinsertion { from: node as u32, to: best, saved: best_saved })
+    }
+}
