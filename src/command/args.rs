@@ -51,7 +51,7 @@ pub struct EditArgs {
 /// Options of every command that traces.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct ComputeArgs {
-    /// Number of tracing threads [default: one per processor]
+    /// Number of tracing threads, at most four per processor or 16 [default: one per processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), allow_negative_numbers = true)]
     threads: Option<u16>,
     /// Random seed; equal seeds give equal pictures
@@ -240,11 +240,54 @@ pub enum SamplerArg {
     Random,
 }
 
+/// Largest number of tracing threads for each processor. More threads only wait: with 4,096 on two
+/// processors, a picture of 64 x 48 pixels takes half a minute.
+const THREADS_PER_PROCESSOR: usize = 4;
+
+/// Number of tracing threads that are allowed on every machine.
+const THREADS_ANYWHERE: usize = 16;
+
+/// Returns the number of processors that this process may use.
+fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// Returns the largest number of tracing threads on this machine.
+fn max_threads() -> usize {
+    THREADS_ANYWHERE.max(THREADS_PER_PROCESSOR * processors())
+}
+
 impl ComputeArgs {
-    /// Returns the number of tracing threads: one per processor unless `--threads` is given.
+    /// Returns the number of tracing threads: one per processor, or the number of `--threads` up to
+    /// a small multiple of the processors.
     pub fn threads(&self) -> usize {
-        let all = || std::thread::available_parallelism().map_or(1, usize::from);
-        self.threads.map_or_else(all, usize::from)
+        self.threads.map_or_else(processors, |given| usize::from(given).min(max_threads()))
+    }
+
+    /// Returns a warning if fewer threads are used than `--threads` requests.
+    fn warning(&self) -> Option<String> {
+        let given = self.threads.map(usize::from).filter(|given| *given > self.threads())?;
+        let number = match processors() {
+            1 => "1 processor".to_string(),
+            n => format!("{n} processors"),
+        };
+        let threads = self.threads();
+        Some(format!(
+            "warning: --threads {given}: {threads} threads are used, since this machine has {number}; \
+             more would only wait"
+        ))
+    }
+}
+
+impl Cli {
+    /// Returns a warning about options that are legal but not followed.
+    pub fn warning(&self) -> Option<String> {
+        match &self.command {
+            Some(Command::Render(args)) => args.compute.warning(),
+            Some(Command::Measure(args)) => args.compute.warning(),
+            Some(Command::Check(_) | Command::New(_) | Command::Doctor(_)) => None,
+            None => self.edit.compute.warning(),
+        }
     }
 }
 
@@ -393,6 +436,18 @@ mod tests {
             ["--seed", "-1"],
         ] {
             assert_eq!(render(&wrong).unwrap_err().exit_code(), 2, "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn threads_are_limited_to_a_multiple_of_the_processors() {
+        let compute = |n: &str| render(&["--threads", n]).unwrap().compute;
+        assert_eq!((compute("16").threads(), compute("16").warning()), (16, None));
+        assert_eq!(compute("4096").threads(), max_threads().min(4096));
+        if max_threads() < 4096 {
+            let warning = compute("4096").warning().unwrap();
+            let expected = format!("--threads 4096: {} threads are used", max_threads());
+            assert!(warning.contains(&expected), "{warning}");
         }
     }
 

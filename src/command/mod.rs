@@ -45,6 +45,9 @@ enum Failure {
 pub fn main() -> ExitCode {
     let started = Instant::now();
     let cli = parse_command_line();
+    if let Some(warning) = cli.warning() {
+        warn(&warning);
+    }
     let result = match &cli.command {
         Some(Command::Render(args)) => render::run(args, started),
         Some(Command::Measure(args)) => measure::run(args),
