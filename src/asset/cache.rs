@@ -1,9 +1,10 @@
 //! Cache of asset files (meshes and images), shared between compilations of scenes.
 
-use crate::asset::error::AssetError;
+use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES, read_error};
 use crate::asset::image::Image;
 use crate::asset::mesh::{Mesh, TriangleMesh};
+use crate::value::{available_memory, megabytes};
 use std::collections::HashMap;
 use std::fmt;
 use std::hash::Hash;
@@ -17,6 +18,9 @@ const UNUSED_BYTES: usize = 256 << 20;
 
 /// Largest size of an image file in bytes: 512 MiB.
 const MAX_IMAGE_BYTES: u64 = 512 << 20;
+
+/// Largest memory for each triangle while the BVH of a mesh is built \[bytes\].
+const BUILD_BYTES: u64 = 400;
 
 /// Stage of loading a file that can take a noticeable time.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -152,6 +156,7 @@ impl Assets {
         let read = |key: &Key| {
             let triangles = TriangleMesh::parse(self.read(path, key, MAX_BYTES)?)?;
             let count = triangles.triangles.len();
+            check_build_memory(path, count)?;
             (self.progress)(&LoadProgress::Building { file: path.to_path_buf(), triangles: count });
             Ok(Mesh::new(triangles))
         };
@@ -170,6 +175,28 @@ impl Assets {
     fn read(&self, path: &Path, key: &Key, limit: u64) -> Result<FileContents, AssetError> {
         (self.progress)(&LoadProgress::Reading { file: path.to_path_buf(), bytes: key.bytes });
         FileContents::read(path, limit)
+    }
+}
+
+/// Checks that there is memory to build the BVH of a mesh of `triangles` triangles.
+///
+/// # Errors
+/// States both sums and the remedy.
+fn check_build_memory(path: &Path, triangles: usize) -> Result<(), AssetError> {
+    let needed = (triangles as u64).saturating_mul(BUILD_BYTES);
+    match available_memory() {
+        Some(available) if available.bytes < needed => Err(AssetError {
+            file: path.to_path_buf(),
+            place: FileLocation::Whole,
+            found: format!(
+                "the tree over {triangles} triangles needs {} of memory, and {} are available ({})",
+                megabytes(needed),
+                megabytes(available.bytes),
+                available.limit
+            ),
+            expected: "a mesh of fewer triangles, or more free memory".to_string(),
+        }),
+        _ => Ok(()),
     }
 }
 

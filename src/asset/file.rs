@@ -2,6 +2,7 @@
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::disk::open_regular;
+use crate::value::megabytes;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 
@@ -41,7 +42,11 @@ impl FileContents {
             let found = format!("the file has {} MiB", metadata.len() >> 20);
             return error(found, &format!("at most {} MiB", limit >> 20));
         }
-        let mut bytes = Vec::with_capacity(metadata.len() as usize);
+        let mut bytes = Vec::new();
+        if bytes.try_reserve_exact(metadata.len() as usize + 1).is_err() {
+            let found = format!("there is no memory for its {}", megabytes(metadata.len()));
+            return error(found, "a smaller file, or more free memory");
+        }
         // One byte more than the limit is read, to detect that the file grew meanwhile.
         file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| read_error(path, &e))?;
         if bytes.len() as u64 > limit {

@@ -7,7 +7,11 @@ use crate::film::invalid::InvalidSamples;
 use crate::film::light_weights::{LightWeights, Replicates, Sums};
 use crate::film::noise::{Estimator, Noise};
 use crate::film::tile::{MAX_FILM_GROUPS, Tile};
+use std::collections::TryReserveError;
 use std::fmt;
+
+/// Memory from which on a film is allocated as a whole before the first sample \[bytes\].
+const RESERVED_FROM: u64 = 64 << 20;
 
 /// Properties of a film. Two films can be added only if their headers are equal.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,6 +101,42 @@ impl Film {
     /// Panics if width, height or the number of groups is 0, if there are more than
     /// [`MAX_FILM_GROUPS`] groups, or if a scale is not a power of two.
     pub fn new(header: Header) -> Self {
+        Self::try_new(header).expect("memory for the tiles of a film")
+    }
+
+    /// Creates a film without samples as [`Film::new`] does. A large film gets all its memory here,
+    /// so that no later write can fail.
+    ///
+    /// # Errors
+    /// Fails if the memory cannot be allocated.
+    ///
+    /// # Panics
+    /// Panics in the same cases as [`Film::new`].
+    pub fn try_new(header: Header) -> Result<Self, TryReserveError> {
+        let mut film = Self::without_memory(header)?;
+        film.reserve()?;
+        Ok(film)
+    }
+
+    /// Returns the memory of the sums of a film in bytes. For each pixel the film holds a 64-bit sum
+    /// for each of two replicates (halves of the samples), each of `groups` light groups, and each
+    /// of three channels. Tiles at the edge of the picture are complete.
+    pub fn memory_bytes(size: [u32; 2], groups: usize) -> u64 {
+        let [columns, rows] = size.map(|n| u64::from(n).div_ceil(TILE as u64));
+        columns * rows * (Tile::sums_len(groups) * size_of::<i64>()) as u64
+    }
+
+    /// Allocates the memory of all tiles if the film is large. The tiles of a small film are
+    /// allocated by the threads that first write them, and the first picture appears sooner.
+    fn reserve(&mut self) -> Result<(), TryReserveError> {
+        let size = [self.width(), self.height()].map(|n| n as u32);
+        if Self::memory_bytes(size, self.groups()) < RESERVED_FROM {
+            return Ok(());
+        }
+        self.tiles.iter_mut().try_for_each(Tile::reserve)
+    }
+
+    fn without_memory(header: Header) -> Result<Self, TryReserveError> {
         let Header { width, height, scales, .. } = &header;
         assert!(*width > 0 && *height > 0, "a film of {width} x {height} pixels");
         assert!(!scales.is_empty(), "a film without light groups");
@@ -109,24 +149,30 @@ impl Film {
         }
         let [columns, rows] = [width.div_ceil(TILE), height.div_ceil(TILE)];
         let inside = |size: usize, i: usize| (size - i * TILE).min(TILE);
-        let tiles = (0..columns * rows)
-            .map(|t| [inside(*width, t % columns), inside(*height, t / columns)])
-            .map(|extent| Tile::cleared(scales.len(), extent))
-            .collect();
-        Self { epoch: 1, tiles, header }
+        let mut tiles = Vec::new();
+        tiles.try_reserve_exact(columns * rows)?;
+        tiles.extend(
+            (0..columns * rows)
+                .map(|t| [inside(*width, t % columns), inside(*height, t / columns)])
+                .map(|extent| Tile::cleared(scales.len(), extent)),
+        );
+        Ok(Self { epoch: 1, tiles, header })
     }
 
     /// Creates a film without samples. It uses the memory of this film, which may have another
     /// header.
     ///
+    /// # Errors
+    /// Fails if the memory cannot be allocated.
+    ///
     /// # Panics
     /// Panics in the same cases as [`Film::new`].
-    pub fn reuse_for(mut self, header: Header) -> Self {
+    pub fn reuse_for(mut self, header: Header) -> Result<Self, TryReserveError> {
         if header == self.header {
             self.restart();
-            return self;
+            return Ok(self);
         }
-        let mut film = Self::new(header);
+        let mut film = Self::without_memory(header)?;
         // Larger than every epoch of the old tiles.
         film.epoch = self.epoch + 1;
         let memory = self.tiles.into_iter().map(Tile::into_memory);
@@ -136,7 +182,8 @@ impl Film {
             .zip(memory.chain(std::iter::repeat(Vec::new())))
             .map(|(tile, memory)| tile.with_memory(memory))
             .collect();
-        film
+        film.reserve()?;
+        Ok(film)
     }
 
     /// Width in pixels.
@@ -431,7 +478,7 @@ mod tests {
         // New films with fewer, more and equally many tiles, and with more and fewer groups.
         for (width, height, groups) in [(20, 20, 1), (70, 30, 3), (70, 30, 2), (40, 40, 1)] {
             let (header, bytes) = expected(width, height, groups);
-            old = old.reuse_for(header);
+            old = old.reuse_for(header).unwrap();
             assert_eq!((old.samples(), old.touched().count()), (0, 0));
             fill(&mut old, 1, |x, _, _| value(x).repeat(groups));
             assert_eq!(old.bytes(), bytes, "{width} x {height}, {groups} groups");

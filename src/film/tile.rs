@@ -3,6 +3,7 @@
 use crate::film::invalid::InvalidSamples;
 use crate::film::{InvalidSample, TILE};
 use crate::lanes::prefetch;
+use std::collections::TryReserveError;
 
 /// Number of pixels in a tile.
 pub const TILE_PIXELS: usize = TILE * TILE;
@@ -69,13 +70,28 @@ impl Tile {
         Self { sums, ..self }
     }
 
+    /// Number of sums of a tile with this number of light groups.
+    pub(super) fn sums_len(groups: usize) -> usize {
+        2 * TILE_PIXELS * groups * 3
+    }
+
+    /// Allocates the memory of the sums, unless the tile has it. The memory is not written.
+    pub(super) fn reserve(&mut self) -> Result<(), TryReserveError> {
+        let len = Self::sums_len(self.stride / 3);
+        if self.sums.capacity() < len {
+            self.sums = Vec::new();
+            self.sums.try_reserve_exact(len)?;
+        }
+        Ok(())
+    }
+
     /// Starts a new epoch of the tile: allocates or clears it if its contents belong to another
     /// epoch.
     pub(super) fn clear_if_stale(&mut self, epoch: u64) {
         if self.epoch == epoch {
             return;
         }
-        let len = 2 * TILE_PIXELS * self.stride;
+        let len = Self::sums_len(self.stride / 3);
         if self.sums.capacity() >= len {
             self.sums.resize(len, 0);
         } else {

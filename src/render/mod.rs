@@ -4,6 +4,7 @@
 pub mod export;
 mod feature_buffer;
 mod first_pass;
+pub mod memory;
 pub mod pass;
 mod relighting;
 mod render_state;

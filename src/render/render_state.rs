@@ -5,7 +5,7 @@ use crate::render::pass::PassContext;
 use crate::render::relighting::Relighting;
 use crate::render::schedule::{Schedule, Settings};
 use crate::render::wave::{Wave, WaveReport};
-use crate::render::{first_pass, pass};
+use crate::render::{first_pass, memory, pass};
 use crate::sampling::SampleSettings;
 use crate::scene::Scene;
 use crate::world::{self, AnyWorld};
@@ -41,14 +41,18 @@ pub struct RenderState {
 impl RenderState {
     /// Compiles `scene`, which has no faults, and creates an empty film. The film reuses the memory
     /// of the film of `previous`.
+    ///
+    /// # Panics
+    /// Panics if there is not enough memory for the film.
     pub fn new(scene: &Scene, options: &Options, previous: Option<Self>) -> Self {
-        Self::compile(Arc::new(scene.clone()), options, previous)
+        Self::compile(Arc::new(scene.clone()), options, previous).expect("memory for the film")
     }
 
     /// Compiles `scene` as [`RenderState::new`] does, if it is valid.
     ///
     /// # Errors
-    /// Returns the first validation error of the scene.
+    /// Returns the first validation error of the scene, or that there is not enough memory for the
+    /// film.
     pub fn checked(
         scene: &Arc<Scene>,
         options: &Options,
@@ -56,12 +60,22 @@ impl RenderState {
     ) -> Result<Self, String> {
         match scene.faults().first() {
             Some(fault) => Err(fault.to_string()),
-            None => Ok(Self::compile(Arc::clone(scene), options, previous)),
+            None => Self::compile(Arc::clone(scene), options, previous),
         }
     }
 
-    fn compile(scene: Arc<Scene>, options: &Options, previous: Option<Self>) -> Self {
+    fn compile(
+        scene: Arc<Scene>,
+        options: &Options,
+        previous: Option<Self>,
+    ) -> Result<Self, String> {
         let world = AnyWorld::compile(&scene, &options.world);
+        let (size, groups) = (scene.film.size, world.light_groups().members.len());
+        let film_of = |previous: &Self| {
+            let size = [previous.film.width(), previous.film.height()].map(|n| n as u32);
+            Film::memory_bytes(size, previous.film.groups())
+        };
+        memory::check(size, groups, previous.as_ref().map_or(0, film_of))?;
         let [width, height] = scene.film.size.map(|n| n as usize);
         let header = Header {
             width,
@@ -74,10 +88,11 @@ impl RenderState {
         let estimator = Estimator::new(&header.scales, &mix, &options.display);
         let film = match previous {
             Some(previous) => previous.film.reuse_for(header),
-            None => Film::new(header),
+            None => Film::try_new(header),
         };
+        let film = film.map_err(|_| memory::refused(size, groups))?;
         let lighting = Relighting::new(Arc::clone(&scene), world.light_groups().clone());
-        Self {
+        Ok(Self {
             world,
             film,
             mix,
@@ -86,7 +101,7 @@ impl RenderState {
             sampling: options.sampling,
             display: options.display,
             estimator,
-        }
+        })
     }
 
     /// Shows `scene` from now on and returns `true` if the samples at hand are valid for it.

@@ -6,6 +6,7 @@ use crate::render::schedule::{Schedule, Settings, Spp, Step, StoppedBy};
 use crate::render::{Options, RenderState};
 use crate::scene::Scene;
 use std::io;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -21,7 +22,8 @@ impl SyncRender {
     /// Compiles `scene`, which has no validation errors, for `threads` threads.
     ///
     /// # Errors
-    /// Returns the operating system's error if a thread cannot be started.
+    /// Returns the operating system's error if a thread cannot be started, or that there is not
+    /// enough memory for the film.
     pub fn new(
         scene: &Scene,
         options: &Options,
@@ -32,7 +34,8 @@ impl SyncRender {
             .num_threads(threads)
             .build()
             .map_err(io::Error::other)?;
-        let rendering = RenderState::new(scene, options, None);
+        let rendering = RenderState::checked(&Arc::new(scene.clone()), options, None)
+            .map_err(io::Error::other)?;
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
         let schedule = rendering.schedule(settings);
         Ok(Self { rendering, schedule, pool, seconds: 0.0 })

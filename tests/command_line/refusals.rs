@@ -93,3 +93,43 @@ fn old_processor_gets_a_message() {
         assert!(run.err.contains(&words), "{model}: {}", run.err);
     }
 }
+
+/// The film of the picture needs 3.2 GB, and the limit is 1.5 GB of address space.
+#[test]
+#[cfg(target_os = "linux")]
+fn film_that_does_not_fit_is_refused_with_sums_and_remedy() {
+    let desk = Desk::new();
+    let scene = format!("film.size = [16384, 4096]\n{SCENE}");
+    fs::write(desk.path("large.toml"), scene).unwrap();
+    let limited = |command: &str| {
+        let script = format!("ulimit -v 1500000; exec \"$0\" {command} --threads 2");
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &script, env!("CARGO_BIN_EXE_zerkalo")]).current_dir(desk.0.path());
+        Run::from(shell.output().unwrap())
+    };
+    for command in ["render large.toml -o a.png", "measure large.toml --seconds 1"] {
+        let run = limited(command);
+        assert_eq!(run.status, 1, "{command}: {}", run.err);
+        for part in [
+            "film: 16384 x 4096 pixels with 1 light group need 4.4 GB of memory, and ",
+            "are available (the limit on address space, `ulimit -v`)",
+            "Expected a smaller picture, such as size = [",
+        ] {
+            assert!(run.err.contains(part), "no {part:?} in {:?}", run.err);
+        }
+        assert_eq!(desk.files(), ["large.toml", "scene.toml"]);
+    }
+    // The suggested size fits.
+    let run = limited("render large.toml -o a.png --size 64x16 --spp 2");
+    assert_eq!(run.status, 0, "{}", run.err);
+}
+
+#[test]
+fn many_threads_are_reduced_with_a_warning() {
+    let desk = Desk::new();
+    let stats = desk.stats(&["--spp", "2", "--threads", "4096"]);
+    let processors = std::thread::available_parallelism().unwrap().get() as u64;
+    assert_eq!(stats["threads"].as_u64().unwrap(), (4 * processors).clamp(16, 4096));
+    let run = desk.render("a.png", &["--spp", "2", "--threads", "4096"]);
+    assert!(run.err.starts_with("warning: --threads 4096: "), "{}", run.err);
+}

@@ -56,12 +56,14 @@ impl<'a> Builder<'a> {
     /// numbers with the length of the file.
     ///
     /// # Errors
-    /// If the mesh would exceed a limit.
+    /// If the mesh would exceed a limit, or there is not enough memory.
     pub fn reserve(&mut self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         self.check_limits(vertices, triangles)?;
-        self.positions.reserve(vertices);
-        self.triangles.reserve(triangles);
-        Ok(())
+        let reserved = self.positions.try_reserve(vertices);
+        reserved.and_then(|()| self.triangles.try_reserve(triangles)).map_err(|_| {
+            let found = format!("there is no memory for {triangles} triangles");
+            self.source.error(FileLocation::Whole, found, "a smaller mesh, or more free memory")
+        })
     }
 
     /// Checks that the mesh may have this many more vertices and triangles.
