@@ -1,5 +1,6 @@
 //! Diagnostics: errors and warnings about a scene file, as users read them.
 
+use crate::scene::format::source_map::LineCounter;
 use crate::value::sanitized;
 use std::fmt;
 
@@ -43,22 +44,90 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// All errors of one scene file: at least one, sorted by location.
+/// Largest number of errors of a file that are reported. The others are counted.
+pub(crate) const MAX_REPORTED: usize = 100;
+
+/// Errors of one scene file: at least one, sorted by location.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneErrors {
     messages: Vec<Diagnostic>,
+    /// Number of errors that are not in `messages`.
+    more: usize,
+}
+
+/// Collector of diagnostics by byte offset in the file, of which it keeps the first
+/// [`MAX_REPORTED`].
+#[derive(Default)]
+pub(super) struct FirstDiagnostics {
+    found: Vec<(usize, Diagnostic)>,
+    more: usize,
+    /// Offset above which nothing is kept.
+    last: Option<usize>,
+}
+
+impl FirstDiagnostics {
+    /// Adds the diagnostic of `make` at the offset `at`, without line and column. `make` is not
+    /// called if there are enough diagnostics at smaller offsets.
+    pub fn add(&mut self, at: usize, make: impl FnOnce() -> Diagnostic) {
+        if self.skips(at) {
+            return;
+        }
+        self.found.push((at, make()));
+        if self.found.len() >= 4 * MAX_REPORTED {
+            self.keep_first();
+        }
+    }
+
+    /// Counts a diagnostic at the offset `at` and returns `true`, if there are enough diagnostics at
+    /// smaller offsets. Returns `false` otherwise.
+    pub fn skips(&mut self, at: usize) -> bool {
+        let skips = self.last.is_some_and(|last| at > last);
+        self.more += usize::from(skips);
+        skips
+    }
+
+    /// Adds to the number of diagnostics that are not kept.
+    pub fn count_more(&mut self, more: usize) {
+        self.more += more;
+    }
+
+    fn keep_first(&mut self) {
+        self.found.sort_by_key(|(at, _)| *at);
+        self.more += self.found.len().saturating_sub(MAX_REPORTED);
+        self.found.truncate(MAX_REPORTED);
+        if self.found.len() == MAX_REPORTED {
+            self.last = self.found.last().map(|(at, _)| *at);
+        }
+    }
+
+    /// Returns `true` if nothing was added.
+    pub fn is_empty(&self) -> bool {
+        self.found.is_empty()
+    }
+
+    /// Returns the diagnostics with lines and columns in `text`, sorted by location, and the number
+    /// of those that were not kept.
+    pub fn located(mut self, text: &str) -> (Vec<Diagnostic>, usize) {
+        self.keep_first();
+        let mut lines = LineCounter::new(text);
+        let located = |(at, diagnostic): (usize, Diagnostic)| Diagnostic {
+            line_column: Some(lines.line_column(at)),
+            ..diagnostic
+        };
+        (self.found.into_iter().map(located).collect(), self.more)
+    }
 }
 
 /// Largest number of diagnostics that are printed at once.
 const MAX_SHOWN: usize = 20;
 
 impl SceneErrors {
-    /// Creates the errors from `messages`, which must not be empty, and sorts them by location.
-    pub(super) fn new(mut messages: Vec<Diagnostic>) -> Self {
+    /// Creates the errors from `messages`, which must not be empty and are sorted by location.
+    /// `more` is the number of further errors.
+    pub(super) fn new((mut messages, more): (Vec<Diagnostic>, usize)) -> Self {
         debug_assert!(!messages.is_empty(), "errors without a message");
-        messages.sort_by_key(|m| m.line_column);
         messages.dedup();
-        Self { messages }
+        Self { messages, more }
     }
 
     /// Creates an error about the file as a whole.
@@ -76,12 +145,18 @@ impl SceneErrors {
         let (file, help) = (file.to_string(), help.to_string());
         Self {
             messages: vec![Diagnostic { file, line_column, subject: String::new(), found, help }],
+            more: 0,
         }
     }
 
-    /// Returns the diagnostics, sorted by location.
+    /// Returns the first diagnostics, at most 100, sorted by location.
     pub fn messages(&self) -> &[Diagnostic] {
         &self.messages
+    }
+
+    /// Returns the number of errors that [`SceneErrors::messages`] does not have.
+    pub fn more(&self) -> usize {
+        self.more
     }
 }
 
@@ -93,7 +168,7 @@ impl fmt::Display for SceneErrors {
             }
             message.fmt(f)?;
         }
-        match self.messages.len().saturating_sub(MAX_SHOWN) {
+        match self.messages.len().saturating_sub(MAX_SHOWN) + self.more {
             0 => Ok(()),
             more => write!(f, "\n… and {more} more."),
         }

@@ -2,6 +2,7 @@
 
 use crate::material::Mapping;
 use crate::scene::Scene;
+use crate::scene::diagnostic::MAX_REPORTED;
 use crate::scene::format::suggest::nearest;
 use crate::value::{ValidationError, truncated};
 use std::collections::HashMap;
@@ -49,6 +50,49 @@ pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<Stri
     }
 }
 
+/// Collector of the first [`MAX_REPORTED`] problems of a scene.
+struct Problems<'a> {
+    scene: &'a Scene,
+    found: Vec<Problem>,
+    /// Number of further problems.
+    more: usize,
+}
+
+impl Problems<'_> {
+    /// Adds the errors of the table at `path`.
+    fn add(&mut self, path: &[&str], errors: Vec<ValidationError>) {
+        for error in errors {
+            if self.is_full() {
+                continue;
+            }
+            let mut all = path.to_vec();
+            all.extend(error.key.split('.').filter(|k| !k.is_empty()));
+            let help = format!("Expected {}.", error.expected);
+            self.found.push(self.scene.problem(&all, error.found, help));
+        }
+    }
+
+    /// Adds the errors of an entry of a list.
+    fn add_entry(&mut self, list: &str, index: usize, errors: Vec<ValidationError>) {
+        if !errors.is_empty() {
+            self.add(&[list, &index.to_string()], errors);
+        }
+    }
+
+    /// Counts a problem and returns `true` if there are enough. Returns `false` otherwise.
+    fn is_full(&mut self) -> bool {
+        self.is_full_with(0)
+    }
+
+    /// Counts a problem and returns `true` if there are enough, together with `others` that are not
+    /// added yet. Returns `false` otherwise.
+    fn is_full_with(&mut self, others: usize) -> bool {
+        let is_full = self.found.len() + others >= MAX_REPORTED;
+        self.more += usize::from(is_full);
+        is_full
+    }
+}
+
 fn keys(parts: &[&str]) -> Vec<String> {
     parts.iter().map(|p| p.to_string()).collect()
 }
@@ -79,46 +123,44 @@ impl Scene {
         }
     }
 
-    /// Returns all validation errors of the scene. A scene that was read from a file has none; an
-    /// edited scene may have some.
+    /// Returns the first 100 validation errors of the scene. A scene that was read from a file has
+    /// none; an edited scene may have some.
     pub fn faults(&self) -> Vec<Problem> {
-        let mut problems = Vec::new();
-        let mut add = |path: &[&str], faults: Vec<ValidationError>| {
-            problems.extend(faults.into_iter().map(|fault| {
-                let mut all = path.to_vec();
-                all.extend(fault.key.split('.').filter(|k| !k.is_empty()));
-                self.problem(&all, fault.found, format!("Expected {}.", fault.expected))
-            }));
-        };
-        add(&["film"], self.film.faults());
-        add(&["trace"], self.trace.faults());
-        add(&["camera"], self.camera.faults());
+        self.check().0
+    }
+
+    /// Returns the first 100 validation errors of the scene, and the number of further ones.
+    pub(super) fn check(&self) -> (Vec<Problem>, usize) {
+        let mut problems = Problems { scene: self, found: Vec::new(), more: 0 };
+        problems.add(&["film"], self.film.faults());
+        problems.add(&["trace"], self.trace.faults());
+        problems.add(&["camera"], self.camera.faults());
         for (name, view) in &self.cameras {
-            add(&["cameras", name], view.faults());
+            problems.add(&["cameras", name], view.faults());
         }
-        add(&["background"], self.background.faults());
-        add(&["ambient"], self.ambient.faults());
+        problems.add(&["background"], self.background.faults());
+        problems.add(&["ambient"], self.ambient.faults());
         for (i, light) in self.lights.iter().enumerate() {
-            add(&["light", &i.to_string()], light.faults());
+            problems.add_entry("light", i, light.faults());
         }
         for (name, material) in &self.materials {
-            add(&["materials", name], material.faults());
+            problems.add(&["materials", name], material.faults());
         }
         for (i, object) in self.objects.iter().enumerate() {
-            add(&["object", &i.to_string()], object.faults());
+            problems.add_entry("object", i, object.faults());
         }
-        if problems.is_empty() {
+        if problems.found.is_empty() {
             self.missing_coordinates(&mut problems);
         }
         self.missing_materials(&mut problems);
         self.same_names("light", self.lights.iter().map(|l| &l.name), &mut problems);
         self.same_names("object", self.objects.iter().map(|o| &o.name), &mut problems);
-        problems
+        (problems.found, problems.more)
     }
 
     /// Adds a problem for each material whose textures need coordinates that the object's shape
     /// does not have. The shapes must be valid.
-    fn missing_coordinates(&self, problems: &mut Vec<Problem>) {
+    fn missing_coordinates(&self, problems: &mut Problems) {
         let uv_key = |name: &str| {
             let material = self.materials.get(name)?;
             let texture = material.texture.as_ref().map(|t| t.placement().mapping);
@@ -136,6 +178,9 @@ impl Scene {
             let spaces = object.shape.texture_spaces();
             let lacks_uv = |k: &usize| uv_keys[*k].is_some() && !spaces[*k].has_uv();
             let Some(part) = (0..spaces.len()).find(lacks_uv) else { continue };
+            if problems.is_full() {
+                continue;
+            }
             let what = match object.shape.file() {
                 Some(file) => format!("there are none in \"{}\"", truncated(file)),
                 None if spaces.len() > 1 => format!("parts of a {} have none", object.shape.key()),
@@ -150,21 +195,24 @@ impl Scene {
                 "Expected a mesh whose file has them, a rectangle or a platform. On other shapes \
                         another mapping works: \"auto\" takes the one that suits the shape."
                     .to_string();
-            problems.push(self.problem(&["object", &i.to_string(), "material"], found, help));
+            problems.found.push(self.problem(&["object", &i.to_string(), "material"], found, help));
         }
     }
 
-    fn missing_materials(&self, problems: &mut Vec<Problem>) {
-        let mut named = Vec::new();
+    fn missing_materials(&self, problems: &mut Problems) {
+        let is_missing = |name: &str| !name.is_empty() && !self.materials.contains_key(name);
+        let mut missing = Vec::new();
         for (i, object) in self.objects.iter().enumerate() {
-            named.push((format!("object.{i}.material"), object.material.as_str()));
-            let parts = object.shape.named_materials().into_iter();
-            named.extend(parts.map(|(key, name)| (format!("object.{i}.shape.{key}"), name)));
-        }
-        for (key, name) in named {
-            if name.is_empty() || self.materials.contains_key(name) {
-                continue;
+            if is_missing(&object.material) && !problems.is_full_with(missing.len()) {
+                missing.push((format!("object.{i}.material"), object.material.as_str()));
             }
+            for (key, name) in object.shape.named_materials() {
+                if is_missing(name) && !problems.is_full_with(missing.len()) {
+                    missing.push((format!("object.{i}.shape.{key}"), name));
+                }
+            }
+        }
+        for (key, name) in missing {
             let defined: Vec<_> =
                 self.materials.keys().take(20).map(|n| format!("\"{}\"", truncated(n))).collect();
             let mut help = match defined.as_slice() {
@@ -179,7 +227,7 @@ impl Scene {
                 help += &format!(" Did you mean \"{}\"?", truncated(meant));
             }
             let found = format!("material \"{}\" is not defined", truncated(name));
-            problems.push(self.problem(&key.split('.').collect::<Vec<_>>(), found, help));
+            problems.found.push(self.problem(&key.split('.').collect::<Vec<_>>(), found, help));
         }
     }
 
@@ -187,14 +235,17 @@ impl Scene {
         &self,
         list: &str,
         names: impl Iterator<Item = &'a String>,
-        problems: &mut Vec<Problem>,
+        problems: &mut Problems,
     ) {
         let mut first = HashMap::new();
         for (i, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
             if let Some(other) = first.get(name) {
+                if problems.is_full() {
+                    continue;
+                }
                 let found = format!("{list} {} has the same name", other + 1);
                 let help = "Expected a name of its own, or none.".to_string();
-                problems.push(self.problem(&[list, &i.to_string(), "name"], found, help));
+                problems.found.push(self.problem(&[list, &i.to_string(), "name"], found, help));
             } else {
                 first.insert(name, i);
             }

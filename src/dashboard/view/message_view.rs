@@ -44,6 +44,9 @@ pub fn broken(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer
         lines.push((String::new(), theme.text()));
         lines.extend(formatted(message, width, theme));
     }
+    if errors.more() > 0 {
+        lines.push((format!("… and {} more.", errors.more()), theme.text()));
+    }
     lines.push((String::new(), theme.text()));
     let help = "Fix the file: it is reloaded as soon as it is written.";
     lines.extend(wrapped(help, width).into_iter().map(|line| (line, theme.text())));

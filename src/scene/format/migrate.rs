@@ -2,7 +2,8 @@
 //! accepts a former word as the present one; saving writes the present word.
 
 use crate::primitive::Acceleration;
-use crate::scene::diagnostic::Diagnostic;
+use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics};
+use crate::scene::format::parts::Part;
 use crate::scene::format::source_map::{line_column, subject_in};
 use std::ops::Range;
 use toml::Spanned;
@@ -66,40 +67,44 @@ struct Conflict {
     present: (&'static str, Range<usize>),
 }
 
-/// Replaces the former words in the parsed file `root` by the present ones; the spans of keys and
-/// values stay. Returns the replaced words, and an error for each table that has a key under both
-/// names.
+/// Replaces the former words in `root` by the present ones; the spans of keys and values stay.
+/// `root` is the parsed `part` of the file with this name and text. Returns the replaced words, and adds an error for each table
+/// that has a key under both names.
 pub(crate) fn migrate(
-    file: &str,
-    text: &str,
+    (file, text): (&str, &str),
     root: &mut DeTable,
-) -> (Vec<FormerWord>, Vec<Diagnostic>) {
-    let mut migration = Migration::default();
+    part: &Part,
+    errors: &mut FirstDiagnostics,
+) -> Vec<FormerWord> {
+    let mut migration =
+        Migration { part, path: Vec::new(), words: Vec::new(), conflicts: Vec::new() };
     migration.table(root);
-    let error = |conflict: &Conflict| {
+    for conflict in &migration.conflicts {
         let (former, at) = &conflict.former;
         let (present, other) = &conflict.present;
-        let (line, column) = line_column(text, other.start);
-        Diagnostic {
-            file: file.to_string(),
-            line_column: Some(line_column(text, at.start)),
-            subject: subject_in(root, &conflict.table),
-            found: format!("`{former}` is the former name of `{present}`, which is given, too"),
-            help: format!("Expected only `{present}`, at {line}:{column}."),
-        }
-    };
-    let errors = migration.conflicts.iter().map(error).collect();
-    (migration.words, errors)
+        let other = part.in_file(other.start);
+        errors.add(part.in_file(at.start), || {
+            let (line, column) = line_column(text, other);
+            Diagnostic {
+                file: file.to_string(),
+                line_column: None,
+                subject: subject_in(root, &conflict.table, part.first_object),
+                found: format!("`{former}` is the former name of `{present}`, which is given, too"),
+                help: format!("Expected only `{present}`, at {line}:{column}."),
+            }
+        });
+    }
+    migration.words
 }
 
-#[derive(Default)]
-struct Migration {
+struct Migration<'a> {
+    part: &'a Part,
     path: Vec<String>,
     words: Vec<FormerWord>,
     conflicts: Vec<Conflict>,
 }
 
-impl Migration {
+impl Migration<'_> {
     fn table(&mut self, table: &mut DeTable) {
         for (former, present) in keys_at(&self.path) {
             self.key(table, former, present);
@@ -121,7 +126,8 @@ impl Migration {
     }
 
     fn entries(&mut self, list: &mut [Spanned<DeValue>]) {
-        for (i, entry) in list.iter_mut().enumerate() {
+        let first = self.part.first_index(&self.path);
+        for (i, entry) in (first..).zip(list) {
             if let DeValue::Table(table) = entry.get_mut() {
                 self.path.push(i.to_string());
                 self.table(table);
@@ -142,7 +148,7 @@ impl Migration {
             return;
         }
         self.words.push(FormerWord {
-            start: span.start,
+            start: self.part.in_file(span.start),
             table: self.path.clone(),
             key: None,
             former,
@@ -153,7 +159,7 @@ impl Migration {
 
     fn value(&mut self, table: &mut DeTable, key: &'static str, pairs: &[Pair]) {
         let Some(value) = table.get_mut(key) else { return };
-        let start = value.span().start;
+        let start = self.part.in_file(value.span().start);
         if let DeValue::String(word) = value.get_mut()
             && let Some(&(former, present)) = pairs.iter().find(|(former, _)| former == word)
         {
@@ -164,31 +170,41 @@ impl Migration {
     }
 }
 
-/// Returns the warning about the former words of a file, which states the first of them and their
-/// number. Returns `None` if there are none.
-pub(crate) fn warning(
-    file: &str,
-    text: &str,
+/// Returns the former word of `words` that comes first in the file, with its offset and the name
+/// that diagnostics use for its table. `root` is the parsed `part` that has the words. Returns `None`
+/// if there are no words.
+pub(crate) fn first_word(
     root: &DeTable,
+    part: &Part,
     words: &[FormerWord],
-) -> Option<Diagnostic> {
+) -> Option<(usize, FormerWord, String)> {
     let first = words.iter().min_by_key(|word| word.start)?;
+    Some((first.start, first.clone(), subject_in(root, &first.table, part.first_object)))
+}
+
+/// Returns the warning about the `count` former words of a file, which states the first of them, in
+/// the table `subject`.
+pub(crate) fn warning(
+    (file, text): (&str, &str),
+    (start, first, subject): &(usize, FormerWord, String),
+    count: usize,
+) -> Diagnostic {
     let FormerWord { former, present, .. } = first;
     let name = match first.key {
         Some(key) => format!("`{key} = \"{former}\"` is now called `{key} = \"{present}\"`"),
         None => format!("`{former}` is now called `{present}`"),
     };
-    let (count, help) = match words.len() {
+    let (count, help) = match count {
         1 => (String::new(), "Saving writes the new name."),
         n => (format!(" ({n} former names in this file)"), "Saving writes the new names."),
     };
-    Some(Diagnostic {
+    Diagnostic {
         file: file.to_string(),
-        line_column: Some(line_column(text, first.start)),
-        subject: subject_in(root, &first.table),
+        line_column: Some(line_column(text, *start)),
+        subject: subject.clone(),
         found: name + &count,
         help: help.to_string(),
-    })
+    }
 }
 
 /// Replaces the former `words` in `document` by the present ones; order, layout and comments stay.

@@ -1,9 +1,10 @@
 //! Reading of scene files: text to validated scene.
 
-use crate::scene::diagnostic::{Diagnostic, SceneErrors};
+use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics, SceneErrors};
 use crate::scene::format::migrate::{self, FormerWord, migrate};
+use crate::scene::format::parts::{PART_BYTES, Part, split};
 use crate::scene::format::schema;
-use crate::scene::format::source_map::{line_column, with_locations};
+use crate::scene::format::source_map::{line_column, locate};
 use crate::scene::{AssetResolver, Scene};
 use serde::Deserialize;
 use std::fs::File;
@@ -11,17 +12,16 @@ use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
 
-use toml::Spanned;
 use toml::de::{DeTable, Deserializer};
 
-/// Largest scene file that is read [bytes]. A file of this size has some hundred thousand objects.
+/// Largest scene file that is read [bytes]. A file of this size has about a million objects.
 const MAX_BYTES: u64 = 64 << 20;
 
 impl Scene {
     /// Reads and validates the scene file at `path`.
     ///
     /// # Errors
-    /// All errors, with line and column: not readable, not UTF-8, not TOML, unknown keys, wrong
+    /// The first 100 errors, with line and column: not readable, not UTF-8, not TOML, unknown keys, wrong
     /// types, values out of range, undefined names. Values are validated only if keys and types are
     /// right.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
@@ -50,14 +50,16 @@ impl Scene {
     }
 }
 
-/// A valid scene and the parsed text that describes it, so that the text is parsed once and the
+/// A valid scene and the text that describes it. The text was parsed once, part by part, and the
 /// scene validated once.
 pub(crate) struct SourceScene<'a> {
     pub scene: Scene,
     pub former_words: Vec<FormerWord>,
+    /// The first of `former_words` in the file.
+    first_word: Option<(usize, FormerWord, String)>,
     name: &'a str,
     text: &'a str,
-    root: Spanned<DeTable<'a>>,
+    parts: Vec<Part>,
 }
 
 impl<'a> SourceScene<'a> {
@@ -70,42 +72,111 @@ impl<'a> SourceScene<'a> {
         name: &'a str,
         resolver: AssetResolver,
     ) -> Result<Self, SceneErrors> {
-        let (mut root, syntax) = DeTable::parse_recoverable(text);
-        let start = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
-        if let Some(error) = syntax.iter().min_by_key(|error| start(error)) {
-            let line_column = Some(line_column(text, start(error)));
-            let found = format!("this is not TOML: {}", error.message());
-            return Err(SceneErrors::at(name, line_column, found, ""));
+        Self::parse_parts(text, name, resolver, split(text, PART_BYTES))
+    }
+
+    /// Parses and validates a scene from the `parts` of `text`.
+    fn parse_parts(
+        text: &'a str,
+        name: &'a str,
+        resolver: AssetResolver,
+        parts: Vec<Part>,
+    ) -> Result<Self, SceneErrors> {
+        let mut source = Self {
+            scene: Scene::default(),
+            former_words: Vec::new(),
+            first_word: None,
+            name,
+            text,
+            parts,
+        };
+        match source.read_parts()? {
+            Reading::Done => {}
+            // Objects that stand outside of `[[object]]` sections belong to the same list.
+            Reading::NotInParts => {
+                return Self::parse_parts(text, name, resolver, vec![Part::whole(text)]);
+            }
         }
-        if root.get_ref().is_empty() {
-            return Err(SceneErrors::at(
-                name,
-                Some((1, 1)),
-                "the file holds no scene".to_string(),
-                "Expected at least one [[object]]; `zerkalo new FILE` writes a scene to start from.",
-            ));
+        source.scene.resolver = resolver;
+        source.scene.resolve();
+        let (problems, more) = source.scene.check();
+        if problems.is_empty() {
+            return Ok(source);
         }
-        let (former_words, mut errors) = migrate(name, text, root.get_mut());
-        errors.extend(schema::check(name, text, &root));
+        let mut errors = FirstDiagnostics::default();
+        locate((name, text), &source.parts, problems, &mut errors);
+        errors.count_more(more);
+        Err(SceneErrors::new(errors.located(text)))
+    }
+
+    /// Reads the scene from the parts, without semantic validation.
+    fn read_parts(&mut self) -> Result<Reading, SceneErrors> {
+        let (name, text) = (self.name, self.text);
+        let mut errors = FirstDiagnostics::default();
+        let mut syntax: Option<(usize, String)> = None;
+        let is_split = self.parts.len() > 1;
+        for (number, part) in self.parts.iter().enumerate() {
+            let part_text = part.text(text);
+            let (mut root, part_syntax) = DeTable::parse_recoverable(&part_text);
+            let start = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
+            if let Some(error) = part_syntax.iter().min_by_key(|error| start(error)) {
+                let at = part.in_file(start(error));
+                if syntax.as_ref().is_none_or(|(first, _)| at < *first) {
+                    syntax = Some((at, error.message().to_string()));
+                }
+            }
+            if syntax.is_some() {
+                continue;
+            }
+            if is_split && number == 0 && root.get_ref().contains_key("object") {
+                return Ok(Reading::NotInParts);
+            }
+            if !is_split && root.get_ref().is_empty() {
+                return Err(SceneErrors::at(
+                    name,
+                    Some((1, 1)),
+                    "the file holds no scene".to_string(),
+                    "Expected at least one [[object]]; `zerkalo new FILE` writes a scene to start from.",
+                ));
+            }
+            let words = migrate((name, text), root.get_mut(), part, &mut errors);
+            let first = migrate::first_word(root.get_ref(), part, &words);
+            if let Some(first) =
+                first.filter(|new| self.first_word.as_ref().is_none_or(|w| new.0 < w.0))
+            {
+                self.first_word = Some(first);
+            }
+            self.former_words.extend(words);
+            schema::check(name, &root, part, &mut errors);
+            if !errors.is_empty() {
+                continue;
+            }
+            let scene = Scene::deserialize(Deserializer::from(root)).map_err(|error| {
+                let line_column =
+                    error.span().map(|span| line_column(text, part.in_file(span.start)));
+                SceneErrors::at(name, line_column, error.message().to_string(), "")
+            })?;
+            match number {
+                0 => self.scene = scene,
+                _ => self.scene.objects.extend(scene.objects),
+            }
+        }
+        if let Some((at, message)) = syntax {
+            let found = format!("this is not TOML: {message}");
+            return Err(SceneErrors::at(name, Some(line_column(text, at)), found, ""));
+        }
         if !errors.is_empty() {
-            return Err(SceneErrors::new(errors));
+            return Err(SceneErrors::new(errors.located(text)));
         }
-        let mut scene = Scene::deserialize(Deserializer::from(root.clone())).map_err(|error| {
-            let line_column = error.span().map(|span| line_column(text, span.start));
-            SceneErrors::at(name, line_column, error.message().to_string(), "")
-        })?;
-        scene.resolver = resolver;
-        scene.resolve();
-        match scene.faults() {
-            problems if problems.is_empty() => Ok(Self { scene, former_words, name, text, root }),
-            problems => Err(SceneErrors::new(with_locations(name, text, root.get_ref(), problems))),
-        }
+        self.scene.objects.shrink_to_fit();
+        Ok(Reading::Done)
     }
 
     /// Returns the lints of the scene and the warning about former words, sorted by location.
     pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
-        let (name, text, root) = (self.name, self.text, self.root.get_ref());
-        let mut warnings = with_locations(name, text, root, self.scene.warnings());
+        let mut found = FirstDiagnostics::default();
+        locate((self.name, self.text), &self.parts, self.scene.warnings(), &mut found);
+        let mut warnings = found.located(self.text).0;
         warnings.extend(self.migration_warning());
         warnings.sort_by_key(|warning| warning.line_column);
         warnings
@@ -113,8 +184,16 @@ impl<'a> SourceScene<'a> {
 
     /// Returns the warning about former words; `None` if the file has none.
     pub(crate) fn migration_warning(&self) -> Option<Diagnostic> {
-        migrate::warning(self.name, self.text, self.root.get_ref(), &self.former_words)
+        let first = self.first_word.as_ref()?;
+        Some(migrate::warning((self.name, self.text), first, self.former_words.len()))
     }
+}
+
+/// Result of reading the parts of a file.
+enum Reading {
+    Done,
+    /// The parts do not describe the scene that the whole file describes.
+    NotInParts,
 }
 
 /// Returns the text of the scene file at `path`, which `open` opens.
@@ -162,4 +241,98 @@ pub(crate) fn read_text(
             "Expected a scene file (TOML), saved as UTF-8.",
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Object;
+    use std::fs;
+
+    /// Parses `text` in parts of single objects, and as a whole.
+    fn both(text: &str, name: &str) -> [Result<Scene, SceneErrors>; 2] {
+        // Meshes are equal only if they were read once.
+        let assets = Arc::default();
+        let parse = |parts: Vec<Part>| {
+            let resolver = AssetResolver::new(Path::new(name), Arc::clone(&assets));
+            let source = SourceScene::parse_parts(text, name, resolver, parts)?;
+            // Warnings become part of the result.
+            let warnings: Vec<_> = source.warnings().iter().map(ToString::to_string).collect();
+            let mut scene = source.scene;
+            scene.objects.extend(warnings.into_iter().map(|name| Object { name, ..ball() }));
+            Ok(scene)
+        };
+        [parse(split(text, 1)), parse(vec![Part::whole(text)])]
+    }
+
+    fn ball() -> Object {
+        let text = "[[object]]\nshape.sphere = { center = [0, 0, 0], radius = 1 }\n";
+        Scene::parse(text, "ball.toml").unwrap().objects.remove(0)
+    }
+
+    #[test]
+    fn parts_of_a_file_give_the_scene_and_the_errors_of_the_whole() {
+        for folder in ["scenes", "tests/bad-scenes"] {
+            let mut count = 0;
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                let is_toml = path.extension().is_some_and(|e| e == "toml");
+                let Ok(text) = fs::read_to_string(&path) else { continue };
+                if is_toml {
+                    let [parts, whole] = both(&text, &path.display().to_string());
+                    assert_eq!(parts, whole, "{}", path.display());
+                    count += 1;
+                }
+            }
+            assert!(count > 20, "{count} files in {folder}");
+        }
+    }
+
+    #[test]
+    fn parts_agree_with_the_whole_in_special_cases() {
+        let ball = "shape.sphere = { center = [0, 0, 0], radius = 1 }\n";
+        let former = "shape.unit_cylinder = { s = 0.5 }\n";
+        for text in [
+            format!("object = []\n[[object]]\n{ball}"),
+            format!("[[object]]\n{ball}[[\"object\"]]\n{ball}"),
+            format!("[[object]]\n{ball}[materials.a]\n[object.x]\n"),
+            format!("[[object]]\n{ball}[[object]]\nname = 'a\n[[object]]\n{ball}"),
+            format!("[[object]]\n{former}[[object]]\nname = \"b\"\n{former}"),
+            format!("[[object]]\nradius = 1\n[[object]]\nname = \"b\"\nsize = 2\n{ball}"),
+            format!("[[object]]\n{ball}[[object]]\n{ball}material = \"gold\"\n[[object]]\n"),
+            format!("[[object]]\n{ball}name = \"a\"\n[[object]]\n{ball}name = \"a\"\n"),
+            format!("[[object]]\n{ball}[[object]]\n{}", ball.replace("radius = 1", "radius = -1")),
+        ] {
+            let [parts, whole] = both(&text, "a.toml");
+            assert_eq!(parts, whole, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_hundred_errors_are_reported_and_the_others_counted() {
+        let keys = |n: usize| (0..n).map(|i| format!("k{i} = 1\n")).collect::<String>();
+        let named = |n: usize| {
+            let ball =
+                "[[object]]\nname = \"a\"\nshape.sphere = { center = [0, 0, 0], radius = 1 }\n";
+            ball.repeat(n)
+        };
+        let radii =
+            |n: usize| named(n).replace("radius = 1", "radius = -1").replace("\"a\"", "\"\"");
+        for (text, line) in [(keys(1000), 100), (named(1001), 302), (radii(1000), 300)] {
+            let errors = Scene::parse(&text, "a.toml").unwrap_err();
+            assert_eq!((errors.messages().len(), errors.more()), (100, 900), "{errors}");
+            assert_eq!(errors.messages()[99].line_column.unwrap().0, line, "{errors}");
+            assert!(errors.to_string().ends_with("\n… and 980 more."), "{errors}");
+        }
+    }
+
+    /// Twice the objects with one error each take twice the time, up to counting.
+    #[test]
+    fn errors_of_large_files_are_found_in_one_pass() {
+        // Each lookup of a line from the beginning of this file would read 2 MB; 20,000 of them
+        // would take half a minute.
+        let text = "[[object]]\nname = \"a\"\nshape.sphere = { center = [0, 0, 0], radius = 1 }\n";
+        let errors = Scene::parse(&text.repeat(20_000), "a.toml").unwrap_err();
+        assert_eq!((errors.messages().len(), errors.more()), (100, 19_899));
+    }
 }

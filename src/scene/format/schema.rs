@@ -2,8 +2,9 @@
 //! type, missing keys. One pass finds all errors.
 
 use crate::scene::OBJECT_FIELDS;
-use crate::scene::diagnostic::Diagnostic;
-use crate::scene::format::source_map::{line_column, subject_in};
+use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics};
+use crate::scene::format::parts::Part;
+use crate::scene::format::source_map::subject_in;
 use crate::scene::format::suggest::nearest;
 use crate::scene::settings::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, TRACE_FIELDS};
 use crate::value::{Color, DefaultValue, Field, NumberRange, ValueType, truncated};
@@ -53,12 +54,15 @@ const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) 
     Field::optional(name, ValueType::Table(fields), "", "its keys have their defaults", doc)
 }
 
-/// Returns all schema errors in the scene file `file`, whose `text` was parsed to `root`.
-pub(crate) fn check(file: &str, text: &str, root: &Spanned<DeTable>) -> Vec<Diagnostic> {
-    let mut walk =
-        SchemaChecker { file, text, root: root.get_ref(), path: Vec::new(), messages: Vec::new() };
+/// Adds the schema errors in `root`, the parsed `part` of the scene file `file`.
+pub(crate) fn check(
+    file: &str,
+    root: &Spanned<DeTable>,
+    part: &Part,
+    errors: &mut FirstDiagnostics,
+) {
+    let mut walk = SchemaChecker { file, part, root: root.get_ref(), path: Vec::new(), errors };
     walk.table(root.get_ref(), 0..0, FIELDS);
-    walk.messages
 }
 
 /// Returns a path in words: `shape.sphere`, `step 2 of transform`, `shape.cube of part 1 of
@@ -82,20 +86,19 @@ fn phrase(keys: &[String]) -> String {
 
 struct SchemaChecker<'a> {
     file: &'a str,
-    text: &'a str,
+    part: &'a Part,
     root: &'a DeTable<'a>,
     path: Vec<String>,
-    messages: Vec<Diagnostic>,
+    errors: &'a mut FirstDiagnostics,
 }
 
 impl SchemaChecker<'_> {
     fn add(&mut self, span: ops::Range<usize>, found: String, help: String) {
-        let subject = subject_in(self.root, &self.path);
-        let place = Some(line_column(self.text, span.start));
-        self.messages.push(Diagnostic {
+        let subject = || subject_in(self.root, &self.path, self.part.first_object);
+        self.errors.add(self.part.in_file(span.start), || Diagnostic {
             file: self.file.to_string(),
-            line_column: place,
-            subject,
+            line_column: None,
+            subject: subject(),
             found,
             help,
         });
@@ -113,6 +116,9 @@ impl SchemaChecker<'_> {
 
     /// Adds an error about a value of a wrong type.
     fn wrong(&mut self, span: ops::Range<usize>, value: &DeValue, expected: &str) {
+        if self.errors.skips(self.part.in_file(span.start)) {
+            return;
+        }
         let name = match self.inner() {
             inner if inner.is_empty() => "it".to_string(),
             inner => inner,
@@ -121,12 +127,15 @@ impl SchemaChecker<'_> {
     }
 
     /// Adds an error about an unknown key. Returns the key that was probably intended; `None` if no
-    /// key is similar.
+    /// key is similar, or if there are enough errors.
     fn unknown(
         &mut self,
         key: &Spanned<toml::de::DeString>,
         fields: &[Field],
     ) -> Option<&'static str> {
+        if self.errors.skips(self.part.in_file(key.span().start)) {
+            return None;
+        }
         let names = || fields.iter().map(|f| f.name);
         let mut help = format!("Known: {}.", names().collect::<Vec<_>>().join(", "));
         let intended = nearest(key.get_ref(), names());
@@ -204,7 +213,8 @@ impl SchemaChecker<'_> {
         expected: &str,
         each: impl Fn(&mut Self, &DeTable, ops::Range<usize>),
     ) {
-        for (i, entry) in list.iter().enumerate() {
+        let first = self.part.first_index(&self.path);
+        for (i, entry) in (first..).zip(list) {
             self.path.push(i.to_string());
             match entry.get_ref() {
                 DeValue::Table(table) => each(self, table, entry.span()),

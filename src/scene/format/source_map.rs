@@ -1,7 +1,10 @@
 //! Source map: lines and columns of keys and values.
 
-use crate::scene::diagnostic::Diagnostic;
+use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics};
+use crate::scene::format::migrate::migrate;
+use crate::scene::format::parts::Part;
 use crate::scene::validate::{Problem, subject};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -9,14 +12,37 @@ use toml::de::{DeTable, DeValue};
 /// Returns line and column of the byte offset `at` in `text`, both from 1; columns count
 /// characters.
 pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
-    let mut at = at.min(text.len());
-    while !text.is_char_boundary(at) {
-        at -= 1;
+    LineCounter::new(text).line_column(at)
+}
+
+/// Lines and columns of ascending byte offsets, found in one pass over the text.
+pub(crate) struct LineCounter<'a> {
+    text: &'a str,
+    /// Offset up to which `lines` counts the line ends.
+    counted: usize,
+    lines: usize,
+}
+
+impl<'a> LineCounter<'a> {
+    pub fn new(text: &'a str) -> Self {
+        Self { text, counted: 0, lines: 0 }
     }
-    let before = &text[..at];
-    let line = before.rfind('\n').map_or(0, |newline| newline + 1);
-    let visible = before[line..].trim_start_matches('\u{feff}');
-    (before.matches('\n').count() + 1, visible.chars().count() + 1)
+
+    /// Returns line and column of the byte offset `at`, both from 1; columns count characters. `at`
+    /// is at least the offset of the call before.
+    pub fn line_column(&mut self, at: usize) -> (usize, usize) {
+        let mut at = at.min(self.text.len());
+        while !self.text.is_char_boundary(at) {
+            at -= 1;
+        }
+        let new = &self.text.as_bytes()[self.counted.min(at)..at];
+        self.lines += new.iter().filter(|byte| **byte == b'\n').count();
+        self.counted = at;
+        let before = &self.text[..at];
+        let line = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let visible = before[line..].trim_start_matches('\u{feff}');
+        (self.lines + 1, visible.chars().count() + 1)
+    }
 }
 
 /// Returns the span of the value at `path`. If the file does not have this value, the span is that
@@ -44,26 +70,54 @@ fn deepest_span(value: &Spanned<DeValue>, path: &[String]) -> Range<usize> {
     }
 }
 
-/// Returns diagnostics for `problems` of the scene in `text`, which was parsed to `root`.
-pub(crate) fn with_locations(
-    file: &str,
-    text: &str,
-    root: &DeTable,
+/// Adds diagnostics for `problems` of the scene in the file with this name and text, which consists
+/// of `parts`. The parts that contain the problems are parsed again.
+pub(crate) fn locate(
+    (file, text): (&str, &str),
+    parts: &[Part],
     problems: Vec<Problem>,
-) -> Vec<Diagnostic> {
-    let diagnostic = |problem: Problem| Diagnostic {
-        file: file.to_string(),
-        line_column: Some(line_column(text, span(root, &problem.path).start)),
-        subject: problem.subject,
-        found: problem.found,
-        help: problem.help,
+    found: &mut FirstDiagnostics,
+) {
+    let part_of = |problem: &Problem| match problem.path.as_slice() {
+        [list, index, ..] if list == "object" && parts.len() > 1 => {
+            let index: usize = index.parse().unwrap_or(0);
+            parts[1..].partition_point(|part| part.first_object <= index)
+        }
+        _ => 0,
     };
-    problems.into_iter().map(diagnostic).collect()
+    let mut by_part: BTreeMap<usize, Vec<Problem>> = BTreeMap::new();
+    for problem in problems {
+        by_part.entry(part_of(&problem)).or_default().push(problem);
+    }
+    for (number, problems) in by_part {
+        let part = &parts[number];
+        let part_text = part.text(text);
+        let (mut root, _) = DeTable::parse_recoverable(&part_text);
+        migrate((file, text), root.get_mut(), part, &mut FirstDiagnostics::default());
+        for Problem { mut path, subject, found: finding, help } in problems {
+            if let [list, index, ..] = path.as_mut_slice()
+                && list == "object"
+                && let Ok(number) = index.parse::<usize>()
+            {
+                *index = number.saturating_sub(part.first_object).to_string();
+            }
+            let at = part.in_file(span(root.get_ref(), &path).start);
+            found.add(at, || Diagnostic {
+                file: file.to_string(),
+                line_column: None,
+                subject,
+                found: finding,
+                help,
+            });
+        }
+    }
 }
 
-/// Returns the name that diagnostics use for the table at `path`: `object "queen"`.
-pub(crate) fn subject_in(root: &DeTable, path: &[String]) -> String {
+/// Returns the name that diagnostics use for the table at `path`: `object "queen"`. `root` has the
+/// objects of the file from `first_object` on.
+pub(crate) fn subject_in(root: &DeTable, path: &[String], first_object: usize) -> String {
     subject(path, |list, index| {
+        let index = if list == "object" { index.checked_sub(first_object)? } else { index };
         let entry = root.get(list)?.get_ref().as_array()?.get(index)?;
         entry.get_ref().as_table()?.get("name")?.get_ref().as_str().map(str::to_string)
     })
@@ -71,7 +125,7 @@ pub(crate) fn subject_in(root: &DeTable, path: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::line_column;
+    use super::{LineCounter, line_column};
 
     #[test]
     fn columns_count_characters_and_skip_a_byte_order_mark() {
@@ -81,5 +135,14 @@ mod tests {
         assert_eq!(line_column(text, text.rfind('=').unwrap()), (2, 5));
         assert_eq!(line_column(text, 1), (1, 1), "inside a character");
         assert_eq!(line_column(text, 10_000), (3, 1));
+    }
+
+    #[test]
+    fn line_counter_agrees_with_single_lookups() {
+        let text = "\u{feff}a = 1\nöäü = 2\n\n\n# é\nb = 3";
+        let mut lines = LineCounter::new(text);
+        for at in 0..text.len() + 3 {
+            assert_eq!(lines.line_column(at), line_column(text, at), "{at}");
+        }
     }
 }

@@ -1,0 +1,254 @@
+//! Parts of a scene file, each a TOML document of its own: the parsed form of a document takes some
+//! hundred times the memory of its text, and only one part is parsed at a time.
+//!
+//! A part consists of whole `[[object]]` sections, or of everything else in the file.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// Length from which on a part of objects ends before the next `[[object]]` \[bytes\]. Files up to
+/// this length have one part.
+pub(crate) const PART_BYTES: usize = 256 << 10;
+
+/// Part of a scene file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Part {
+    /// Ranges of the file's text, in ascending order.
+    ranges: Vec<Range<usize>>,
+    /// Index in the file of the part's first object.
+    pub first_object: usize,
+}
+
+/// Beginning of a section of a TOML document.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Header {
+    /// `[[object]]`.
+    Object,
+    /// A table inside of the object above, such as `[object.shape]`.
+    InObject,
+    Other,
+}
+
+impl Part {
+    /// Returns the part that consists of all of `text`.
+    pub fn whole(text: &str) -> Self {
+        Self { ranges: vec![0..text.len()], first_object: 0 }
+    }
+
+    /// Returns the text of this part of the file with this `text`.
+    pub fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
+        match self.ranges.as_slice() {
+            [range] => Cow::Borrowed(&text[range.clone()]),
+            ranges => ranges.iter().map(|range| &text[range.clone()]).collect(),
+        }
+    }
+
+    /// Returns the index in the file of the first entry of the list at `path` in this part.
+    pub fn first_index(&self, path: &[String]) -> usize {
+        match path {
+            [list] if list == "object" => self.first_object,
+            _ => 0,
+        }
+    }
+
+    /// Returns the byte offset in the file of the offset `at` in the text of this part.
+    pub fn in_file(&self, mut at: usize) -> usize {
+        for range in &self.ranges {
+            if at < range.len() {
+                return range.start + at;
+            }
+            at -= range.len();
+        }
+        self.ranges.last().map_or(0, |range| range.end)
+    }
+}
+
+/// Returns the parts of a file: everything but the objects, then the objects in parts of at least
+/// `part_bytes` and the remaining ones. Returns a single part if the file is shorter, has no objects,
+/// or continues an object after another section.
+pub(crate) fn split(text: &str, part_bytes: usize) -> Vec<Part> {
+    let sections = sections(text);
+    let objects = sections.iter().filter(|(_, header)| *header == Header::Object).count();
+    if text.len() <= part_bytes || objects == 0 {
+        return vec![Part::whole(text)];
+    }
+    let mut others: Vec<Range<usize>> = Vec::new();
+    let mut parts: Vec<Part> = Vec::new();
+    let (mut object, mut before) = (0, Header::Other);
+    for (i, (start, header)) in sections.iter().enumerate() {
+        let range = *start..sections.get(i + 1).map_or(text.len(), |(next, _)| *next);
+        let extends = |ranges: &[Range<usize>]| ranges.last().is_some_and(|r| r.end == *start);
+        match header {
+            Header::InObject if before == Header::Other => return vec![Part::whole(text)],
+            Header::Other => match others.last_mut().filter(|last| last.end == *start) {
+                Some(last) => last.end = range.end,
+                None => others.push(range),
+            },
+            _ => {
+                let is_full = |part: &Part| part.ranges[0].len() >= part_bytes;
+                match parts.last_mut().filter(|part| extends(&part.ranges)) {
+                    Some(part) if *header == Header::InObject || !is_full(part) => {
+                        part.ranges[0].end = range.end;
+                    }
+                    _ => parts.push(Part { ranges: vec![range], first_object: object }),
+                }
+                object += usize::from(*header == Header::Object);
+            }
+        }
+        before = *header;
+    }
+    parts.insert(0, Part { ranges: others, first_object: 0 });
+    parts
+}
+
+/// Returns the sections of a TOML document, each with the offset of its first line. The first one
+/// begins at 0.
+fn sections(text: &str) -> Vec<(usize, Header)> {
+    let bytes = text.as_bytes();
+    let mut sections = vec![(0, Header::Other)];
+    let (mut at, mut depth, mut line) = (0, 0usize, 0);
+    // `true` while a line has only spaces so far.
+    let mut is_indent = true;
+    while let Some(byte) = bytes.get(at) {
+        match byte {
+            b'[' if is_indent && depth == 0 => {
+                sections.push((line, header(&text[at..])));
+                at = end_of_line(bytes, at);
+                continue;
+            }
+            b'#' => {
+                at = end_of_line(bytes, at);
+                continue;
+            }
+            b'"' | b'\'' => {
+                at = end_of_string(bytes, at);
+                is_indent = false;
+                continue;
+            }
+            b'[' | b'{' => depth += 1,
+            b']' | b'}' => depth = depth.saturating_sub(1),
+            b'\n' => (line, is_indent) = (at + 1, true),
+            _ => {}
+        }
+        is_indent &= matches!(byte, b' ' | b'\t' | b'\n' | b'\r');
+        at += 1;
+    }
+    if sections.get(1).is_some_and(|(start, _)| *start == 0) {
+        sections.remove(0);
+    }
+    sections
+}
+
+/// Returns the kind of the header that `text` begins with.
+fn header(text: &str) -> Header {
+    let is_list = text.starts_with("[[");
+    let name = text.trim_start_matches('[').trim_start_matches([' ', '\t']);
+    let Some(after) = name.strip_prefix("object") else { return Header::Other };
+    match after.trim_start_matches([' ', '\t']).as_bytes().first() {
+        Some(b']') if is_list => Header::Object,
+        Some(b'.') => Header::InObject,
+        _ => Header::Other,
+    }
+}
+
+/// Returns the offset of the line end at or after `at`.
+fn end_of_line(bytes: &[u8], at: usize) -> usize {
+    bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |length| at + length)
+}
+
+/// Returns the offset after the string that begins with the quotation mark at `at`. An unterminated
+/// string of one line ends with the line.
+fn end_of_string(bytes: &[u8], at: usize) -> usize {
+    let quote = bytes[at];
+    let is_quoted = |at: usize, marks: usize| {
+        bytes[at..].len() >= marks && bytes[at..at + marks].iter().all(|b| *b == quote)
+    };
+    let marks = if is_quoted(at, 3) { 3 } else { 1 };
+    let mut at = at + marks;
+    while at < bytes.len() {
+        match bytes[at] {
+            b'\\' if quote == b'"' => at += 1,
+            b'\n' if marks == 1 => return at,
+            _ if is_quoted(at, marks) => {
+                // A string of several lines may end with one or two quotation marks of its own.
+                let more = if marks == 3 {
+                    (3..5).take_while(|n| is_quoted(at, n + 1)).count()
+                } else {
+                    0
+                };
+                return at + marks + more;
+            }
+            _ => {}
+        }
+        at += 1;
+    }
+    bytes.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = r##"# [[object]] in a comment
+film.size = [
+[8], 8] # [[object]]
+s = "\"[[object]]" # "
+t = """
+[[object]]
+""" # """"
+u = '''
+[[object]] ''''
+[[object]]
+name = "a"
+[object.shape]
+x = 1
+ [[ object ]] # b
+[objects]
+y = 1
+[[object]]
+name = '[[object]]'
+[[object.transform]]
+"##;
+
+    #[test]
+    fn parts_begin_with_headers_of_objects() {
+        let parts = split(TEXT, 1);
+        let texts: Vec<_> = parts.iter().map(|part| part.text(TEXT)).collect();
+        let at = |text: &str| TEXT.find(text).unwrap();
+        let first = at("[[object]]\nname = \"a\"");
+        assert_eq!(texts[0], format!("{}[objects]\ny = 1\n", &TEXT[..first]));
+        assert_eq!(texts[1], TEXT[first..at(" [[ object ]]")]);
+        assert_eq!(texts[2], " [[ object ]] # b\n");
+        assert_eq!(texts[3], TEXT[at("[[object]]\nname = '")..]);
+        let objects: Vec<_> = parts.iter().map(|part| part.first_object).collect();
+        assert_eq!(objects, [0, 0, 1, 2]);
+        assert_eq!(parts[0].in_file(first), at("[objects]"));
+        assert_eq!(parts[0].in_file(first + 12), at("[objects]") + 12);
+        assert_eq!(parts[3].in_file(3), at("[[object]]\nname = '") + 3);
+        assert_eq!(parts[0].in_file(TEXT.len()), at("[[object]]\nname = '"));
+    }
+
+    #[test]
+    fn parts_have_at_least_the_given_length() {
+        let text = "a = 1\n".to_string() + &"[[object]]\n".repeat(10);
+        let lengths =
+            |bytes| split(&text, bytes).iter().map(|p| p.text(&text).len()).collect::<Vec<_>>();
+        assert_eq!(lengths(33), [6, 33, 33, 33, 11]);
+        assert_eq!(lengths(20), [6, 22, 22, 22, 22, 22]);
+        assert_eq!(lengths(text.len()), [text.len()]);
+    }
+
+    #[test]
+    fn files_that_cannot_be_split_have_one_part() {
+        for text in [
+            "",
+            "a = 1\n",
+            "[[object]]\n[b]\n[object.shape]\n",
+            "[object.shape]\n[[object]]\n",
+            "x = \"\"\"\n[[object]]\n",
+            "x = [\n[[object]]\n",
+        ] {
+            assert_eq!(split(text, 0), [Part::whole(text)], "{text}");
+        }
+    }
+}
