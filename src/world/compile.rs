@@ -22,6 +22,7 @@ use crate::world::radiance_range::SceneDistances;
 use crate::world::truncation_bias;
 use crate::world::world::{LightSource, World};
 use glam::{DAffine3, DVec3};
+use std::collections::HashMap;
 
 /// Geometry of all objects in double precision, translated so that the scene's centre is the
 /// origin.
@@ -80,13 +81,16 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
     /// not define.
     fn new(scene: &'a Scene, default: &'a Material) -> Self {
         let mut materials: Vec<&Material> = Vec::new();
-        let mut index_of = |name: &str| {
-            let material = scene.materials.get(name).unwrap_or(default);
-            let known = materials.iter().position(|m| *m == material);
-            if known.is_none() {
-                materials.push(material);
-            }
-            known.unwrap_or(materials.len() - 1) as u32
+        let mut index_of_name: HashMap<&'a str, u32> = HashMap::new();
+        let mut index_of = |name: &'a str| {
+            *index_of_name.entry(name).or_insert_with(|| {
+                let material = scene.materials.get(name).unwrap_or(default);
+                let known = materials.iter().position(|m| *m == material);
+                if known.is_none() {
+                    materials.push(material);
+                }
+                known.unwrap_or(materials.len() - 1) as u32
+            })
         };
         let of_object = scene
             .objects
