@@ -13,6 +13,7 @@ pub mod flow;
 pub mod image;
 mod keyboard;
 mod probe;
+mod restorer;
 mod screen;
 mod sequence;
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Full-screen use of the terminal and its restoration: raw mode, alternate screen, mouse,
 //! bracketed paste.
 
+use crate::terminal::restorer::Restorer;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use crossterm::style::{Attribute, SetAttribute};
 use crossterm::terminal::{
@@ -64,10 +65,11 @@ pub(crate) fn append(out: &mut String, command: impl Command) {
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Full-screen use of the terminal. Dropping this value restores the terminal, as does a panic in
-/// any thread.
+/// any thread. After any other end of the process a [`Restorer`] does so, if one could be started.
 pub struct Screen {
     tty: Arc<Tty>,
     left: Receiver<()>,
+    restorer: Option<Restorer>,
 }
 
 /// Writer to the terminal, shared between threads.
@@ -124,9 +126,13 @@ impl Screen {
     /// If stdin is no terminal or stdout cannot be written.
     pub fn enter() -> io::Result<Self> {
         let modes_before = tcgetattr(io::stdin())?;
+        let restorer = Restorer::start().ok();
         set_raw_mode(&modes_before)?;
         // From here on `Drop` restores the terminal, even if `over` fails.
-        Self::over(Box::new(io::stdout()), Some(modes_before))
+        let mut screen = Self::over(Box::new(io::stdout()), Some(modes_before))?;
+        screen.restorer = restorer;
+        screen.restorer.iter_mut().for_each(Restorer::entered);
+        Ok(screen)
     }
 
     fn over(out: Box<dyn Write + Send>, modes_before: Option<Termios>) -> io::Result<Self> {
@@ -140,7 +146,7 @@ impl Screen {
         });
         // Prepared here, because a panic hook should do little.
         LazyLock::force(&LEAVE);
-        let screen = Self { tty, left };
+        let screen = Self { tty, left, restorer: None };
         let tty = Arc::clone(&screen.tty);
         let report = panic::take_hook();
         panic::set_hook(Box::new(move |panic| {

@@ -211,3 +211,26 @@ fn pipe_in_place_of_the_scene_blocks_neither_edits_nor_the_end() {
     assert!(bytes.contains("unsaved edits are kept in"), "{bytes:?}");
     assert!(fs::metadata(fixture.path(".room.toml.unsaved")).unwrap().len() > 100);
 }
+
+/// An aborted program runs no code of its own, as after a failed allocation; a killed one neither.
+#[test]
+fn abort_and_kill_leave_a_restored_terminal() {
+    for name in ["ABRT", "KILL"] {
+        let fixture = Fixture::with_room();
+        let mut terminal = shell(&fixture);
+        terminal.wait_for_text("shell> ");
+        terminal.send("sh -c 'echo $$ >id; exec \"$ZERKALO\" room.toml'\n");
+        wait_for_picture(&terminal);
+        let id = fs::read_to_string(fixture.path("id")).unwrap();
+        signal(name, id.trim().parse().unwrap());
+        terminal.wait_for("the shell", |screen| {
+            (!screen.alternate_screen() && !screen.hide_cursor()).then_some(())
+        });
+        assert!(is_left(&terminal), "{name}");
+        terminal.send("echo $((6 * 7))\n");
+        terminal.wait_for_text("42");
+        terminal.send("exit\n");
+        // Compares the modes of the terminal with those before.
+        terminal.end();
+    }
+}
