@@ -31,13 +31,15 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         ImageOutput::from_path(&args.output).map_err(|error| Failure::Usage(error.to_string()))?;
     let document = Document::read_with(&args.scene, LoadReporter::new().assets)
         .map_err(|e| Failure::Failed(e.to_string()))?;
-    let scene = sized(document.scene(), args)?;
+    let warnings = document.warnings().to_vec();
+    let hash = scene_hash(document.text());
+    let scene = sized(document.into_scene(), args)?;
     // An output file that cannot be written is reported before the render starts.
     output.check_writable().map_err(failed_write)?;
     if let Some(path) = &args.stats {
         check_stats_path(path, &args.output)?;
     }
-    for warning in document.warnings() {
+    for warning in warnings {
         warn(&format!("warning: {warning}"));
     }
     let signals = Signals::watch().map_err(|e| Failure::Failed(format!("no signals: {e}")))?;
@@ -55,7 +57,6 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let end = watch(&session, &signals)?;
 
     let writing = Instant::now();
-    let hash = scene_hash(document.text());
     let (report, precision, written) = write(&session, args, &output, hash.clone())
         .ok_or_else(|| Failure::Failed("the renderer has no picture".to_string()))?;
     written.map_err(failed_write)?;
@@ -164,8 +165,7 @@ fn failed_write(error: WriteError) -> Failure {
 }
 
 /// Returns `scene` with the acceleration structure and the size that are given on the command line.
-fn sized(scene: &Scene, args: &RenderArgs) -> Result<Scene, Failure> {
-    let mut scene = scene.clone();
+fn sized(mut scene: Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     if let Some(acceleration) = args.acceleration {
         scene.trace.acceleration = acceleration;
     }

@@ -20,15 +20,15 @@ pub struct Document {
     name: String,
     /// Text and scene as read. [`Document::apply`] changes a copy of this text each time, so that
     /// undone changes come back with their comments.
-    origin: (String, Scene),
+    origin: (Arc<String>, Arc<Scene>),
     /// Keys and values in the text as read that have names of earlier versions of the program.
     former_words: Vec<FormerWord>,
     /// Warnings about the text as read.
     warnings: Vec<Diagnostic>,
     /// The warning in `warnings` that is about names of earlier versions.
     migration_warning: Option<Diagnostic>,
-    text: String,
-    scene: Scene,
+    text: Arc<String>,
+    scene: Arc<Scene>,
 }
 
 impl Document {
@@ -77,10 +77,11 @@ impl Document {
         let source = SourceScene::parse(&text, name, resolver)?;
         let warnings = source.warnings();
         let migration_warning = source.migration_warning();
-        let (scene, former_words) = (source.scene, source.former_words);
+        let (scene, former_words) = (Arc::new(source.scene), source.former_words);
+        let text = Arc::new(text);
         Ok(Self {
             name: name.to_string(),
-            origin: (text.clone(), scene.clone()),
+            origin: (Arc::clone(&text), Arc::clone(&scene)),
             former_words,
             warnings,
             migration_warning,
@@ -91,27 +92,28 @@ impl Document {
 
     /// Creates a document for `scene`, which must be valid. `name` is the file name in diagnostics.
     pub fn new(scene: &Scene, name: &str) -> Self {
-        let text = new_text(String::new(), &[], &Scene::default(), scene);
+        let text = Arc::new(new_text(String::new(), &[], &Scene::default(), scene));
+        let scene = Arc::new(scene.clone());
         Self {
             name: name.to_string(),
-            origin: (text.clone(), scene.clone()),
+            origin: (Arc::clone(&text), Arc::clone(&scene)),
             former_words: Vec::new(),
             warnings: Vec::new(),
             migration_warning: None,
             text,
-            scene: scene.clone(),
+            scene,
         }
     }
 
     /// Changes the text so that it describes `scene`, which must be valid.
     pub fn apply(&mut self, scene: &Scene) {
         let (text, old) = &self.origin;
-        self.text = if scene == old && self.former_words.is_empty() {
-            text.clone()
+        self.text = if *scene == **old && self.former_words.is_empty() {
+            Arc::clone(text)
         } else {
-            new_text(text.clone(), &self.former_words, old, scene)
+            Arc::new(new_text(text.to_string(), &self.former_words, old, scene))
         };
-        self.scene = scene.clone();
+        self.scene = Arc::new(scene.clone());
     }
 
     /// Returns the document under another name.
@@ -128,6 +130,12 @@ impl Document {
     /// Returns the scene that the text describes.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Returns the scene that the text describes, without a copy.
+    pub fn into_scene(self) -> Scene {
+        drop(self.origin);
+        Arc::unwrap_or_clone(self.scene)
     }
 
     /// Returns the text.
