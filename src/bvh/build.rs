@@ -320,8 +320,11 @@ mod tests {
         }
     }
 
+    /// Corners of the box with a number.
+    type Family = fn(usize) -> [[f32; 3]; 2];
+
     /// Families of boxes in which many distances are equal or grow steadily.
-    const FAMILIES: [(&str, fn(usize) -> [[f32; 3]; 2]); 8] = [
+    const FAMILIES: [(&str, Family); 8] = [
         ("one box", |_| [[0.0; 3], [1.0; 3]]),
         ("one point", |_| [[0.5; 3]; 2]),
         ("two boxes", |i| [[(i % 2) as f32 * 9.0; 3], [(i % 2) as f32 * 9.0 + 1.0; 3]]),
@@ -335,7 +338,7 @@ mod tests {
         }),
     ];
 
-    fn boxes(family: fn(usize) -> [[f32; 3]; 2], count: usize) -> Vec<Aabb> {
+    fn boxes(family: Family, count: usize) -> Vec<Aabb> {
         let aabb = |i: usize| {
             let [low, high] = family(i).map(Vec3A::from_array);
             Aabb::new(low, high)

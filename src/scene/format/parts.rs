@@ -32,7 +32,8 @@ enum Header {
 impl Part {
     /// Returns the part that consists of all of `text`.
     pub fn whole(text: &str) -> Self {
-        Self { ranges: vec![0..text.len()], first_object: 0 }
+        let everything = 0..text.len();
+        Self { ranges: vec![everything], first_object: 0 }
     }
 
     /// Returns the text of this part of the file with this `text`.
