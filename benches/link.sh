@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # Latency over a slow connection: `cargo bench --bench link` behind an OpenSSH server, plain and inside
-# tmux. Installs missing programs if it may.
+# tmux and screen. Installs missing programs if it may.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 missing=()
 [ -x /usr/sbin/sshd ] || missing+=(openssh-server)
 command -v ssh >/dev/null || missing+=(openssh-client)
 command -v tmux >/dev/null || missing+=(tmux)
+command -v screen >/dev/null || missing+=(screen)
 if [ ${#missing[@]} -gt 0 ]; then
     if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null &&
         apt-get install -y --no-install-recommends "${missing[@]}" >/dev/null 2>&1; then
@@ -16,7 +17,7 @@ if [ ${#missing[@]} -gt 0 ]; then
     fi
 fi
 echo "machine: $(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | xargs), $(nproc) cores; $(date +%F)"
-echo "connection: 1 Mbit/s, 50 ms each way; 160x45 cells; from a key to the first change of the picture"
+echo "connections by rate and round trip; 160x45 cells; from a key to the first change of the picture"
 cargo bench --quiet --bench link "$@"
 echo "on a simulated connection, one wave at a time to 1,024 samples per pixel:"
 cargo test --quiet --test link -- --nocapture --test-threads 1 | grep -E "room|noisy|acting"

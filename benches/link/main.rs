@@ -1,7 +1,7 @@
 //! Latency from a key to the first change of the picture over a slow connection. The program runs behind
-//! an OpenSSH server on loopback, plain and inside tmux; a relay limits the rate to 1 Mbit/s and delays
-//! all bytes by 50 ms. `benches/link.sh` installs the requirements. Arguments: the name of a row, and the
-//! number of keys.
+//! an OpenSSH server on loopback, plain and inside tmux and screen; a relay limits the rate and delays
+//! all bytes. `benches/link.sh` installs the requirements. Arguments: a part of the names of rows, and the
+//! number of keys. `ZERKALO_PROGRAM` is the path of another build of the program, for comparison.
 
 #[path = "../../tests/pty/terminal.rs"]
 mod terminal;
@@ -23,14 +23,13 @@ use zerkalo::terminal::cells::Oklab;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 const SIZE: [u16; 2] = [160, 45];
-/// 1 Mbit/s, in bytes per second.
-const RATE: f64 = 125e3;
-const ONE_WAY: Duration = Duration::from_millis(50);
+/// Connections: name, bytes per second, delay of each direction.
+const LINKS: [(&str, f64, Duration); 2] = [
+    ("1 Mbit/s, 100 ms", 125e3, Duration::from_millis(50)),
+    ("256 kbit/s, 300 ms", 32e3, Duration::from_millis(150)),
+];
 /// Number of keys without argument.
 const KEYS: usize = 40;
-/// File of the program's messages.
-const MESSAGES: &str = "messages.txt";
-
 /// Arrow keys whose moves cancel each other.
 const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[C", "\x1b[D", "\x1b[D"];
 
@@ -41,8 +40,7 @@ fn main() {
         return;
     }
     let keys = arguments.iter().find_map(|a| a.parse().ok()).unwrap_or(KEYS);
-    let row = arguments.iter().find(|a| !a.starts_with('-') && a.parse::<usize>().is_err());
-    let is_selected = |name: &str| row.is_none_or(|row| row == name);
+    let part = arguments.iter().find(|a| !a.starts_with('-') && a.parse::<usize>().is_err());
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("room.toml"), BUILT_IN).unwrap();
     let server = match Server::start(folder.path()) {
@@ -50,62 +48,156 @@ fn main() {
         Err(why) => return println!("skipped: {why}"),
     };
     println!(
-        "{:38} {:>7} {:>7} {:>7} {:>5}  of the line, while visible differences waited",
+        "{:50} {:>7} {:>7} {:>7} {:>5}  rate reported while and after the picture converges",
         "", "median", "p95", "max", "keys"
     );
-    let room = folder.path().join("room.toml");
-    let [trace, messages] = ["trace.csv", MESSAGES].map(|name| folder.path().join(name));
-    // Messages go to a file, because tmux would swallow them in the terminal.
-    let program = |options: &str| {
-        let [room, trace, messages] = [&room, &trace, &messages].map(|path| path.display());
-        format!("COLORTERM=truecolor {PROGRAM} {room} --trace {trace} {options} 2>{messages}")
-    };
-    let plain = [
-        ("plain", "", true),
-        ("plain, answers lost after the start", "", false),
-        ("plain, --bandwidth 30", "--bandwidth 30", true),
-    ];
-    for (name, options, replying) in plain.into_iter().filter(|(name, ..)| is_selected(name)) {
-        measure(name, keys, &server, folder.path(), &program(options), replying);
-    }
-    if Command::new("tmux").arg("-V").output().is_err() {
-        return println!("inside tmux: skipped, there is no tmux");
-    }
-    let inside = [("tmux, passthrough", "on"), ("tmux, no passthrough", "off")];
-    for (name, passthrough) in inside.into_iter().filter(|(name, _)| is_selected(name)) {
-        let settings = folder.path().join("tmux.conf");
-        let text = format!(
-            "set -g allow-passthrough {passthrough}\nset -g status off\nset -g escape-time 10\n\
-             set -as terminal-features ',*:RGB'\n"
-        );
-        fs::write(&settings, text).unwrap();
-        let socket = format!("zerkalo-bench-{}", std::process::id());
-        let command =
-            format!("tmux -L {socket} -f {} new-session '{}'", settings.display(), program(""));
-        measure(name, keys, &server, folder.path(), &command, true);
-        let _ = Command::new("tmux").args(["-L", &socket, "kill-server"]).output();
+    for link in LINKS {
+        for row in ROWS {
+            let name = format!("{}: {}", link.0, row.name);
+            if part.is_some_and(|part| !name.contains(part.as_str())) {
+                continue;
+            }
+            if row.host.is_missing() {
+                println!("{name:50} skipped, there is no such program");
+                continue;
+            }
+            measure(&name, &row, link, keys, &server, folder.path());
+        }
     }
 }
 
+/// Program inside which the dashboard runs.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Host {
+    None,
+    /// With `allow-passthrough on` or `off`.
+    Tmux(&'static str),
+    Screen,
+}
+
+impl Host {
+    fn is_missing(self) -> bool {
+        let program = match self {
+            Self::None => return false,
+            Self::Tmux(_) => "tmux",
+            Self::Screen => "screen",
+        };
+        Command::new(program).arg("-V").output().is_err()
+    }
+
+    /// Returns the command that runs `program` inside this host.
+    fn command(self, folder: &Path, program: &str) -> String {
+        let settings = folder.join("settings");
+        let name = format!("zerkalo-bench-{}", std::process::id());
+        let (text, command) = match self {
+            Self::None => return program.to_string(),
+            Self::Tmux(passthrough) => (
+                format!(
+                    "set -g allow-passthrough {passthrough}\nset -g status off\nset -g escape-time 10\n\
+                     set -as terminal-features ',*:RGB'\n"
+                ),
+                format!("tmux -L {name} -f {} new-session '{program}'", settings.display()),
+            ),
+            Self::Screen => (
+                "startup_message off\nterm screen-256color\n".to_string(),
+                format!("screen -c {} -S {name} sh -c '{program}'", settings.display()),
+            ),
+        };
+        fs::write(settings, text).unwrap();
+        command
+    }
+
+    /// Ends the host.
+    fn end(self) {
+        let name = format!("zerkalo-bench-{}", std::process::id());
+        let (program, arguments): (_, &[&str]) = match self {
+            Self::None => return,
+            Self::Tmux(_) => ("tmux", &["-L", &name, "kill-server"]),
+            Self::Screen => ("screen", &["-S", &name, "-X", "quit"]),
+        };
+        let _ = Command::new(program).args(arguments).output();
+    }
+}
+
+/// Terminal's replies.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Replies {
+    Always,
+    /// Until the dashboard is open.
+    Lost,
+    Never,
+}
+
+/// Setting of a measurement.
+#[derive(Clone, Copy)]
+struct Row {
+    name: &'static str,
+    host: Host,
+    options: &'static str,
+    replies: Replies,
+}
+
+const ROWS: [Row; 7] = [
+    Row { name: "plain", host: Host::None, options: "", replies: Replies::Always },
+    Row { name: "replies lost", host: Host::None, options: "", replies: Replies::Lost },
+    Row { name: "no replies", host: Host::None, options: "", replies: Replies::Never },
+    Row {
+        name: "--bandwidth 30",
+        host: Host::None,
+        options: "--bandwidth 30",
+        replies: Replies::Always,
+    },
+    Row {
+        name: "tmux, passthrough",
+        host: Host::Tmux("on"),
+        options: "",
+        replies: Replies::Always,
+    },
+    Row {
+        name: "tmux, no passthrough",
+        host: Host::Tmux("off"),
+        options: "",
+        replies: Replies::Always,
+    },
+    // GNU screen 4 knows no 24-bit colours.
+    Row { name: "screen", host: Host::Screen, options: "--color 256", replies: Replies::Always },
+];
+
 /// Measures one row: opens the dashboard, lets it converge, presses keys.
-fn measure(name: &str, keys: usize, server: &Server, folder: &Path, program: &str, replying: bool) {
-    let _ = fs::remove_file(folder.join(MESSAGES));
-    let relay = Relay::start(server.address, RATE, ONE_WAY).unwrap();
-    let command = server.ssh(relay.address, program);
+fn measure(
+    name: &str,
+    row: &Row,
+    (_, rate, one_way): (&str, f64, Duration),
+    keys: usize,
+    server: &Server,
+    folder: &Path,
+) {
+    let relay = Relay::start(server.address, rate, one_way).unwrap();
+    let program = std::env::var("ZERKALO_PROGRAM").unwrap_or(PROGRAM.to_string());
+    let room = folder.join("room.toml");
+    let program = format!("COLORTERM=truecolor {program} {} {}", room.display(), row.options);
+    let command = server.ssh(relay.address, &row.host.command(folder, &program));
     let words: Vec<&str> = command.iter().map(String::as_str).collect();
-    let start = Start { command: &words, folder, size: SIZE, env: &[], replies: true };
+    let replies = row.replies != Replies::Never;
+    let start = Start { command: &words, folder, size: SIZE, env: &[], replies };
     let mut terminal = Terminal::start(&start);
     terminal.wait_for_text("spp");
-    terminal.set_replying(replying);
+    terminal.set_replying(row.replies == Replies::Always);
     // A noise target out of reach keeps it converging.
     terminal.send("T");
     terminal.wait_for_text("top at");
     terminal.send("\x15noise 0.01\r");
-    std::thread::sleep(Duration::from_secs(if replying { 3 } else { 12 }));
+    std::thread::sleep(Duration::from_secs(if row.replies == Replies::Lost { 12 } else { 3 }));
     let mut seconds: Vec<f64> = (0..keys).map(|i| press_key(&mut terminal, i)).collect();
     seconds.sort_by(f64::total_cmp);
     let quantile = |share: f64| seconds[((share * keys as f64).ceil() as usize).max(1) - 1];
-    let status = status(&terminal);
+    let mut rates = vec![status(&terminal)];
+    // A converged picture, of which little is sent.
+    terminal.send("T");
+    terminal.wait_for_text("top at");
+    terminal.send("\x15noise 2\r");
+    std::thread::sleep(Duration::from_secs(20));
+    rates.push(status(&terminal));
     terminal.send("q");
     std::thread::sleep(Duration::from_secs(3));
     // The moved camera is an unsaved edit; the prompt is answered.
@@ -113,24 +205,15 @@ fn measure(name: &str, keys: usize, server: &Server, folder: &Path, program: &st
         terminal.send("d");
         std::thread::sleep(Duration::from_secs(3));
     }
+    row.host.end();
     drop(terminal);
-    let line = [busy(folder).unwrap_or("not reported".to_string()), status];
     println!(
-        "{name:38} {:5.3} s {:5.3} s {:5.3} s {keys:5}  {}",
+        "{name:50} {:5.3} s {:5.3} s {:5.3} s {keys:5}  {}",
         quantile(0.5),
         quantile(0.95),
         quantile(1.0),
-        line.join("; "),
+        rates.join("; "),
     );
-}
-
-/// Returns the share of the rate used while visible differences waited, from the program's messages.
-fn busy(folder: &Path) -> Option<String> {
-    let messages = fs::read_to_string(folder.join(MESSAGES)).ok()?;
-    let line = messages.lines().find_map(|line| line.split_once("waited for "))?.1;
-    let numbers = line.split_whitespace().filter_map(|word| word.parse::<f64>().ok());
-    let &[seconds, bytes] = &numbers.collect::<Vec<_>>()[..] else { return None };
-    Some(format!("{:.0} % in {seconds:.1} s", 100.0 * bytes / seconds / RATE))
 }
 
 /// Presses a key. Returns the seconds until the picture has clearly changed.
@@ -164,10 +247,21 @@ fn colors(screen: &vt100::Screen) -> BTreeMap<(u16, u16), [u8; 3]> {
         };
         match color {
             vt100::Color::Rgb(r, g, b) => Some(((row, column), [r, g, b])),
-            _ => None,
+            vt100::Color::Idx(index) => Some(((row, column), indexed(index))),
+            vt100::Color::Default => None,
         }
     };
     cells.filter_map(color).collect()
+}
+
+/// Returns the colour with this index in xterm's palette of 256. The first 16 are all black here.
+fn indexed(index: u8) -> [u8; 3] {
+    const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
+    match index {
+        0..16 => [0; 3],
+        16..232 => [36, 6, 1].map(|step| LEVELS[usize::from((index - 16) / step % 6)]),
+        232.. => [8 + 10 * (index - 232); 3],
+    }
 }
 
 /// Returns the part of the status line about the connection.

@@ -1,5 +1,8 @@
-//! Relay that limits the server's output to a rate and delays both directions.
+//! Relay that limits the server's output to a rate and delays both directions. It reads from the server
+//! no more than it transmits, so that the server's TCP send queue fills as on a slow connection.
 
+use rustix::net::sockopt::set_socket_recv_buffer_size;
+use rustix::net::{AddressFamily, SocketType, connect, socket};
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -7,8 +10,10 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Bytes in the relay beyond which the sender waits, as in a router at this rate.
-const MAX_BUFFERED: usize = 64 << 10;
+/// Size of the receive buffer at the server's side, in bytes. The kernel acknowledges what is in it.
+const RECEIVE_BUFFER: usize = 4 << 10;
+/// Bytes of a piece of the transmission.
+const PIECE: usize = 700;
 
 /// Listening relay. It forwards each connection to the server.
 pub struct Relay {
@@ -19,7 +24,6 @@ pub struct Relay {
 #[derive(Default)]
 struct Pipe {
     pieces: VecDeque<(Instant, Vec<u8>)>,
-    bytes: usize,
     closed: bool,
 }
 
@@ -31,7 +35,7 @@ impl Relay {
         let address = listener.local_addr()?;
         thread::spawn(move || {
             for client in listener.incoming().flatten() {
-                let Ok(server) = TcpStream::connect(target) else { continue };
+                let Ok(server) = connected(target) else { continue };
                 let _ = client.set_nodelay(true).and_then(|()| server.set_nodelay(true));
                 let (Ok(up), Ok(down)) = (client.try_clone(), server.try_clone()) else { continue };
                 forward(up, server, f64::INFINITY, one_way);
@@ -42,28 +46,38 @@ impl Relay {
     }
 }
 
+/// Connects to the server with a small receive buffer.
+fn connected(target: SocketAddr) -> io::Result<TcpStream> {
+    let socket = socket(AddressFamily::INET, SocketType::STREAM, None)?;
+    set_socket_recv_buffer_size(&socket, RECEIVE_BUFFER)?;
+    connect(&socket, &target)?;
+    Ok(TcpStream::from(socket))
+}
+
 /// Forwards one direction.
 fn forward(mut from: TcpStream, mut to: TcpStream, rate: f64, one_way: Duration) {
     let pipe = Arc::new((Mutex::new(Pipe::default()), Condvar::new()));
     let other = Arc::clone(&pipe);
     thread::spawn(move || {
         // Small pieces, so that the rate is even.
-        let mut buffer = [0; 1400];
+        let mut buffer = [0; PIECE];
         let mut free_at = Instant::now();
         loop {
             let read = from.read(&mut buffer).unwrap_or(0);
+            free_at = free_at.max(Instant::now()) + Duration::from_secs_f64(read as f64 / rate);
             let (pipe, changed) = &*pipe;
-            let mut pipe =
-                changed.wait_while(pipe.lock().unwrap(), |pipe| pipe.bytes > MAX_BUFFERED).unwrap();
+            let mut pipe = pipe.lock().unwrap();
+            pipe.closed = read == 0;
+            if read > 0 {
+                pipe.pieces.push_back((free_at + one_way, buffer[..read].to_vec()));
+            }
+            changed.notify_all();
+            drop(pipe);
             if read == 0 {
-                pipe.closed = true;
-                changed.notify_all();
                 break;
             }
-            free_at = free_at.max(Instant::now()) + Duration::from_secs_f64(read as f64 / rate);
-            pipe.bytes += read;
-            pipe.pieces.push_back((free_at + one_way, buffer[..read].to_vec()));
-            changed.notify_all();
+            // The next piece is read when this one has been transmitted.
+            thread::sleep(free_at.saturating_duration_since(Instant::now()));
         }
     });
     thread::spawn(move || {
@@ -78,8 +92,6 @@ fn forward(mut from: TcpStream, mut to: TcpStream, rate: f64, one_way: Duration)
             if to.write_all(&piece).is_err() {
                 break;
             }
-            shared.lock().unwrap().bytes -= piece.len();
-            changed.notify_all();
         }
         let _ = to.shutdown(Shutdown::Write);
     });

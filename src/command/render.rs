@@ -57,7 +57,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let end = watch(&session, &signals)?;
 
     let writing = Instant::now();
-    let (report, precision, written) = write(&session, args, &output, hash.clone())
+    let (report, precision, biased, written) = write(&session, args, &output, hash.clone())
         .ok_or_else(|| Failure::Failed("the renderer has no picture".to_string()))?;
     written.map_err(failed_write)?;
     let write_seconds = writing.elapsed().as_secs_f64();
@@ -95,6 +95,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
             bad_samples: report.bad_samples,
             saturated_samples: report.saturated_samples,
             saturated_pixels: report.saturated_pixels,
+            biased,
             peak_rss_bytes: peak_rss_bytes(),
             stopped_by: match end {
                 End::Done(reason) => reason.name(),
@@ -137,7 +138,8 @@ fn watch(session: &Session, signals: &Signals) -> Result<End, Failure> {
     end
 }
 
-type Written = (Report, &'static str, Result<(), WriteError>);
+/// Report, precision, sentences about truncated paths, and the result of writing.
+type Written = (Report, &'static str, Vec<String>, Result<(), WriteError>);
 
 /// Writes the picture on the rendering thread. Returns `None` if there is no film yet.
 fn write(
@@ -156,7 +158,7 @@ fn write(
     let (display, output) = (args.picture.display(), output.clone());
     session.with(move |state, report| {
         let written = state.write(report, &provenance, display, depth, &output);
-        (report.clone(), state.world.precision(), written)
+        (report.clone(), state.world.precision(), state.world.biases(), written)
     })
 }
 

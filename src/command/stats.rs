@@ -53,6 +53,9 @@ pub struct Stats {
     pub saturated_samples: u64,
     /// Number of pixels with a sum that reached the largest value of the film.
     pub saturated_pixels: u64,
+    /// Sentences of the picture's metadata about limits that truncate paths. Empty: no path is
+    /// truncated, so that the picture is unbiased.
+    pub biased: Vec<String>,
     /// Peak resident memory in bytes. Null on systems that do not report it.
     pub peak_rss_bytes: Option<u64>,
     /// Reason for the end: `spp`, `noise`, `rmse`, `time`, `rays_per_pixel`, `full` or `signal`.

@@ -231,6 +231,7 @@ fn stats_file_has_every_key() {
     assert_eq!([&stats["spp_min"], &stats["spp_max"]], [32, 32]);
     assert_eq!(stats["stopped_by"], "spp");
     assert_eq!(stats["bad_samples"], 0);
+    assert_eq!(stats["biased"], serde_json::json!([]));
     assert!(stats["noise_codes"].as_f64().unwrap() > 0.0);
     assert!(stats["rmse_linear"].as_f64().unwrap() > 0.0);
     let number = |key: &str| stats[key].as_f64().unwrap();
@@ -240,6 +241,18 @@ fn stats_file_has_every_key() {
     if cfg!(target_os = "linux") {
         assert!(number("peak_rss_bytes") > 1e6);
     }
+}
+
+#[test]
+fn stats_and_check_name_the_same_biases() {
+    let desk = Desk::new();
+    let mirrors = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/facing-mirrors.toml");
+    fs::copy(mirrors, desk.path("scene.toml")).unwrap();
+    let check = desk.run(&["check", "scene.toml"]);
+    let named: Vec<_> =
+        check.out.lines().filter_map(|line| line.strip_prefix("  biased    ")).collect();
+    assert!(!named.is_empty(), "{}", check.out);
+    assert_eq!(desk.stats(&["--spp", "2"])["biased"], serde_json::json!(named));
 }
 
 #[test]

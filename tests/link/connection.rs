@@ -21,6 +21,11 @@ pub struct Connection {
     replies: VecDeque<Duration>,
     /// `true` if the terminal replies.
     pub is_replying: bool,
+    /// Frames in the kernel's send queue: start and end of their transmission, and their bytes. They
+    /// leave the queue one round trip later.
+    queue: VecDeque<(Duration, Duration, usize)>,
+    /// `true` if the next frame shows the effect of input.
+    is_answering: bool,
     pub sent: Vec<Sent>,
     /// `true` if the user is always active.
     pub is_user_active: bool,
@@ -41,11 +46,23 @@ const STEP: Duration = Duration::from_millis(1);
 
 impl Connection {
     /// Creates a connection of `rate` bytes per second. `round_trip` is that of an empty connection.
-    pub fn new([columns, rows]: [u16; 2], rate: f64, round_trip: Duration) -> Self {
+    pub fn new(size: [u16; 2], rate: f64, round_trip: Duration) -> Self {
+        Self::with_mode(size, rate, round_trip, PacingMode::AckClocked(None))
+    }
+
+    /// Creates a connection whose frames are paced by `mode`. Without replies the round trip is not
+    /// known.
+    pub fn with_mode(
+        [columns, rows]: [u16; 2],
+        rate: f64,
+        round_trip: Duration,
+        mode: PacingMode,
+    ) -> Self {
+        let is_replying = mode != PacingMode::SendQueue;
         let start = InitialLink {
-            mode: PacingMode::AckClocked(None),
-            round_trip: Some(round_trip),
-            queue: false,
+            mode,
+            round_trip: is_replying.then_some(round_trip),
+            queue: !is_replying,
             fixed_rate: 30e3,
         };
         let [columns, rows] = [columns, rows].map(|n| NonZeroU16::new(n).unwrap());
@@ -59,7 +76,9 @@ impl Connection {
             free_at: Duration::ZERO,
             in_transit: VecDeque::new(),
             replies: VecDeque::new(),
-            is_replying: true,
+            is_replying,
+            queue: VecDeque::new(),
+            is_answering: false,
             sent: Vec::new(),
             is_user_active: false,
             waited: [Duration::ZERO; 2],
@@ -75,10 +94,14 @@ impl Connection {
             self.now += STEP;
             self.arrive();
             self.flow.expire(self.now);
+            if self.flow.asks_kernel(self.now) {
+                let queued = self.queued();
+                self.flow.held_back(self.now, Some(queued));
+            }
             if self.is_user_active {
                 self.flow.act(self.now);
             }
-            let allowance = self.flow.allowance(self.now, false);
+            let allowance = self.flow.allowance(self.now, self.is_answering);
             if let Some(allowance) = allowance.filter(|_| next <= self.now) {
                 next = self.now + FRAME_INTERVAL;
                 let mut bytes = Vec::new();
@@ -89,7 +112,10 @@ impl Connection {
                     let [size, budget] = [bytes.len(), allowance.bytes];
                     self.sent.push(Sent { bytes: size, budget, flushed: frame.flushed });
                     let duration = Duration::from_secs_f64(size as f64 / self.rate);
-                    self.free_at = self.free_at.max(self.now) + duration;
+                    let start = self.free_at.max(self.now);
+                    self.free_at = start + duration;
+                    self.queue.push_back((start, self.free_at, size));
+                    self.is_answering &= !frame.picture;
                     self.in_transit.push_back((self.free_at + self.one_way, bytes));
                 }
             }
@@ -98,6 +124,34 @@ impl Connection {
                 self.waited[1] += if self.free_at >= self.now { STEP } else { Duration::ZERO };
             }
         }
+    }
+
+    /// Presses a key while `old` is shown. Its effect is `new`. Returns the time until the first
+    /// kilobyte of the first frame of the picture arrives.
+    pub fn press(&mut self, old: &TargetFrame, new: &TargetFrame) -> Duration {
+        let pressed = self.now;
+        self.pass(old, self.one_way);
+        self.flow.act(self.now);
+        self.is_answering = true;
+        while self.is_answering {
+            self.pass(new, STEP);
+        }
+        let (start, end, bytes) = *self.queue.back().expect("the frame");
+        let share = (1000.0 / bytes as f64).min(1.0);
+        start + (end - start).mul_f64(share) + self.one_way - pressed
+    }
+
+    /// Returns the number of bytes in the kernel's send queue.
+    fn queued(&mut self) -> usize {
+        let acked_at = self.now.saturating_sub(2 * self.one_way);
+        while self.queue.front().is_some_and(|(_, end, _)| *end <= acked_at) {
+            self.queue.pop_front();
+        }
+        let in_queue = |(start, end, bytes): &(Duration, Duration, usize)| {
+            let acked = acked_at.saturating_sub(*start).as_secs_f64();
+            *bytes as f64 * (1.0 - acked / (*end - *start).as_secs_f64())
+        };
+        self.queue.iter().map(in_queue).sum::<f64>().ceil() as usize
     }
 
     /// Delivers all frames in transmission.

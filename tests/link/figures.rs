@@ -5,6 +5,7 @@ use crate::picture::{SCREEN, Work};
 use crate::support;
 use std::time::Duration;
 use zerkalo::scene::Scene;
+use zerkalo::terminal::diff::TargetFrame;
 
 /// Scene seen in a rough mirror, noisy everywhere.
 const NOISY: &str = r#"
@@ -204,6 +205,50 @@ fn connection_is_busy_while_differences_wait() {
         assert!(waited > 2.0 && busy >= 0.6, "{acting} {waited} {busy}");
         let longest = connection.sent.iter().map(|sent| sent.bytes).max().unwrap();
         assert!(longest as f64 <= 0.15 * RATE, "{longest} bytes");
+    }
+}
+
+/// Key presses while the effects of earlier ones are sent. The bound of the median is the round trip,
+/// 0.1 s for the frame before, 0.05 s for the excess of the measured round trip, and the time of a
+/// kilobyte; at 1 Mbit/s it is the goal of 0.25 s.
+#[test]
+fn keys_wait_for_one_frame_only() {
+    use zerkalo::terminal::flow::PacingMode::{AckClocked, SendQueue};
+    let scenes = ["mirror-room.toml", "viewpoint-left.toml"].map(support::shipped);
+    let works = scenes.map(|scene| {
+        let mut work = Work::new(&scene, 16);
+        while !work.done {
+            work.wave();
+        }
+        work
+    });
+    let mut numbers = 0x2545_f491_u32;
+    for (rate, round_trip, limit) in [(RATE, 100, 0.25), (32e3, 300, 0.48)] {
+        for mode in [AckClocked(None), SendQueue] {
+            let round_trip = Duration::from_millis(round_trip);
+            let mut connection = Connection::with_mode(SCREEN, rate, round_trip, mode);
+            let target = |key: u64| {
+                let work = &works[key as usize % 2];
+                TargetFrame { subject: key, version: key, ..work.target() }
+            };
+            connection.pass(&target(0), Duration::from_secs(20));
+            let mut latencies = Vec::new();
+            for key in 1..41 {
+                latencies.push(connection.press(&target(key - 1), &target(key)).as_secs_f64());
+                numbers = numbers.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+                let pause = 250 + u64::from(numbers >> 23);
+                connection.pass(&target(key), Duration::from_millis(pause));
+            }
+            latencies.sort_by(f64::total_cmp);
+            let [median, p95] = [latencies[20], latencies[38]];
+            let found = connection.flow.reading().unwrap().rate;
+            let what = format!(
+                "{mode:?}, {rate} B/s, {round_trip:?}: median {median:.3} s, p95 {p95:.3} s, rate {found:.0}"
+            );
+            println!("{what}");
+            assert!(median <= limit && p95 <= 1.3 * limit, "{what}");
+            assert!((0.7..1.3).contains(&(found / rate)), "{what}");
+        }
     }
 }
 

@@ -33,6 +33,8 @@ pub struct FramePipeline {
     /// The terminal supports synchronised updates.
     synchronised: bool,
     writer: Writer,
+    /// Time at which the frame that is being written was sent.
+    writing_since: Option<Duration>,
     /// Bytes of frames sent so far.
     sent: u64,
     /// The last drawn frame, of which parts may not have been sent yet.
@@ -88,6 +90,7 @@ impl FramePipeline {
             queue,
             synchronised: terminal.synchronised,
             writer: Writer::new(Arc::clone(&tty))?,
+            writing_since: None,
             sent: 0,
             target: Buffer::empty(Rect::ZERO),
             cursor: None,
@@ -166,6 +169,7 @@ impl FramePipeline {
             self.flow.sent(now, bytes.len(), true, 0);
         }
         self.writer.send(bytes);
+        self.writing_since = Some(now);
         DrawOutcome::Slice
     }
 
@@ -212,6 +216,18 @@ impl FramePipeline {
         if self.flow.asks_kernel(now) {
             self.flow.held_back(now, self.queue.as_ref().and_then(TcpSendQueue::bytes));
         }
+    }
+
+    /// Returns the time of the next measurement of the kernel's send queue by
+    /// [`FramePipeline::look`]. Returns `None` if none is needed.
+    pub fn measures_at(&self, now: Duration) -> Option<Duration> {
+        self.flow.measures_at(now)
+    }
+
+    /// Returns the time from which the connection counts as silent if nothing comes before. Returns
+    /// `None` if nothing is under way to the terminal.
+    pub fn silent_at(&self) -> Option<Duration> {
+        self.flow.silent_at(self.writing_since)
     }
 
     /// Returns the time from which a frame with new content could be sent. `answers` is `true` if
@@ -318,6 +334,7 @@ impl FramePipeline {
         self.sent += bytes.len() as u64;
         self.flow.sent(now, bytes.len(), frame.picture, frame.flushed);
         self.writer.send(bytes);
+        self.writing_since = Some(now);
         if frame.picture { DrawOutcome::Picture } else { DrawOutcome::Text }
     }
 
@@ -335,6 +352,7 @@ impl FramePipeline {
         if std::mem::take(&mut self.removing) {
             self.tty.set_exit_sequence(&[]);
         }
+        self.writing_since = None;
         self.writer.done(frame)
     }
 

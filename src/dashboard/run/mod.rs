@@ -131,6 +131,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         image_epoch: 0,
         resizing: ResizeDebounce::default(),
         status_sent_at: Duration::ZERO,
+        resting: false,
         changed: true,
         suspend: false,
         quit: false,
@@ -184,6 +185,8 @@ struct Dashboard {
     resizing: ResizeDebounce,
     /// Time at which the model last received the connection's status or upload progress.
     status_sent_at: Duration,
+    /// The renderer is paused because the connection is silent.
+    resting: bool,
     /// The model has changed since the last frame.
     changed: bool,
     /// The program is to be suspended after the current messages.
@@ -419,8 +422,22 @@ impl Dashboard {
                 };
             }
         }
-        let next = self.model.next_timeout().into_iter().chain(due).min();
-        next.map(|at| at.saturating_sub(now))
+        let measures_at = self.frames.measures_at(now);
+        let silent_at = self.rest(now);
+        let times = [self.model.next_timeout(), due, measures_at, silent_at];
+        times.into_iter().flatten().min().map(|at| at.saturating_sub(now))
+    }
+
+    /// Pauses the renderer while the connection is silent, because its pictures arrive nowhere.
+    /// Returns the time of the next pause if nothing comes from the terminal before.
+    fn rest(&mut self, now: Duration) -> Option<Duration> {
+        let silent_at = self.frames.silent_at();
+        let is_silent = silent_at.is_some_and(|at| at <= now);
+        if std::mem::replace(&mut self.resting, is_silent) != is_silent && !self.model.paused {
+            let session = self.effects.session();
+            if is_silent { session.pause() } else { session.resume() }
+        }
+        silent_at.filter(|_| !is_silent)
     }
 }
 

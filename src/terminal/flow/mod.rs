@@ -50,10 +50,17 @@ const PROBE_INTERVAL: Duration = Duration::from_secs(30);
 const NEW_WEIGHT: f64 = 0.3;
 /// Time after user input during which the user counts as active.
 const ACTIVE_TIME: Duration = Duration::from_millis(500);
-/// Number of bytes in the kernel's send queue below which a frame never waits.
-const MIN_QUEUE: f64 = 16e3;
 /// Interval at which the kernel's send queue is measured.
 const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
+/// Interval at which the queue is measured after no byte has left it for [`LOST_AFTER`].
+const STALLED_INTERVAL: Duration = Duration::from_millis(500);
+/// Round trip that is assumed until it is measured.
+const DEFAULT_ROUND_TRIP: Duration = Duration::from_millis(100);
+/// Time without any sign of the terminal after which the connection counts as silent.
+const SILENT_AFTER: Duration = Duration::from_secs(30);
+/// Acknowledgements that come within this time are measured together: the connection between may
+/// have held the first ones back.
+const ACKS_TOGETHER: Duration = Duration::from_millis(20);
 /// Rate of a connection that cannot be measured, in bytes per second.
 pub const DEFAULT_RATE: f64 = 30e3;
 /// Share of the rate that refinement may use: the sending of differences below the threshold of
@@ -105,6 +112,9 @@ pub struct FlowControl {
     rate: f64,
     round_trip: Option<Duration>,
     round_trip_at: Duration,
+    /// Rate from which the round trip is measured again: half of the rate at the last measurement. A
+    /// queue that is too short for a round trip that has grown lowers the rate as well.
+    doubtful_rate: f64,
     in_flight: FramesInFlight,
     losses: u32,
     /// Start of the last period of user activity.
@@ -121,6 +131,16 @@ pub struct FlowControl {
     /// Earliest time at which a frame may again contain refinement.
     refine_at: Duration,
     send_queue: SendQueueEstimate,
+    /// Last measurement of the rate by acknowledgements.
+    ack_sample: Option<AckSample>,
+}
+
+/// Bytes that were transmitted from `start` until their acknowledgement.
+#[derive(Clone, Copy, Debug)]
+struct AckSample {
+    start: Duration,
+    at: Duration,
+    bytes: usize,
 }
 
 impl FlowControl {
@@ -137,6 +157,7 @@ impl FlowControl {
             },
             round_trip: start.round_trip,
             round_trip_at: Duration::ZERO,
+            doubtful_rate: BUDGET[1] / span / 2.0,
             start,
             in_flight: FramesInFlight::default(),
             losses: 0,
@@ -147,6 +168,7 @@ impl FlowControl {
             clear_at: Duration::ZERO,
             refine_at: Duration::ZERO,
             send_queue: SendQueueEstimate::default(),
+            ack_sample: None,
         }
     }
 
@@ -188,9 +210,27 @@ impl FlowControl {
     /// Returns `true` if the caller should now measure the kernel's send queue and pass the result
     /// to [`FlowControl::held_back`].
     pub fn asks_kernel(&self, now: Duration) -> bool {
-        let measured_at = self.send_queue.asked;
-        self.mode == PacingMode::SendQueue
-            && measured_at.is_none_or(|at| at + QUEUE_INTERVAL <= now)
+        self.measures_at(now).is_some_and(|at| at <= now)
+    }
+
+    /// Returns the time of the next measurement of the kernel's send queue. Returns `None` if none
+    /// is needed: bytes are not in the queue, or the queue does not pace the frames.
+    pub fn measures_at(&self, now: Duration) -> Option<Duration> {
+        if self.mode != PacingMode::SendQueue {
+            return None;
+        }
+        let is_stalled = self.send_queue.stalled_since().is_some_and(|at| at + LOST_AFTER <= now);
+        self.send_queue.next_at(if is_stalled { STALLED_INTERVAL } else { QUEUE_INTERVAL })
+    }
+
+    /// Returns the time from which the connection counts as silent if nothing comes before.
+    /// `blocked_since` is the start of a write to the terminal that has not returned. Returns `None`
+    /// if no bytes are under way whose arrival would be noticed.
+    pub fn silent_at(&self, blocked_since: Option<Duration>) -> Option<Duration> {
+        let is_measured = self.mode == PacingMode::SendQueue;
+        let stalled_since = self.send_queue.stalled_since().filter(|_| is_measured);
+        let since = stalled_since.into_iter().chain(blocked_since).min()?;
+        Some(since.max(self.active_until) + SILENT_AFTER)
     }
 
     /// Returns the limits of a frame that may be sent now. Returns `None` if no frame may be sent.
@@ -226,7 +266,7 @@ impl FlowControl {
             // By this time the oldest frame is acknowledged or counts as lost.
             PacingMode::AckClocked(_) => self.lost_at().unwrap_or(frame),
             PacingMode::SendQueue => {
-                let due = self.send_queue.asked.map_or(now, |at| at + QUEUE_INTERVAL);
+                let due = self.measures_at(now).unwrap_or(now);
                 if self.has_room(now, false) { frame } else { frame.max(due) }
             }
             PacingMode::FixedRate => frame.max(self.free_at),
@@ -255,10 +295,7 @@ impl FlowControl {
                 self.clear_at = self.clear_at.max(now) + seconds(bytes, self.rate);
                 self.in_flight.add(InFlight { sent: now, bytes, picture });
             }
-            PacingMode::SendQueue => {
-                self.send_queue.sent += bytes as f64;
-                self.send_queue.bytes += bytes as f64;
-            }
+            PacingMode::SendQueue => self.send_queue.sent(now, bytes, self.max_queue()),
             PacingMode::FixedRate => {
                 self.free_at = self.free_at.max(now) + seconds(bytes, self.rate)
             }
@@ -303,12 +340,19 @@ impl FlowControl {
         // is 0.9 round trips after the frame was sent, but not before the previous acknowledgement.
         let earliest = frame.sent + self.round_trip.unwrap_or_default().mul_f64(0.9);
         let start = previous_ack.map_or(earliest, |previous| earliest.max(previous));
-        let span = at.saturating_sub(start).max(Duration::from_millis(10));
-        let rate = frame.bytes as f64 / span.as_secs_f64();
+        let sample = match self.ack_sample {
+            Some(last) if at <= last.at + ACKS_TOGETHER => {
+                AckSample { at, bytes: last.bytes + frame.bytes, ..last }
+            }
+            _ => AckSample { start, at, bytes: frame.bytes },
+        };
+        self.ack_sample = Some(sample);
+        let span = at.saturating_sub(sample.start).max(Duration::from_millis(10));
+        let rate = sample.bytes as f64 / span.as_secs_f64();
         // The time of a small frame is mostly latency. It can prove a connection fast, but not
         // slow.
-        if frame.bytes >= SMALL || rate > self.rate {
-            let is_full = 2 * frame.bytes >= self.budget() || span > 2 * FRAME_SPAN;
+        if sample.bytes >= SMALL || rate > self.rate {
+            let is_full = 2 * sample.bytes >= self.budget() || span > 2 * FRAME_SPAN;
             if is_full || rate > self.rate {
                 self.rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
             }
@@ -323,33 +367,22 @@ impl FlowControl {
             self.stop_requests(PacingMode::FixedRate, now);
             return;
         };
-        let queue = &mut self.send_queue;
-        let drained = queue.sent - bytes as f64;
-        let before = queue.asked.replace(now).map(|at| (at, queue.drained));
-        (queue.bytes, queue.drained) = (bytes as f64, drained);
-        let (since, drained_before) = match (before, queue.busy_since) {
-            // The queue is empty: the rate of the connection is at least that at which bytes were
-            // sent.
-            (Some(before), _) if bytes == 0 => before,
-            (_, Some(busy)) => busy,
-            _ => {
-                queue.busy_since = Some((now, drained));
-                return;
+        let (limit, round_trip) = (self.max_queue(), self.round_trip);
+        let sample = self.send_queue.measured(now, bytes, limit, round_trip);
+        if let Some((elapsed, bytes)) = sample.round_trip {
+            if bytes <= SMALL && self.is_probing(now) {
+                self.round_trip = Some(elapsed);
+                self.round_trip_at = now;
+                self.doubtful_rate = self.rate / 2.0;
             }
-        };
-        let span = now.saturating_sub(since);
-        let rate = (drained - drained_before) / span.as_secs_f64().max(1e-3);
-        if bytes == 0 {
-            queue.busy_since = None;
-            if rate <= self.rate {
-                return;
-            }
-        } else if span < FRAME_SPAN {
-            return;
-        } else {
-            queue.busy_since = Some((now, drained));
+            self.round_trip = self.round_trip.map(|least| least.min(elapsed));
         }
-        self.rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate.max(BUDGET[0]);
+        if let Some(rate) = sample.rate
+            && (sample.is_full || rate > self.rate)
+        {
+            let rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
+            self.rate = rate.max(BUDGET[0]);
+        }
     }
 
     /// Counts all frames in flight as lost if the oldest one is overdue at `now`.
@@ -410,15 +443,28 @@ impl FlowControl {
                     is_active && answers && newest_sent.is_some_and(|at| at < self.active_since);
                 is_first || self.in_flight.pictures() < limit
             }
+            PacingMode::SendQueue if self.is_probing(now) => self.send_queue.bytes == 0.0,
             PacingMode::SendQueue => {
-                let limit = MIN_QUEUE.max(self.rate * FRAME_SPAN.as_secs_f64());
-                self.send_queue.bytes < limit
+                // The first frame that shows the effect of input does not wait for frames sent
+                // before the input.
+                let is_first = now < self.active_until
+                    && answers
+                    && self.last_frame.is_some_and(|at| at < self.active_since);
+                let extra = if is_first { self.budget() as f64 } else { 0.0 };
+                self.send_queue.bytes < self.max_queue() + extra
             }
             PacingMode::FixedRate => {
                 let lead = if answers { FRAME_SPAN } else { Duration::ZERO };
                 self.free_at <= now + lead
             }
         }
+    }
+
+    /// Returns the number of bytes in the kernel's send queue from which no frame is sent: the bytes
+    /// of a round trip, which keep the connection busy, and of one frame.
+    fn max_queue(&self) -> f64 {
+        let time = self.round_trip.unwrap_or(DEFAULT_ROUND_TRIP) + FRAME_SPAN;
+        (self.rate * time.as_secs_f64()).max(BUDGET[0])
     }
 
     /// Returns the number of frames in flight that keeps the connection busy: one frame in
@@ -429,11 +475,13 @@ impl FlowControl {
         (1 + round_trips.round() as usize).clamp(2, MAX_IN_FLIGHT)
     }
 
-    /// Returns `true` if the next frame is to measure the round trip. Always `false` while the user
-    /// is active.
+    /// Returns `true` if the next frame is to measure the round trip. While the user is active, only
+    /// a rate that has fallen by half is a reason.
     fn is_probing(&self, now: Duration) -> bool {
         let is_known = self.round_trip.is_some() && now < self.round_trip_at + PROBE_INTERVAL;
-        matches!(self.mode, PacingMode::AckClocked(_)) && !is_known && now >= self.active_until
+        let is_measurable = matches!(self.mode, PacingMode::AckClocked(_) | PacingMode::SendQueue);
+        let is_doubtful = self.mode == PacingMode::SendQueue && self.rate < self.doubtful_rate;
+        is_measurable && (is_doubtful || !is_known && now >= self.active_until)
     }
 
     fn lost_at(&self) -> Option<Duration> {
@@ -446,6 +494,7 @@ impl FlowControl {
         }
         self.mode = mode;
         self.free_at = now;
+        self.ack_sample = None;
         self.send_queue = SendQueueEstimate::default();
         if mode == PacingMode::FixedRate {
             self.rate = self.start.fixed_rate;

@@ -1,6 +1,15 @@
-//! Estimate of the bytes still in the kernel's TCP send queue.
+//! Estimates from the bytes in the kernel's TCP send queue: round trip and rate.
 
 use std::time::Duration;
+
+/// Time after a frame was sent in which the queue is not measured: the bytes may not have reached
+/// it, since another process, such as `sshd`, passes them on.
+const SETTLING: Duration = Duration::from_millis(10);
+/// Shortest busy period, while the round trip is unknown, whose end is believed. A queue that is
+/// empty earlier may not have got the bytes yet.
+const BELIEVED_AFTER: Duration = Duration::from_millis(50);
+/// Time over which bytes are counted for a rate. The queue is measured every 20 ms.
+const SAMPLE: Duration = Duration::from_millis(100);
 
 /// Estimate of the length of the send queue and of the rate at which bytes leave it.
 #[derive(Debug, Default)]
@@ -9,11 +18,133 @@ pub struct SendQueueEstimate {
     pub bytes: f64,
     /// Time of the last measurement.
     pub asked: Option<Duration>,
-    /// Number of bytes that had left the queue by the last measurement.
-    pub drained: f64,
-    /// Start of the current period in which the queue was never empty, and the number of bytes that
-    /// had left the queue before this period.
-    pub busy_since: Option<(Duration, f64)>,
     /// Number of bytes sent in total.
-    pub sent: f64,
+    sent: f64,
+    /// Time of the last frame.
+    sent_at: Duration,
+    busy: Option<Busy>,
+}
+
+/// Period in which the queue is not empty.
+#[derive(Debug)]
+struct Busy {
+    since: Duration,
+    /// Number of bytes that had left the queue before.
+    drained: f64,
+    /// Size in bytes of the only frame of the period; `None` if there are more.
+    alone: Option<usize>,
+    /// Start of the present rate sample, and the number of bytes that had left the queue by then.
+    sample: Option<(Duration, f64)>,
+    /// The queue was full at some time in the sample, so that its rate is that of the connection.
+    is_full: bool,
+    /// Time at which bytes last left the queue, or the start of the period.
+    progress: Duration,
+    /// Largest number of bytes that had left the queue in any measurement.
+    most_drained: f64,
+}
+
+/// Result of a measurement of the queue.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct QueueSample {
+    /// Time in which a frame without other frames in flight was acknowledged, and its size.
+    pub round_trip: Option<(Duration, usize)>,
+    /// Bytes per second that left the queue.
+    pub rate: Option<f64>,
+    /// `true` if `rate` is the rate of the connection; `false` if the connection may be faster.
+    pub is_full: bool,
+}
+
+impl SendQueueEstimate {
+    /// Records a frame of `bytes` bytes. `limit` is the number of bytes from which the queue counts
+    /// as full.
+    pub fn sent(&mut self, now: Duration, bytes: usize, limit: f64) {
+        match &mut self.busy {
+            Some(busy) => busy.alone = None,
+            None => {
+                self.busy = Some(Busy {
+                    since: now,
+                    drained: self.sent,
+                    alone: Some(bytes),
+                    sample: None,
+                    is_full: false,
+                    progress: now,
+                    most_drained: self.sent,
+                });
+            }
+        }
+        self.sent += bytes as f64;
+        self.bytes += bytes as f64;
+        self.sent_at = now;
+        if let Some(busy) = &mut self.busy {
+            busy.is_full |= self.bytes >= limit;
+        }
+    }
+
+    /// Returns the earliest time of the next measurement if they are `interval` apart. Returns
+    /// `None` if no bytes are in the queue.
+    pub fn next_at(&self, interval: Duration) -> Option<Duration> {
+        self.busy.as_ref()?;
+        let settled = self.sent_at + SETTLING;
+        Some(self.asked.map_or(settled, |asked| settled.max(asked + interval)))
+    }
+
+    /// Returns the time since which the queue is not empty and no bytes have left it.
+    pub fn stalled_since(&self) -> Option<Duration> {
+        self.busy.as_ref().map(|busy| busy.progress)
+    }
+
+    /// Records a measurement: `bytes` bytes are in the queue. `limit` is the number of bytes from
+    /// which the queue counts as full, `round_trip` the shortest round trip known.
+    pub fn measured(
+        &mut self,
+        now: Duration,
+        bytes: usize,
+        limit: f64,
+        round_trip: Option<Duration>,
+    ) -> QueueSample {
+        self.asked = Some(now);
+        let Some(busy) = &mut self.busy else {
+            self.bytes = bytes as f64;
+            return QueueSample::default();
+        };
+        // Before this time no acknowledgement can have come.
+        let filled_at = busy.since + round_trip.map_or(BELIEVED_AFTER, |time| time.mul_f64(0.9));
+        if now < filled_at {
+            return QueueSample::default();
+        }
+        self.bytes = bytes as f64;
+        let drained = self.sent - self.bytes;
+        let is_progress = drained > busy.most_drained;
+        if is_progress {
+            busy.progress = now;
+            busy.most_drained = drained;
+        }
+        busy.is_full |= self.bytes >= limit;
+        if bytes == 0 {
+            let elapsed = now - busy.since;
+            let whole = (busy.since, busy.drained);
+            let is_long = |(start, _): &(Duration, f64)| now.saturating_sub(*start) >= SAMPLE;
+            let (start, before) = busy.sample.filter(is_long).unwrap_or(whole);
+            let span = now.saturating_sub(start);
+            let sample = QueueSample {
+                round_trip: busy.alone.map(|bytes| (elapsed, bytes)),
+                rate: Some((drained - before) / span.as_secs_f64()),
+                is_full: false,
+            };
+            self.busy = None;
+            return sample;
+        }
+        let Some((start, before)) = busy.sample else {
+            busy.sample = is_progress.then_some((now, drained));
+            return QueueSample::default();
+        };
+        let span = now.saturating_sub(start);
+        if span < SAMPLE {
+            return QueueSample::default();
+        }
+        let rate = Some((drained - before).max(0.0) / span.as_secs_f64());
+        let is_full = std::mem::replace(&mut busy.is_full, self.bytes >= limit);
+        busy.sample = Some((now, drained));
+        QueueSample { round_trip: None, rate, is_full }
+    }
 }

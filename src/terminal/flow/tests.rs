@@ -165,26 +165,164 @@ fn send_queue_replaces_lost_replies() {
         flow.expire(LOST_AFTER * (i as u32 + 1));
     }
     assert_eq!(flow.reading().unwrap().mode, PacingMode::SendQueue);
-    // The connection carries 100 kB/s. The rate is estimated from the send queue.
-    let (mut queue, mut longest_queue) = (0.0f64, 0.0f64);
-    for at in 9_001..20_000 {
-        let now = ms(at);
-        queue = (queue - 100.0).max(0.0);
-        if flow.asks_kernel(now) {
-            flow.held_back(now, Some(queue as usize));
+    let now = LOST_AFTER * MAX_LOSSES;
+    // The kernel no longer lists the connection.
+    flow.sent(now, 4000, true, 0);
+    assert!(flow.measures_at(now).is_some_and(|at| flow.asks_kernel(at)));
+    flow.held_back(now, None);
+    assert_eq!(flow.reading().unwrap().mode, PacingMode::FixedRate);
+}
+
+/// Simulated connection whose send queue is measured. Bytes reach the queue `LAG` after they were
+/// sent, and leave it when the other end acknowledges them.
+struct MeasuredWire {
+    wire: Wire,
+    /// Frames: time of arrival in the queue, start and end of transmission, and size.
+    frames: std::collections::VecDeque<(Duration, Duration, Duration, f64)>,
+}
+
+impl MeasuredWire {
+    const LAG: Duration = Duration::from_millis(6);
+
+    fn new(rate: f64, round_trip: u64) -> Self {
+        let wire = Wire { rate, round_trip: ms(round_trip), free_at: Duration::ZERO };
+        Self { wire, frames: Default::default() }
+    }
+
+    fn send(&mut self, now: Duration, bytes: usize) {
+        let queued_at = now + Self::LAG;
+        let start = self.wire.free_at.max(queued_at);
+        let end = self.wire.send(queued_at, bytes) - self.wire.round_trip;
+        self.frames.push_back((queued_at, start, end, bytes as f64));
+    }
+
+    /// Returns the number of bytes in the queue.
+    fn queue(&mut self, now: Duration) -> usize {
+        let acked_at = now.saturating_sub(self.wire.round_trip);
+        while self.frames.front().is_some_and(|(_, _, end, _)| *end <= acked_at) {
+            self.frames.pop_front();
         }
-        if let Some(allowance) = flow.allowance(now, false) {
-            flow.sent(now, allowance.bytes, true, 0);
-            queue += allowance.bytes as f64;
-            longest_queue = longest_queue.max(queue);
+        let in_queue = |(queued_at, start, end, bytes): &(Duration, Duration, Duration, f64)| {
+            let share =
+                acked_at.saturating_sub(*start).as_secs_f64() / (*end - *start).as_secs_f64();
+            if *queued_at <= now { bytes * (1.0 - share) } else { 0.0 }
+        };
+        self.frames.iter().map(in_queue).sum::<f64>().ceil() as usize
+    }
+
+    /// Advances by `seconds`. `wants` returns the bytes to send at a time, of the number permitted.
+    /// Returns the longest time for which bytes waited in the last quarter.
+    fn run(
+        &mut self,
+        flow: &mut FlowControl,
+        from: u64,
+        seconds: u64,
+        wants: impl Fn(u64, usize) -> usize,
+    ) -> Duration {
+        let mut longest = Duration::ZERO;
+        for at in from * 1000..(from + seconds) * 1000 {
+            let now = ms(at);
+            if flow.asks_kernel(now) {
+                let queue = self.queue(now);
+                flow.held_back(now, Some(queue));
+            }
+            let Some(allowance) = flow.allowance(now, false) else { continue };
+            let bytes = wants(at, allowance.bytes);
+            if bytes > 0 {
+                flow.sent(now, bytes, allowance.picture, 0);
+                self.send(now, bytes);
+                if at >= (from + seconds) * 1000 - seconds * 250 {
+                    longest = longest.max(self.wire.free_at.saturating_sub(now));
+                }
+            }
+        }
+        longest
+    }
+}
+
+#[test]
+fn send_queue_holds_a_round_trip_and_a_frame() {
+    for (rate, round_trip) in [(32e3, 300), (125e3, 100), (125e3, 30), (1.25e6, 40), (20e3, 300)] {
+        let start = InitialLink { round_trip: None, ..start(PacingMode::SendQueue) };
+        let mut flow = FlowControl::new(start);
+        let mut wire = MeasuredWire::new(rate, round_trip);
+        let waited = wire.run(&mut flow, 0, 60, |_, permitted| permitted);
+        let found = flow.reading().unwrap().rate;
+        let what = format!("{rate} B/s, {round_trip} ms: {found:.0} B/s, {waited:?}");
+        assert!((0.85..1.2).contains(&(found / rate)), "{what}");
+        // A frame of 0.1 s follows one that waits for at most the excess of the estimated round trip
+        // and the interval of measurements.
+        assert!(waited < ms(300), "{what}");
+    }
+}
+
+#[test]
+fn rate_stays_true_after_convergence() {
+    for (rate, round_trip) in [(125e3, 100), (32e3, 300)] {
+        let mut flow = FlowControl::new(start(PacingMode::SendQueue));
+        let mut wire = MeasuredWire::new(rate, round_trip);
+        wire.run(&mut flow, 0, 30, |_, permitted| permitted);
+        // Small frames, which have not reached the queue when it is measured next.
+        wire.run(
+            &mut flow,
+            30,
+            60,
+            |at, permitted| {
+                if at % 450 < 40 { permitted.min(1400) } else { 0 }
+            },
+        );
+        let found = flow.reading().unwrap().rate;
+        assert!((0.7..1.2).contains(&(found / rate)), "{found:.0} of {rate}");
+    }
+    // Acknowledgements that come together prove no rate.
+    let mut flow = FlowControl::new(start(PacingMode::AckClocked(None)));
+    let mut wire = Wire { rate: 125e3, round_trip: ms(100), free_at: Duration::ZERO };
+    saturate(&mut flow, &mut wire, 40, false);
+    flow.in_flight = FramesInFlight::default();
+    for i in 41..60 {
+        let now = ms(1000 * i);
+        flow.sent(now, 900, false, 0);
+        flow.sent(now + ms(40), 3600, true, 0);
+        flow.on_ack(now + ms(175));
+        flow.on_ack(now + ms(175));
+    }
+    let found = flow.reading().unwrap().rate;
+    assert!((0.7..1.2).contains(&(found / 125e3)), "{found:.0}");
+}
+
+#[test]
+fn unknown_round_trip_is_measured_by_a_small_frame() {
+    let mut flow =
+        FlowControl::new(InitialLink { round_trip: None, ..start(PacingMode::SendQueue) });
+    let mut wire = MeasuredWire::new(125e3, 200);
+    assert_eq!(flow.allowance(ms(0), false).unwrap().bytes, SMALL);
+    wire.run(&mut flow, 0, 5, |_, permitted| permitted);
+    let found = flow.round_trip.unwrap();
+    assert!((ms(200)..ms(260)).contains(&found), "{found:?}");
+}
+
+#[test]
+fn connection_without_acknowledgements_becomes_silent() {
+    let mut flow = FlowControl::new(start(PacingMode::SendQueue));
+    assert_eq!(flow.silent_at(None), None, "nothing is under way");
+    flow.sent(ms(0), 5000, true, 0);
+    let mut now = ms(0);
+    while flow.silent_at(None).unwrap() > now {
+        assert!(now < ms(60_000));
+        now += ms(20);
+        if flow.asks_kernel(now) {
+            flow.held_back(now, Some(5000));
         }
     }
-    let rate = flow.reading().unwrap().rate;
-    assert!((80e3..120e3).contains(&rate), "{rate}");
-    assert!(longest_queue < 32e3, "{longest_queue}");
-    // The kernel no longer lists the connection.
-    flow.held_back(ms(20_000), None);
-    assert_eq!(flow.reading().unwrap().mode, PacingMode::FixedRate);
+    assert_eq!(flow.measures_at(now), Some(flow.send_queue.asked.unwrap() + STALLED_INTERVAL));
+    // Input and acknowledgements are signs of life.
+    flow.act(now);
+    assert!(flow.silent_at(None).unwrap() > now);
+    flow.held_back(now, Some(0));
+    assert_eq!(flow.silent_at(None), None);
+    // Without acknowledgements a write that does not return is the only sign.
+    let flow = FlowControl::new(start(PacingMode::FixedRate));
+    assert_eq!(flow.silent_at(Some(ms(7))), Some(ms(7) + SILENT_AFTER));
 }
 
 #[test]
