@@ -87,6 +87,11 @@ impl SyncRender {
         Some((self.seconds + low, self.seconds + high))
     }
 
+    /// The schedule, with the estimates so far.
+    pub fn schedule(&self) -> &Schedule {
+        &self.schedule
+    }
+
     /// The compiled scene and its film.
     pub fn rendering(&self) -> &RenderState {
         &self.rendering

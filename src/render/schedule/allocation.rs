@@ -41,12 +41,13 @@ const WORTHWHILE: f64 = 0.25;
 const OWN_WEIGHT: f64 = 0.25;
 
 /// A block of samples that a decision may allocate to a tile.
-struct Candidate {
+pub(super) struct Candidate {
     /// Expected decrease of the summed squared error, per ray.
     gain: f64,
     /// Samples per replicate of the tile before the block.
-    count: u32,
-    tile: usize,
+    pub count: u32,
+    /// Number of the tile.
+    pub tile: usize,
 }
 
 impl PartialEq for Candidate {
@@ -71,13 +72,14 @@ impl Ord for Candidate {
 
 /// Model of how a tile's error falls with the samples per replicate: `scale * n^(-2 slope)`.
 #[derive(Clone, Copy)]
-struct ErrorModel {
+pub(super) struct ErrorModel {
     scale: f64,
     slope: f64,
 }
 
 impl ErrorModel {
-    fn mse(&self, count: u32) -> f64 {
+    /// Mean squared error after `count` samples per replicate.
+    pub fn mse(&self, count: u32) -> f64 {
         self.scale * f64::from(count).powf(-2.0 * self.slope)
     }
 
@@ -112,19 +114,31 @@ fn block(count: u32) -> u32 {
 }
 
 /// Sample counts that a decision in progress has allocated.
-struct Allocation<'a> {
+pub(super) struct Allocation<'a> {
     schedule: &'a Schedule,
-    counts: Vec<u32>,
+    /// Samples per replicate of each tile, with the allocated blocks.
+    pub counts: Vec<u32>,
     /// Expected number of rays of the allocated blocks.
-    spent: f64,
+    pub spent: f64,
     blocks: usize,
     samples_left: u64,
 }
 
-impl Allocation<'_> {
+impl<'a> Allocation<'a> {
+    /// Starts at the counts of the schedule.
+    pub fn new(schedule: &'a Schedule) -> Self {
+        Self {
+            schedule,
+            counts: schedule.tiles.iter().map(|t| t.done).collect(),
+            spent: 0.0,
+            blocks: 0,
+            samples_left: schedule.samples_left(),
+        }
+    }
+
     /// Returns the number of samples of the next block of `tile`. Returns 0 if the tile has reached
     /// its cap, or the picture its mean sample count.
-    fn next_block(&self, tile: usize) -> u32 {
+    pub fn next_block(&self, tile: usize) -> u32 {
         let (t, count) = (&self.schedule.tiles[tile], self.counts[tile]);
         let affordable =
             u32::try_from(self.samples_left / u64::from(t.pixels)).unwrap_or(MAX_SAMPLES);
@@ -136,7 +150,8 @@ impl Allocation<'_> {
         2.0 * f64::from(samples) * f64::from(t.pixels) * t.rays_per_sample()
     }
 
-    fn allocate(&mut self, tile: usize, samples: u32) {
+    /// Allocates `samples` samples per replicate to `tile`.
+    pub fn allocate(&mut self, tile: usize, samples: u32) {
         self.spent += self.rays(tile, samples);
         self.samples_left -= u64::from(samples) * u64::from(self.schedule.tiles[tile].pixels);
         self.blocks += 1;
@@ -144,7 +159,7 @@ impl Allocation<'_> {
     }
 
     /// Allocates one block to each of the tiles with the fewest samples, up to about `rays` rays.
-    fn explore(&mut self, rays: f64) {
+    pub fn explore(&mut self, rays: f64) {
         let mut order: Vec<usize> = (0..self.counts.len()).collect();
         order.sort_by_key(|tile| self.counts[*tile]);
         for tile in order {
@@ -158,7 +173,8 @@ impl Allocation<'_> {
         }
     }
 
-    fn candidate(&self, tile: usize, model: &ErrorModel) -> Option<Candidate> {
+    /// Returns the next block of `tile` with its gain under `model`, if the tile is open.
+    pub fn candidate(&self, tile: usize, model: &ErrorModel) -> Option<Candidate> {
         let (count, samples) = (self.counts[tile], self.next_block(tile));
         let fall = model.mse(count) - model.mse(count + samples);
         let pixels = f64::from(self.schedule.tiles[tile].pixels);
@@ -179,18 +195,10 @@ impl Schedule {
     /// [`Schedule::min_samples`].
     pub(super) fn highest_gain(&self) -> Vec<Job> {
         let criterion = self.settings.criterion;
-        let pooled = [self.pooled_slope(false), self.pooled_slope(true)];
-        let models: Vec<TileModels> =
-            self.tiles.iter().map(|t| tile_models(t, criterion, pooled)).collect();
+        let models = self.tile_models([self.pooled_slope(false), self.pooled_slope(true)]);
         let expected = self.calibrated(&models);
 
-        let mut allocation = Allocation {
-            schedule: self,
-            counts: self.tiles.iter().map(|t| t.done).collect(),
-            spent: 0.0,
-            blocks: 0,
-            samples_left: self.samples_left(),
-        };
+        let mut allocation = Allocation::new(self);
         let budget = DECISION_SHARE * self.rays as f64;
         allocation.explore(EXPLORATION * budget);
 
@@ -223,6 +231,16 @@ impl Schedule {
             heap.extend(allocation.candidate(tile, &expected[tile]));
         }
         allocation.into_jobs()
+    }
+
+    /// Returns the expected error of each tile as a function of its sample count. `pooled` are the
+    /// slopes of tiles without and with glossy lobes.
+    pub(super) fn expected_errors(&self, pooled: [f64; 2]) -> Vec<ErrorModel> {
+        self.calibrated(&self.tile_models(pooled))
+    }
+
+    fn tile_models(&self, pooled: [f64; 2]) -> Vec<TileModels> {
+        self.tiles.iter().map(|t| tile_models(t, self.settings.criterion, pooled)).collect()
     }
 
     /// Returns the expected error of each tile. It is a weighted mean of the validation estimates

@@ -62,11 +62,13 @@ impl ConvergenceFit {
     /// Slope over all recorded points, at most three doublings; 0.5 if there are fewer than two
     /// points.
     pub fn slope(&self) -> f64 {
-        match (self.points.first(), self.points.last()) {
-            (Some((r0, n0)), Some((r1, n1))) if r1 > r0 => {
-                clamp_slope((n0 / n1).ln() / (r1 / r0).ln())
-            }
-            _ => 0.5,
-        }
+        self.fitted_slope().unwrap_or(0.5)
+    }
+
+    /// Slope over all recorded points. `None` if there are fewer than two.
+    pub fn fitted_slope(&self) -> Option<f64> {
+        let (r0, n0) = *self.points.first()?;
+        let (r1, n1) = *self.points.last()?;
+        (r1 > r0).then(|| clamp_slope((n0 / n1).ln() / (r1 / r0).ln()))
     }
 }

@@ -9,6 +9,7 @@
 
 mod allocation;
 mod convergence_fit;
+mod prediction;
 mod retarget;
 mod settings;
 mod stop;
@@ -19,6 +20,7 @@ mod tile;
 use crate::film::Noise;
 use crate::render::wave::{Job, Wave, WaveReport};
 use convergence_fit::ConvergenceFit;
+pub use prediction::{Prediction, TilePrediction, TileSamples, USUAL_SLOPE};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
 
@@ -40,7 +42,7 @@ const FEW_PIXELS: f64 = 16.0;
 pub const SAMPLE_ALIGNMENT: u32 = 16;
 /// Samples per replicate at which a tile is full: the largest aligned count for which the sum over
 /// both replicates fits 32 bits.
-const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
+pub const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
 
 /// Returns the number of samples from `count` to the next packet boundary; 0 for counts below one
 /// packet. A count is unaligned if an earlier stop criterion ended inside a packet.
@@ -310,8 +312,13 @@ impl Schedule {
     }
 
     /// Returns the slope of the error over all glossy tiles (or over all other tiles), from their
-    /// latest doublings.
+    /// latest doublings; 0.5 before the first one.
     fn pooled_slope(&self, glossy: bool) -> f64 {
+        self.fitted_slope(glossy).unwrap_or(0.5)
+    }
+
+    /// Returns [`Schedule::pooled_slope`] if it follows from doublings.
+    fn fitted_slope(&self, glossy: bool) -> Option<f64> {
         let criterion = self.settings.criterion;
         let selected = self.tiles.iter().filter(|t| t.glossy == glossy);
         let doublings =
@@ -322,10 +329,7 @@ impl Schedule {
             after += pixels * e1;
             growth += pixels * e0 * (n1 / n0).ln();
         }
-        if before > 0.0 && after > 0.0 {
-            clamp_slope(0.5 * (before / after).ln() / (growth / before))
-        } else {
-            0.5
-        }
+        (before > 0.0 && after > 0.0)
+            .then(|| clamp_slope(0.5 * (before / after).ln() / (growth / before)))
     }
 }

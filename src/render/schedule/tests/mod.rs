@@ -2,6 +2,7 @@
 
 mod adaptive;
 mod changes;
+mod prediction;
 mod stops;
 
 use crate::film::testing::Rng;
