@@ -2,6 +2,7 @@
 
 use crate::film::{Display, Tone};
 use crate::measure::Experiment;
+use crate::render::plan::MAX_SHARDS;
 use crate::sampling::SamplerKind;
 use crate::scene::{Acceleration, Scene};
 use crate::world::Precision;
@@ -86,6 +87,10 @@ pub struct PictureArgs {
 pub enum Command {
     /// Render a scene to a picture file
     Render(Box<RenderArgs>),
+    /// Divide a render among shards, which other processes or machines trace
+    Plan(Box<PlanArgs>),
+    /// Add the parts that the shards of a plan have traced
+    Merge(MergeArgs),
     /// Measure the cost of accuracy on a scene: seconds to a given noise, gain and cost of settings
     Measure(Box<MeasureArgs>),
     /// Validate a scene and print its contents
@@ -135,12 +140,76 @@ pub struct RenderArgs {
     /// Give every pixel the same number of samples
     #[arg(long)]
     pub uniform: bool,
+    /// Trace the samples of a plan, which `zerkalo plan` has written
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "exposure", "tone", "spp", "noise", "rmse", "time", "seed", "precision", "sampler", "uniform", "stats"])]
+    pub plan: Option<PathBuf>,
+    /// Trace only this shard of the plan, into a .zk file; 0 is the base
+    #[arg(long, value_name = "K", requires = "plan", allow_negative_numbers = true)]
+    pub shard: Option<u32>,
     /// Bits per channel of a PNG
     #[arg(long, value_name = "8|16", default_value = "8", value_parser = bits)]
     pub bits: u8,
     /// Write statistics of the run as JSON
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
+}
+
+/// Arguments of `zerkalo plan`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "The pilot, an adaptive render to a coarser noise, decides how many samples each \
+                        tile gets. Its samples are part of the picture: the base, shard 0. Trace \
+                        shard K of 1..N by\n  zerkalo render SCENE --plan FILE --shard K -o \
+                        part-K.zk\nand add base and parts by `zerkalo merge`."
+)]
+pub struct PlanArgs {
+    /// The scene file
+    #[arg(required_unless_present = "from", conflicts_with = "from")]
+    pub scene: Option<PathBuf>,
+    /// The plan file to write
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Target: estimated RMSE of the displayed picture, in 8-bit levels
+    #[arg(long, value_name = "LEVELS", value_parser = positive, default_value_t = 0.5, allow_negative_numbers = true)]
+    pub noise: f64,
+    /// Number of shards
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SHARDS)), allow_negative_numbers = true)]
+    pub shards: u32,
+    /// Noise at which the pilot ends, in 8-bit levels [default: twice the target]
+    #[arg(long, value_name = "LEVELS", value_parser = positive, conflicts_with = "from", allow_negative_numbers = true)]
+    pub pilot: Option<f64>,
+    /// File for the samples of the pilot [default: the plan's name with -0.zk]
+    #[arg(long, value_name = "FILE.zk", conflicts_with = "from")]
+    pub base: Option<PathBuf>,
+    /// Plan the next round: continue this merged film, which takes the place of the pilot
+    #[arg(long, value_name = "FILE.zk", conflicts_with_all = ["size", "exposure", "tone", "seed", "precision", "sampler"])]
+    pub from: Option<PathBuf>,
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    #[command(flatten)]
+    pub compute: ComputeArgs,
+    #[command(flatten)]
+    pub precision: PrecisionArgs,
+    /// Sampler: sobol spreads samples evenly, random is for comparison
+    #[arg(long, value_enum, default_value_t = SamplerArg::Sobol)]
+    pub sampler: SamplerArg,
+}
+
+/// Arguments of `zerkalo merge`.
+#[derive(Clone, Debug, Args)]
+pub struct MergeArgs {
+    /// The parts, in any order
+    #[arg(required = true, value_name = "PART.zk")]
+    pub parts: Vec<PathBuf>,
+    /// The file to write: a picture (.png, .exr) or a film (.zk)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Accept missing and unfinished shards, and report what they cost in noise
+    #[arg(long)]
+    pub partial: bool,
+    /// Bits per channel of a PNG
+    #[arg(long, value_name = "8|16", default_value = "8", value_parser = bits)]
+    pub bits: u8,
 }
 
 /// Arguments of `zerkalo measure`.
@@ -284,8 +353,11 @@ impl Cli {
     pub fn warning(&self) -> Option<String> {
         match &self.command {
             Some(Command::Render(args)) => args.compute.warning(),
+            Some(Command::Plan(args)) => args.compute.warning(),
             Some(Command::Measure(args)) => args.compute.warning(),
-            Some(Command::Check(_) | Command::New(_) | Command::Doctor(_)) => None,
+            Some(Command::Merge(_) | Command::Check(_) | Command::New(_) | Command::Doctor(_)) => {
+                None
+            }
             None => self.edit.compute.warning(),
         }
     }

@@ -7,9 +7,13 @@ mod doctor;
 mod edit;
 mod load_progress;
 mod measure;
+mod merge;
 mod new;
+mod part_file;
+mod plan;
 mod progress;
 mod render;
+mod shard;
 mod signals;
 mod stats;
 
@@ -50,6 +54,8 @@ pub fn main() -> ExitCode {
     }
     let result = match &cli.command {
         Some(Command::Render(args)) => render::run(args, started),
+        Some(Command::Plan(args)) => plan::run(args),
+        Some(Command::Merge(args)) => merge::run(args),
         Some(Command::Measure(args)) => measure::run(args),
         Some(Command::Check(args)) => check::run(args),
         Some(Command::New(args)) => new::run(args),

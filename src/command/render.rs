@@ -5,7 +5,7 @@ use crate::command::load_progress::LoadReporter;
 use crate::command::progress::Progress;
 use crate::command::signals::Signals;
 use crate::command::stats::{Stats, peak_rss_bytes};
-use crate::command::{Failure, check_file, print_line, warn, write_file};
+use crate::command::{Failure, check_file, print_line, shard, warn, write_file};
 use crate::disk::WriteError;
 use crate::film::{Depth, ImageOutput};
 use crate::render::Options;
@@ -27,6 +27,9 @@ const DEFAULT_NOISE_CODES: f64 = 0.5;
 const POLL: Duration = Duration::from_millis(50);
 
 pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
+    if let Some(plan) = &args.plan {
+        return shard::run(args, plan);
+    }
     let output =
         ImageOutput::from_path(&args.output).map_err(|error| Failure::Usage(error.to_string()))?;
     let document = Document::read_with(&args.scene, LoadReporter::new().assets)

@@ -51,20 +51,13 @@ pub fn scene_hash(text: &str) -> String {
 }
 
 /// Metadata keys and values.
-fn metadata(
+pub fn metadata(
     rendering: &RenderState,
     report: &Report,
     provenance: &Provenance,
     display: &Display,
 ) -> Vec<(String, String)> {
-    let spp = &report.spp;
-    let noise = match report.noise {
-        Some(n) => format!(
-            "{:.4} codes, {:.4} codes in 95% of the tiles, linear RMSE {:.6e}",
-            n.rmse_codes, n.p95_codes, n.rmse_linear
-        ),
-        None => "unknown".to_string(),
-    };
+    let [spp, noise, bad_samples, saturated_samples, saturated_pixels] = film_entries(report);
     let biases = rendering.world.biases();
     let tone =
         Tone::NAMED.iter().find(|(_, tone)| *tone == display.tone).map_or("", |(name, _)| name);
@@ -74,11 +67,11 @@ fn metadata(
         ("Source", provenance.source.clone()),
         ("Scene hash", provenance.scene_hash.clone()),
         ("Seed", header.seed.to_string()),
-        ("Samples per pixel", format!("{:.2} ({}-{})", spp.mean, spp.min, spp.max)),
-        ("Noise", noise),
-        ("Bad samples", report.bad_samples.to_string()),
-        ("Saturated samples", report.saturated_samples.to_string()),
-        ("Saturated pixels", report.saturated_pixels.to_string()),
+        spp,
+        noise,
+        bad_samples,
+        saturated_samples,
+        saturated_pixels,
         ("Biased", if biases.is_empty() { "no".to_string() } else { biases.join("; ") }),
         (
             "Settings",
@@ -93,4 +86,30 @@ fn metadata(
         ),
     ];
     entries.into_iter().map(|(key, value)| (key.to_string(), value)).collect()
+}
+
+/// Metadata that depend on the film alone.
+fn film_entries(report: &Report) -> [(&'static str, String); 5] {
+    let spp = &report.spp;
+    let noise = match report.noise {
+        Some(n) => format!(
+            "{:.4} codes, {:.4} codes in 95% of the tiles, linear RMSE {:.6e}",
+            n.rmse_codes, n.p95_codes, n.rmse_linear
+        ),
+        None => "unknown".to_string(),
+    };
+    [
+        ("Samples per pixel", format!("{:.2} ({}-{})", spp.mean, spp.min, spp.max)),
+        ("Noise", noise),
+        ("Bad samples", report.bad_samples.to_string()),
+        ("Saturated samples", report.saturated_samples.to_string()),
+        ("Saturated pixels", report.saturated_pixels.to_string()),
+    ]
+}
+
+/// Replaces the metadata that depend on the film by those of `report`.
+pub fn update_metadata(metadata: &mut [(String, String)], report: &Report) {
+    for (key, value) in film_entries(report) {
+        metadata.iter_mut().filter(|(k, _)| k == key).for_each(|(_, v)| v.clone_from(&value));
+    }
 }

@@ -6,6 +6,7 @@ mod feature_buffer;
 mod first_pass;
 pub mod memory;
 pub mod pass;
+pub mod plan;
 mod relighting;
 mod render_state;
 pub mod schedule;

@@ -49,6 +49,7 @@ mod mutations;
 mod paths;
 mod program;
 mod shapes;
+mod shards;
 mod table;
 mod textures;
 mod tracks;

@@ -2,6 +2,10 @@
 
 use image::{DynamicImage, ImageFormat};
 use std::io::Cursor;
+use zerkalo::film::Display;
+use zerkalo::render::plan::{Plan, PlanSettings, PlannedTile};
+use zerkalo::sampling::SamplerKind;
+use zerkalo::value::fnv1a64;
 
 /// Returns a sphere of triangles: corners, and the corners of each triangle.
 fn ball(rings: usize, sides: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
@@ -235,4 +239,51 @@ pub fn toml() -> Vec<Vec<u8>> {
     // Long files would only find the same errors more slowly.
     let texts = paths.iter().map(|p| std::fs::read(p).unwrap()).filter(|t| t.len() < 20_000);
     texts.collect()
+}
+
+/// Returns plans: of a pilot, and of a second round.
+pub fn plan() -> Vec<Vec<u8>> {
+    let tile = |(base, end, glossy): (u32, u32, bool)| PlannedTile {
+        base,
+        end,
+        rays_per_sample: 2.75,
+        glossy,
+    };
+    let plan = |base_plan: Option<u64>, shards: u32| Plan {
+        settings: PlanSettings {
+            source: "scenes/mirror-room.toml".into(),
+            scene_hash: "fnv1a64:0123456789abcdef".into(),
+            size: [40, 20],
+            seed: 3,
+            sampler: SamplerKind::Sobol,
+            precision: "single".into(),
+            display: Display::default(),
+            rays_per_pixel: 0,
+            noise_codes: 0.25,
+            shards,
+            base_plan,
+        },
+        predicted_codes: 0.25,
+        slopes: [0.7, 0.5],
+        tiles: [
+            (4, 16, false),
+            (8, 8, false),
+            (16, 480, true),
+            (4, 8, false),
+            (4, 4, false),
+            (32, 64, true),
+        ]
+        .map(tile)
+        .to_vec(),
+    };
+    [plan(None, 8), plan(Some(12), 40)].map(|plan| plan.text().into_bytes()).into()
+}
+
+/// Returns the lines of a plan before its checksum, with a correct checksum.
+pub fn repaired_plan(bytes: &[u8]) -> Vec<u8> {
+    let end = bytes.windows(9).rposition(|w| w == b"checksum ").unwrap_or(bytes.len());
+    let mut out = bytes[..end].to_vec();
+    let checksum = fnv1a64(&out);
+    out.extend(format!("checksum {checksum:016x}\n").bytes());
+    out
 }

@@ -9,6 +9,7 @@ use mutate::Random;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use zerkalo::asset::Assets;
+use zerkalo::render::plan::Plan;
 use zerkalo::scene::Scene;
 
 /// Mutations of each kind of file.
@@ -147,4 +148,28 @@ fn toml() {
     assert_mixed(read_mutations("toml", &seeds, |bytes| {
         std::str::from_utf8(bytes).is_ok_and(|text| Scene::parse(text, name).is_ok())
     }));
+}
+
+#[test]
+fn plan() {
+    let mut parsed = Vec::new();
+    let accepted = read_mutations("plan", &files::plan(), |bytes| {
+        let repaired = files::repaired_plan(bytes);
+        // Half of the files keep their wrong checksum, as files that were damaged on the way do.
+        let bytes = if bytes.len() % 2 == 0 { &repaired } else { bytes };
+        let plan = Plan::parse(Path::new("a.plan"), bytes);
+        parsed.extend(plan.clone().ok().filter(|_| parsed.len() < 100));
+        plan.is_ok()
+    });
+    assert!(accepted > 20 && accepted < CASES, "{accepted} of {CASES} were accepted");
+    for plan in parsed {
+        let again = Plan::parse(Path::new("a.plan"), plan.text().as_bytes()).unwrap();
+        assert_eq!(again, plan);
+        // Every sample of an accepted plan belongs to one shard.
+        let shards = plan.settings.shards.min(50);
+        let ranges = (0..=shards).map(|shard| plan.ranges(shard));
+        let samples: u64 = ranges.flatten().map(|range| range.len() as u64).sum();
+        let all: u64 = plan.tiles.iter().map(|tile| u64::from(tile.end)).sum();
+        assert!(samples == all || shards < plan.settings.shards, "{samples} of {all}");
+    }
 }

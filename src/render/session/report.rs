@@ -1,6 +1,6 @@
 //! Progress report of a session.
 
-use crate::film::Noise;
+use crate::film::{Display, Film, LightWeights, Noise};
 use crate::render::schedule::{Spp, StoppedBy};
 use std::sync::Arc;
 
@@ -72,7 +72,7 @@ pub struct Report {
 
 impl Report {
     /// Creates the report of a session without a scene.
-    pub(super) fn idle(threads: usize) -> Self {
+    pub(in crate::render) fn idle(threads: usize) -> Self {
         Self {
             generation: 0,
             state: State::Idle,
@@ -93,6 +93,26 @@ impl Report {
             threads,
             lanes: "",
             inventory: Arc::from(""),
+        }
+    }
+
+    /// Creates the report of a complete film, shown with `mix` and `display`.
+    pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
+        let counts = (0..film.tile_count()).map(|tile| {
+            let [a, b] = film.tile(tile).map_or([0; 2], |tile| tile.counts());
+            a.saturating_add(b)
+        });
+        let (min, max) = counts.fold((u32::MAX, 0), |(min, max), n| (min.min(n), max.max(n)));
+        let samples = film.samples();
+        let pixels = film.width() * film.height();
+        Self {
+            spp: Spp { min, mean: samples as f64 / pixels as f64, max },
+            samples,
+            noise: film.noise(mix, display),
+            bad_samples: film.bad_samples().count,
+            saturated_samples: film.saturated_samples(),
+            saturated_pixels: film.saturated_pixels(),
+            ..Self::idle(0)
         }
     }
 

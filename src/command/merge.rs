@@ -1,0 +1,53 @@
+//! `zerkalo merge`: adds the parts that the shards of a plan have traced.
+
+use crate::command::args::MergeArgs;
+use crate::command::part_file::{self, FilmOutput};
+use crate::command::{Failure, print_line};
+use crate::render::export::update_metadata;
+use crate::render::plan::Merged;
+use crate::render::session::Report;
+
+pub fn run(args: &MergeArgs) -> Result<(), Failure> {
+    let output = FilmOutput::new(&args.output, args.bits)?;
+    let mut merged = Merged::of_files(&args.parts, args.partial).map_err(Failure::Failed)?;
+    let report = Report::of_film(&merged.film, &merged.header.weights, &merged.header.display);
+    let missing = merged.missing();
+    let header = &mut merged.header;
+    update_metadata(&mut header.metadata, &report);
+    let plan = &merged.part.plan;
+    if let Some(missing) = &missing {
+        let shards = format!("missing of {}: {missing}", plan.settings.shards);
+        header.metadata.push(("Shards".to_string(), shards));
+    }
+    output.write(&merged.film, header)?;
+    let path = args.output.display();
+    print_line(&format!("{path}  {}  {} rays", part_file::summary(&report), merged.part.rays))?;
+    if let Some(missing) = missing {
+        print_line(&format!(
+            "missing of {} shards: {missing}; {}",
+            plan.settings.shards,
+            cost(&report, plan.predicted_codes)
+        ))?;
+    } else if let Some(noise) = report.noise
+        && noise.rmse_codes > plan.settings.noise_codes
+    {
+        print_line(&format!(
+            "the noise is {:.1} % above the target of {}: merge to a .zk file, and plan another \
+             round by `zerkalo plan --from`",
+            100.0 * (noise.rmse_codes / plan.settings.noise_codes - 1.0),
+            plan.settings.noise_codes
+        ))?;
+    }
+    Ok(())
+}
+
+/// Formats the noise of a picture without some shards, relative to that of the whole picture.
+fn cost(report: &Report, predicted_codes: f64) -> String {
+    match report.noise {
+        Some(noise) => format!(
+            "noise {:.3} instead of about {predicted_codes:.3} 8-bit levels",
+            noise.rmse_codes
+        ),
+        None => "noise unknown, because some tiles have no samples".to_string(),
+    }
+}

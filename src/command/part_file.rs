@@ -1,0 +1,100 @@
+//! Output of films of a plan: part files, and pictures of complete films.
+
+use crate::command::{Failure, check_file};
+use crate::disk::WriteError;
+use crate::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
+use crate::film::{Depth, Film, ImageData, ImageOutput};
+use crate::render::RenderState;
+use crate::render::export::{Provenance, metadata};
+use crate::render::plan::{Part, Plan};
+use crate::render::session::Report;
+use std::path::{Path, PathBuf};
+
+/// Destination of a film.
+pub enum FilmOutput {
+    /// Film file.
+    Film(PathBuf),
+    /// Picture file, with the bits per channel of a PNG.
+    Picture(ImageOutput, Depth),
+}
+
+impl FilmOutput {
+    /// Chooses the format by the extension of `path`, and checks that the file can be written.
+    pub fn new(path: &Path, bits: u8) -> Result<Self, Failure> {
+        let failed = |error: WriteError| Failure::Failed(error.to_string());
+        if is_film(path) {
+            check_file(path)?;
+            return Ok(Self::Film(path.to_path_buf()));
+        }
+        let output = ImageOutput::from_path(path)
+            .map_err(|error| Failure::Usage(format!("{error}; a film has the extension .zk")))?;
+        output.check_writable().map_err(failed)?;
+        Ok(Self::Picture(output, if bits == 16 { Depth::Sixteen } else { Depth::Eight }))
+    }
+
+    /// Writes `film`. Pictures are made with the light weights, display and metadata of `header`.
+    pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), Failure> {
+        let written = match self {
+            Self::Film(path) => write_film(path, film, header),
+            Self::Picture(output, depth) => output.write(&ImageData {
+                film,
+                mix: &header.weights,
+                group_names: &header.group_names,
+                display: header.display,
+                depth: *depth,
+                metadata: &header.metadata,
+            }),
+        };
+        written.map_err(|error| Failure::Failed(error.to_string()))
+    }
+}
+
+/// Returns `true` if `path` has the extension of film files.
+pub fn is_film(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zk"))
+}
+
+/// Returns the header of the film of `state`, which holds the shards of `part`. `report` is the
+/// report on this film.
+pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHeader {
+    let settings = &part.plan.settings;
+    let provenance = Provenance {
+        source: settings.source.clone(),
+        scene_hash: settings.scene_hash.clone(),
+        sampler: settings.sampler,
+        adaptive: true,
+    };
+    let mut header = FilmFileHeader {
+        film: state.film.header().clone(),
+        weights: state.mix.clone(),
+        group_names: state.group_names(),
+        display: settings.display,
+        metadata: metadata(state, report, &provenance, &settings.display),
+        chunks: Default::default(),
+    };
+    part.record(&mut header);
+    header
+}
+
+/// Formats sample counts and noise: `212 spp (32-900)  noise 0.250 8-bit levels`.
+pub fn summary(report: &Report) -> String {
+    let spp = &report.spp;
+    let noise = match report.noise {
+        Some(noise) => format!("noise {:.3} 8-bit levels", noise.rmse_codes),
+        None => "noise unknown".to_string(),
+    };
+    format!("{:.0} spp ({}-{})  {noise}", spp.mean, spp.min, spp.max)
+}
+
+/// Reads a plan file.
+pub fn read_plan(path: &Path) -> Result<Plan, Failure> {
+    Plan::read(path).map_err(|error| Failure::Failed(error.to_string()))
+}
+
+/// Writes a film file.
+pub fn write_film(path: &Path, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
+    let mut pieces = vec![header.encode()];
+    pieces.extend((0..tile_chunks(film)).map(|chunk| encode_tiles(film, chunk)));
+    pieces.push(encode_end(film, &pieces));
+    write_film_file(path, &pieces)
+}

@@ -1,0 +1,187 @@
+//! `zerkalo plan`: divides a render among shards.
+
+use crate::command::args::PlanArgs;
+use crate::command::load_progress::LoadReporter;
+use crate::command::part_file;
+use crate::command::{Failure, check_file, print_line, warn, write_file};
+use crate::film::file::FilmReader;
+use crate::film::{Estimator, Noise};
+use crate::render::export::scene_hash;
+use crate::render::plan::{BASE, Part, PartShard, Plan, PlanSettings};
+use crate::render::schedule::{Criterion, Settings, Stop, USUAL_SLOPE};
+use crate::render::session::Report;
+use crate::render::{Options, SyncRender};
+use crate::sampling::SampleSettings;
+use crate::scene::Document;
+use crate::world;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::{Path, PathBuf};
+
+/// Noise of the pilot relative to the target, without `--pilot`. A pilot to twice the target takes
+/// a third to a half of the rays of the whole picture, and predicts the noise within 10 %.
+const PILOT: f64 = 2.0;
+
+pub fn run(args: &PlanArgs) -> Result<(), Failure> {
+    check_file(&args.output)?;
+    let plan = match (&args.from, &args.scene) {
+        (Some(film), _) => next_round(args, film)?,
+        (None, Some(scene)) => by_pilot(args, scene)?,
+        (None, None) => return Err(Failure::Usage("name a scene or --from FILE.zk".into())),
+    };
+    write_file(&args.output, plan.text().as_bytes())?;
+    let rays: Vec<f64> = (BASE..=plan.settings.shards).map(|shard| plan.rays(shard)).collect();
+    let (base, shards) = rays.split_at(1);
+    let most = shards.iter().copied().fold(0.0, f64::max);
+    let total: f64 = rays.iter().sum();
+    print_line(&format!(
+        "{}  {} shards  {:.0} spp  expected noise {:.3} 8-bit levels",
+        args.output.display(),
+        plan.settings.shards,
+        plan.spp(),
+        plan.predicted_codes
+    ))?;
+    print_line(&format!(
+        "expected rays: {total:.3e}; base {:.1} %, largest shard {:.2} %",
+        100.0 * base[0] / total,
+        100.0 * most / total
+    ))?;
+    Ok(())
+}
+
+/// Hash of the scene of `document` and of the files that it names.
+pub fn hash(document: &Document) -> String {
+    let text = scene_hash(document.text());
+    match document.scene().contents_hash() {
+        Some(contents) => format!("{text}+{contents:016x}"),
+        None => text,
+    }
+}
+
+/// Renders the pilot, writes its film, and plans the rest.
+fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
+    let pilot_noise = args.pilot.unwrap_or(PILOT * args.noise);
+    if pilot_noise < args.noise {
+        return Err(Failure::Usage(format!(
+            "--pilot {pilot_noise} is below --noise {}: a pilot ends before the target",
+            args.noise
+        )));
+    }
+    let base_file = args.base.clone().unwrap_or_else(|| default_base(&args.output));
+    check_file(&base_file)?;
+    let document = Document::read_with(path, LoadReporter::new().assets)
+        .map_err(|e| Failure::Failed(e.to_string()))?;
+    for warning in document.warnings() {
+        warn(&format!("warning: {warning}"));
+    }
+    let mut scene = document.scene().clone();
+    args.picture.resize(&mut scene).map_err(Failure::Usage)?;
+    let options = Options {
+        world: world::Options { precision: args.precision.get() },
+        sampling: SampleSettings { seed: args.compute.seed, kind: args.sampler.kind() },
+        display: args.picture.display(),
+    };
+    let threads = args.compute.threads();
+    let mut pilot =
+        SyncRender::new(&scene, &options, settings(pilot_noise), threads).map_err(|error| {
+            let what = format!("cannot start {threads} threads: {error}; try fewer by --threads");
+            Failure::Failed(what)
+        })?;
+    let bar = spinner();
+    while pilot.step().is_none() {
+        if let Some(noise) = pilot.noise_codes() {
+            bar.set_message(format!("pilot: noise {noise:.2} of {pilot_noise} 8-bit levels"));
+        }
+        bar.tick();
+    }
+    bar.finish_and_clear();
+    let state = pilot.rendering();
+    let settings = PlanSettings {
+        source: path.display().to_string(),
+        scene_hash: hash(&document),
+        size: scene.film.size,
+        seed: args.compute.seed,
+        sampler: args.sampler.kind(),
+        precision: state.world.precision().to_string(),
+        display: args.picture.display(),
+        rays_per_pixel: scene.film.rays_per_pixel,
+        noise_codes: args.noise,
+        shards: args.shards,
+        base_plan: None,
+    };
+    let mut schedule = pilot.schedule().clone();
+    schedule.set_stop(stop(args.noise));
+    let plan = Plan::of_schedule(&schedule, [USUAL_SLOPE; 2], settings)
+        .ok_or_else(|| Failure::Failed("the pilot has no estimate of its noise".into()))?;
+    let part = Part {
+        plan,
+        shards: vec![PartShard { number: BASE, complete: true }],
+        rays: schedule.rays(),
+    };
+    let report = Report::of_film(&state.film, &state.mix, &options.display);
+    part_file::write_film(&base_file, &state.film, &part_file::header(state, &part, &report))
+        .map_err(|e| Failure::Failed(e.to_string()))?;
+    print_line(&format!(
+        "{}  {}  {} rays  {:.2} s  (pilot, the base of the plan)",
+        base_file.display(),
+        part_file::summary(&report),
+        schedule.rays(),
+        pilot.seconds()
+    ))?;
+    Ok(part.plan)
+}
+
+/// Plans the samples that follow those of the merged film at `path`.
+fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
+    let failed =
+        |reason: &str| Failure::Failed(format!("cannot plan from {}: {reason}", path.display()));
+    let reader = FilmReader::open(path).map_err(|e| Failure::Failed(e.to_string()))?;
+    let part = Part::of_header(path, reader.header()).map_err(Failure::Failed)?;
+    let part = part.ok_or_else(|| {
+        failed("it belongs to no plan; name a film that `zerkalo merge` has written")
+    })?;
+    if !part.is_whole() {
+        return Err(failed("it lacks shards of its plan; merge all of them first"));
+    }
+    let (header, film) = reader.read().map_err(|e| Failure::Failed(e.to_string()))?;
+    let estimator = Estimator::new(film.scales(), &header.weights, &header.display);
+    let cap = part.plan.settings.rays_per_pixel;
+    let schedule_settings = Settings { rays_per_pixel: cap, ..settings(args.noise) };
+    let schedule = part.plan.schedule(&film, &estimator, schedule_settings);
+    let schedule = schedule.ok_or_else(|| failed("it has no estimate of its noise"))?;
+    print_line(&format!(
+        "{}  noise {:.3} 8-bit levels (the base of the plan)",
+        path.display(),
+        schedule.noise().map_or(0.0, |noise: Noise| noise.rmse_codes)
+    ))?;
+    let settings = PlanSettings {
+        noise_codes: args.noise,
+        shards: args.shards,
+        base_plan: Some(part.plan.checksum()),
+        ..part.plan.settings.clone()
+    };
+    Plan::of_schedule(&schedule, part.plan.slopes, settings)
+        .ok_or_else(|| failed("it has no estimate of its noise"))
+}
+
+/// Returns the file of the pilot's film: `job-0.zk` for `job.plan`.
+fn default_base(plan: &Path) -> PathBuf {
+    let mut name = plan.file_stem().unwrap_or_default().to_os_string();
+    name.push("-0.zk");
+    plan.with_file_name(name)
+}
+
+fn stop(noise_codes: f64) -> Stop {
+    Stop { noise_codes: Some(noise_codes), ..Stop::default() }
+}
+
+fn settings(noise_codes: f64) -> Settings {
+    let criterion = Criterion::Codes;
+    // The renderer replaces the cap by that of the scene.
+    Settings { adaptive: true, criterion, rays_per_pixel: 0, stop: stop(noise_codes) }
+}
+
+fn spinner() -> ProgressBar {
+    let style = ProgressStyle::with_template("{spinner} {msg}  {elapsed}")
+        .unwrap_or_else(|_| ProgressStyle::default_spinner());
+    ProgressBar::new_spinner().with_style(style)
+}

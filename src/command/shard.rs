@@ -1,0 +1,233 @@
+//! `zerkalo render --plan`: traces one shard of a plan into a part file, or the whole plan.
+//!
+//! The part file is also the checkpoint of its shard. The same command again continues an
+//! unfinished part and keeps a complete one, so that engines can repeat any failed command.
+
+use crate::command::args::RenderArgs;
+use crate::command::load_progress::LoadReporter;
+use crate::command::part_file::{self, FilmOutput};
+use crate::command::progress::Progress;
+use crate::command::signals::Signals;
+use crate::command::{Failure, print_line, warn};
+use crate::film::Film;
+use crate::film::file::FilmReader;
+use crate::render::plan::{BASE, Part, PartShard, Plan, ShardRender};
+use crate::render::session::Report;
+use crate::render::{Options, RenderState};
+use crate::sampling::SampleSettings;
+use crate::scene::Document;
+use crate::world::{self, Precision};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Time from the start of a shard to its first checkpoint. Each following interval is twice the
+/// previous one, up to [`LONGEST_INTERVAL`].
+const FIRST_CHECKPOINT: Duration = Duration::from_secs(5);
+/// Longest interval between checkpoints.
+const LONGEST_INTERVAL: Duration = Duration::from_secs(60);
+/// Smallest interval between checkpoints, relative to the time to write one.
+const WRITES_PER_INTERVAL: u32 = 50;
+
+/// Renders `plan_path`, or a shard of it.
+pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
+    let plan = part_file::read_plan(plan_path)?;
+    let numbers = match args.shard {
+        Some(number) => {
+            check_shard(args, &plan, plan_path, number)?;
+            vec![number]
+        }
+        None => (BASE..=plan.settings.shards).collect(),
+    };
+    let output = FilmOutput::new(&args.output, args.bits)?;
+    let document = Document::read_with(&args.scene, LoadReporter::new().assets)
+        .map_err(|e| Failure::Failed(e.to_string()))?;
+    let found = crate::command::plan::hash(&document);
+    if found != plan.settings.scene_hash {
+        return Err(Failure::Failed(format!(
+            "{} is not the scene of {}: its hash is {found}, that of the plan {}; name the \
+             unchanged scene, or plan again",
+            args.scene.display(),
+            plan_path.display(),
+            plan.settings.scene_hash
+        )));
+    }
+    let complete = numbers.iter().map(|number| PartShard { number: *number, complete: true });
+    let mut part = Part { plan, shards: complete.collect(), rays: 0 };
+    let saved = match args.shard {
+        Some(_) => saved(&args.output, &part)?,
+        None => None,
+    };
+    if let Some((_, rays, true)) = saved {
+        print_line(&format!("{}  complete already  {rays} rays", args.output.display()))?;
+        return Ok(());
+    }
+    let render =
+        start(args, &document, &part.plan, &numbers, saved.map(|(film, rays, _)| (film, rays)))?;
+    let signals = Signals::watch().map_err(|e| Failure::Failed(format!("no signals: {e}")))?;
+    let (render, signal) = trace(render, &mut part, &output, &signals)?;
+    let unfinished = signal.is_some() && render.progress() < 1.0;
+    part.shards.iter_mut().for_each(|shard| shard.complete = !unfinished);
+    part.rays = render.rays();
+    let state = render.state();
+    let report = Report::of_film(&state.film, &state.mix, &part.plan.settings.display);
+    output.write(&state.film, &part_file::header(state, &part, &report))?;
+    let share = match unfinished {
+        true => {
+            format!("  {:.0} % of the samples (stopped by a signal)", 100.0 * render.progress())
+        }
+        false => String::new(),
+    };
+    print_line(&format!(
+        "{}  {}  {} rays{share}",
+        args.output.display(),
+        part_file::summary(&report),
+        render.rays(),
+    ))?;
+    match signal {
+        Some(status) if unfinished => Err(Failure::Signalled(status)),
+        _ => Ok(()),
+    }
+}
+
+fn check_shard(args: &RenderArgs, plan: &Plan, path: &Path, shard: u32) -> Result<(), Failure> {
+    let last = plan.settings.shards;
+    if shard > last {
+        return Err(Failure::Usage(format!(
+            "--shard {shard}: {} has the shards 1 to {last}, and 0 for the base",
+            path.display()
+        )));
+    }
+    if shard == BASE
+        && let Some(merged) = plan.settings.base_plan
+    {
+        return Err(Failure::Usage(format!(
+            "--shard 0: the base of {} is the merged film of the plan {merged:016x}, which no \
+             shard traces",
+            path.display()
+        )));
+    }
+    if !part_file::is_film(&args.output) {
+        return Err(Failure::Usage(format!(
+            "cannot write a shard to {}: it holds a part of the samples; name a .zk file, and \
+             add the parts by `zerkalo merge`",
+            args.output.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Reads the part file of an earlier run of the same shard: film, number of rays, and `true` if it
+/// is complete. Returns `None` without such a file, or if it is damaged.
+fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let failed = |reason: &str| {
+        Failure::Failed(format!(
+            "{} exists and {reason}; remove it or name another file",
+            path.display()
+        ))
+    };
+    let reader = match FilmReader::open(path) {
+        Ok(reader) => reader,
+        Err(error) => {
+            warn(&format!("warning: {error}; the shard starts again"));
+            return Ok(None);
+        }
+    };
+    let found = Part::of_header(path, reader.header()).map_err(Failure::Failed)?;
+    let found = found.ok_or_else(|| failed("is a film without plan"))?;
+    if found.plan.checksum() != part.plan.checksum() {
+        return Err(failed("belongs to another plan"));
+    }
+    let [shard] = found.shards[..] else { return Err(failed("holds several shards")) };
+    if shard.number != part.shards[0].number {
+        return Err(failed(&format!("holds shard {}", shard.number)));
+    }
+    match reader.read() {
+        Ok((_, film)) => Ok(Some((film, found.rays, shard.complete))),
+        Err(error) => {
+            warn(&format!("warning: {error}; the shard starts again"));
+            Ok(None)
+        }
+    }
+}
+
+/// Compiles the scene for the samples of the shards `numbers`. `saved` is the film of an earlier
+/// run, with its number of rays.
+fn start(
+    args: &RenderArgs,
+    document: &Document,
+    plan: &Plan,
+    numbers: &[u32],
+    saved: Option<(Film, u64)>,
+) -> Result<ShardRender, Failure> {
+    let settings = &plan.settings;
+    let mut scene = document.scene().clone();
+    scene.film.size = settings.size;
+    if let Some(acceleration) = args.acceleration {
+        scene.trace.acceleration = acceleration;
+    }
+    if let Some(fault) = scene.faults().first() {
+        return Err(Failure::Failed(format!("{}: {fault}", args.scene.display())));
+    }
+    let precision =
+        if settings.precision == "double" { Precision::Double } else { Precision::Single };
+    let options = Options {
+        world: world::Options { precision },
+        sampling: SampleSettings { seed: settings.seed, kind: settings.sampler },
+        display: settings.display,
+    };
+    let mut state = RenderState::new(&scene, &options, None);
+    let mut rays = 0;
+    if let Some((film, saved_rays)) = saved {
+        if film.header() != state.film.header() {
+            return Err(Failure::Failed(format!(
+                "{} is the film of another scene; remove it or name another file",
+                args.output.display()
+            )));
+        }
+        (state.film, rays) = (film, saved_rays);
+    }
+    let ranges = match numbers {
+        [one] => plan.ranges(*one),
+        _ => plan.tiles.iter().map(|tile| 0..tile.end).collect(),
+    };
+    let threads = args.compute.threads();
+    ShardRender::new(state, &ranges, rays, threads).map_err(Failure::Failed)
+}
+
+/// Traces all samples, or until a signal arrives, whose exit status is returned. Writes checkpoints
+/// of a shard.
+fn trace(
+    mut render: ShardRender,
+    part: &mut Part,
+    output: &FilmOutput,
+    signals: &Signals,
+) -> Result<(ShardRender, Option<u8>), Failure> {
+    let mut progress = Progress::on_stderr();
+    let mut interval = FIRST_CHECKPOINT;
+    let mut written = Instant::now();
+    while render.step() {
+        if let Some(status) = signals.caught() {
+            progress.finish();
+            return Ok((render, Some(status)));
+        }
+        progress.show(&render.report());
+        if let FilmOutput::Film(_) = output
+            && written.elapsed() >= interval
+        {
+            let start = Instant::now();
+            part.shards.iter_mut().for_each(|shard| shard.complete = false);
+            part.rays = render.rays();
+            let state = render.state();
+            let report = Report::of_film(&state.film, &state.mix, &part.plan.settings.display);
+            output.write(&state.film, &part_file::header(state, part, &report))?;
+            interval =
+                (2 * interval).min(LONGEST_INTERVAL).max(WRITES_PER_INTERVAL * start.elapsed());
+            written = Instant::now();
+        }
+    }
+    progress.finish();
+    Ok((render, None))
+}

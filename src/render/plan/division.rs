@@ -1,0 +1,115 @@
+//! Division of a plan's samples among its shards.
+//!
+//! The samples of a tile after its base are cut at multiples of [`SAMPLE_ALIGNMENT`] into blocks.
+//! Shards get whole blocks, contiguous within a tile, for three reasons:
+//!
+//! - An aligned block of a power of two indices of the Owen-scrambled Sobol sequence is a net of
+//!   its own. Every shard's part is stratified, and so is a merged picture in which a shard is
+//!   missing. The full picture holds the indices from 0 to the end of each tile, whatever the cuts.
+//! - A block is as long as the widest packet. Shards trace the same packets as one process, at the
+//!   same speed.
+//! - A shard traces the same indices in both replicates. In every sum of parts each tile therefore
+//!   has equally many samples of A and B, from whose difference the noise is estimated.
+//!
+//! If the number of blocks is not a multiple of the number of shards, the remaining blocks go to
+//! shards in turn, tile after tile. The total numbers of blocks of two shards differ by at most 1.
+
+use crate::render::plan::{BASE, Plan, PlannedTile};
+use crate::render::schedule::SAMPLE_ALIGNMENT;
+use std::ops::Range;
+
+impl PlannedTile {
+    /// Number of blocks after the base.
+    fn blocks(&self) -> u32 {
+        if self.end > self.base {
+            self.end.div_ceil(SAMPLE_ALIGNMENT) - self.base / SAMPLE_ALIGNMENT
+        } else {
+            0
+        }
+    }
+
+    /// Index of the first sample of a block.
+    fn block_start(&self, block: u32) -> u32 {
+        let aligned = (self.base / SAMPLE_ALIGNMENT + block).saturating_mul(SAMPLE_ALIGNMENT);
+        aligned.clamp(self.base, self.end)
+    }
+}
+
+impl Plan {
+    /// Returns the sample indices that `shard` traces in both replicates of each tile, in row
+    /// order. Ranges may be empty. [`BASE`] has the samples of the base.
+    ///
+    /// # Panics
+    /// Panics if there is no such shard.
+    pub fn ranges(&self, shard: u32) -> Vec<Range<u32>> {
+        let shards = self.settings.shards;
+        assert!(shard <= shards, "shard {shard} of {shards}");
+        if shard == BASE {
+            return self.tiles.iter().map(|tile| 0..tile.base).collect();
+        }
+        let mut turn = 0;
+        let range = |tile: &PlannedTile| {
+            let (whole, remaining) = (tile.blocks() / shards, tile.blocks() % shards);
+            // Place of the shard in the order of this tile, in which the shard `turn` is first.
+            let place = (shard - 1 + shards - turn) % shards;
+            turn = (turn + remaining) % shards;
+            let start = |place: u32| tile.block_start(place * whole + place.min(remaining));
+            start(place)..start(place + 1)
+        };
+        self.tiles.iter().map(range).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::plan::testing::plan;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn ranges_cover_every_sample_once_in_whole_blocks(
+            counts in proptest::collection::vec((0u32..70, 0u32..900), 12),
+            shards in 1u32..40,
+        ) {
+            let tiles: Vec<[u32; 2]> =
+                counts.iter().map(|(base, more)| [*base, base + more]).collect();
+            let plan = plan(shards, &tiles);
+            let ranges: Vec<_> = (0..=shards).map(|shard| plan.ranges(shard)).collect();
+            for (tile, [base, end]) in tiles.iter().enumerate() {
+                let mut sorted: Vec<_> = ranges.iter().map(|r| r[tile].clone()).collect();
+                sorted.retain(|range| !range.is_empty());
+                sorted.sort_by_key(|range| range.start);
+                let mut next = 0;
+                for range in sorted {
+                    prop_assert_eq!(range.start, next);
+                    let aligned = range.start % SAMPLE_ALIGNMENT == 0 || range.start == *base;
+                    prop_assert!(aligned, "{:?}", range);
+                    next = range.end;
+                }
+                prop_assert_eq!(next, *end);
+            }
+            let blocks = |shard: u32| -> u32 {
+                let of_range = |r: &Range<u32>| {
+                    if r.is_empty() { 0 } else { r.end.div_ceil(16) - r.start / 16 }
+                };
+                ranges[shard as usize].iter().map(of_range).sum()
+            };
+            let (least, most) = ((1..=shards).map(blocks).min(), (1..=shards).map(blocks).max());
+            prop_assert!(most.unwrap() - least.unwrap() <= 1);
+        }
+    }
+
+    #[test]
+    fn shards_of_equal_tiles_have_equal_blocks() {
+        let plan = plan(4, &[[8, 40]; 12]);
+        // Blocks: 8..16, 16..32, 32..40. The fourth shard of the first tile is the first of the
+        // second one.
+        let ranges = |shard: u32| plan.ranges(shard)[..2].to_vec();
+        assert_eq!(ranges(0), [0..8, 0..8]);
+        assert_eq!(ranges(1), [8..16, 16..32]);
+        assert_eq!(ranges(2), [16..32, 32..40]);
+        assert_eq!(ranges(3), [32..40, 40..40]);
+        assert_eq!(ranges(4), [40..40, 8..16]);
+    }
+}

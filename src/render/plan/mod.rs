@@ -1,0 +1,184 @@
+//! Plans: renders that are divided among shards, which other processes or machines trace.
+//!
+//! A plan fixes the sample count of every tile before the shards start, because shards do not
+//! communicate. A pilot, which is an adaptive render to a coarser noise, predicts the counts
+//! ([`Schedule::predict`]). Its samples are the start of the sample sequence of every tile, the
+//! *base* of the plan; the shards trace the rest. The sum of base and all shards therefore holds
+//! the samples `0..end` of each tile in both replicates, like an adaptive render that has stopped
+//! there, and equals the film of one process bit for bit.
+//!
+//! [`Schedule::predict`]: crate::render::schedule::Schedule::predict
+
+mod division;
+mod file;
+mod merge;
+mod part;
+mod shard_render;
+#[cfg(test)]
+mod testing;
+
+pub use file::PlanError;
+pub use merge::Merged;
+pub use part::{Part, PartShard};
+pub use shard_render::ShardRender;
+
+use crate::film::{Display, Estimator, Film, TILE};
+use crate::render::schedule::{Schedule, Settings, TilePrediction, TileSamples};
+use crate::sampling::SamplerKind;
+
+/// Largest number of shards of a plan.
+pub const MAX_SHARDS: u32 = 1 << 16;
+
+/// Number of the shard that stands for the base of a plan.
+pub const BASE: u32 = 0;
+
+/// Settings that determine the samples of a plan, and its target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlanSettings {
+    /// Path of the scene file, as the user has given it.
+    pub source: String,
+    /// Hash of the scene and of the files that it names.
+    pub scene_hash: String,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Seed of the samples.
+    pub seed: u64,
+    /// Sample sequence.
+    pub sampler: SamplerKind,
+    /// Precision of the geometry, `single` or `double`.
+    pub precision: String,
+    /// Display transform under which the noise is estimated.
+    pub display: Display,
+    /// Cap on samples per pixel of tiles with glossy lobes; 0 is no cap.
+    pub rays_per_pixel: u32,
+    /// Target: RMSE of the displayed picture in 8-bit levels.
+    pub noise_codes: f64,
+    /// Number of shards, 1 to [`MAX_SHARDS`]. They are numbered from 1.
+    pub shards: u32,
+    /// Checksum of the plan whose merged film is the base; `None` if the base is the pilot.
+    pub base_plan: Option<u64>,
+}
+
+/// Plan of a render that is divided among shards.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Settings that determine the samples, and the target.
+    pub settings: PlanSettings,
+    /// Expected RMSE of the merged picture in 8-bit levels.
+    pub predicted_codes: f64,
+    /// Slope of the error of tiles without and with glossy lobes: RMSE ~ n^-slope.
+    pub slopes: [f64; 2],
+    /// Tiles in row order.
+    pub tiles: Vec<PlannedTile>,
+}
+
+/// Samples of one tile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlannedTile {
+    /// Samples per replicate in the base.
+    pub base: u32,
+    /// Samples per replicate in the merged film; at least `base`.
+    pub end: u32,
+    /// Expected number of rays per sample.
+    pub rays_per_sample: f32,
+    /// `true` if a path has hit a glossy lobe.
+    pub glossy: bool,
+}
+
+impl Plan {
+    /// Plans the render that continues the samples of `schedule` until its target. `usual_slopes`
+    /// replace slopes that the schedule does not know yet. Returns `None` if the schedule has no
+    /// target, or no estimate of the noise.
+    pub fn of_schedule(
+        schedule: &Schedule,
+        usual_slopes: [f64; 2],
+        settings: PlanSettings,
+    ) -> Option<Self> {
+        let prediction = schedule.predict(usual_slopes)?;
+        let tile = |tile: &TilePrediction| PlannedTile {
+            base: tile.done,
+            end: tile.count,
+            // Two decimals suffice for an expected cost.
+            rays_per_sample: (tile.rays_per_sample * 100.0).round() as f32 / 100.0,
+            glossy: tile.glossy,
+        };
+        Some(Self {
+            settings,
+            predicted_codes: prediction.rmse,
+            slopes: prediction.slopes,
+            tiles: prediction.tiles.iter().map(tile).collect(),
+        })
+    }
+
+    /// Expected number of rays of `shard`.
+    pub fn rays(&self, shard: u32) -> f64 {
+        let rays = |(tile, range): (usize, std::ops::Range<u32>)| {
+            let samples = 2.0 * range.len() as f64 * pixels_of(self.settings.size, tile) as f64;
+            samples * f64::from(self.tiles[tile].rays_per_sample)
+        };
+        self.ranges(shard).into_iter().enumerate().map(rays).sum()
+    }
+
+    /// Mean number of samples per pixel in the merged picture, both replicates together.
+    pub fn spp(&self) -> f64 {
+        let size = self.settings.size;
+        let samples = |(i, t): (usize, &PlannedTile)| 2 * u64::from(t.end) * pixels_of(size, i);
+        let samples: u64 = self.tiles.iter().enumerate().map(samples).sum();
+        let [width, height] = self.settings.size.map(u64::from);
+        samples as f64 / (width * height) as f64
+    }
+
+    /// Returns the number of a tile whose counts in `film` differ from the samples of `shards`.
+    pub fn differing_tile(&self, film: &Film, shards: &[u32]) -> Option<usize> {
+        let mut expected = vec![0u32; self.tiles.len()];
+        for shard in shards {
+            for (sum, range) in expected.iter_mut().zip(self.ranges(*shard)) {
+                *sum += range.len() as u32;
+            }
+        }
+        let counts = |tile: usize| film.tile(tile).map_or([0; 2], |tile| tile.counts());
+        (0..self.tiles.len()).find(|tile| counts(*tile) != [expected[*tile]; 2])
+    }
+
+    /// Returns the schedule of `film`, which is the complete film of this plan, with `settings`.
+    /// Returns `None` if a tile has no estimate of its error.
+    pub fn schedule(
+        &self,
+        film: &Film,
+        estimator: &Estimator,
+        settings: Settings,
+    ) -> Option<Schedule> {
+        let sample = |(index, planned): (usize, &PlannedTile)| {
+            let tile = film.tile(index)?;
+            Some(TileSamples {
+                pixels: pixels_of(self.settings.size, index) as u32,
+                count: tile.counts()[0],
+                rays_per_sample: f64::from(planned.rays_per_sample),
+                glossy: planned.glossy,
+                error: estimator.tile(tile)?,
+            })
+        };
+        let samples: Option<Vec<_>> = self.tiles.iter().enumerate().map(sample).collect();
+        Some(Schedule::of_samples(&samples?, settings))
+    }
+
+    /// Returns the first setting in which two plans differ, with both values.
+    fn difference(&self, other: &Self) -> String {
+        let [ours, theirs] = [self, other].map(Self::text);
+        let different = ours.lines().zip(theirs.lines()).find(|(a, b)| a != b);
+        different.map_or_else(|| "one is longer".to_string(), |(a, b)| format!("`{a}` and `{b}`"))
+    }
+}
+
+/// Number of tiles of a picture.
+fn tiles_of([width, height]: [u32; 2]) -> usize {
+    width.div_ceil(TILE as u32) as usize * height.div_ceil(TILE as u32) as usize
+}
+
+/// Number of pixels of a tile that are inside the picture.
+fn pixels_of(size: [u32; 2], tile: usize) -> u64 {
+    let [width, height] = size.map(|n| n as usize);
+    let columns = width.div_ceil(TILE);
+    let [x, y] = [tile % columns * TILE, tile / columns * TILE];
+    ((width - x).min(TILE) * (height - y).min(TILE)) as u64
+}

@@ -1,0 +1,98 @@
+//! Parts: film files that hold the samples of some shards of a plan.
+
+use crate::film::file::FilmFileHeader;
+use crate::render::plan::{BASE, Plan};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Tag of the chunk with the text of the plan.
+const PLAN_TAG: [u8; 4] = *b"PLAN";
+/// Tag of the chunk with the shards in the film: a line `rays N`, then a line `shard K complete` or
+/// `shard K unfinished` for each shard.
+const PART_TAG: [u8; 4] = *b"PART";
+
+/// Plan of a film file, and the shards that the film holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// The plan.
+    pub plan: Plan,
+    /// Shards in ascending order.
+    pub shards: Vec<PartShard>,
+    /// Number of rays of all samples in the film.
+    pub rays: u64,
+}
+
+/// Shard in a film file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PartShard {
+    /// Number of the shard; [`BASE`] is the base.
+    pub number: u32,
+    /// `true` if the film holds all samples of the shard.
+    pub complete: bool,
+}
+
+impl Part {
+    /// Adds the plan and the shards to the header of a film file.
+    pub fn record(&self, header: &mut FilmFileHeader) {
+        let mut text = format!("rays {}\n", self.rays);
+        for PartShard { number, complete } in &self.shards {
+            let state = if *complete { "complete" } else { "unfinished" };
+            // Writing into a string cannot fail.
+            let _ = writeln!(text, "shard {number} {state}");
+        }
+        header.chunks.insert(PLAN_TAG, self.plan.text().into_bytes());
+        header.chunks.insert(PART_TAG, text.into_bytes());
+    }
+
+    /// Reads plan and shards from the header of the film file at `path`. Returns `None` if the film
+    /// belongs to no plan.
+    ///
+    /// # Errors
+    /// Fails if the plan or the list of shards is not valid, or does not fit the film.
+    pub fn of_header(path: &Path, header: &FilmFileHeader) -> Result<Option<Self>, String> {
+        let Some(plan) = header.chunks.get(&PLAN_TAG) else { return Ok(None) };
+        let plan = Plan::parse(path, plan).map_err(|e| e.to_string())?;
+        let damaged = |what: &str| {
+            format!("cannot use {}: it is damaged: {what}; trace it again", path.display())
+        };
+        let part = header.chunks.get(&PART_TAG).and_then(|text| Self::parse(plan, text));
+        let part = part.ok_or_else(|| damaged("its list of shards is not valid"))?;
+        let settings = &part.plan.settings;
+        let size = settings.size.map(|n| n as usize);
+        if size != [header.film.width, header.film.height]
+            || settings.seed != header.film.seed
+            || settings.precision != header.film.precision
+        {
+            return Err(damaged("film and plan differ in size, seed or precision"));
+        }
+        Ok(Some(part))
+    }
+
+    fn parse(plan: Plan, text: &[u8]) -> Option<Self> {
+        let mut lines = std::str::from_utf8(text).ok()?.lines();
+        let rays = lines.next()?.strip_prefix("rays ")?.parse().ok()?;
+        let mut shards: Vec<PartShard> = Vec::new();
+        for line in lines {
+            let (number, state) = line.strip_prefix("shard ")?.split_once(' ')?;
+            let complete = match state {
+                "complete" => true,
+                "unfinished" => false,
+                _ => return None,
+            };
+            let shard = PartShard { number: number.parse().ok()?, complete };
+            let ascending = shards.last().is_none_or(|last| last.number < shard.number);
+            if !ascending || shard.number > plan.settings.shards {
+                return None;
+            }
+            shards.push(shard);
+        }
+        (!shards.is_empty()).then_some(Self { plan, shards, rays })
+    }
+
+    /// Returns `true` if the film holds all samples of the plan.
+    pub fn is_whole(&self) -> bool {
+        let numbers = BASE..=self.plan.settings.shards;
+        self.shards.iter().map(|shard| shard.number).eq(numbers)
+            && self.shards.iter().all(|shard| shard.complete)
+    }
+}

@@ -1,0 +1,165 @@
+//! Render of the samples that a plan gives to one shard.
+
+use crate::film::TILE_PIXELS;
+use crate::render::RenderState;
+use crate::render::plan::pixels_of;
+use crate::render::schedule::{SAMPLE_ALIGNMENT, Spp};
+use crate::render::session::{Report, State};
+use crate::render::wave::{Job, Wave};
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+/// Target duration of a step in seconds. Between two steps the caller can save the film.
+const STEP_SECONDS: f64 = 0.25;
+/// Target duration of one job in seconds. Short jobs occupy all threads until the end of a step.
+const JOB_SECONDS: f64 = 0.01;
+/// Number of pixel samples of the first step, which measures the speed.
+const FIRST_STEP_SAMPLES: u64 = 1 << 18;
+
+/// Render of the samples of one shard. After each step both replicates of every tile hold equally
+/// many samples: the first ones of the tile's range. A film that was saved between two steps
+/// therefore suffices to continue.
+pub struct ShardRender {
+    state: RenderState,
+    pool: rayon::ThreadPool,
+    /// Samples that are still to be traced in both replicates.
+    remaining: VecDeque<Job>,
+    /// Number of pixel samples of the shard, and of those in the film.
+    samples: [u64; 2],
+    rays: u64,
+    /// Samples and seconds of the steps so far.
+    measured: (u64, f64),
+}
+
+impl ShardRender {
+    /// Continues the film of `state`, which holds the first samples of some of `ranges`, with
+    /// `threads` threads. `ranges` holds the sample indices of each tile. `rays` is the number of
+    /// rays of the film.
+    ///
+    /// # Errors
+    /// Fails if a tile has sample counts that no interrupted render of these ranges has, or if the
+    /// threads cannot be started.
+    pub fn new(
+        state: RenderState,
+        ranges: &[Range<u32>],
+        rays: u64,
+        threads: usize,
+    ) -> Result<Self, String> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|e| format!("cannot start {threads} threads: {e}; try fewer by --threads"))?;
+        let mut remaining = VecDeque::new();
+        let mut samples = [0; 2];
+        let size = [state.film.width(), state.film.height()].map(|n| n as u32);
+        for (tile, range) in ranges.iter().enumerate() {
+            let counts = state.film.tile(tile).map_or([0; 2], |tile| tile.counts());
+            let [done, total] = [counts[0], range.len() as u32];
+            if counts[1] != done || done > total {
+                let what = format!("{counts:?} samples in A and B of tile {tile}");
+                return Err(format!("the film has {what}, which are not those of its shard"));
+            }
+            let pixels = pixels_of(size, tile);
+            samples[0] += 2 * u64::from(total) * pixels;
+            samples[1] += 2 * u64::from(done) * pixels;
+            if done < total {
+                let job = Job { tile: tile as u32, first: range.start + done, count: total - done };
+                remaining.push_back(job);
+            }
+        }
+        Ok(Self { state, pool, remaining, samples, rays, measured: (0, 0.0) })
+    }
+
+    /// Traces samples for about a quarter of a second. Returns `false` if none are left.
+    pub fn step(&mut self) -> bool {
+        let speed = match self.measured {
+            (samples, seconds) if seconds > 0.0 => samples as f64 / seconds,
+            _ => FIRST_STEP_SAMPLES as f64 / STEP_SECONDS,
+        };
+        let threads = self.pool.current_num_threads() as f64;
+        // A job is traced twice, once for each replicate.
+        let longest = (0.5 * JOB_SECONDS * speed / threads / TILE_PIXELS as f64) as u32;
+        let longest = longest.next_multiple_of(SAMPLE_ALIGNMENT).max(SAMPLE_ALIGNMENT);
+        let mut jobs: Vec<Job> = Vec::new();
+        let (mut sum, mut cut) = (0.0, Vec::new());
+        while sum < STEP_SECONDS * speed
+            && let Some(job) = self.remaining.pop_front()
+        {
+            // Cuts are aligned, so that later packets are full.
+            let end = (job.first + longest) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT;
+            let count = job.count.min(end - job.first);
+            if count < job.count {
+                cut.push(Job { first: end, count: job.count - count, ..job });
+            }
+            jobs.push(Job { count, ..job });
+            sum += 2.0 * f64::from(count) * TILE_PIXELS as f64;
+        }
+        if jobs.is_empty() {
+            return false;
+        }
+        let start = Instant::now();
+        let mut wave = Wave { replicate: 0, jobs, estimate: false };
+        let mut traced = 0;
+        for replicate in 0..2 {
+            wave.replicate = replicate;
+            let report = self.state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
+            self.rays += report.reports.iter().flatten().map(|report| report.rays).sum::<u64>();
+        }
+        let size = [self.state.film.width(), self.state.film.height()].map(|n| n as u32);
+        for job in &wave.jobs {
+            traced += 2 * u64::from(job.count) * pixels_of(size, job.tile as usize);
+        }
+        self.samples[1] += traced;
+        self.measured.0 += traced;
+        self.measured.1 += start.elapsed().as_secs_f64();
+        // The rest of cut jobs is traced next, while the tile is in the cache.
+        cut.into_iter().rev().for_each(|job| self.remaining.push_front(job));
+        true
+    }
+
+    /// Compiled scene and film.
+    pub fn state(&self) -> &RenderState {
+        &self.state
+    }
+
+    /// Returns the compiled scene and film.
+    pub fn into_state(self) -> RenderState {
+        self.state
+    }
+
+    /// Number of rays of all samples in the film.
+    pub fn rays(&self) -> u64 {
+        self.rays
+    }
+
+    /// Share of the shard's samples that the film holds, 0..=1.
+    pub fn progress(&self) -> f64 {
+        let [total, done] = self.samples;
+        if total == 0 { 1.0 } else { done as f64 / total as f64 }
+    }
+
+    /// Report on the progress.
+    pub fn report(&self) -> Report {
+        let [total, done] = self.samples;
+        let (traced, seconds) = self.measured;
+        let speed = if seconds > 0.0 { traced as f64 / seconds } else { 0.0 };
+        let left = (total - done) as f64 / speed.max(1.0);
+        let film = &self.state.film;
+        let pixels = (film.width() * film.height()) as f64;
+        let spp = done as f64 / pixels;
+        Report {
+            state: State::Tracing,
+            spp: Spp { min: 0, mean: spp, max: spp.ceil() as u32 },
+            samples: traced,
+            rays: self.rays,
+            seconds,
+            eta_seconds: Some((left, left)),
+            progress: Some(self.progress()),
+            recent_samples_per_second: speed,
+            lanes: self.state.world.lanes(),
+            ..Report::idle(self.pool.current_num_threads())
+        }
+    }
+}
