@@ -18,6 +18,7 @@ if [ -z "${ZERKALO:-}" ]; then
     ZERKALO="$(cargo metadata --format-version 1 --no-deps | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')/debug/zerkalo"
 fi
 export ZERKALO
+size="${SIZE:-560x420}"
 work="$(mktemp -d)"
 daemons=()
 cleanup() {
@@ -32,11 +33,14 @@ say() { printf '%4d s  %s\n' "$((SECONDS - start))" "$*"; }
 # Process of the shard $1 of the plan $2, as soon as it has written a checkpoint.
 shard_process() {
     until [ -e "$work/$2-$1.zk" ]; do sleep 0.2; done
-    pgrep -f "^$ZERKALO render .*$2.plan --shard $1 "
+    pgrep -f "^$ZERKALO render .*$2.plan --shard $1 " || {
+        echo "shard $1 has ended already; use a larger SIZE than $size" >&2
+        return 1
+    }
 }
 
 plan() {
-    "$ZERKALO" plan scenes/gallery-glass.toml --size "${SIZE:-400x300}" --noise "${NOISE:-0.25}" --pilot 2 --shards 8 \
+    "$ZERKALO" plan scenes/gallery-glass.toml --size "$size" --noise "${NOISE:-0.25}" --pilot 2 --shards 8 \
         -o "$work/$1.plan" --base "$work/$1-0.zk"
 }
 
@@ -44,7 +48,7 @@ equal() {
     cmp "$work/one.png" "$work/$1.png" && say "$1.png equals the picture of one run"
 }
 
-echo "$(uname -sr), $(nproc) cores, zerkalo $("$ZERKALO" --version | cut -d' ' -f2), commit $(git rev-parse --short HEAD)"
+echo "$(uname -sr), $(nproc) cores, zerkalo $("$ZERKALO" --version | cut -d' ' -f2)"
 plan one
 "$ZERKALO" render scenes/gallery-glass.toml --plan "$work/one.plan" -o "$work/one.png" 2>/dev/null
 say "one run of the plan is done"
