@@ -60,6 +60,10 @@ pub struct Transmission<S> {
     pub strength: S,
     /// Index of refraction inside of the surface.
     pub index: S,
+    /// Absorption coefficients of the inside [1 / scene unit]; 0 absorbs nothing.
+    pub absorption: [S; 3],
+    /// Distribution of the transmitted rays about the refracted direction; `Mirror` is clear glass.
+    pub lobe: ReflectionLobe<S>,
     /// `true` if Fresnel's equations split the light between reflection and transmission; otherwise k_r
     /// and k_t are used unchanged.
     pub dielectric: bool,
@@ -134,6 +138,8 @@ impl<S: Float> Bsdf<S> {
         let transmission = (reflects && k_t > 0.0).then(|| Transmission {
             strength: S::from_f64(k_t),
             index: S::from_f64(material.ior),
+            absorption: material.absorption().map(S::from_f64),
+            lobe,
             dielectric,
         });
         let reflectance = Reflectance::new(material);
@@ -168,7 +174,7 @@ pub struct BsdfSample<L> {
 /// The tangent is computed from the part of `h` across `n`, so that small angles keep full precision, and
 /// bounded by 1e15, so that terms computed from it are finite.
 #[inline(always)]
-fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
+pub(super) fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     let along = h.dot(n);
     let across = h - n * along;
     (along, (across.length_squared() / (along * along)).min(L::from_f64(1e15)))
@@ -202,11 +208,33 @@ fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
     (-(alpha * s * series)).exp().masked(along.gt(L::zero()))
 }
 
+/// Samples a direction of the lobe `cone` or `square` about the direction `axis`, whose length is 1
+/// within rounding; `u` and `v` are uniform in [0, 1). Returns `axis` for other lobes.
+#[inline(always)]
+pub(super) fn spread<L: SimdFloat>(
+    lobe: &ReflectionLobe<L::Scalar>,
+    axis: Vec3<L>,
+    (u, v): (L, L),
+) -> Vec3<L> {
+    let local = match lobe {
+        ReflectionLobe::Cone { one_minus_cos } => warp::cone(u, v, L::splat(*one_minus_cos)),
+        ReflectionLobe::Square { side } => warp::square(u, v, L::splat(*side)),
+        ReflectionLobe::Mirror | ReflectionLobe::MicrofacetDistribution(_) => return axis,
+    };
+    Frame::around(axis.renormalize()).to_world(local)
+}
+
 impl<S: Float> Bsdf<S> {
     /// Returns `true` if the surface has highlights of lights.
     #[inline(always)]
     pub fn has_highlight(&self) -> bool {
         !matches!(self.specular, SpecularModel::None)
+    }
+
+    /// Returns `true` if the surface bounds solids that absorb light.
+    pub fn absorbs(&self) -> bool {
+        let absorption = self.transmission.map(|t| t.absorption.map(S::to_f64));
+        absorption.is_some_and(|absorption| absorption != [0.0; 3])
     }
 
     /// Returns the highlight of a light, in units of 1/sr: the radiance towards `view` divided by
@@ -255,7 +283,7 @@ impl<S: Float> Bsdf<S> {
     }
 
     /// Samples a reflected ray. `incident` is the unit direction towards the surface, `n` the
-    /// normal on the viewer's side; `u` and `v` are uniform in [0, 1). If `fold` is `true`,
+    /// normal on the viewer's side; `uv` are uniform in [0, 1). If `fold` is `true`,
     /// directions below the surface are mirrored up; otherwise their weight is 0.
     #[inline(always)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
@@ -264,23 +292,18 @@ impl<S: Float> Bsdf<S> {
         lobe: &ReflectionLobe<S>,
         incident: Vec3<L>,
         n: Vec3<L>,
-        (u, v): (L, L),
+        uv: (L, L),
         fold: bool,
     ) -> BsdfSample<L> {
         let mirror = incident.reflect(n);
         let k = L::splat(strength);
         let (direction, weight) = match lobe {
             ReflectionLobe::Mirror => (mirror, k),
-            ReflectionLobe::Cone { one_minus_cos } => {
-                let local = warp::cone(u, v, L::splat(*one_minus_cos));
-                (Frame::around(mirror.renormalize()).to_world(local), k)
-            }
-            ReflectionLobe::Square { side } => {
-                let local = warp::square(u, v, L::splat(*side));
-                (Frame::around(mirror.renormalize()).to_world(local), k)
+            ReflectionLobe::Cone { .. } | ReflectionLobe::Square { .. } => {
+                (spread(lobe, mirror, uv), k)
             }
             ReflectionLobe::MicrofacetDistribution(facets) => {
-                return self.sample_microfacet(k, facets, incident, n, (u, v));
+                return self.sample_microfacet(k, facets, incident, n, uv);
             }
         };
         let up = direction.dot(n);
@@ -298,7 +321,8 @@ impl<S: Float> Bsdf<S> {
         BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }
     }
 
-    /// Samples the reflection at a microfacet. G is zero below the surface, and so is the weight.
+    /// Samples the reflection at a visible microfacet. G is zero below the surface, and so is the
+    /// weight. Elsewhere f N.L / density = F G / G_1 is at most 1.
     #[inline(always)]
     fn sample_microfacet<L: SimdFloat<Scalar = S>>(
         &self,
@@ -306,27 +330,15 @@ impl<S: Float> Bsdf<S> {
         facets: &MicrofacetDistribution<S>,
         incident: Vec3<L>,
         n: Vec3<L>,
-        (u, v): (L, L),
+        uv: (L, L),
     ) -> BsdfSample<L> {
         let frame = Frame::around(n);
         let view = frame.to_local(-incident);
-        let alpha = L::splat(facets.alpha);
-        let h = if facets.ggx {
-            warp::ggx_visible(u, v, alpha, view)
-        } else {
-            warp::beckmann(u, v, alpha)
-        };
+        let h = facets.sample_visible(uv, view);
         let vh = view.dot(h);
         let light = h * (vh + vh) - view;
-        let (visible, total) = facets.masking(h.z, view.z, light.z, vh);
-        let weight: L = if facets.ggx {
-            // Visible normals: density D G1 V.H / N.V, so that f N.L / density = F G / G1.
-            k * visible * (L::one() + MicrofacetEval::<L>::lambda(facets, view.z)) / total
-        } else {
-            // Normals with density D N.H: f N.L / density = F G V.H / (N.V N.H).
-            k * visible * vh / (total * view.z * h.z)
-        };
         let valid = vh.gt(L::zero()) & light.z.gt(L::zero()) & view.z.gt(L::zero());
+        let weight: L = k * facets.shadowing(h.z, view.z, light.z, vh);
         BsdfSample {
             direction: frame.to_world(light).renormalize(),
             weight: self.reflection_fresnel.times(|| vh, weight).masked(valid),
@@ -358,14 +370,9 @@ impl<S: Float> Bsdf<S> {
                 let (nh, tan2) = along_tan2(h, n);
                 let nv = -incident.dot(n);
                 let d: L = facets.density(tan2);
-                let four = L::from_f64(4.0);
-                let density = if facets.ggx {
-                    d / ((L::one() + MicrofacetEval::<L>::lambda(facets, nv)) * four * nv)
-                } else {
-                    // The squared length of h is twice its dot product with the direction to the
-                    // viewer.
-                    d * nh * L::from_f64(0.5) / h.length_squared()
-                };
+                // The squared length of h is twice its dot product with the view.
+                let visible: L = facets.visibility(nh, nv, h.length_squared() * L::from_f64(0.5));
+                let density = d * visible / (nv * L::from_f64(4.0));
                 Some(density.masked(nh.gt(L::zero()) & nv.gt(L::zero())))
             }
         }

@@ -1,6 +1,6 @@
 //! Microfacet distributions: Beckmann and GGX, with V-cavity and Smith masking.
 
-use crate::lanes::{Float, Mask, SimdFloat};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::material::Masking;
 use crate::sampling::warp;
 use std::f64::consts::PI;
@@ -31,6 +31,24 @@ impl<S: Float> MicrofacetDistribution<S> {
         let [alpha, alpha2, inverse_alpha2] = [alpha, alpha2, 1.0 / alpha2].map(S::from_f64);
         Self { ggx, alpha, alpha2, inverse_alpha2, masking }
     }
+
+    /// Samples a microfacet normal that is visible from `view`. Both are in the frame of the
+    /// surface normal. `u` and `v` are uniform in [0, 1). The density is G_1 D V.H / N.V, with G_1 of
+    /// [`MicrofacetEval::visibility`].
+    #[inline(always)]
+    pub fn sample_visible<L: SimdFloat<Scalar = S>>(
+        &self,
+        (u, v): (L, L),
+        view: Vec3<L>,
+    ) -> Vec3<L> {
+        let alpha = L::splat(self.alpha);
+        let v_cavity = self.masking == Masking::VCavity;
+        match self.ggx {
+            true if v_cavity => warp::ggx_visible_v_cavity(u, v, alpha, view),
+            true => warp::ggx_visible(u, v, alpha, view),
+            false => warp::beckmann_visible(u, v, alpha, view, v_cavity),
+        }
+    }
 }
 
 /// Terms of a microfacet BSDF in SIMD lanes.
@@ -42,6 +60,17 @@ pub trait MicrofacetEval<L: SimdFloat> {
     /// that are visible from both directions. `nh`, `nv`, `nl`, `vh` are positive cosines; `nh` and
     /// `vh` may have a common factor.
     fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L);
+    /// Returns G_1, the fraction of the microfacets with normal h that are visible from the view.
+    /// The parameters are those of [`MicrofacetEval::masking`].
+    fn visibility(&self, nh: L, nv: L, vh: L) -> L;
+    /// Returns G / G_1 in [0, 1]: the weight of a reflected ray for visible normals of unit
+    /// reflectance. The parameters are those of [`MicrofacetEval::masking`].
+    fn shadowing(&self, nh: L, nv: L, nl: L, vh: L) -> L;
+    /// Returns G / G_1 in [0, 1] of rays that are transmitted to the other side: the weight of a
+    /// transmitted ray for visible normals of unit transmittance. `nh`, `nv` and `vh` are those of
+    /// [`MicrofacetEval::masking`]; `nt` and `lh` are the positive cosines of the transmitted ray with the
+    /// reversed surface normal and microfacet normal.
+    fn shadowing_behind(&self, view: (L, L, L), transmitted: (L, L)) -> L;
     /// Returns Smith's Lambda for a direction with the cosine `c` > 0 to the normal.
     fn lambda(&self, c: L) -> L;
 }
@@ -96,6 +125,44 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         match self.masking {
             Masking::VCavity => ((L::from_f64(2.0) * nh * nv.min(nl)).min(vh), vh),
             Masking::Smith => (L::one(), L::one() + self.lambda(nv) + self.lambda(nl)),
+        }
+    }
+
+    #[inline(always)]
+    fn visibility(&self, nh: L, nv: L, vh: L) -> L {
+        match self.masking {
+            Masking::VCavity => (L::from_f64(2.0) * nh * nv / vh).min(L::one()),
+            Masking::Smith => L::one() / (L::one() + self.lambda(nv)),
+        }
+    }
+
+    #[inline(always)]
+    fn shadowing(&self, nh: L, nv: L, nl: L, vh: L) -> L {
+        match self.masking {
+            Masking::VCavity => {
+                let twice = L::from_f64(2.0) * nh;
+                let visible = (twice * nv).min(vh);
+                (twice * nl).min(visible) / visible
+            }
+            Masking::Smith => {
+                let visible = L::one() + self.lambda(nv);
+                visible / (visible + self.lambda(nl))
+            }
+        }
+    }
+
+    /// Returns the separable G_1 of Smith (Walter et al. 2007, eq. 23), or that of V-cavities: the
+    /// sides of a groove that are visible from above and from below overlap in G_1 + G_1' - 1 (Heitz
+    /// and d'Eon 2014).
+    #[inline(always)]
+    fn shadowing_behind(&self, (nh, nv, vh): (L, L, L), (nt, lh): (L, L)) -> L {
+        match self.masking {
+            Masking::VCavity => {
+                let visible: L = self.visibility(nh, nv, vh);
+                let behind: L = self.visibility(nh, nt, lh);
+                (L::one() - (L::one() - behind) / visible).max(L::zero())
+            }
+            Masking::Smith => L::one() / (L::one() + self.lambda(nt)),
         }
     }
 

@@ -6,6 +6,7 @@ mod mapping;
 mod microfacet;
 mod properties;
 mod refraction;
+mod rough_interface;
 mod texture;
 mod texture_eval;
 
@@ -17,6 +18,7 @@ pub use mapping::{Projection, TexCoord, TextureMapping};
 pub use microfacet::{MicrofacetDistribution, SMOOTH_ALPHA};
 pub use properties::{BsdfProperties, Energy};
 pub use refraction::{FresnelSplit, Interface};
+pub use rough_interface::{InterfaceMedia, InterfaceSample};
 pub use texture::{
     Axis, Bump, Checker, HeightImage, ImageTexture, Mapping, Placement, Texture, TextureFilter,
     Wrap,
@@ -47,10 +49,15 @@ description! {
         transmission: f64 = 0.0, in COEFFICIENT;
         /// Index of refraction n of the inside; outside of everything it is 1.
         ior: f64 = 1.5, in closed(0.1, 1e4);
-        /// Tangent of the half-angle of the reflection cone, not a microfacet alpha; 0 is a perfect
-        /// mirror.
+        /// Share of the light in each channel that is left after `attenuation_distance` inside of a solid with
+        /// `transmission`, by Beer's law; white absorbs nothing.
+        attenuation_color: Color = [1.0, 1.0, 1.0], in SHARE;
+        /// Distance inside of a solid after which `attenuation_color` is left of white light.
+        attenuation_distance: f64 = 1.0, in SIZE;
+        /// Tangent of the half-angle of the cone of reflected and of transmitted rays, not a microfacet
+        /// alpha; 0 is a perfect mirror and clear glass.
         roughness: f64 = 0.0, in closed(0.0, 1e6);
-        /// Distribution of reflected rays; the same roughness means a comparable blur in each.
+        /// Distribution of reflected and transmitted rays; the same roughness means a comparable blur in each.
         lobe: Lobe = "cone";
         /// Roughness parameter alpha of the microfacet distribution.
         alpha: Option<f64>, or "roughness / (2 √2)", in closed(0.0, 1e6);
@@ -176,6 +183,14 @@ impl Material {
         self.alpha.unwrap_or(self.roughness / 8f64.sqrt())
     }
 
+    /// Returns the absorption coefficients of the inside [1 / scene unit] by Beer's law: light of
+    /// intensity 1 has the intensity exp(-coefficient x distance) after a distance. They are at most
+    /// 1e30. A channel of 0 counts as 1e-38.
+    pub fn absorption(&self) -> [f64; 3] {
+        let coefficient = |c: f64| -c.max(1e-38).ln() / self.attenuation_distance;
+        self.attenuation_color.0.map(|c| coefficient(c).clamp(0.0, 1e30))
+    }
+
     /// Returns `true` if the reflection or the highlight uses a microfacet distribution.
     pub fn has_microfacets(&self) -> bool {
         matches!(self.lobe, Lobe::Beckmann | Lobe::Ggx)
@@ -235,6 +250,8 @@ mod tests {
             reflection: -0.1,
             transmission: -0.1,
             ior: 0.0,
+            attenuation_color: Color([0.5, 1.1, 0.5]),
+            attenuation_distance: 0.0,
             roughness: -1e-9,
             alpha: Some(-1.0),
             f0: Some(Color([1.1, 0.0, 0.0])),
@@ -250,6 +267,8 @@ mod tests {
             "reflection",
             "transmission",
             "ior",
+            "attenuation_color",
+            "attenuation_distance",
             "roughness",
             "alpha",
             "f0",

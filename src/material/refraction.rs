@@ -123,6 +123,28 @@ impl<L: SimdFloat> Interface<L> {
         let f = self.pane_reflectance();
         FresnelSplit { reflected: f, transmitted: k_t * (L::one() - f), tir: L::zero() }
     }
+
+    /// Returns the weights of [`Interface::split`], and those of [`Interface::split_thin`] in the lanes
+    /// of `thin`.
+    #[inline(always)]
+    pub fn split_at(
+        &self,
+        transmission: &Transmission<L::Scalar>,
+        outer: L::Mask,
+        thin: L::Mask,
+    ) -> FresnelSplit<L> {
+        let split = self.split(transmission, outer);
+        if thin.none() {
+            return split;
+        }
+        let of_thin = self.split_thin(transmission);
+        let choose = |a, b| L::select(thin, a, b);
+        FresnelSplit {
+            reflected: choose(of_thin.reflected, split.reflected),
+            transmitted: choose(of_thin.transmitted, split.transmitted),
+            tir: choose(of_thin.tir, split.tir),
+        }
+    }
 }
 
 #[cfg(test)]

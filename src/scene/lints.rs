@@ -48,6 +48,15 @@ impl Scene {
             }),
             "It belongs to lobe \"beckmann\" or \"ggx\", or to highlight \"cook-torrance\".",
         );
+        add(
+            materials(&|m| {
+                let opaque = m.transmission == 0.0 && m.attenuation_color != Color::WHITE;
+                opaque.then(|| {
+                    ("attenuation_color", "attenuation_color has no effect here".to_string())
+                })
+            }),
+            "It colours light inside of solids: give the material a transmission.",
+        );
         add(self.dark_light(), "Leave the light out, or write on = false.");
         add(
             self.objects.is_empty().then(|| (Vec::new(), "there is no object".to_string(), 0)),

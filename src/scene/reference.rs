@@ -27,12 +27,22 @@ and every key with a default may be left out. Unknown keys are errors.
   by Snell's law where it enters and leaves, and totally reflected past the critical angle. Where
   such solids overlap, the one listed last fills the space and hides the surfaces of the others: a
   bubble is listed after its ball. At most four solids at one point are distinguished. A compound is
-  one solid, whose first part with `transmission` gives the index. An open surface (plane, platform,
-  rectangle) is a thin pane without refraction.
+  one solid, whose first part with `transmission` gives the index and the absorption. An open surface
+  (plane, platform, rectangle) is a thin pane without refraction.
 - A transparent solid reflects on its outer side only, and past the critical angle. With `fresnel =
   \"dielectric\"` both sides divide the light physically between `reflection` (x F) and
-  `transmission` (x 1 - F), so that glass has both at 1. Transmitted light is neither blurred nor
-  coloured. Transparent objects cast shadows like all others.
+  `transmission` (x 1 - F), so that glass has both at 1. Shadow rays end at transparent
+  surfaces, clear or rough: transparent objects cast shadows like all others.
+- Inside of a solid with `transmission` light is absorbed by Beer's law. After the distance d it has the
+  share `attenuation_color` ^ (d / `attenuation_distance`) in each channel; a channel of 0 is black. So
+  green bottle glass has `attenuation_color = [0.3, 0.7, 0.4]` with `attenuation_distance = 0.5`. Where
+  solids overlap, the one that fills the space absorbs. A thin pane does not absorb.
+- `roughness` and `lobe` blur transmitted light as well as reflected light: frosted glass has a roughness of
+  about 0.3. The lobes `cone` and `square` are spread about the refracted direction. The lobes `beckmann` and
+  `ggx` refract and reflect at microfacets, each with Fresnel's equations for its own normal (Walter et
+  al. 2007), so that refraction is blurred less than reflection; light between microfacets is lost. A
+  thin pane sends the rays that it transmits in the directions of its reflection, mirrored to the other
+  side. Nothing is blurred where both sides have the same index of refraction.
 - Where a transparent surface coincides with another one, within rounding, as the bottom of a glass on
   a table, the picture is the limit of a vanishing gap between them: light leaves the glass and then
   hits the table, whichever face rounding puts in front. Two glasses that touch have such a gap, too,

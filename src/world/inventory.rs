@@ -1,6 +1,7 @@
 //! Inventory: list of the features that a compiled scene contains, for reports.
 
-use crate::material::{Bsdf, ReflectionLobe, SpecularModel};
+use crate::lanes::Float;
+use crate::material::{Bsdf, ReflectionLobe, SpecularModel, Transmission};
 use crate::scene::{BelowHorizon, Filter, RayTypes, Scene};
 use crate::world::light_groups::LightGroupSource;
 use std::fmt;
@@ -27,7 +28,7 @@ pub(super) struct InventorySources<'a, S> {
 
 impl Inventory {
     /// Creates the inventory of a compiled scene.
-    pub(super) fn new<S>(scene: &Scene, sources: InventorySources<S>) -> Self {
+    pub(super) fn new<S: Float>(scene: &Scene, sources: InventorySources<S>) -> Self {
         let InventorySources { geometry, textures, bsdfs, groups, lights, precision } = sources;
         let mut parts = vec![geometry];
         parts.extend(textures.into_iter().map(String::from));
@@ -63,6 +64,11 @@ impl Inventory {
         };
         add_if(any_transmission(false), "transmission");
         add_if(any_transmission(true), "dielectric");
+        let transmits = |test: fn(&Transmission<S>) -> bool| {
+            bsdfs.iter().filter_map(|bsdf| bsdf.transmission.as_ref()).any(test)
+        };
+        add_if(transmits(|t| !matches!(t.lobe, ReflectionLobe::Mirror)), "rough transmission");
+        add_if(bsdfs.iter().any(Bsdf::absorbs), "absorption");
         let absorbs = scene.trace.below_horizon == BelowHorizon::Absorb;
         add_if(
             absorbs && any_lobe(|lobe| !matches!(lobe, ReflectionLobe::Mirror)),

@@ -11,7 +11,7 @@ use zerkalo::scene::BelowHorizon;
 const SMOOTHEST: f64 = 1e-3;
 
 /// Fresnel reflectance at cosine `c` between light and microfacet normal.
-fn fresnel(material: &Material, c: f64) -> DVec3 {
+pub fn fresnel(material: &Material, c: f64) -> DVec3 {
     let channel = |f0: f64| match material.fresnel_mode() {
         Fresnel::Constant => f0,
         Fresnel::Schlick => f0 + (1.0 - f0) * (1.0 - c).powi(5),
@@ -64,6 +64,16 @@ fn lambda(ggx: bool, alpha: f64, c: f64) -> f64 {
     }
     let a = 1.0 / (alpha * tan);
     0.5 * (erf(a) - 1.0) + (-a * a).exp() / (2.0 * a * PI.sqrt())
+}
+
+/// Fraction of the facets with normal `h` that are visible from `v`; both are on the same side of
+/// the surface.
+fn visible(material: &Material, n: DVec3, h: DVec3, v: DVec3) -> f64 {
+    let (ggx, alpha) = (material.lobe == Lobe::Ggx, material.microfacet_alpha());
+    match material.masking {
+        Masking::VCavity => 1f64.min(2.0 * n.dot(h) * n.dot(v) / v.dot(h)),
+        Masking::Smith => 1.0 / (1.0 + lambda(ggx, alpha, n.dot(v))),
+    }
 }
 
 fn masking(material: &Material, ggx: bool, alpha: f64, n: DVec3, v: DVec3, l: DVec3) -> f64 {
@@ -131,26 +141,11 @@ pub fn reflect(
     if mutation == Mutation::WiderLobe {
         radius *= 1.05;
     }
-    let facets = matches!(material.lobe, Lobe::Beckmann | Lobe::Ggx);
-    let sharp = material.lobe == Lobe::Mirror
-        || if facets { material.microfacet_alpha() < SMOOTHEST } else { radius == 0.0 };
-    if facets && !sharp {
+    let sharp = is_sharp(material);
+    if has_facets(material) && !sharp {
         return microfacet(material, n, v, mutation, numbers);
     }
-    let (a, b) = around(mirror);
-    let local = if sharp {
-        DVec3::Z
-    } else if material.lobe == Lobe::Cone {
-        let edge = 1.0 / (1.0 + radius * radius).sqrt();
-        let z = numbers.between(edge, 1.0);
-        let (sin, cos) = numbers.between(0.0, TAU).sin_cos();
-        let r = (1.0 - z * z).sqrt();
-        DVec3::new(r * cos, r * sin, z)
-    } else {
-        let half = 0.5 * PI.sqrt() * radius;
-        DVec3::new(numbers.between(-half, half), numbers.between(-half, half), 1.0).normalize()
-    };
-    let mut direction = a * local.x + b * local.y + mirror * local.z;
+    let mut direction = if sharp { mirror } else { spread(material, mirror, radius, numbers) };
     if direction.dot(n) <= 0.0 {
         if horizon == BelowHorizon::Absorb || mutation == Mutation::Absorb {
             return None;
@@ -160,6 +155,93 @@ pub fn reflect(
     // Fresnel at the half vector of both directions.
     let f = fresnel(material, v.dot((v + direction).normalize()));
     Some((direction, f * k / if sharp { 1.0 } else { density_factor(mutation) }))
+}
+
+pub fn has_facets(material: &Material) -> bool {
+    matches!(material.lobe, Lobe::Beckmann | Lobe::Ggx)
+}
+
+/// Returns `true` if reflected and transmitted rays have one direction.
+pub fn is_sharp(material: &Material) -> bool {
+    match material.lobe {
+        Lobe::Mirror => true,
+        Lobe::Beckmann | Lobe::Ggx => material.microfacet_alpha() < SMOOTHEST,
+        Lobe::Cone | Lobe::Square => material.roughness == 0.0,
+    }
+}
+
+/// Samples a direction in the cone or square about `axis`.
+pub fn spread(material: &Material, axis: DVec3, radius: f64, numbers: &mut Numbers) -> DVec3 {
+    let (a, b) = around(axis);
+    let local = if material.lobe == Lobe::Cone {
+        let edge = 1.0 / (1.0 + radius * radius).sqrt();
+        let z = numbers.between(edge, 1.0);
+        let (sin, cos) = numbers.between(0.0, TAU).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * cos, r * sin, z)
+    } else {
+        let half = 0.5 * PI.sqrt() * radius;
+        DVec3::new(numbers.between(-half, half), numbers.between(-half, half), 1.0).normalize()
+    };
+    a * local.x + b * local.y + axis * local.z
+}
+
+/// Samples a microfacet normal with density D cos.
+pub fn facet_normal(material: &Material, alpha: f64, n: DVec3, numbers: &mut Numbers) -> DVec3 {
+    let u = numbers.unit();
+    let ggx = material.lobe == Lobe::Ggx;
+    let tan2 = alpha * alpha * if ggx { u / (1.0 - u) } else { -(1.0 - u).ln() };
+    let cos = 1.0 / (1.0 + tan2).sqrt();
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    let (s, c) = numbers.between(0.0, TAU).sin_cos();
+    let (a, b) = around(n);
+    a * (sin * c) + b * (sin * s) + n * cos
+}
+
+/// Indices of refraction before and behind a surface.
+pub type Indices = (f64, f64);
+
+/// Samples light that is refracted at a microfacet, without Fresnel's factor. Returns its direction,
+/// its weight, and the microfacet normal; `None` if the microfacet reflects totally, or if the refracted ray
+/// stays in front of the surface.
+pub fn refracted_at_facet(
+    material: &Material,
+    n: DVec3,
+    v: DVec3,
+    (n_i, n_t): Indices,
+    mutation: Mutation,
+    numbers: &mut Numbers,
+) -> Option<(DVec3, f64, DVec3)> {
+    let alpha = material.microfacet_alpha();
+    let h = facet_normal(material, alpha, n, numbers);
+    let vh = v.dot(h);
+    let ratio = n_i / n_t;
+    let cos2_t = 1.0 - ratio * ratio * (1.0 - vh * vh);
+    if vh <= 0.0 || cos2_t <= 0.0 {
+        return None;
+    }
+    let l = h * (ratio * vh - cos2_t.sqrt()) - v * ratio;
+    let (nv, nl, nh, lh) = (n.dot(v), -n.dot(l), n.dot(h), -l.dot(h));
+    if nl <= 0.0 || nv <= 0.0 {
+        return None;
+    }
+    let (above, below) = (visible(material, n, h, v), visible(material, -n, -h, l));
+    let g = match material.masking {
+        Masking::VCavity => (above + below - 1.0).max(0.0),
+        Masking::Smith => above * below,
+    };
+    let d = facet_density(material.lobe == Lobe::Ggx, alpha, nh);
+    let jacobian = |n_t: f64| n_t * n_t * lh / (n_i * vh - n_t * lh).powi(2);
+    // Walter et al. 2007, eq. 21 without the factor of radiance, times the cosine of the light.
+    let f_cos = vh / nv * g * d * jacobian(n_t);
+    let density = d
+        * nh
+        * match mutation {
+            Mutation::NoJacobian => 1.0,
+            Mutation::OtherIndex => jacobian(n_t) * (n_i / n_t).powi(2),
+            _ => jacobian(n_t),
+        };
+    Some((l, f_cos / density, h))
 }
 
 /// Samples a microfacet normal with density D cos and reflects at it.
@@ -173,13 +255,7 @@ fn microfacet(
     let ggx = material.lobe == Lobe::Ggx;
     let alpha =
         material.microfacet_alpha() * if mutation == Mutation::WiderLobe { 1.05 } else { 1.0 };
-    let u = numbers.unit();
-    let tan2 = alpha * alpha * if ggx { u / (1.0 - u) } else { -(1.0 - u).ln() };
-    let cos = 1.0 / (1.0 + tan2).sqrt();
-    let sin = (1.0 - cos * cos).max(0.0).sqrt();
-    let (s, c) = numbers.between(0.0, TAU).sin_cos();
-    let (a, b) = around(n);
-    let h = a * (sin * c) + b * (sin * s) + n * cos;
+    let h = facet_normal(material, alpha, n, numbers);
     let vh = v.dot(h);
     let l = 2.0 * vh * h - v;
     let (nv, nl, nh) = (n.dot(v), n.dot(l), n.dot(h));

@@ -1,15 +1,20 @@
 //! Transmission of the reference tracer. The media on both sides of a surface are found by point
 //! tests just in front of and just behind it.
 
-use crate::answers::reflect;
+use crate::answers::{Indices, fresnel, has_facets, is_sharp, reflect, refracted_at_facet, spread};
 use crate::common::Numbers;
 use crate::compounds::Body;
 use crate::tracer::{Hit, Mutation, Tracer};
 use glam::DVec3;
 use zerkalo::material::{Fresnel, Material};
+use zerkalo::scene::{BelowHorizon, RayTypes};
+use zerkalo::value::Color;
 
 /// Distance of the tested points from the surface.
 const ASIDE: f64 = 1e-6;
+
+/// Direction and throughput of a path's next ray.
+type Next = (DVec3, DVec3);
 
 /// Continuation of a path.
 pub enum Way {
@@ -38,11 +43,33 @@ impl Tracer<'_> {
     /// Index and index of refraction of the solid that fills the space at `point`: the one listed
     /// last.
     fn medium(&self, point: DVec3) -> (Option<usize>, f64) {
+        self.filling(point).map_or((None, 1.0), |(i, material)| (Some(i), material.ior))
+    }
+
+    /// Index and material of the solid that fills the space at `point`.
+    fn filling(&self, point: DVec3) -> Option<(usize, &Material)> {
         let bodies = self.bodies.iter().enumerate().rev();
         bodies
             .filter_map(|(i, body)| Some((i, body, self.transparent(body)?)))
             .find(|(_, body, _)| body.holds(point))
-            .map_or((None, 1.0), |(i, _, material)| (Some(i), material.ior))
+            .map(|(i, _, material)| (i, material))
+    }
+
+    /// Share of light that is left on the way from `origin` to `end`, or without end in `direction`.
+    pub fn transmittance(&self, origin: DVec3, end: Option<DVec3>, direction: DVec3) -> DVec3 {
+        let plain = |m: &Material| m.attenuation_color == Color::WHITE;
+        if self.scene.trace.ray_types < RayTypes::Full || self.scene.materials.values().all(plain) {
+            return DVec3::ONE;
+        }
+        let middle = end.map_or(origin + direction * ASIDE, |end| 0.5 * (origin + end));
+        let Some((_, material)) = self.filling(middle) else { return DVec3::ONE };
+        let distance = end.map_or(f64::INFINITY, |end| origin.distance(end));
+        let mut share = distance / material.attenuation_distance;
+        if self.mutation == Mutation::HalfAbsorption {
+            share *= 0.5;
+        }
+        let left = |c: f64| if c == 1.0 { 1.0 } else { c.powf(share) };
+        DVec3::from(material.attenuation_color.0.map(left))
     }
 
     /// Chooses reflection or transmission at `hit`, whose material transmits, at random.
@@ -55,6 +82,10 @@ impl Tracer<'_> {
             n_t = material.ior;
         } else if before == behind {
             return Way::Straight;
+        }
+        if !is_sharp(material) {
+            let [mirrored, passed] = self.rough(hit, direction, (n_i, n_t), numbers);
+            return self.one_of(hit, mirrored, passed, numbers);
         }
         let i = (-direction.dot(n)).min(1.0).acos();
         let sin_t = n_i / n_t * i.sin();
@@ -95,6 +126,17 @@ impl Tracer<'_> {
         };
         let k_t = material.transmission * if dielectric { 1.0 - f } else { 1.0 };
         let passed = onward.map(|d| (d, DVec3::splat(k_t)));
+        self.one_of(hit, mirrored, passed, numbers)
+    }
+
+    /// Chooses one of two ways in proportion to their weights.
+    fn one_of(
+        &self,
+        hit: &Hit,
+        mirrored: Option<Next>,
+        passed: Option<Next>,
+        numbers: &mut Numbers,
+    ) -> Way {
         let share = |way: &Option<(DVec3, DVec3)>| way.map_or(0.0, |w| w.1.max_element());
         let (r, t) = (share(&mirrored), share(&passed));
         if r + t == 0.0 {
@@ -106,5 +148,85 @@ impl Tracer<'_> {
         // Directions on the wrong side because of bumps are mirrored to the right one.
         let to = side * hit.normal;
         Way::On(way.map(|(d, k)| (d - 2.0 * d.dot(to).min(0.0) * to, k / chance)))
+    }
+
+    /// Reflectance of a smooth or microscopic surface at the cosine `c`, and `true` for total reflection.
+    fn reflectance(&self, hit: &Hit, c: f64, (n_i, n_t): Indices) -> (f64, bool) {
+        let i = c.clamp(0.0, 1.0).acos();
+        let sin_t = n_i / n_t * i.sin();
+        let t = (sin_t < 1.0).then(|| sin_t.asin());
+        let polarised = polarised(i, t, n_i, n_t);
+        let open = self.bodies[hit.body].is_open();
+        let f = match hit.material.fresnel_mode() {
+            Fresnel::Dielectric if open => polarised.iter().map(|r| r / (1.0 + r)).sum(),
+            Fresnel::Dielectric => polarised.iter().sum::<f64>() / 2.0,
+            _ => 1.0,
+        };
+        (f, t.is_none() && !open)
+    }
+
+    /// Samples the reflected and the transmitted ray at a rough surface, each by numbers of its own.
+    fn rough(
+        &self,
+        hit: &Hit,
+        direction: DVec3,
+        indices: Indices,
+        numbers: &mut Numbers,
+    ) -> [Option<Next>; 2] {
+        let (material, n, v) = (hit.material, hit.seen, -direction);
+        let open = self.bodies[hit.body].is_open();
+        let facets = has_facets(material);
+        let dielectric = material.fresnel_mode() == Fresnel::Dielectric;
+        let horizon = self.scene.trace.below_horizon;
+        let white =
+            Material { fresnel: None, f0: None, metal: None, reflection: 1.0, ..material.clone() };
+        let reflect_white =
+            |numbers: &mut Numbers| reflect(&white, n, v, horizon, self.mutation, numbers);
+        // Cosine at the microfacet that reflects `v` to `l`, or at the surface.
+        let cosine = |l: DVec3| v.dot(if facets { (v + l).normalize() } else { n });
+        let mirrored = reflect_white(numbers).and_then(|(l, weight)| {
+            let (f, total) = self.reflectance(hit, cosine(l), indices);
+            if total && !dielectric {
+                return Some((l, weight));
+            }
+            if hit.bare || !(dielectric || open || hit.front) {
+                return None;
+            }
+            let k = if dielectric {
+                DVec3::splat(material.reflection)
+            } else {
+                fresnel(material, v.dot((v + l).normalize())) * material.reflection
+            };
+            Some((l, weight * k * f))
+        });
+        if indices.0 == indices.1 && !open {
+            return [mirrored, Some((direction, DVec3::splat(material.transmission)))];
+        }
+        let k_t = |c: f64| {
+            let (f, total) = self.reflectance(hit, c, indices);
+            let left = if dielectric { 1.0 - f } else { 1.0 };
+            material.transmission * if total { 0.0 } else { left }
+        };
+        let passed = if facets && open {
+            // The reflected ray, mirrored to the other side.
+            reflect_white(numbers)
+                .map(|(l, weight)| (l - 2.0 * l.dot(n) * n, weight * k_t(cosine(l))))
+        } else if facets {
+            refracted_at_facet(material, n, v, indices, self.mutation, numbers)
+                .map(|(l, weight, h)| (l, DVec3::splat(weight * k_t(v.dot(h)))))
+        } else {
+            let c = v.dot(n);
+            let ratio = indices.0 / indices.1;
+            let cos_t = (1.0 - ratio * ratio * (1.0 - c * c)).max(0.0).sqrt();
+            let axis = if open { direction } else { direction * ratio + n * (ratio * c - cos_t) };
+            let mut l = spread(material, axis.normalize(), material.roughness, numbers);
+            let wrong = l.dot(n) >= 0.0;
+            if wrong {
+                l -= 2.0 * l.dot(n) * n;
+            }
+            let kept = !wrong || horizon == BelowHorizon::Fold;
+            kept.then(|| (l, DVec3::splat(k_t(c))))
+        };
+        [mirrored, passed]
     }
 }

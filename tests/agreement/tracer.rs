@@ -41,6 +41,12 @@ pub enum Mutation {
     SquareLens,
     /// Rays through the lens keep the direction of the ray through its centre.
     UnfocusedLens,
+    /// The density of refracted rays is that of the microfacet normals.
+    NoJacobian,
+    /// The Jacobian of the half vector of refraction has the index of the other side.
+    OtherIndex,
+    /// Absorbed light falls off by the square root of the distance's share.
+    HalfAbsorption,
 }
 
 /// A scene to trace.
@@ -127,7 +133,9 @@ impl<'a> Tracer<'a> {
         let mut weight = DVec3::ONE;
         let mut radiance = DVec3::ZERO;
         for bounce in 0.. {
-            let Some(hit) = self.meet(origin, direction) else {
+            let hit = self.meet(origin, direction);
+            weight *= self.transmittance(origin, hit.as_ref().map(|hit| hit.point), direction);
+            let Some(hit) = hit else {
                 return radiance + weight * DVec3::from(self.scene.background.color.0);
             };
             let through = trace.ray_types == RayTypes::Full && hit.material.transmission > 0.0;
@@ -341,7 +349,7 @@ fn spot_factor(spot: &Spot, along: DVec3, mutation: Mutation) -> f64 {
 }
 
 /// Material keys that this tracer supports.
-const KNOWN: [&str; 19] = [
+const KNOWN: [&str; 21] = [
     "color",
     "ambient",
     "diffuse",
@@ -351,6 +359,8 @@ const KNOWN: [&str; 19] = [
     "reflection",
     "transmission",
     "ior",
+    "attenuation_color",
+    "attenuation_distance",
     "roughness",
     "lobe",
     "alpha",

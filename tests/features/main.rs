@@ -42,6 +42,7 @@ mod row;
 
 mod camera;
 mod extents;
+mod glass;
 mod light;
 mod lobes;
 mod mesh;

@@ -9,6 +9,7 @@ mod highlights;
 mod lanes;
 #[path = "../common/report.rs"]
 mod report;
+mod rough;
 mod sampler;
 mod setup;
 mod stats;

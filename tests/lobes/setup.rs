@@ -1,7 +1,7 @@
 //! Shared helpers: materials, vectors, sampled reflections, traced samples.
 
 use zerkalo::lanes::{Float, Mask, SimdFloat, Vec3};
-use zerkalo::material::{Bsdf, Lobe, Masking, Material, ReflectionLobe};
+use zerkalo::material::{Bsdf, InterfaceMedia, Lobe, Masking, Material, ReflectionLobe};
 use zerkalo::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::world::{MAX_GROUPS, Radiance, World};
@@ -110,6 +110,72 @@ pub fn each_reflection<L: SimdFloat>(
         let r = finish.sample(strength, &spread, incident, n, uv, fold);
         for lane in 0..L::WIDTH {
             take(r.direction.lane(lane).map(Float::to_f64), r.weight.lane(lane).map(Float::to_f64));
+        }
+    }
+}
+
+/// Returns a white dielectric with this lobe, whose coefficients are both 1.
+pub fn rough_glass(lobe: Lobe, masking: Masking, alpha: f64, ior: f64) -> Material {
+    Material {
+        alpha: Some(alpha),
+        transmission: 1.0,
+        ior,
+        fresnel: Some(zerkalo::material::Fresnel::Dielectric),
+        ..reflector(lobe, masking, alpha * 8f64.sqrt())
+    }
+}
+
+/// A smooth or rough interface: the indices on both sides, and `true` for a thin pane.
+#[derive(Clone, Copy, Debug)]
+pub struct Sides {
+    pub n_i: f64,
+    pub n_t: f64,
+    pub thin: bool,
+}
+
+impl Sides {
+    pub fn media<L: SimdFloat>(self) -> InterfaceMedia<L> {
+        InterfaceMedia {
+            n_i: L::from_f64(self.n_i),
+            n_t: L::from_f64(self.n_t),
+            outer: L::mask(self.n_i <= self.n_t),
+            thin: L::mask(self.thin),
+        }
+    }
+}
+
+/// Directions and weights of one sample at a rough interface.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossing {
+    pub reflected: (Vector, Vector),
+    pub transmitted: (Vector, f64),
+}
+
+/// Samples `count` pairs of reflected and transmitted rays like the kernel, in the lane type `L`.
+pub fn each_crossing<L: SimdFloat>(
+    material: &Material,
+    (incident, n): (Vector, Vector),
+    (sides, fold): (Sides, bool),
+    numbers: Numbers,
+    count: u32,
+    mut take: impl FnMut(Crossing),
+) {
+    let finish = Bsdf::<L::Scalar>::new(material, true);
+    let transmission = finish.transmission.unwrap();
+    let directions = (Vec3::<L>::of(incident), Vec3::<L>::of(n));
+    let settings = SampleSettings { seed: numbers.seed, kind: numbers.kind };
+    let sampler = Sampler::<L>::new(settings, CameraDimensions { pixel: false, lens: false });
+    for first in (0..count).step_by(L::WIDTH) {
+        let key = sampler.key(numbers.pixel, 0);
+        let uv = sampler.block(first, L::WIDTH).for_pixel(key).lobe_2d(0);
+        let how = (L::mask(true), fold);
+        let s = finish.sample_interface(&transmission, &sides.media(), directions, uv, how);
+        for lane in 0..L::WIDTH {
+            let of = |v: Vec3<L>| v.lane(lane).map(Float::to_f64);
+            take(Crossing {
+                reflected: (of(s.reflected), of(s.reflected_weight)),
+                transmitted: (of(s.transmitted), s.transmitted_weight.lane(lane).to_f64()),
+            });
         }
     }
 }

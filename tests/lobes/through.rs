@@ -4,7 +4,7 @@ use crate::report::report;
 use crate::setup::*;
 use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
-use zerkalo::material::Interface;
+use zerkalo::material::{Interface, Lobe};
 use zerkalo::primitive::Aggregate;
 use zerkalo::scene::Scene;
 
@@ -130,6 +130,94 @@ fn closed_form_11_a_slab_with_all_orders() {
     }
 }
 
+/// Radiance of a white background through an absorbing slab of the thickness 0.8, seen at an angle.
+fn through_slab<L: SimdFloat>(degrees: f64, ior: f64, keys: &str) -> Vector {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let all = samples::<L>(
+        &scene(&format!(
+            "film = {{ size = [1, 1], filter = \"point\" }}
+            background.color = [1.0, 1.0, 1.0]
+            camera = {{ eye = [0.0, 0.0, 2.0], direction = [{sin}, 0.0, -{cos}] }}
+            [materials.glass]
+            ambient = 0.0\ndiffuse = 0.0\ntransmission = 1.0\nior = {ior:?}\n{keys}
+            [[object]]
+            material = \"glass\"
+            shape.box = {{ center = [0.0, 0.0, 0.0], size = [400.0, 2.0, 0.8] }}"
+        )),
+        16,
+    );
+    mean(&all)
+}
+
+/// Beer's law: a slab of the thickness t with the absorption coefficient s has the transmittance
+/// exp(-s t / cos), with the cosine of the refracted direction. The path through the slab is shorter by the
+/// ray's offset, 8 roundings of the slab's half width of 200.
+fn check_beer<L: SimdFloat>() {
+    let (color, distance, thickness) = ([0.25f64, 0.9, 0.0], 0.5, 0.8);
+    let keys = format!("attenuation_color = {color:?}\nattenuation_distance = {distance:?}");
+    let mut worst = 0f64;
+    for ior in [1.0, 1.5, 2.4] {
+        for degrees in [0.0f64, 30.0, 60.0, 85.0] {
+            let found = through_slab::<L>(degrees, ior, &keys);
+            let cos = (1.0 - (degrees.to_radians().sin() / ior).powi(2)).sqrt();
+            for c in 0..3 {
+                let expected = color[c].powf(thickness / cos / distance);
+                let error = (found[c] - expected).abs();
+                let limit = L::EPSILON * (8.0 * 200.0 * 3.0 + 40.0 / cos.powi(3));
+                assert!(error <= limit, "{} {ior} {degrees}: {found:?} for {expected}", L::NAME);
+                worst = worst.max(error);
+            }
+        }
+    }
+    println!("{}: Beer's law {worst:.1e} off at most", L::NAME);
+    // Extremes: absorption within a rounding of the surface, and none within the whole range.
+    for (distance, expected) in [(1e-300, 0.0), (1e-9, 0.0), (1e9, 1.0)] {
+        let keys =
+            format!("attenuation_color = [0.5, 0.5, 0.5]\nattenuation_distance = {distance:?}");
+        for c in through_slab::<L>(40.0, 1.5, &keys) {
+            assert!((c - expected).abs() < 1e-6, "{} {distance}: {c}", L::NAME);
+        }
+    }
+}
+
+#[test]
+fn closed_form_beers_law_through_a_slab() {
+    check_beer::<Double>();
+    check_beer::<Single>();
+}
+
+/// A glass slab with Fresnel's equations and the transmittance a reflects F + F (1 - F)^2 a^2 / (1 - F^2
+/// a^2) and transmits (1 - F)^2 a / (1 - F^2 a^2). The bound of 4.5 standard errors allows for twelve
+/// comparisons.
+#[test]
+fn closed_form_an_absorbing_slab_with_all_orders() {
+    for n in [1.5f64, 2.4, 4.0] {
+        for a in [0.3, 0.9f64] {
+            let f = ((n - 1.0) / (n + 1.0f64)).powi(2);
+            let slab = format!(
+                "ior = {n:?}\nattenuation_color = [{a:?}, {a:?}, {a:?}]\n\
+                 [[object]]\nmaterial = \"glass\"\n\
+                 shape.box = {{ center = [0.0, 0.0, -2.0], size = [9.0, 9.0, 1.0] }}"
+            );
+            let count = 1 << 13;
+            let check = |all: Vec<Vector>| {
+                let [t, r, _] = mean(&all);
+                let orders = 1.0 - (f * a).powi(2);
+                let expected =
+                    [(1.0 - f).powi(2) * a / orders, f + f * ((1.0 - f) * a).powi(2) / orders];
+                let sigma = |i: usize, mean: f64| {
+                    let squares: f64 = all.iter().map(|s| (s[i] - mean).powi(2)).sum();
+                    (squares / f64::from(count) / f64::from(count)).sqrt() + 1e-6
+                };
+                assert!((t - expected[0]).abs() < 4.5 * sigma(0, t), "{n} {a}: {t} {expected:?}");
+                assert!((r - expected[1]).abs() < 4.5 * sigma(1, r), "{n} {a}: {r} {expected:?}");
+            };
+            check(samples::<Double>(&between_walls(&slab), count));
+            check(samples::<Single>(&between_walls(&slab), count));
+        }
+    }
+}
+
 /// Scene with objects between camera and background; `inner` are keys of the material.
 fn ball_in_front(background: &str, depth: u32, inner: &str, objects: &str) -> Scene {
     scene(&format!(
@@ -171,6 +259,66 @@ fn glass_is_invisible_in_white_furnace() {
             }
         }
     }
+}
+
+/// The lobes `cone` and `square` lose nothing, so that rough glass is invisible, too; microfacets lose light
+/// but do not gain any.
+#[test]
+fn rough_glass_in_white_furnace() {
+    for lobe in [
+        "lobe = \"cone\"",
+        "lobe = \"square\"",
+        "lobe = \"beckmann\"",
+        "lobe = \"ggx\"\nmasking = \"smith\"",
+    ] {
+        for roughness in [1e-3, 0.3, 3.0] {
+            let inner = format!("{GLASS}ior = 1.5\n{lobe}\nroughness = {roughness:?}\n");
+            let scene = ball_in_front("[1.0, 1.0, 1.0]", 10_000, &inner, BALL);
+            let check = |all: Vec<Vector>, epsilon: f64| {
+                for s in &all {
+                    let exact = lobe.contains("cone") || lobe.contains("square");
+                    let kept = s.iter().all(|c| {
+                        *c <= 1.0 + epsilon && (*c >= 1.0 - epsilon || !exact) && *c >= 0.0
+                    });
+                    assert!(kept, "{lobe} {roughness}: {s:?}");
+                }
+            };
+            check(samples::<Double>(&scene, 16), 1e-9);
+            check(samples::<Single>(&scene, 16), 1e-3);
+        }
+    }
+}
+
+/// With a vanishing alpha the picture converges to that of clear glass, and below 0.001 it is the same.
+#[test]
+fn rough_glass_converges_to_clear_glass() {
+    let mut scene = scene(&std::fs::read_to_string("scenes/rough-glass.toml").unwrap());
+    scene.film.size = [24, 16];
+    let with = |alpha: f64| {
+        let mut scene = scene.clone();
+        for material in scene.materials.values_mut().filter(|m| m.transmission > 0.0) {
+            (material.lobe, material.alpha) = (Lobe::Ggx, Some(alpha));
+        }
+        mean_by_pixel(&samples::<Double>(&scene, 512), 512)
+    };
+    let clear = with(0.0);
+    assert!(with(9e-4) == clear);
+    let apart = |alpha: f64| {
+        let squares: f64 = with(alpha)
+            .iter()
+            .zip(&clear)
+            .map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>())
+            .sum();
+        (squares / clear.len() as f64 / 3.0).sqrt()
+    };
+    let (near, far) = (apart(1e-3), apart(0.2));
+    println!("root mean square {near:.4} at alpha 0.001, {far:.4} at 0.2");
+    // Half of the rays at an interface beyond the second are reflected at random: the noise is 0.01.
+    assert!(near < 0.2 * far, "{near} {far}");
+}
+
+fn mean_by_pixel(samples: &[Vector], count: usize) -> Vec<Vector> {
+    samples.chunks(count).map(mean).collect()
 }
 
 /// A material of index 1 neither refracts nor reflects.

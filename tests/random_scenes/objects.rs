@@ -68,6 +68,7 @@ fn material_key(numbers: &mut Numbers, field: &Field) -> Option<Value> {
             0 => 0.0,
             _ => log(numbers, 1e-4, 3.0),
         }),
+        "attenuation_distance" => Value::Float(log(numbers, 0.01, 100.0)),
         "height" => Value::Float(numbers.between(-0.05, 0.05)),
         "scale" => list([log(numbers, 0.1, 50.0), log(numbers, 0.1, 50.0)]),
         "offset" => list([numbers.between(-2.0, 2.0), numbers.between(-2.0, 2.0)]),

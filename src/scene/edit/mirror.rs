@@ -8,7 +8,7 @@ use crate::scene::edit::{Edit, EditError, Target, step, toggle};
 /// Returns the name of the material that the mirror commands change. The first of these that
 /// reflects is chosen: the material of the selected object or the selected material, a material of
 /// a part of the selected object, that of the first reflecting rectangle, the most reflecting
-/// material of all objects and parts.
+/// material of all objects and parts. Selected glass counts even if it only transmits.
 ///
 /// If no material reflects, the selected material is chosen, else that of the first rectangle, so
 /// that the reflection can be turned up from 0 again. Returns `None` if there is neither.
@@ -18,9 +18,10 @@ pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
         Some(Target::Material(name)) => Some(name),
         _ => None,
     });
-    let mirrors =
-        |material: &String| scene.materials.get(material).is_some_and(|m| m.reflection > 0.0);
-    if let Some(chosen) = chosen.clone().filter(mirrors) {
+    let is_specular = |material: &String| {
+        scene.materials.get(material).is_some_and(|m| m.reflection > 0.0 || m.transmission > 0.0)
+    };
+    if let Some(chosen) = chosen.clone().filter(is_specular) {
         return Some(chosen);
     }
     if let Some(Target::Object(i)) = selected
@@ -100,6 +101,9 @@ mod tests {
         assert_eq!(at(&scene, Some(Target::Object(3))), "mirror", "the cube does not reflect");
         assert_eq!(at(&scene, Some(Target::Material("floor".into()))), "floor");
         assert_eq!(at(&scene, Some(Target::Camera)), "mirror");
+        scene.materials.get_mut("green").unwrap().transmission = 0.5;
+        assert_eq!(at(&scene, Some(Target::Object(3))), "green", "glass is as rough as a mirror");
+        scene.materials.get_mut("green").unwrap().transmission = 0.0;
         scene.materials.get_mut("mirror").unwrap().reflection = 0.0;
         assert_eq!(at(&scene, None), "red");
         for material in scene.materials.values_mut() {

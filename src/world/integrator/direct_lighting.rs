@@ -10,13 +10,15 @@ use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
 /// Adds the ambient light and the light of all sources that the surfaces reflect to the radiance in
-/// `out`.
+/// `out`. `transmittance` returns the share of light that the medium before the surfaces lets through on
+/// a way of the given length; `None` if no medium absorbs light.
 #[inline(always)]
 pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
     path: &Path<L>,
     interaction: &SurfaceInteraction<L>,
     candidates: &TileCandidates,
+    transmittance: impl Fn(L) -> Option<Vec3<L>>,
     out: &mut Radiance<L>,
     counts: &mut Counts,
 ) {
@@ -75,6 +77,9 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
             value += highlight.masked(lanes);
         }
         let mut value = path.throughput.component_mul(value) * light.irradiance;
+        if let Some(left) = transmittance(light.distance) {
+            value = value.component_mul(left);
+        }
         if let Some(emission) = source.emission {
             value = value.component_mul(Vec3::splat(emission));
         }

@@ -47,13 +47,14 @@ pub(crate) fn power_heuristic<L: SimdFloat>(p: L, q: L) -> L {
 }
 
 /// Adds the radiance of the visible emitters that the rays of `lanes` reach before the distance
-/// `t_max`.
+/// `t_max`. `transmittance` is that of [`direct_lighting`](super::direct_lighting::direct_lighting).
 #[inline(never)]
 pub(crate) fn visible_emitters<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
     t_max: L,
     lanes: L::Mask,
+    transmittance: impl Fn(L) -> Option<Vec3<L>>,
     out: &mut Radiance<L>,
 ) {
     for source in world.emitters.iter().filter(|source| source.visible) {
@@ -68,6 +69,9 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
             let density = source.emitter.density(origin, t);
             radiance = radiance * power_heuristic(path.lobe_density, density);
         }
+        if let Some(left) = transmittance(t) {
+            radiance = radiance.component_mul(left);
+        }
         out.groups[source.group] += source.emitted(radiance).masked(seen);
     }
 }
@@ -81,7 +85,8 @@ pub(crate) struct ReflectingLobes<L: SimdFloat> {
 }
 
 /// Adds the light of all emitters that the surfaces reflect. `bounce` is the number of earlier
-/// surfaces of the path.
+/// surfaces of the path. `transmittance` is that of
+/// [`direct_lighting`](super::direct_lighting::direct_lighting).
 #[inline(never)]
 pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -89,7 +94,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
     interaction: &SurfaceInteraction<L>,
     candidates: &TileCandidates,
     (sampler, bounce): (&PacketSampler<'_, L>, u32),
-    lobes: &ReflectingLobes<L>,
+    (lobes, transmittance): (&ReflectingLobes<L>, impl Fn(L) -> Option<Vec3<L>>),
     (out, counts): (&mut Radiance<L>, &mut Counts),
 ) {
     let mut glossy = L::mask(false);
@@ -147,7 +152,10 @@ pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
                 continue;
             }
         }
-        let radiance = path.throughput.component_mul(value) * light.irradiance;
+        let mut radiance = path.throughput.component_mul(value) * light.irradiance;
+        if let Some(left) = transmittance(light.distance) {
+            radiance = radiance.component_mul(left);
+        }
         out.groups[source.group] += source.emitted(radiance).masked(lit);
     }
 }

@@ -7,7 +7,7 @@
 //! glass that is listed after the water. Outside of all solids the index of refraction is 1.
 
 use crate::bvh::Ray;
-use crate::lanes::{Float, Mask, SimdFloat, next_distinct};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
 use crate::material::Bsdf;
 use crate::primitive::{Aggregate, Form, PrimitiveId};
 use crate::world::compile::RecenteredGeometry;
@@ -107,6 +107,9 @@ pub(crate) struct NestedDielectrics<L: SimdFloat> {
     priority_of: Vec<u32>,
     /// Index of refraction of the solid with each priority; 1 for priority 0.
     indices: Vec<L::Scalar>,
+    /// Absorption coefficients of the solid with each priority [1 / scene unit]; 0 for priority 0.
+    /// `None` if no solid absorbs light.
+    absorption: Option<Vec<[L::Scalar; 3]>>,
     /// Solids that may contain the origins of camera rays: the priority of each, and its boundary.
     around_eye: Vec<(u32, Aggregate<L>)>,
     /// Contacts between primitives, at least one of each touching pair transmissive. `None` if
@@ -152,13 +155,18 @@ impl<L: SimdFloat> NestedDielectrics<L> {
             return None;
         }
         let mut indices = vec![None; forms.len() + 1];
+        let mut absorption = vec![[L::Scalar::default(); 3]; forms.len() + 1];
         let priority_of = primitives.iter().zip(bsdf_of).map(|(id, bsdf)| {
             let flat = forms[id.form].is_flat();
             let priority = id.form + 1;
             match transmission_of(*bsdf) {
                 Some(transmission) if !flat => {
-                    // The first transmissive part of a compound determines the index of refraction.
-                    indices[priority].get_or_insert(transmission.index);
+                    // The first transmissive part of a compound determines the index of refraction
+                    // and the absorption.
+                    if indices[priority].is_none() {
+                        indices[priority] = Some(transmission.index);
+                        absorption[priority] = transmission.absorption;
+                    }
                     priority as u32
                 }
                 _ => 0,
@@ -176,7 +184,9 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         };
         let around_eye = indices[1..].iter().enumerate().filter_map(solid_around_eye).collect();
         let indices = indices.into_iter().map(|n| n.unwrap_or(L::Scalar::from_f64(1.0))).collect();
-        Some(Self { priority_of, indices, around_eye, contacts })
+        let absorbs = absorption.iter().flatten().any(|c| c.to_f64() > 0.0);
+        let absorption = absorbs.then_some(absorption);
+        Some(Self { priority_of, indices, absorption, around_eye, contacts })
     }
 
     /// Returns `true` for each primitive that bounds a solid that paths can be inside of.
@@ -201,6 +211,15 @@ impl<L: SimdFloat> NestedDielectrics<L> {
             media = MediumStack::select(within, &entered, &media);
         }
         media
+    }
+
+    /// Returns the share of light that is left after `distance` [scene units] in `media`, in each
+    /// channel, by Beer's law. `distance` may be the largest finite number. Returns `None` if no
+    /// solid of the world absorbs light.
+    #[inline(always)]
+    pub fn transmittance(&self, media: &MediumStack<L>, distance: L) -> Option<Vec3<L>> {
+        let absorption = self.absorption.as_ref()?;
+        Some(transmittance(absorption, media.top(), distance))
     }
 
     /// Returns the index of refraction of the solid with `priority`.
@@ -250,6 +269,19 @@ impl<L: SimdFloat> NestedDielectrics<L> {
             medium_transmitted,
         }
     }
+}
+
+/// Returns exp(-coefficient x distance) with the absorption coefficients of the solid of each priority.
+#[inline(never)]
+fn transmittance<L: SimdFloat>(absorption: &[[L::Scalar; 3]], priority: L, distance: L) -> Vec3<L> {
+    let of = |lane| absorption[priority.lane(lane).to_f64() as usize];
+    let coefficients = if equal(priority, L::splat(priority.lane(0))).all() {
+        Vec3::splat(of(0))
+    } else {
+        Vec3::from_fn(of)
+    };
+    let left = |c: L| (-(c * distance)).exp();
+    Vec3::new(left(coefficients.x), left(coefficients.y), left(coefficients.z))
 }
 
 #[cfg(test)]

@@ -41,13 +41,21 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
             out.groups[group] += path.throughput.masked(active.and_not(is_hit));
         }
         if EMITTERS {
-            visible_emitters(world, &path, hit.t, active, out);
+            visible_emitters(world, &path, hit.t, active, |_| None, out);
         }
         active = active & is_hit;
         let Some(interaction) = interact::<_, SIMPLE>(world, &path.ray, &hit, active) else {
             return counts;
         };
-        direct_lighting::<_, SIMPLE>(world, &path, &interaction, candidates, out, &mut counts);
+        direct_lighting::<_, SIMPLE>(
+            world,
+            &path,
+            &interaction,
+            candidates,
+            |_| None,
+            out,
+            &mut counts,
+        );
         let is_last = bounce == world.depth;
         if EMITTERS {
             let lanes = if is_last { L::mask(false) } else { interaction.reflecting };
@@ -57,7 +65,7 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
                 &interaction,
                 candidates,
                 (sampler, bounce),
-                &ReflectingLobes { lanes, share: L::one() },
+                (&ReflectingLobes { lanes, share: L::one() }, |_| None),
                 (out, &mut counts),
             );
         }

@@ -3,7 +3,7 @@
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
-use crate::material::{FresnelSplit, Interface, ReflectionLobe, Transmission};
+use crate::material::{Bsdf, Interface, InterfaceMedia, ReflectionLobe, Transmission};
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState, Contacts};
@@ -135,13 +135,18 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             hit.take_in(next.lanes, L::zero(), (next.item, next.triangle));
             behind = Some(next);
         }
+        let transmittance = |distance| self.nested_dielectrics.transmittance(&media, distance);
+        let has_emitters = !world.emitters.is_empty();
+        if has_emitters {
+            visible_emitters(world, &path, hit.t, branch.lanes, transmittance, out);
+        }
+        if let Some(left) = transmittance(hit.t) {
+            path.throughput = path.throughput.component_mul(left);
+            branch.path.throughput = path.throughput;
+        }
         let is_hit = hit.t.lt(L::from_f64(L::MAX));
         if let Some(group) = world.background {
             out.groups[group] += path.throughput.masked(branch.lanes.and_not(is_hit));
-        }
-        let has_emitters = !world.emitters.is_empty();
-        if has_emitters {
-            visible_emitters(world, &path, hit.t, branch.lanes, out);
         }
         let lanes = branch.lanes & is_hit;
         let Some(mut interaction) = interact::<_, false>(world, &path.ray, &hit, lanes) else {
@@ -162,7 +167,15 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         if let Some(interface_hit) = &interface_hit {
             interaction.mask_out(interface_hit.suppressed);
         }
-        direct_lighting::<_, false>(world, &path, &interaction, candidates, out, counts);
+        direct_lighting::<_, false>(
+            world,
+            &path,
+            &interaction,
+            candidates,
+            transmittance,
+            out,
+            counts,
+        );
         if has_emitters {
             let lobes = if bounce == world.depth {
                 ReflectingLobes { lanes: L::mask(false), share: L::one() }
@@ -175,7 +188,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 &interaction,
                 candidates,
                 (self.sampler, bounce),
-                &lobes,
+                (&lobes, transmittance),
                 (out, counts),
             );
         }
@@ -350,27 +363,29 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     }
 
     /// Returns the lanes whose reflected rays are followed, with the fraction of the light that the
-    /// surfaces reflect.
+    /// surfaces reflect. Rough interfaces are left out: their rays alone find the emitters.
     fn reflecting_lobes(
         &self,
         path: &Path<L>,
         interaction: &SurfaceInteraction<L>,
         interface_hit: Option<&InterfaceHit<L>>,
     ) -> ReflectingLobes<L> {
-        let (lanes, mut share) = (interaction.reflecting, L::one());
+        let (mut followed, mut share) = (interaction.reflecting, L::one());
         let Some(interface_hit) = interface_hit else {
-            return ReflectingLobes { lanes, share };
+            return ReflectingLobes { lanes: followed, share };
         };
-        let incident = path.ray.direction;
-        let interface =
-            Interface::new(incident, interaction.normal, interface_hit.n_i, interface_hit.n_t);
-        for (index, lanes) in interaction.bsdfs(lanes & interface_hit.lanes) {
+        let interface = smooth_interface(path.ray.direction, interaction, interface_hit);
+        for (index, lanes) in interaction.bsdfs(followed & interface_hit.lanes) {
             if let Some(transmission) = &self.world.bsdfs[index].transmission {
-                let shares = split_shares(&interface, interface_hit, transmission);
+                if !matches!(transmission.lobe, ReflectionLobe::Mirror) {
+                    followed = followed.and_not(lanes);
+                }
+                let shares =
+                    interface.split_at(transmission, interface_hit.outer, interface_hit.thin);
                 share = L::select(lanes, shares.reflected, share);
             }
         }
-        ReflectingLobes { lanes: lanes.and_not(interface_hit.suppressed), share }
+        ReflectingLobes { lanes: followed.and_not(interface_hit.suppressed), share }
     }
 
     /// Samples the reflected and transmitted directions at surfaces of which at least one
@@ -384,8 +399,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         counts: &mut Counts,
     ) -> SplitDirections<L> {
         let incident = path.ray.direction;
-        let interface =
-            Interface::new(incident, interaction.normal, interface_hit.n_i, interface_hit.n_t);
+        let interface = smooth_interface(incident, interaction, interface_hit);
         let straight = interface_hit.thin | interface_hit.suppressed;
         let mut directions = SplitDirections {
             reflected: incident.reflect(interaction.normal),
@@ -399,7 +413,15 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             let bsdf = &self.world.bsdfs[index];
             let mut reflected_share = L::one();
             if let Some(transmission) = &bsdf.transmission {
-                let shares = split_shares(&interface, interface_hit, transmission);
+                if !matches!(transmission.lobe, ReflectionLobe::Mirror) {
+                    counts.glossy = true;
+                    let uv = *lobe_sample.get_or_insert_with(|| self.sampler.lobe_2d(bounce));
+                    let at = (path, interaction, interface_hit);
+                    self.sample_rough(&mut directions, bsdf, transmission, at, (lanes, uv));
+                    continue;
+                }
+                let shares =
+                    interface.split_at(transmission, interface_hit.outer, interface_hit.thin);
                 reflected_share = shares.reflected.masked(!interface_hit.suppressed);
                 let transmitted = L::select(interface_hit.suppressed, L::one(), shares.transmitted);
                 directions.transmitted_weight = Vec3::select(
@@ -448,22 +470,47 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         directions.transmitted_weight = Path::bounded(directions.transmitted_weight);
         directions
     }
+
+    /// Samples the reflected and transmitted directions of `lanes`, whose surfaces are rough, with the
+    /// numbers `uv`, and stores them in `directions`.
+    #[inline(never)]
+    fn sample_rough(
+        &self,
+        directions: &mut SplitDirections<L>,
+        bsdf: &Bsdf<L::Scalar>,
+        transmission: &Transmission<L::Scalar>,
+        (path, interaction, hit): (&Path<L>, &SurfaceInteraction<L>, &InterfaceHit<L>),
+        (lanes, uv): (L::Mask, (L, L)),
+    ) {
+        let media = InterfaceMedia { n_i: hit.n_i, n_t: hit.n_t, outer: hit.outer, thin: hit.thin };
+        let incident = path.ray.direction;
+        let sample = bsdf.sample_interface(
+            transmission,
+            &media,
+            (incident, interaction.normal),
+            uv,
+            (interaction.reflecting, self.world.fold),
+        );
+        // A suppressed boundary has no effect.
+        let rough = lanes.and_not(hit.suppressed);
+        let reflected_weight = path.throughput.component_mul(sample.reflected_weight);
+        let transmitted = L::select(hit.suppressed, L::one(), sample.transmitted_weight);
+        let transmitted_weight = path.throughput * transmitted;
+        directions.reflected = Vec3::select(rough, sample.reflected, directions.reflected);
+        directions.reflected_weight =
+            Vec3::select(rough, reflected_weight, directions.reflected_weight);
+        directions.transmitted = Vec3::select(rough, sample.transmitted, directions.transmitted);
+        directions.transmitted_weight =
+            Vec3::select(lanes, transmitted_weight, directions.transmitted_weight);
+    }
 }
 
-/// Returns the shares of reflected and transmitted light at interfaces, which may be thin.
+/// Returns the refraction of rays with the direction `incident` at clear surfaces.
 #[inline(always)]
-fn split_shares<L: SimdFloat>(
-    interface: &Interface<L>,
-    interface_hit: &InterfaceHit<L>,
-    transmission: &Transmission<L::Scalar>,
-) -> FresnelSplit<L> {
-    let mut shares = interface.split(transmission, interface_hit.outer);
-    if interface_hit.thin.any() {
-        let thin = interface.split_thin(transmission);
-        let choose = |a, b| L::select(interface_hit.thin, a, b);
-        shares.reflected = choose(thin.reflected, shares.reflected);
-        shares.transmitted = choose(thin.transmitted, shares.transmitted);
-        shares.tir = choose(thin.tir, shares.tir);
-    }
-    shares
+fn smooth_interface<L: SimdFloat>(
+    incident: Vec3<L>,
+    interaction: &SurfaceInteraction<L>,
+    hit: &InterfaceHit<L>,
+) -> Interface<L> {
+    Interface::new(incident, interaction.normal, hit.n_i, hit.n_t)
 }
