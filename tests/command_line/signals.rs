@@ -9,25 +9,33 @@ fn signal(name: &str, id: u32) {
     assert!(sent.unwrap().success());
 }
 
-/// Starts the program and waits until it handles SIGINT, as its bit in `SigCgt` of Linux's
-/// `/proc/PID/status` says. Elsewhere it waits for a second.
+/// Longest wait; reached only on failure.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Waits until `condition` holds for the set of signals `set` of the process, a line of Linux's
+/// `/proc/PID/status`. Elsewhere it waits for a second.
+fn wait_for_signals(id: u32, set: &str, condition: impl Fn(u64) -> bool) {
+    if cfg!(not(target_os = "linux")) {
+        return std::thread::sleep(Duration::from_secs(1));
+    }
+    let holds = || {
+        let status = fs::read_to_string(format!("/proc/{id}/status")).ok()?;
+        let signals = status.lines().find_map(|line| line.strip_prefix(set))?;
+        Some(condition(u64::from_str_radix(signals.trim(), 16).ok()?))
+    };
+    let end = Instant::now() + PATIENCE;
+    while holds() == Some(false) {
+        assert!(Instant::now() < end, "{set} stays");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Starts the program and waits until it handles SIGTERM, and SIGINT, whose handlers are installed
+/// before.
 fn spawn(desk: &Desk, args: &[&str]) -> Child {
     let mut command = desk.command(args);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    if cfg!(not(target_os = "linux")) {
-        std::thread::sleep(Duration::from_secs(1));
-        return child;
-    }
-    let handles_sigint = || {
-        let status = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
-        let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"))?;
-        Some(u64::from_str_radix(caught.trim(), 16).ok()? & 2 != 0)
-    };
-    let end = Instant::now() + Duration::from_secs(120);
-    while handles_sigint() != Some(true) {
-        assert!(Instant::now() < end, "no handler of SIGINT is installed");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    wait_for_signals(child.id(), "SigCgt:", |caught| caught >> 14 & 1 == 1);
     child
 }
 
@@ -64,6 +72,8 @@ fn second_signal_ends_a_long_wave_at_once() {
     ];
     let child = spawn(&desk, &args);
     signal("INT", child.id());
+    // Two pending signals would be one.
+    wait_for_signals(child.id(), "ShdPnd:", |pending| pending >> 1 & 1 == 0);
     signal("INT", child.id());
     let run = Run::from(child.wait_with_output().unwrap());
     assert_eq!(run.status, 130, "{}", run.err);
