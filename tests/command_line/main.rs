@@ -4,6 +4,7 @@ mod hostile;
 #[cfg(unix)]
 mod outputs;
 mod refusals;
+mod scale;
 mod shards;
 #[cfg(unix)]
 mod signals;
