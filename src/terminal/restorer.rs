@@ -5,21 +5,18 @@
 //! replace it: after the handler of SIGABRT returns, the process ends at once.
 
 use crate::terminal::LEAVE;
-use std::io::{self, Read, Write};
+use rustix::termios::{InputModes, LocalModes, OutputModes, Termios};
+use std::io::{self, Write};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, ChildStdin, Command, Stdio};
 
-/// Program of the shell; its `$0` is [`LEAVE`]. It reads a line when the program has entered
-/// full-screen use, and another one at its regular end. The modes are restored only if they are
-/// still those of full-screen use, since the shell of the user may have restored its own.
+/// Program of the shell; `$0` is [`LEAVE`], the other arguments are those of `stty`. It reads a line
+/// at the regular end of this process. The modes are restored only while those of full-screen use
+/// are set: the shell of the user may have restored its own, which process output.
 const PROGRAM: &str = "\
 trap '' INT QUIT TERM HUP TSTP TTIN TTOU
-before=$(stty -g </dev/tty) || exit
-echo
-read -r _ || exit
-raw=$(stty -g </dev/tty)
 read -r _ && exit
-[ \"$(stty -g </dev/tty)\" = \"$raw\" ] && stty \"$before\" </dev/tty
+case $(stty -a </dev/tty) in *-opost*) stty \"$@\" </dev/tty ;; esac
 printf %s \"$0\" >/dev/tty";
 
 /// Shell that restores the terminal if this process ends without dropping the value.
@@ -29,39 +26,60 @@ pub struct Restorer {
 }
 
 impl Restorer {
-    /// Starts the shell and waits until it knows the present modes of the terminal.
+    /// Starts the shell, which will restore `modes_before`.
     ///
     /// # Errors
-    /// If there is no shell, or it has no terminal.
-    pub fn start() -> io::Result<Self> {
+    /// If there is no shell.
+    pub fn start(modes_before: &Termios) -> io::Result<Self> {
         let mut shell = Command::new("/bin/sh")
             .args(["-c", PROGRAM, LEAVE.as_str()])
+            .args(stty_arguments(modes_before))
             .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
+            .stdout(Stdio::null())
             .stderr(Stdio::null())
             // A process group of its own: keys such as Ctrl-C and Ctrl-Z do not reach it.
             .process_group(0)
             .spawn()?;
-        let ready = shell.stdout.take().map_or(Ok(0), |mut out| out.read(&mut [0]));
-        match (ready, shell.stdin.take()) {
-            (Ok(1), Some(messages)) => Ok(Self { shell, messages }),
-            _ => {
-                let _ = shell.wait();
-                Err(io::ErrorKind::NotFound.into())
-            }
-        }
+        let messages = shell.stdin.take().ok_or(io::ErrorKind::BrokenPipe)?;
+        Ok(Self { shell, messages })
     }
+}
 
-    /// Reports that full-screen use has begun.
-    pub fn entered(&mut self) {
-        let _ = self.messages.write_all(b"\n");
-    }
+/// Returns the modes that raw mode changes, as `stty` of POSIX names them.
+fn stty_arguments(modes: &Termios) -> Vec<String> {
+    let inputs = [
+        ("ignbrk", InputModes::IGNBRK),
+        ("brkint", InputModes::BRKINT),
+        ("parmrk", InputModes::PARMRK),
+        ("istrip", InputModes::ISTRIP),
+        ("inlcr", InputModes::INLCR),
+        ("igncr", InputModes::IGNCR),
+        ("icrnl", InputModes::ICRNL),
+        ("ixon", InputModes::IXON),
+    ];
+    let locals = [
+        ("echo", LocalModes::ECHO),
+        ("echonl", LocalModes::ECHONL),
+        ("icanon", LocalModes::ICANON),
+        ("isig", LocalModes::ISIG),
+        ("iexten", LocalModes::IEXTEN),
+    ];
+    let is_set = inputs.map(|(name, mode)| (name, modes.input_modes.contains(mode)));
+    let is_set = is_set
+        .into_iter()
+        .chain(locals.map(|(name, mode)| (name, modes.local_modes.contains(mode))));
+    let output = ("opost", modes.output_modes.contains(OutputModes::OPOST));
+    let argument = |(name, is_set): (&str, bool)| match is_set {
+        true => name.to_string(),
+        false => format!("-{name}"),
+    };
+    is_set.chain([output]).map(argument).collect()
 }
 
 impl Drop for Restorer {
     /// Ends the shell: the terminal is restored already.
     fn drop(&mut self) {
-        let _ = self.messages.write_all(b"\n\n");
-        let _ = self.shell.wait();
+        let _ = self.messages.write_all(b"\n");
+        let _ = self.shell.try_wait();
     }
 }
