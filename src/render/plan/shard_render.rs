@@ -15,6 +15,8 @@ use std::time::Instant;
 const STEP_SECONDS: f64 = 0.25;
 /// Target duration of one job in seconds. Short jobs occupy all threads until the end of a step.
 const JOB_SECONDS: f64 = 0.01;
+/// Largest number of samples per pixel and replicate of a job, whatever the measured speed is.
+const LONGEST_JOB: u32 = 1 << 20;
 /// Number of pixel samples of the first step, which measures the speed.
 const FIRST_STEP_SAMPLES: u64 = 1 << 18;
 
@@ -81,7 +83,8 @@ impl ShardRender {
         let threads = self.pool.current_num_threads() as f64;
         // A job is traced twice, once for each replicate.
         let longest = (0.5 * JOB_SECONDS * speed / threads / TILE_PIXELS as f64) as u32;
-        let longest = longest.next_multiple_of(SAMPLE_ALIGNMENT).max(SAMPLE_ALIGNMENT);
+        let longest =
+            longest.min(LONGEST_JOB).next_multiple_of(SAMPLE_ALIGNMENT).max(SAMPLE_ALIGNMENT);
         let mut jobs: Vec<Job> = Vec::new();
         let (mut sum, mut cut) = (0.0, Vec::new());
         while sum < STEP_SECONDS * speed
