@@ -61,8 +61,10 @@ fn object_takes_at_most_a_kilobyte_beyond_its_text() {
 #[cfg(target_os = "linux")]
 fn million_objects_and_triangles_take_linear_time_and_memory() {
     let desk = Desk::new();
-    let families: [(&str, &dyn Fn(usize) -> String, f64); 2] =
-        [("spheres", &spheres, 6.0), ("coincident spheres", &coincident, 8.0)];
+    let families = [
+        ("spheres", spheres as fn(usize) -> String, 6.0),
+        ("coincident spheres", coincident as fn(usize) -> String, 8.0),
+    ];
     for (name, family, limit) in families {
         let costs = [250_000, 500_000, 1_000_000].map(|count| cost(&desk, &family(count)));
         println!("{name}: {costs:.2?}");
