@@ -79,3 +79,30 @@ fn second_signal_ends_a_long_wave_at_once() {
     assert_eq!(run.status, 130, "{}", run.err);
     assert_eq!((run.out.as_str(), desk.path("a.png").exists()), ("", false));
 }
+
+#[test]
+fn signal_keeps_the_samples_of_a_shard_which_continues() {
+    let desk = Desk::new();
+    let plan = ["plan", "scene.toml", "-o", "job.plan", "--size", "64x48", "--shards", "1"];
+    let run = desk.run(&[&plan[..], &["--noise", "0.02", "--pilot", "1"]].concat());
+    assert_eq!(run.status, 0, "{}", run.err);
+    let shard = ["render", "scene.toml", "--plan", "job.plan", "--shard", "1", "-o"];
+    let child = spawn(&desk, &[&shard[..], &["job-1.zk"]].concat());
+    signal("TERM", child.id());
+    let run = Run::from(child.wait_with_output().unwrap());
+    assert_eq!(run.status, 143, "{}", run.err);
+    assert!(run.out.contains("% of the samples (stopped by a signal)"), "{}", run.out);
+    let merge = |more: &[&str]| desk.run(&[&["merge", "job-0.zk", "job-1.zk"], more].concat());
+    let run = merge(&["-o", "a.png"]);
+    assert!(run.status == 1, "{}", run.out);
+    assert!(run.err.contains("job-1.zk is an unfinished checkpoint of shard 1"), "{}", run.err);
+    let run = merge(&["-o", "a.png", "--partial"]);
+    assert!(run.out.contains("missing of 1 shards: 1; noise 0."), "{} {}", run.out, run.err);
+    for output in ["job-1.zk", "uninterrupted.zk"] {
+        let run = desk.run(&[&shard[..], &[output]].concat());
+        assert_eq!(run.status, 0, "{}", run.err);
+    }
+    let [resumed, whole] =
+        ["job-1.zk", "uninterrupted.zk"].map(|name| fs::read(desk.path(name)).unwrap());
+    assert!(resumed == whole, "the interrupted shard has another film");
+}
