@@ -95,6 +95,8 @@ pub enum Command {
     Measure(Box<MeasureArgs>),
     /// Validate a scene and print its contents
     Check(CheckArgs),
+    /// Print the origin of a picture or a checkpoint: scene, samples, noise, seed, precision
+    Info(InfoArgs),
     /// Write a commented starter scene
     New(NewArgs),
     /// Report the abilities of the terminal and of the connection, and how to improve them
@@ -152,6 +154,16 @@ pub struct RenderArgs {
     /// Write statistics of the run as JSON
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
+    /// Keep the samples in this file: every minute, on signals and at the end
+    #[arg(long, value_name = "FILE.zk", conflicts_with = "plan")]
+    pub checkpoint: Option<PathBuf>,
+    /// Seconds between checkpoints
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 60.0, requires = "checkpoint", allow_negative_numbers = true)]
+    pub checkpoint_interval: f64,
+    /// Continue this checkpoint. If --checkpoint names the same file and it does not exist yet, the
+    /// render starts anew
+    #[arg(long, value_name = "FILE.zk", conflicts_with = "plan")]
+    pub resume: Option<PathBuf>,
 }
 
 /// Arguments of `zerkalo plan`.
@@ -257,6 +269,16 @@ pub struct CheckArgs {
     pub scene: PathBuf,
 }
 
+/// Arguments of `zerkalo info`.
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// A PNG, OpenEXR or checkpoint file
+    pub file: PathBuf,
+    /// Compare the file with this scene; exit status 1 if it shows another one
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+}
+
 /// Arguments of `zerkalo new`.
 #[derive(Debug, Args)]
 pub struct NewArgs {
@@ -355,9 +377,13 @@ impl Cli {
             Some(Command::Render(args)) => args.compute.warning(),
             Some(Command::Plan(args)) => args.compute.warning(),
             Some(Command::Measure(args)) => args.compute.warning(),
-            Some(Command::Merge(_) | Command::Check(_) | Command::New(_) | Command::Doctor(_)) => {
-                None
-            }
+            Some(
+                Command::Merge(_)
+                | Command::Check(_)
+                | Command::Info(_)
+                | Command::New(_)
+                | Command::Doctor(_),
+            ) => None,
             None => self.edit.compute.warning(),
         }
     }

@@ -2,9 +2,11 @@
 
 mod args;
 mod check;
+mod checkpoints;
 mod cpu;
 mod doctor;
 mod edit;
+mod info;
 mod load_progress;
 mod measure;
 mod merge;
@@ -58,6 +60,7 @@ pub fn main() -> ExitCode {
         Some(Command::Merge(args)) => merge::run(args),
         Some(Command::Measure(args)) => measure::run(args),
         Some(Command::Check(args)) => check::run(args),
+        Some(Command::Info(args)) => info::run(args),
         Some(Command::New(args)) => new::run(args),
         Some(Command::Doctor(args)) => doctor::run(args),
         None => edit::run(&cli.edit),

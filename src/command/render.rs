@@ -1,6 +1,7 @@
 //! `zerkalo render`: renders a scene file to a picture file.
 
 use crate::command::args::RenderArgs;
+use crate::command::checkpoints::CheckpointWriter;
 use crate::command::load_progress::LoadReporter;
 use crate::command::progress::Progress;
 use crate::command::signals::Signals;
@@ -8,10 +9,10 @@ use crate::command::stats::{Stats, peak_rss_bytes};
 use crate::command::{Failure, check_file, print_line, shard, warn, write_file};
 use crate::disk::WriteError;
 use crate::film::{Depth, ImageOutput};
-use crate::render::Options;
 use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use crate::render::session::{Report, Session, State};
+use crate::render::{Checkpoint, Options};
 use crate::sampling::SampleSettings;
 use crate::scene::{Document, Scene};
 use crate::world;
@@ -35,13 +36,17 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let document = Document::read_with(&args.scene, LoadReporter::new().assets)
         .map_err(|e| Failure::Failed(e.to_string()))?;
     let warnings = document.warnings().to_vec();
-    let hash = scene_hash(document.text());
+    let hash = scene_hash(document.text(), document.scene());
     let scene = sized(document.into_scene(), args)?;
     // An output file that cannot be written is reported before the render starts.
     output.check_writable().map_err(failed_write)?;
     if let Some(path) = &args.stats {
         check_stats_path(path, &args.output)?;
     }
+    if let Some(path) = &args.checkpoint {
+        check_checkpoint_path(path, args)?;
+    }
+    let checkpoint = read_checkpoint(args)?;
     for warning in warnings {
         warn(&format!("warning: {warning}"));
     }
@@ -55,12 +60,27 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
             ))
         })?;
     let size = scene.film.size;
-    session.set_scene(Arc::new(scene));
+    let provenance = Provenance {
+        source: args.scene.display().to_string(),
+        scene_hash: hash.clone(),
+        sampler: args.sampler.kind(),
+        adaptive: !args.uniform,
+    };
+    match checkpoint {
+        Some(checkpoint) => resume(&mut session, Arc::new(scene), checkpoint),
+        None => drop(session.set_scene(Arc::new(scene))),
+    }
     let scene_set_after = started.elapsed();
-    let end = watch(&session, &signals)?;
+    let mut checkpoints = args.checkpoint.as_ref().map(|path| {
+        let interval = Duration::from_secs_f64(args.checkpoint_interval.min(1e9));
+        CheckpointWriter::new(path, interval, provenance.clone())
+    });
+    let end = watch(&session, &signals, checkpoints.as_mut())?;
+    // The picture is written even if the checkpoint cannot be.
+    let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
 
     let writing = Instant::now();
-    let (report, precision, biased, written) = write(&session, args, &output, hash.clone())
+    let (report, precision, biased, written) = write(&session, args, &output, provenance)
         .ok_or_else(|| Failure::Failed("the renderer has no picture".to_string()))?;
     written.map_err(failed_write)?;
     let write_seconds = writing.elapsed().as_secs_f64();
@@ -108,6 +128,9 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         write_file(path, stats.json().as_bytes())?;
     }
     printed?;
+    if let Some(Err(error)) = kept {
+        return Err(failed_write(error));
+    }
     match end {
         End::Done(_) => Ok(()),
         End::Signal(status) => Err(Failure::Signalled(status)),
@@ -124,11 +147,18 @@ enum End {
 }
 
 /// Shows progress until the render is done or a signal ends it.
-fn watch(session: &Session, signals: &Signals) -> Result<End, Failure> {
+fn watch(
+    session: &Session,
+    signals: &Signals,
+    mut checkpoints: Option<&mut CheckpointWriter>,
+) -> Result<End, Failure> {
     let mut progress = Progress::on_stderr();
     let end = loop {
         if let Some(status) = signals.caught() {
             break Ok(End::Signal(status));
+        }
+        if let Some(checkpoints) = &mut checkpoints {
+            checkpoints.poll(session);
         }
         let Some(snapshot) = session.wait(POLL) else { continue };
         match &snapshot.report.state {
@@ -149,20 +179,46 @@ fn write(
     session: &Session,
     args: &RenderArgs,
     output: &ImageOutput,
-    hash: String,
+    provenance: Provenance,
 ) -> Option<Written> {
-    let provenance = Provenance {
-        source: args.scene.display().to_string(),
-        scene_hash: hash,
-        sampler: args.sampler.kind(),
-        adaptive: !args.uniform,
-    };
     let depth = if args.bits == 16 { Depth::Sixteen } else { Depth::Eight };
     let (display, output) = (args.picture.display(), output.clone());
     session.with(move |state, report| {
         let written = state.write(report, &provenance, display, depth, &output);
         (report.clone(), state.world.precision(), state.world.biases(), written)
     })
+}
+
+/// Reads the checkpoint of `--resume`. Returns `None` if a new render is to start.
+fn read_checkpoint(args: &RenderArgs) -> Result<Option<Checkpoint>, Failure> {
+    let Some(path) = &args.resume else { return Ok(None) };
+    if args.checkpoint.as_ref() == Some(path) && !path.exists() {
+        return Ok(None);
+    }
+    Checkpoint::read(path).map(Some).map_err(|error| Failure::Failed(error.to_string()))
+}
+
+/// Continues `checkpoint`, and prints a note if the lights of `scene` are others.
+fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
+    let weights = checkpoint.weights().clone();
+    session.continue_from(scene, checkpoint);
+    if session.with(move |state, _| state.mix != weights) == Some(true) {
+        warn(
+            "note: the lights of the scene differ from those of the checkpoint; its samples are kept",
+        );
+    }
+}
+
+fn check_checkpoint_path(path: &Path, args: &RenderArgs) -> Result<(), Failure> {
+    for (option, other) in [("output", Some(&args.output)), ("stats", args.stats.as_ref())] {
+        if other.is_some_and(|other| other == path) {
+            let path = path.display();
+            return Err(Failure::Usage(format!(
+                "--checkpoint and --{option} name the same file, {path}"
+            )));
+        }
+    }
+    CheckpointWriter::check(path, args.resume.as_deref())
 }
 
 fn failed_write(error: WriteError) -> Failure {

@@ -17,6 +17,7 @@ mod image_data;
 mod invalid;
 mod light_weights;
 mod linear_image;
+mod metadata;
 mod noise;
 #[cfg(test)]
 mod noise_test;
@@ -38,6 +39,7 @@ pub use image_data::{Depth, ImageData};
 pub use invalid::{INVALID_REMEMBERED, InvalidSample, InvalidSamples};
 pub use light_weights::{LightWeights, Replicates};
 pub use linear_image::LinearImage;
+pub use metadata::FileMetadata;
 pub use noise::{Estimator, Mse, Noise, TileNoise};
 pub use output::ImageOutput;
 pub use png::png_of_rgb;

@@ -6,7 +6,8 @@ use crate::film::{Depth, Display, ImageData, ImageOutput, Tone};
 use crate::render::render_state::RenderState;
 use crate::render::session::Report;
 use crate::sampling::SamplerKind;
-use crate::value::fnv1a64;
+use crate::scene::Scene;
+use crate::value::Fnv1a64;
 
 /// Origin of a picture: the metadata that its render state does not contain.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,9 +46,15 @@ impl RenderState {
     }
 }
 
-/// Hash of a scene's text, which identifies the scene of a picture.
-pub fn scene_hash(text: &str) -> String {
-    format!("fnv1a64:{:016x}", fnv1a64(text.as_bytes()))
+/// Hash that identifies the scene of a picture: of the scene file's text, followed by the hash of
+/// the contents of its meshes and images, if there are any.
+pub fn scene_hash(text: &str, scene: &Scene) -> String {
+    let mut hash = Fnv1a64::default();
+    hash.update(text.as_bytes());
+    if let Some(contents) = scene.contents_hash() {
+        hash.update(&contents.to_le_bytes());
+    }
+    format!("fnv1a64:{:016x}", hash.value())
 }
 
 /// Metadata keys and values.

@@ -1,6 +1,7 @@
 //! Progressive rendering: the schedule of samples, the passes that trace them, and the session that
 //! runs both in the background.
 
+mod checkpoint;
 pub mod export;
 mod feature_buffer;
 mod first_pass;
@@ -14,6 +15,7 @@ pub mod session;
 mod sync_render;
 pub mod wave;
 
+pub use checkpoint::{Checkpoint, EncodedCheckpoint, SampleInputs};
 pub use feature_buffer::FeatureBuffer;
 pub use relighting::Relighting;
 pub use render_state::{Options, RenderState};

@@ -20,6 +20,11 @@ impl Relighting {
         Self { compiled, groups }
     }
 
+    /// Scene for which the samples were traced.
+    pub fn compiled(&self) -> &Arc<Scene> {
+        &self.compiled
+    }
+
     /// Returns the light weights with which the film shows `scene`. Returns `None` if `scene` needs
     /// samples of its own. That is the case if it differs from the compiled scene in more than the
     /// colours, intensities and on/off switches of lights, ambient light and background that have

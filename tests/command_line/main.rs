@@ -1,5 +1,6 @@
 //! The command line as users and scripts use it.
 
+mod checkpoints;
 mod hostile;
 #[cfg(unix)]
 mod outputs;

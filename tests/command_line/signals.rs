@@ -4,7 +4,7 @@ use super::*;
 use std::process::Child;
 use std::time::{Duration, Instant};
 
-fn signal(name: &str, id: u32) {
+pub fn signal(name: &str, id: u32) {
     let sent = Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
     assert!(sent.unwrap().success());
 }

@@ -4,13 +4,15 @@ use crate::first_hits::{RASTER, first_hits, hits_agree};
 use crate::plain_tracer::agrees;
 use crate::row::{Verdict, ensure, material, number};
 use crate::support::{begin, follow, picture, pool, settings, shipped, sized};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo::film::{Display, Film, Replicates, TILE};
 use zerkalo::material::Material;
+use zerkalo::render::export::Provenance;
 use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use zerkalo::render::session::{Session, State};
-use zerkalo::render::{Options, SyncRender};
+use zerkalo::render::{Checkpoint, Options, SyncRender};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::edit::{self, Edit, EditError, Target};
 use zerkalo::scene::{Document, History, Scene};
@@ -335,4 +337,53 @@ fn a16_demonstrations() {
         let (other, _) = demonstrations[(i + 1) % 3];
         println!("{}", check([&pair[0], &other[1]]).unwrap_err());
     }
+}
+
+/// Renders the scene until it is finished, with a checkpoint after the first samples if `path` is
+/// given, and returns its film.
+fn film_of(session: &mut Session, generation: u64, path: Option<&Path>) -> Vec<u8> {
+    let mut path = path;
+    loop {
+        let snapshot = session.wait(Duration::from_secs(60)).expect("a report");
+        let report = &snapshot.report;
+        assert_eq!(report.generation, generation);
+        if report.noise.is_some()
+            && let Some(path) = path.take()
+        {
+            let (sender, receiver) = std::sync::mpsc::channel();
+            let provenance = Provenance {
+                source: String::new(),
+                scene_hash: String::new(),
+                sampler: SamplerKind::Sobol,
+                adaptive: true,
+            };
+            session.checkpoint(provenance, move |checkpoint| sender.send(checkpoint).unwrap());
+            receiver.recv().unwrap().expect("a picture").write(path).unwrap();
+        }
+        if let State::Finished(_) = report.state {
+            return session.with(|state, _| state.film.bytes()).expect("a film");
+        }
+    }
+}
+
+#[test]
+fn a19_checkpoints() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.zk");
+    let scene = Arc::new(sized(shipped("mirror-room.toml"), [96, 72]));
+    let stop = Stop { noise_codes: Some(0.7), ..Stop::default() };
+    let settings =
+        Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+    let start = || Session::new(2, options(), settings).unwrap();
+    let mut first = start();
+    let generation = first.set_scene(Arc::clone(&scene));
+    let whole = film_of(&mut first, generation, Some(&path));
+    let checkpoint = Checkpoint::read(&path).unwrap();
+    let samples = checkpoint.film().samples();
+    let mut second = start();
+    let generation = second.continue_from(Arc::clone(&scene), checkpoint);
+    assert!(film_of(&mut second, generation, None) == whole, "other samples after {samples}");
+    // The checkpoint was taken before the end.
+    let end = second.with(|state, _| state.film.samples()).unwrap();
+    assert!(samples < end, "{samples} samples of {end}");
 }

@@ -287,3 +287,29 @@ pub fn repaired_plan(bytes: &[u8]) -> Vec<u8> {
     out.extend(format!("checksum {checksum:016x}\n").bytes());
     out
 }
+
+/// Returns a film file with the checksums that fit its chunks, as far as it has chunks.
+pub fn repair_film(bytes: &[u8]) -> Vec<u8> {
+    const START: usize = 12;
+    let mut out = bytes.to_vec();
+    let mut at = START;
+    let mut all = crc32fast::Hasher::new();
+    all.update(&out[..START.min(out.len())]);
+    while let Some(head) = out.get(at..at + 12) {
+        let length = u64::from_le_bytes(head[4..].try_into().unwrap());
+        let end = usize::try_from(length).ok().and_then(|n| (at + 12).checked_add(n));
+        let Some(end) = end.filter(|end| end.checked_add(4).is_some_and(|e| e <= out.len())) else {
+            break;
+        };
+        if &out[at..at + 4] == b"DONE" && end - at >= 24 {
+            let total = all.clone().finalize();
+            out[at + 20..at + 24].copy_from_slice(&total.to_le_bytes());
+        }
+        let checksum = crc32fast::hash(&out[at..end]).to_le_bytes();
+        out[end..end + 4].copy_from_slice(&checksum);
+        let is_tile = &out[at..at + 4] == b"TILE";
+        all.update(if is_tile { &checksum } else { &out[at..end + 4] });
+        at = end + 4;
+    }
+    out
+}

@@ -7,9 +7,17 @@ mod mutate;
 
 use mutate::Random;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo::asset::Assets;
+use zerkalo::film::Display;
+use zerkalo::film::file::{FilmFileHeader, FilmReader};
+use zerkalo::render::export::Provenance;
 use zerkalo::render::plan::Plan;
+use zerkalo::render::schedule::{Criterion, Settings, Stop};
+use zerkalo::render::session::{Session, State};
+use zerkalo::render::{Checkpoint, Options, SampleInputs};
+use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 
 /// Mutations of each kind of file.
@@ -172,4 +180,105 @@ fn plan() {
         let all: u64 = plan.tiles.iter().map(|tile| u64::from(tile.end)).sum();
         assert!(samples == all || shards < plan.settings.shards, "{samples} of {all}");
     }
+}
+
+/// Bytes of two checkpoints of a small render, one of them in the middle of a decision.
+fn checkpoints() -> Vec<Vec<u8>> {
+    let scene = Scene::parse(
+        "light = [{ point = { position = [2.0, 4.0, 3.0] } }]\n[film]\nsize = [40, 21]\n\
+         [materials.m]\nreflection = 0.5\nroughness = 0.3\n[[object]]\nmaterial = \"m\"\n\
+         shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }\n",
+        "test",
+    );
+    let scene = Arc::new(scene.unwrap_or_else(|e| panic!("{e}")));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.zk");
+    [8, 200]
+        .map(|spp| {
+            let mut session = session(spp);
+            session.set_scene(Arc::clone(&scene));
+            wait(&session);
+            let (sender, receiver) = std::sync::mpsc::channel();
+            let provenance = Provenance {
+                source: "a.toml".to_string(),
+                scene_hash: "none".to_string(),
+                sampler: SamplerKind::Sobol,
+                adaptive: true,
+            };
+            session.checkpoint(provenance, move |checkpoint| sender.send(checkpoint).unwrap());
+            receiver.recv().unwrap().expect("a picture").write(&path).unwrap();
+            std::fs::read(&path).unwrap()
+        })
+        .to_vec()
+}
+
+fn session(spp: u32) -> Session {
+    let options = Options {
+        world: zerkalo::world::Options::default(),
+        sampling: SampleSettings { seed: 0, kind: SamplerKind::Sobol },
+        display: Display::default(),
+    };
+    let stop = Stop { spp: Some(spp), ..Stop::default() };
+    let criterion = Criterion::Codes;
+    let settings = Settings { adaptive: true, criterion, rays_per_pixel: 0, stop };
+    Session::new(1, options, settings).unwrap()
+}
+
+/// Waits until the session has finished or failed. Returns `true` if it has finished.
+fn wait(session: &Session) -> bool {
+    loop {
+        match session.wait(Duration::from_secs(60)).expect("a report").report.state {
+            State::Finished(_) => return true,
+            State::Failed(_) => return false,
+            State::Idle | State::Tracing | State::Paused => {}
+        }
+    }
+}
+
+fn film(bytes: &[u8]) -> Option<(FilmFileHeader, Vec<u8>)> {
+    let reader = FilmReader::new(Path::new("a.zk"), bytes, bytes.len() as u64);
+    let (header, film) = reader.and_then(FilmReader::read).ok()?;
+    Some((header, film.bytes()))
+}
+
+/// A mutated checkpoint is refused unless its contents are those of the original.
+#[test]
+fn film_files() {
+    let seeds = checkpoints();
+    let originals: Vec<_> = seeds.iter().map(|seed| film(seed).expect("a film")).collect();
+    read_mutations("film files", &seeds, |bytes| match film(bytes) {
+        Some(read) => {
+            assert!(originals.contains(&read), "a wrong picture was accepted");
+            true
+        }
+        None => false,
+    });
+}
+
+/// Checkpoints with mutated parts and right checksums cause no panic, neither when they are read nor
+/// when their render continues.
+#[test]
+fn film_files_with_repaired_checksums() {
+    let seeds = checkpoints();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.zk");
+    let mut continued = 0;
+    let accepted = read_mutations("film", &seeds, |bytes| {
+        let bytes = files::repair_film(bytes);
+        let Some(_) = film(&bytes) else { return false };
+        std::fs::write(&path, &bytes).unwrap();
+        let Ok(checkpoint) = Checkpoint::read(&path) else { return false };
+        let inputs = SampleInputs::of(checkpoint.header()).expect("inputs");
+        if continued < 200
+            && let Ok(scene) = Scene::parse(&inputs.scene, "a.toml")
+        {
+            continued += 1;
+            // Ends at once, so that a mutated decision does not trace for hours.
+            let mut session = session(2);
+            session.continue_from(Arc::new(scene), checkpoint);
+            session.with(|_, _| ());
+        }
+        true
+    });
+    assert!(accepted > 20 && continued > 20, "{accepted} accepted, {continued} continued");
 }

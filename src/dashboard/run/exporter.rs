@@ -47,7 +47,7 @@ impl Exporter {
         let (source, text) = self.source(rendering.scene());
         let provenance = Provenance {
             source,
-            scene_hash: scene_hash(&text),
+            scene_hash: scene_hash(&text, rendering.scene()),
             sampler: self.sampler,
             adaptive: self.adaptive,
         };

@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Smallest size of a tile record \[bytes\].
@@ -39,6 +40,12 @@ impl fmt::Display for ReadError {
 }
 
 impl std::error::Error for ReadError {}
+
+/// Returns `true` if the file at `path` begins like a film file.
+pub fn is_film_file(path: &Path) -> bool {
+    let mut start = [0; MAGIC.len()];
+    open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == MAGIC
+}
 
 /// Film file of which everything before the tiles has been read.
 #[derive(Debug)]
@@ -163,26 +170,64 @@ impl<R: Read> FilmReader<R> {
     /// Fails if size, scales, seed or precision differ from those of `film`, or if the file cannot
     /// be read or is damaged.
     pub fn add_to(self, film: &mut Film) -> Result<FilmFileHeader, ReadError> {
-        let Self { mut input, header, mut next, mut checksums } = self;
-        if let Err(mismatch) = film.check_header(&header.film) {
-            return Err(input.error(mismatch.to_string(), "name a file of the same render"));
+        if let Err(mismatch) = film.check_header(&self.header.film) {
+            return Err(self.input.error(mismatch.to_string(), "name a file of the same render"));
         }
+        let groups = self.header.groups();
+        self.visit_tiles(|fields, numbers| {
+            for index in numbers {
+                if let Some(rest) = fields.0.strip_prefix(&[0; RECORD_BYTES as usize]) {
+                    fields.0 = rest;
+                    continue;
+                }
+                let mut tile = film.new_tile(index);
+                tile_record::decode(&mut tile, groups, fields)?;
+                film.add_at(index, tile).ok()?;
+            }
+            fields.is_empty().then_some(())
+        })
+    }
+
+    /// Reads the file to its end and verifies all checksums, without a film.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read or is damaged.
+    pub fn verify(self) -> Result<FilmFileHeader, ReadError> {
+        self.visit_tiles(|_, _| Some(()))
+    }
+
+    /// Calls `visit` with the records of each `TILE` chunk and the numbers of their tiles. The
+    /// result of `visit` is `None` if a record is not valid.
+    fn visit_tiles(
+        self,
+        mut visit: impl FnMut(&mut Fields, Range<usize>) -> Option<()>,
+    ) -> Result<FilmFileHeader, ReadError> {
+        let Self { mut input, header, mut next, mut checksums } = self;
+        let all = header.film.width.div_ceil(TILE) * header.film.height.div_ceil(TILE);
         let mut tiles = 0;
         while next.tag == TILES {
-            let added =
-                add_tiles(film, &mut Fields::new(&next.contents), &mut tiles, header.groups());
-            added.ok_or_else(|| input.damaged(format!("tile {tiles} has impossible values")))?;
+            let mut fields = Fields::new(&next.contents);
+            let numbers = fields.u32().zip(fields.u32());
+            let numbers =
+                numbers.map(|(first, count)| first as usize..(first as usize + count as usize));
+            let numbers =
+                numbers.filter(|n| n.start == tiles && n.len() <= TILES_PER_CHUNK && n.end <= all);
+            let visited = numbers.and_then(|numbers| {
+                visit(&mut fields, numbers.clone()).map(|()| tiles = numbers.end)
+            });
+            if visited.is_none() {
+                return Err(input.damaged(format!("a tile from {tiles} on has impossible values")));
+            }
             checksums.update(&next.checksum);
             next = input.chunk()?;
         }
         let mut done = Fields::new(&next.contents);
-        let expected = (film.tile_count() as u64, checksums.finalize());
+        let expected = (all as u64, checksums.finalize());
         if next.tag != DONE || done.u64().zip(done.u32()) != Some(expected) || !done.is_empty() {
             return Err(input.damaged("its parts do not belong together"));
         }
-        if tiles != film.tile_count() {
-            let found = format!("it has {tiles} tiles of {}", film.tile_count());
-            return Err(input.damaged(found));
+        if tiles != all {
+            return Err(input.damaged(format!("it has {tiles} tiles of {all}")));
         }
         if input.left != 0 {
             return Err(input.damaged(format!("{} bytes follow its end", input.left)));
@@ -195,26 +240,6 @@ impl FilmFileHeader {
     fn groups(&self) -> usize {
         self.film.scales.len()
     }
-}
-
-/// Adds the tiles of a chunk to `film`. `next` is the number of the next tile.
-fn add_tiles(film: &mut Film, fields: &mut Fields, next: &mut usize, groups: usize) -> Option<()> {
-    let [first, count] = [fields.u32()? as usize, fields.u32()? as usize];
-    if first != *next || count > TILES_PER_CHUNK || first + count > film.tile_count() {
-        return None;
-    }
-    for index in first..first + count {
-        *next = index;
-        if let Some(rest) = fields.0.strip_prefix(&[0; RECORD_BYTES as usize]) {
-            fields.0 = rest;
-            continue;
-        }
-        let mut tile = film.new_tile(index);
-        tile_record::decode(&mut tile, groups, fields)?;
-        film.add_at(index, tile).ok()?;
-    }
-    *next = first + count;
-    fields.is_empty().then_some(())
 }
 
 /// Decodes the `HEAD` chunk of a file with `length` bytes. Metadata and other chunks stay empty.

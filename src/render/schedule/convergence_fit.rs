@@ -16,7 +16,7 @@ const SPREAD: f64 = 0.15;
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConvergenceFit {
     /// Number of rays and RMSE, oldest first.
-    points: Vec<(f64, f64)>,
+    pub points: Vec<(f64, f64)>,
 }
 
 impl ConvergenceFit {

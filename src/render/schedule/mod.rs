@@ -12,6 +12,7 @@ mod convergence_fit;
 mod prediction;
 mod retarget;
 mod settings;
+mod state;
 mod stop;
 #[cfg(test)]
 mod tests;

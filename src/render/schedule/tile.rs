@@ -22,7 +22,7 @@ pub(super) struct Tile {
     pub error: Option<(u32, TileNoise)>,
     /// Earlier noise estimates with their sample counts, oldest first. From one entry to the next
     /// the count at least doubles.
-    history: Vec<(u32, TileNoise)>,
+    pub history: Vec<(u32, TileNoise)>,
 }
 
 impl Tile {

@@ -1,6 +1,8 @@
 //! Active render: traces one scene piece by piece, estimates its noise, and publishes snapshots.
 
 use crate::film::{Film, IncrementalDownsample, TileNoise};
+use crate::render::checkpoint::{Checkpoint, EncodedCheckpoint};
+use crate::render::export::Provenance;
 use crate::render::feature_buffer::FeatureBuffer;
 use crate::render::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings};
 use crate::render::session::Shared;
@@ -106,6 +108,53 @@ impl ActiveRender {
             feature_ray_seconds,
             state,
         })
+    }
+
+    /// Continues the render of `checkpoint` and shows `scene`.
+    ///
+    /// # Errors
+    /// Returns the reason for which the checkpoint is of no use for this scene.
+    pub fn resume(
+        scene: &Arc<Scene>,
+        options: &Options,
+        settings: Settings,
+        checkpoint: Checkpoint,
+    ) -> Result<Self, String> {
+        let started = Instant::now();
+        let resumed = checkpoint.resume(scene, options).map_err(|error| error.to_string())?;
+        let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
+        let schedule = resumed.schedule(settings).map_err(|error| error.to_string())?;
+        let mut render = Self {
+            schedule,
+            started,
+            compiled_in: started.elapsed(),
+            traced_for: Duration::from_secs_f64(resumed.seconds),
+            first_picture_after: Some(started.elapsed()),
+            estimates_stale: false,
+            throughput: Throughput::default(),
+            inventory: Arc::from(resumed.state.world.inventory().to_string()),
+            downsample: None,
+            features: None,
+            feature_ray_seconds: FEATURE_RAY_SECONDS,
+            state: resumed.state,
+        };
+        if resumed.is_relit {
+            render.invalidate_estimates();
+        }
+        Ok(render)
+    }
+
+    /// Encodes the render as a checkpoint. Returns `None` before the first picture.
+    pub fn checkpoint(
+        &self,
+        provenance: &Provenance,
+        context: &WorkContext,
+        state: State,
+    ) -> Option<EncodedCheckpoint> {
+        self.first_picture_after?;
+        let report = self.report(context, state);
+        let Self { state, schedule, .. } = self;
+        Some(EncodedCheckpoint::new(state, schedule, &report, provenance, context.pool))
     }
 
     /// Seconds spent on tracing.

@@ -24,8 +24,9 @@ mod throughput;
 mod worker;
 
 use crate::film::Display;
+use crate::render::export::Provenance;
 use crate::render::schedule::{Settings, Stop};
-use crate::render::{Options, RenderState};
+use crate::render::{Checkpoint, EncodedCheckpoint, Options, RenderState};
 use crate::scene::Scene;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 pub use report::{QUALITIES, Report, State};
@@ -41,8 +42,12 @@ use worker::Worker;
 /// Function that runs on the rendering thread. Its argument is `None` if there is no film.
 type Task = Box<dyn FnOnce(Option<(&RenderState, &Report)>) + Send>;
 
+/// Function that gets an encoded checkpoint, or `None` if there is no picture yet.
+type CheckpointTask = Box<dyn FnOnce(Option<EncodedCheckpoint>) + Send>;
+
 enum Command {
     Scene(u64, Arc<Scene>),
+    Resume(u64, Arc<Scene>, Box<Checkpoint>),
     Restart(u64),
     Pause(bool),
     View(View),
@@ -50,6 +55,7 @@ enum Command {
     Display(Display),
     Pool(rayon::ThreadPool),
     Task(Task),
+    Checkpoint(Provenance, CheckpointTask),
     Quit,
 }
 
@@ -102,6 +108,25 @@ impl Session {
         self.send(Command::Scene(self.generations, scene));
         self.shared.cancel_first_pass.store(true, Ordering::Release);
         self.generations
+    }
+
+    /// Continues the render of `checkpoint` and shows `scene`, as [`Session::set_scene`] does. If
+    /// the checkpoint is of no use for this scene, reports have the state [`State::Failed`].
+    pub fn continue_from(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) -> u64 {
+        self.generations += 1;
+        self.send(Command::Resume(self.generations, scene, Box::new(checkpoint)));
+        self.shared.cancel_first_pass.store(true, Ordering::Release);
+        self.generations
+    }
+
+    /// Encodes the render as a checkpoint between two pieces of work, and calls `task` with it on
+    /// the rendering thread. The argument is `None` if there is no picture yet.
+    pub fn checkpoint(
+        &self,
+        provenance: Provenance,
+        task: impl FnOnce(Option<EncodedCheckpoint>) + Send + 'static,
+    ) {
+        self.send(Command::Checkpoint(provenance, Box::new(task)));
     }
 
     /// Compiles the newest scene again and starts with an empty film. Returns a new generation, as

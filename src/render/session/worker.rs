@@ -1,12 +1,13 @@
 //! Worker: the session's thread, which receives commands and chooses the next piece of work.
 
 use crate::film::Display;
-use crate::render::Options;
+use crate::render::export::Provenance;
 use crate::render::schedule::{Settings, Step, Stop};
 use crate::render::session::active_render::{ActiveRender, WorkContext};
 use crate::render::session::report::{Report, State};
 use crate::render::session::snapshot::{Snapshot, View};
-use crate::render::session::{Command, Shared, Task};
+use crate::render::session::{CheckpointTask, Command, Shared, Task};
+use crate::render::{Checkpoint, Options};
 use crate::scene::Scene;
 use crossbeam_channel::{Receiver, Sender};
 use std::ops::ControlFlow;
@@ -26,7 +27,10 @@ pub(super) struct Worker {
     pending: bool,
     /// `true` if the newest scene starts with an empty film, even if samples could be reused.
     restart: bool,
+    /// Checkpoint to be continued, and the scene that it is to show.
+    resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
     tasks: Vec<Task>,
+    checkpoints: Vec<(Provenance, CheckpointTask)>,
     paused: bool,
     view: View,
     /// Active render, or the reason for which the newest scene cannot be rendered.
@@ -56,7 +60,9 @@ impl Worker {
             newest: None,
             pending: false,
             restart: false,
+            resume: None,
             tasks: Vec::new(),
+            checkpoints: Vec::new(),
             paused: false,
             view: View::default(),
             work: Ok(None),
@@ -99,6 +105,11 @@ impl Worker {
                 self.newest = Some((generation, scene));
                 self.pending = true;
             }
+            Command::Resume(generation, scene, checkpoint) => {
+                self.resume = Some((Arc::clone(&scene), checkpoint));
+                self.newest = Some((generation, scene));
+                self.pending = true;
+            }
             Command::Restart(generation) => {
                 if let Some((newest, _)) = &mut self.newest {
                     *newest = generation;
@@ -116,6 +127,7 @@ impl Worker {
                 }
             }
             Command::Task(task) => self.tasks.push(task),
+            Command::Checkpoint(provenance, task) => self.checkpoints.push((provenance, task)),
             Command::Quit => return ControlFlow::Break(()),
         }
         ControlFlow::Continue(())
@@ -141,6 +153,14 @@ impl Worker {
     fn start_newest(&mut self) {
         let Some((_, scene)) = &self.newest else { return };
         let restart = std::mem::take(&mut self.restart);
+        if let Some((own, checkpoint)) = self.resume.take() {
+            self.work = Ok(None);
+            let resumed = ActiveRender::resume(&own, &self.options, self.settings, *checkpoint);
+            self.work = resumed.map(Some);
+            if Arc::ptr_eq(&own, scene) && !restart {
+                return;
+            }
+        }
         if let Ok(Some(work)) = &mut self.work
             && !restart
             && work.try_reuse(scene)
@@ -154,6 +174,12 @@ impl Worker {
     }
 
     fn run_tasks(&mut self) {
+        for (provenance, task) in std::mem::take(&mut self.checkpoints) {
+            task(match &self.work {
+                Ok(Some(work)) => work.checkpoint(&provenance, &self.context(), self.state.clone()),
+                _ => None,
+            });
+        }
         if self.tasks.is_empty() {
             return;
         }

@@ -41,11 +41,10 @@ impl Scene {
 
     /// Parses and validates a scene like [`Scene::parse`]. `resolver` reads the files that the
     /// scene refers to.
-    pub(crate) fn parse_in(
-        text: &str,
-        name: &str,
-        resolver: AssetResolver,
-    ) -> Result<Self, SceneErrors> {
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub fn parse_in(text: &str, name: &str, resolver: AssetResolver) -> Result<Self, SceneErrors> {
         SourceScene::parse(text, name, resolver).map(|source| source.scene)
     }
 }

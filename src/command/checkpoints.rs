@@ -1,0 +1,101 @@
+//! Checkpoints of `zerkalo render`: written at intervals, on signals and at the end.
+
+use crate::command::{Failure, warn};
+use crate::disk::WriteError;
+use crate::film::file::is_film_file;
+use crate::render::EncodedCheckpoint;
+use crate::render::export::Provenance;
+use crate::render::session::Session;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Writer of checkpoints, on a thread of its own. Rendering pauses only while a checkpoint is
+/// encoded.
+pub struct CheckpointWriter {
+    path: PathBuf,
+    interval: Duration,
+    provenance: Provenance,
+    due: Instant,
+    /// `true` while a checkpoint is being encoded or written.
+    busy: bool,
+    encoded: Sender<Option<EncodedCheckpoint>>,
+    results: Receiver<Result<(), WriteError>>,
+    thread: JoinHandle<()>,
+}
+
+impl CheckpointWriter {
+    /// Starts the thread. The first checkpoint is due after `interval`.
+    pub fn new(path: &Path, interval: Duration, provenance: Provenance) -> Self {
+        let (encoded, inbox) = channel::<Option<EncodedCheckpoint>>();
+        let (outbox, results) = channel();
+        let target = path.to_path_buf();
+        let thread = std::thread::spawn(move || {
+            for checkpoint in inbox {
+                let written = checkpoint.map_or(Ok(()), |checkpoint| checkpoint.write(&target));
+                // A closed channel means that the render has ended by an error.
+                let _ = outbox.send(written);
+            }
+        });
+        let due = Instant::now() + interval;
+        let path = path.to_path_buf();
+        Self { path, interval, provenance, due, busy: false, encoded, results, thread }
+    }
+
+    /// Checks that a render may write checkpoints to `path`. `resume` is the checkpoint that it
+    /// continues.
+    pub fn check(path: &Path, resume: Option<&Path>) -> Result<(), Failure> {
+        crate::disk::check_writable(path).map_err(|error| Failure::Failed(error.to_string()))?;
+        if resume == Some(path) || !path.exists() {
+            return Ok(());
+        }
+        let shown = path.display();
+        Err(Failure::Failed(if is_film_file(path) {
+            format!(
+                "cannot write {shown}: there is such a checkpoint already; add --resume {shown} to \
+                 continue it, or remove it"
+            )
+        } else {
+            format!("cannot write {shown}: there is another file of this name; name another one")
+        }))
+    }
+
+    /// Requests a checkpoint if one is due. Never waits.
+    pub fn poll(&mut self, session: &Session) {
+        match self.results.try_recv() {
+            Ok(written) => {
+                self.busy = false;
+                self.due = Instant::now() + self.interval;
+                // The next one may succeed, for example when space was freed.
+                written.unwrap_or_else(|error| warn(&format!("warning: {error}")));
+            }
+            Err(TryRecvError::Empty | TryRecvError::Disconnected) => {}
+        }
+        if !self.busy && Instant::now() >= self.due {
+            self.busy = true;
+            self.request(session);
+        }
+    }
+
+    fn request(&self, session: &Session) {
+        let encoded = self.encoded.clone();
+        session.checkpoint(self.provenance.clone(), move |checkpoint| {
+            // The thread ends only after the last sender.
+            let _ = encoded.send(checkpoint);
+        });
+    }
+
+    /// Writes the last checkpoint and waits for it. Returns the path.
+    pub fn finish(self, session: &Session) -> Result<PathBuf, WriteError> {
+        self.request(session);
+        // The task is dropped with its sender when it has run, so that the thread ends.
+        session.with(|_, _| ());
+        let Self { path, encoded, results, thread, .. } = self;
+        drop(encoded);
+        if let Err(panic) = thread.join() {
+            std::panic::resume_unwind(panic);
+        }
+        results.into_iter().last().unwrap_or(Ok(())).map(|()| path)
+    }
+}

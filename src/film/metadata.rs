@@ -1,0 +1,79 @@
+//! Reader of the metadata of picture files and film files.
+
+use crate::disk::open_regular;
+use crate::film::file::{FilmFileHeader, FilmReader, is_film_file};
+use exr::meta::MetaData;
+use exr::meta::attribute::AttributeValue;
+use png::Decoder;
+use std::io::BufReader;
+use std::path::Path;
+
+/// Metadata of a picture or of a film file.
+#[derive(Clone, Debug)]
+pub struct FileMetadata {
+    /// Format: `PNG`, `OpenEXR` or `film`.
+    pub format: &'static str,
+    /// Width and height in pixels.
+    pub size: [usize; 2],
+    /// Keys and values, in the order of the file; sorted by key in OpenEXR files.
+    pub entries: Vec<(String, String)>,
+    /// Header of a film file.
+    pub film: Option<FilmFileHeader>,
+}
+
+impl FileMetadata {
+    /// Reads the metadata of the PNG, OpenEXR or film file at `path`. The checksums of a film file
+    /// are verified.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read, is none of these, or is damaged.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        if is_film_file(path) {
+            let header = FilmReader::open(path).and_then(FilmReader::verify);
+            let header = header.map_err(|error| error.to_string())?;
+            return Ok(Self {
+                format: "film",
+                size: [header.film.width, header.film.height],
+                entries: header.metadata.clone(),
+                film: Some(header),
+            });
+        }
+        let shown = path.display();
+        let file = open_regular(path).map_err(|error| format!("cannot read {shown}: {error}"))?;
+        let mut decoder = Decoder::new(BufReader::new(file));
+        if let Ok(info) = decoder.read_header_info() {
+            let (width, height) = info.size();
+            let reader = decoder.read_info().map_err(|e| format!("cannot read {shown}: {e}"))?;
+            let info = reader.info();
+            let latin = info.uncompressed_latin1_text.iter();
+            let latin = latin.map(|chunk| (chunk.keyword.clone(), chunk.text.clone()));
+            let utf8 = info.utf8_text.iter();
+            let utf8 =
+                utf8.filter_map(|chunk| Some((chunk.keyword.clone(), chunk.get_text().ok()?)));
+            return Ok(Self {
+                format: "PNG",
+                size: [width as usize, height as usize],
+                entries: latin.chain(utf8).collect(),
+                film: None,
+            });
+        }
+        let meta = MetaData::read_from_file(path, false)
+            .map_err(|_| format!("cannot read {shown}: it is no PNG, OpenEXR or film file"))?;
+        let header = meta.headers.first().ok_or(format!("{shown} has no picture"))?;
+        let text = |value: &AttributeValue| match value {
+            AttributeValue::Text(text) => Some(text.to_string()),
+            _ => None,
+        };
+        let all = header.own_attributes.other.iter();
+        let mut entries: Vec<_> =
+            all.filter_map(|(key, value)| Some((key.to_string(), text(value)?))).collect();
+        entries.sort();
+        let size = [header.layer_size.width(), header.layer_size.height()];
+        Ok(Self { format: "OpenEXR", size, entries, film: None })
+    }
+
+    /// Value of an entry.
+    pub fn get(&self, key: &str) -> Option<&str> {
+        self.entries.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str())
+    }
+}

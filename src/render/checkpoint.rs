@@ -1,0 +1,276 @@
+//! Checkpoints: a render as a film file, with which a later process continues it, bit for bit.
+//!
+//! A checkpoint has three chunks in addition to those of a film file. `SCEN` has the scene for which
+//! the samples were traced, and the other inputs of samples. `SCHD` has the state of the schedule.
+//! `TIME` has the seconds of rendering so far (f64); they are no part of `SCHD`, because equal
+//! renders take different times.
+
+use crate::disk::WriteError;
+use crate::film::file::{
+    Fields, FilmFileHeader, FilmReader, ReadError, Tag, encode_end, encode_tiles, tile_chunks,
+    write_film_file,
+};
+use crate::film::{Film, LightWeights};
+use crate::render::export::{Provenance, metadata};
+use crate::render::schedule::{Schedule, Settings};
+use crate::render::session::Report;
+use crate::render::{Options, RenderState};
+use crate::sampling::SamplerKind;
+use crate::scene::{Document, Scene};
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+const SCENE: Tag = *b"SCEN";
+const SCHEDULE: Tag = *b"SCHD";
+const CLOCK: Tag = *b"TIME";
+
+/// Version of the program. Samples of other versions may differ.
+const PROGRAM: &str = env!("CARGO_PKG_VERSION");
+
+/// Inputs of a film's samples, apart from size, seed and precision, which the film's header has.
+///
+/// As bytes: hash of the contents of meshes and images (u64, 0 for none), length (u32) and text of
+/// the program's version, of the sampler's name and of the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampleInputs {
+    /// Hash of the contents of meshes and images, see [`Scene::contents_hash`].
+    pub contents_hash: Option<u64>,
+    /// Version of the program that traced the samples.
+    pub program: String,
+    /// Name of the sampler.
+    pub sampler: String,
+    /// Scene file with the scene that was compiled.
+    pub scene: String,
+}
+
+impl SampleInputs {
+    /// Inputs of the samples that this program traces of `scene`.
+    pub fn new(scene: &Scene, sampler: SamplerKind) -> Self {
+        Self {
+            contents_hash: scene.contents_hash(),
+            program: PROGRAM.to_string(),
+            sampler: sampler.name().to_string(),
+            scene: Document::new(scene, "").text().to_string(),
+        }
+    }
+
+    /// Tag and contents of the chunk.
+    pub fn encode(&self) -> (Tag, Vec<u8>) {
+        let mut out = self.contents_hash.unwrap_or(0).to_le_bytes().to_vec();
+        for text in [&self.program, &self.sampler, &self.scene] {
+            out.extend((text.len() as u32).to_le_bytes());
+            out.extend(text.bytes());
+        }
+        (SCENE, out)
+    }
+
+    /// Returns the inputs in a film file. Returns `None` if there are none or they are not valid.
+    pub fn of(header: &FilmFileHeader) -> Option<Self> {
+        let mut fields = Fields::new(header.chunks.get(&SCENE)?);
+        let hash = fields.u64()?;
+        let [program, sampler, scene] = [fields.text()?, fields.text()?, fields.text()?];
+        let contents_hash = (hash != 0).then_some(hash);
+        fields.is_empty().then_some(Self { contents_hash, program, sampler, scene })
+    }
+}
+
+/// Checkpoint as bytes, to be written by another thread.
+pub struct EncodedCheckpoint(Vec<Vec<u8>>);
+
+impl EncodedCheckpoint {
+    /// Encodes a render on the threads of `pool`. `report` is the latest report on it.
+    pub(super) fn new(
+        state: &RenderState,
+        schedule: &Schedule,
+        report: &Report,
+        provenance: &Provenance,
+        pool: &rayon::ThreadPool,
+    ) -> Self {
+        let film = &state.film;
+        let compiled = state.lighting().compiled();
+        let header = FilmFileHeader {
+            film: film.header().clone(),
+            weights: state.mix.clone(),
+            group_names: state.group_names(),
+            display: state.display(),
+            metadata: metadata(state, report, provenance, &state.display()),
+            chunks: [
+                SampleInputs::new(compiled, provenance.sampler).encode(),
+                (SCHEDULE, schedule.encode()),
+                (CLOCK, report.seconds.to_le_bytes().to_vec()),
+            ]
+            .into(),
+        };
+        let mut pieces = vec![header.encode()];
+        pool.install(|| {
+            let tiles = (0..tile_chunks(film)).into_par_iter();
+            pieces.par_extend(tiles.map(|index| encode_tiles(film, index)));
+        });
+        pieces.push(encode_end(film, &pieces));
+        Self(pieces)
+    }
+
+    /// Writes the checkpoint. The file at `path` is replaced when the new one is complete.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be written; an existing file is then unchanged.
+    pub fn write(&self, path: &Path) -> Result<(), WriteError> {
+        write_film_file(path, &self.0)
+    }
+}
+
+/// Checkpoint that was read from a file.
+#[derive(Debug)]
+pub struct Checkpoint {
+    path: PathBuf,
+    header: FilmFileHeader,
+    inputs: SampleInputs,
+    film: Film,
+}
+
+/// State of a render that continues a checkpoint.
+pub(super) struct Resumed {
+    pub state: RenderState,
+    schedule: Vec<u8>,
+    path: PathBuf,
+    /// Seconds of rendering so far.
+    pub seconds: f64,
+    /// `true` if light weights or display transform differ from those of the checkpoint.
+    pub is_relit: bool,
+}
+
+impl Resumed {
+    /// Restores the schedule, with new settings.
+    ///
+    /// # Errors
+    /// Fails if the state of the schedule does not belong to the film.
+    pub fn schedule(&self, settings: Settings) -> Result<Schedule, ReadError> {
+        let film = &self.state.film;
+        let counts = |tile| film.tile(tile).map_or([0; 2], |tile| tile.counts());
+        let counts: Vec<_> = (0..film.tile_count()).map(counts).collect();
+        let mut schedule = self.state.schedule(settings);
+        schedule.restore(&self.schedule, &counts).map(|()| schedule).ok_or_else(|| ReadError {
+            path: self.path.clone(),
+            what: "the state of its schedule does not belong to its samples".to_string(),
+            remedy: "copy it again, or use an older one".to_string(),
+        })
+    }
+}
+
+impl Checkpoint {
+    /// Reads the checkpoint at `path`.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read, is no checkpoint, or is damaged.
+    pub fn read(path: &Path) -> Result<Self, ReadError> {
+        let (header, film) = FilmReader::open(path)?.read()?;
+        let inputs = SampleInputs::of(&header).filter(|_| header.chunks.contains_key(&SCHEDULE));
+        let Some(inputs) = inputs else {
+            return Err(ReadError {
+                path: path.to_path_buf(),
+                what: "it is a film without the state of a render".to_string(),
+                remedy: "name a file that `zerkalo render --checkpoint` has written".to_string(),
+            });
+        };
+        Ok(Self { path: path.to_path_buf(), header, inputs, film })
+    }
+
+    /// Everything in the file but the film.
+    pub fn header(&self) -> &FilmFileHeader {
+        &self.header
+    }
+
+    /// The film.
+    pub fn film(&self) -> &Film {
+        &self.film
+    }
+
+    /// Weight of each light group in the picture of the checkpoint.
+    pub fn weights(&self) -> &LightWeights {
+        &self.header.weights
+    }
+
+    /// Compiles the scene of the checkpoint and shows `scene` with its samples.
+    ///
+    /// # Errors
+    /// Fails if the samples of the checkpoint are not those of `scene` and `options`.
+    pub(super) fn resume(
+        self,
+        scene: &Arc<Scene>,
+        options: &Options,
+    ) -> Result<Resumed, ReadError> {
+        self.check_options(scene, options)?;
+        let foreign = "name the scene and its files as they were, or render without --resume";
+        let same = Document::new(scene, "").text() == self.inputs.scene;
+        let compiled = if same {
+            Arc::clone(scene)
+        } else {
+            let read = Scene::parse_in(&self.inputs.scene, "checkpoint", scene.resolver.clone());
+            Arc::new(
+                read.map_err(|e| self.error(format!("its scene cannot be used: {e}"), foreign))?,
+            )
+        };
+        if compiled.contents_hash() != self.inputs.contents_hash {
+            let what = "the meshes or images of the scene have other contents now";
+            return Err(self.error(what, foreign));
+        }
+        let mut state = RenderState::checked(&compiled, options, None)
+            .map_err(|fault| self.error(fault, "correct the scene"))?;
+        let (ours, theirs) = (state.film.header(), &self.header.film);
+        if ours.precision != theirs.precision {
+            let what = format!("its precision is {}, not {}", theirs.precision, ours.precision);
+            return Err(self.error(what, &format!("add --precision {}", theirs.precision)));
+        }
+        if let Err(mismatch) = state.film.check_header(theirs) {
+            return Err(self.error(mismatch.to_string(), foreign));
+        }
+        if !same && !state.try_reuse(scene) {
+            let what = "it is of another scene, which differs in more than its lights";
+            return Err(self.error(what, foreign));
+        }
+        let is_relit = state.mix != self.header.weights || state.display() != self.header.display;
+        let seconds = self.header.chunks.get(&CLOCK).and_then(|clock| Fields::new(clock).f64());
+        let seconds = seconds.filter(|seconds| *seconds >= 0.0 && seconds.is_finite());
+        let mut chunks = self.header.chunks;
+        state.film = self.film;
+        Ok(Resumed {
+            state,
+            schedule: chunks.remove(&SCHEDULE).unwrap_or_default(),
+            path: self.path,
+            seconds: seconds.unwrap_or(0.0),
+            is_relit,
+        })
+    }
+
+    /// Compares size, seed, sampler and program with those of a render of `scene`.
+    fn check_options(&self, scene: &Scene, options: &Options) -> Result<(), ReadError> {
+        let film = &self.header.film;
+        let [width, height] = scene.film.size.map(|n| n as usize);
+        let size = format!("{}x{}", film.width, film.height);
+        let sampler = options.sampling.kind.name();
+        let comparisons = [
+            ("size", size, format!("{width}x{height}"), "--size"),
+            ("seed", film.seed.to_string(), options.sampling.seed.to_string(), "--seed"),
+            ("sampler", self.inputs.sampler.clone(), sampler.to_string(), "--sampler"),
+        ];
+        for (name, theirs, ours, option) in comparisons {
+            if theirs != ours {
+                let what = format!("its {name} is {theirs}, not {ours}");
+                return Err(self.error(what, &format!("add {option} {theirs}")));
+            }
+        }
+        if self.inputs.program != PROGRAM {
+            let program = &self.inputs.program;
+            let what = format!("zerkalo {program} wrote it, and this is {PROGRAM}");
+            let remedy = format!("use zerkalo {program}, whose samples may differ");
+            return Err(self.error(what, &remedy));
+        }
+        Ok(())
+    }
+
+    fn error(&self, what: impl Into<String>, remedy: &str) -> ReadError {
+        let (path, remedy) = (self.path.clone(), remedy.to_string());
+        ReadError { path, what: what.into(), remedy }
+    }
+}
