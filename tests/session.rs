@@ -3,9 +3,10 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo::film::Display;
-use zerkalo::render::Options;
+use zerkalo::render::export::Provenance;
 use zerkalo::render::schedule::{Criterion, Settings, Stop};
 use zerkalo::render::session::{Report, Session, State};
+use zerkalo::render::{Checkpoint, Options};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::world;
@@ -107,5 +108,51 @@ fn interruptions_and_earlier_scenes_do_not_change_the_film() {
         let report = finished(&session, generation);
         assert!(report.samples >= samples);
         assert!(bytes(&session) == expected, "after {pause_us} us");
+    }
+}
+
+/// Prints the cost of a checkpoint of 1920x1080 pixels: seconds in which no samples are traced, and
+/// speed of writing and reading.
+#[test]
+#[ignore = "prints figures: cargo test --test session -- --ignored --nocapture checkpoint_cost"]
+fn checkpoint_cost() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/mirror-room.toml");
+    let mut scene = Scene::read(&path).unwrap();
+    scene.film.size = [1920, 1080];
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.zk");
+    let threads = std::thread::available_parallelism().unwrap().get();
+    let mut session = session(threads, false);
+    session.set_stop(Stop { spp: Some(16), ..Stop::default() });
+    let generation = session.set_scene(Arc::new(scene));
+    finished(&session, generation);
+    for round in 0..5 {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        let provenance = Provenance {
+            source: String::new(),
+            scene_hash: String::new(),
+            sampler: SamplerKind::Sobol,
+            adaptive: false,
+        };
+        let start = Instant::now();
+        session.checkpoint(provenance, move |checkpoint| sender.send(checkpoint).unwrap());
+        let checkpoint = receiver.recv().unwrap().expect("a picture");
+        let encoded = start.elapsed();
+        let start = Instant::now();
+        checkpoint.write(&path).unwrap();
+        let written = start.elapsed();
+        let megabytes = std::fs::metadata(&path).unwrap().len() as f64 * 1e-6;
+        let start = Instant::now();
+        let read = Checkpoint::read(&path).unwrap();
+        let seconds = start.elapsed().as_secs_f64();
+        println!(
+            "round {round}: pause {:.0} ms ({:.2} % of a minute); {megabytes:.0} MB written at \
+             {:.0} MB/s, read at {:.0} MB/s",
+            1e3 * encoded.as_secs_f64(),
+            100.0 * encoded.as_secs_f64() / 60.0,
+            megabytes / written.as_secs_f64(),
+            megabytes / seconds
+        );
+        assert_eq!(read.film().width(), 1920);
     }
 }

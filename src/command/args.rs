@@ -30,7 +30,7 @@ pub struct Cli {
 /// Arguments of `zerkalo` without a command.
 #[derive(Clone, Debug, Args)]
 pub struct EditArgs {
-    /// A scene file [default: the built-in mirror room]
+    /// A scene file [default: the built-in mirror room], or a checkpoint to continue
     pub scene: Option<PathBuf>,
     #[command(flatten)]
     pub compute: ComputeArgs,

@@ -8,13 +8,14 @@ use crate::dashboard::message::Exported;
 use crate::dashboard::run::{Colors, DEFAULT_STOP, Setup, run as run_dashboard};
 use crate::disk::open_regular;
 use crate::film::Display;
-use crate::render::Options;
+use crate::film::file::is_film_file;
 use crate::render::schedule::{Criterion, Settings};
+use crate::render::{Checkpoint, Options};
 use crate::sampling::{SampleSettings, SamplerKind};
 use crate::scene::{BUILT_IN, Recovery, SceneErrors, SceneFile, state_folder};
 use crate::terminal::Environment;
 use crate::value::sanitized;
-use crate::world;
+use crate::world::{self, Precision};
 use std::env;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -38,19 +39,35 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     }
     let reporter = LoadReporter::new();
     let state = state_folder(|name| env::var_os(name));
-    let file = match &args.scene {
-        Some(path) => open(path, reporter.assets.clone(), state.as_deref())?,
-        None => SceneFile::untitled(BUILT_IN.to_string(), BUILT_IN_NAME)
+    let checkpoint = match args.scene.as_deref().filter(|path| is_film_file(path)) {
+        Some(path) => Some(read_checkpoint(path)?),
+        None => None,
+    };
+    let file = match (&checkpoint, &args.scene) {
+        (Some(checkpoint), _) => Ok(scene_of(checkpoint, reporter.assets.clone())?),
+        (None, Some(path)) => open(path, reporter.assets.clone(), state.as_deref())?,
+        (None, None) => SceneFile::untitled(BUILT_IN.to_string(), BUILT_IN_NAME)
             .map_err(|errors| (PathBuf::new(), errors)),
     };
     reporter.mute();
+    // The samples of a checkpoint are continued.
+    let sampling = match &checkpoint {
+        Some(checkpoint) => checkpoint.sampling(),
+        None => SampleSettings { seed: args.compute.seed, kind: SamplerKind::Sobol },
+    };
+    let precision = match &checkpoint {
+        Some(checkpoint) if checkpoint.header().film.precision == "double" => Precision::Double,
+        Some(_) => Precision::Single,
+        None => args.precision.get(),
+    };
     let setup = Setup {
         file,
+        checkpoint,
         state,
         threads: args.compute.threads(),
         options: Options {
-            world: world::Options { precision: args.precision.get() },
-            sampling: SampleSettings { seed: args.compute.seed, kind: SamplerKind::Sobol },
+            world: world::Options { precision },
+            sampling,
             display: Display::default(),
         },
         settings: Settings {
@@ -72,6 +89,12 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
             Err(reason) => warn(reason),
         }
     }
+    for written in &ended.checkpoints {
+        match written {
+            Ok(path) => print_line(&format!("{}  checkpoint", path.display()))?,
+            Err(reason) => warn(reason),
+        }
+    }
     match &ended.kept {
         Ok(Some(path)) => {
             let path = path.display();
@@ -82,6 +105,28 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     }
     ended.latencies.iter().for_each(|line| warn(line));
     ended.signalled.map_or(Ok(()), |status| Err(Failure::Signalled(status)))
+}
+
+fn read_checkpoint(path: &Path) -> Result<Checkpoint, Failure> {
+    Checkpoint::read(path).map_err(|error| Failure::Failed(error.to_string()))
+}
+
+/// Opens the scene of a checkpoint: the scene file that it was rendered from, if its samples are
+/// valid for that file, otherwise the scene that the checkpoint contains, without a file.
+///
+/// # Errors
+/// Fails if the scene in the checkpoint is not valid.
+fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, Failure> {
+    let metadata = &checkpoint.header().metadata;
+    let source = metadata.iter().find(|(key, _)| key == "Source");
+    let source = source.map_or("", |(_, source)| source);
+    if let Ok(file) = SceneFile::open_with(Path::new(source), assets)
+        && checkpoint.inputs().fit(file.document().scene())
+    {
+        return Ok(file);
+    }
+    SceneFile::untitled(checkpoint.inputs().scene.clone(), source)
+        .map_err(|errors| Failure::Failed(errors.to_string()))
 }
 
 /// Opens the scene file. The inner error means that the file is readable but not a valid scene: the

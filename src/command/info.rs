@@ -6,8 +6,7 @@ use crate::command::{Failure, print_line};
 use crate::film::FileMetadata;
 use crate::render::SampleInputs;
 use crate::render::export::scene_hash;
-use crate::scene::{Document, Scene};
-use crate::world::{self, AnyWorld};
+use crate::scene::Document;
 use std::path::Path;
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
@@ -42,26 +41,15 @@ fn compare(metadata: &FileMetadata, path: &Path, args: &InfoArgs) -> Result<(), 
             "scene: {shown} and the files that it names are those of {file}"
         ));
     }
+    // The size is an option of `render`.
+    let mut sized = scene.clone();
+    sized.film.size = metadata.size.map(|n| n as u32);
     let inputs = metadata.film.as_ref().and_then(SampleInputs::of);
-    match inputs.map(|inputs| is_relit(&inputs, scene)) {
+    match inputs.map(|inputs| inputs.fit(&sized)) {
         Some(true) => print_line(&format!(
             "scene: the pictures of {shown} and {file} differ in light weights, names or layout of \
              the text only; --resume keeps the samples"
         )),
         _ => Err(Failure::Failed(format!("{file} shows another scene than {shown} describes"))),
     }
-}
-
-/// Returns `true` if the samples with the given inputs are valid for `scene`.
-fn is_relit(inputs: &SampleInputs, scene: &Scene) -> bool {
-    let Ok(compiled) = Scene::parse_in(&inputs.scene, "film", scene.resolver.clone()) else {
-        return false;
-    };
-    // The size is an option of `render`.
-    let mut scene = scene.clone();
-    scene.film.size = compiled.film.size;
-    inputs.contents_hash == compiled.contents_hash()
-        && AnyWorld::compile(&compiled, &world::Options::default())
-            .light_groups()
-            .can_reuse(&compiled, &scene)
 }

@@ -38,6 +38,8 @@ pub enum Message {
     Warning(String),
     /// Result of an export.
     Exported(Result<Exported, String>),
+    /// Result of [`Effect::Checkpoint`].
+    CheckpointWritten(Result<PathBuf, String>),
     /// Progress of [`Effect::ExportSized`], 0..=1.
     ExportProgress(f64),
     /// Result of [`Effect::ViewImage`] for this path.
@@ -169,6 +171,9 @@ pub enum Effect {
     Load,
     /// Write the current picture to the next free file name derived from the scene's name.
     Export(Format),
+    /// Write the samples of this scene as a checkpoint to the next free file name derived from the
+    /// scene's name.
+    Checkpoint(Arc<Scene>),
     /// Render the scene at another size until `stop`, while the main render continues, and write
     /// the picture to the next free file name.
     ExportSized {

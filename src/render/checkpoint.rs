@@ -7,16 +7,17 @@
 
 use crate::disk::WriteError;
 use crate::film::file::{
-    Fields, FilmFileHeader, FilmReader, ReadError, Tag, encode_end, encode_tiles, tile_chunks,
-    write_film_file,
+    Fields, FilmFileHeader, FilmReader, ReadError, Tag, create_film_file, encode_end, encode_tiles,
+    tile_chunks, write_film_file,
 };
 use crate::film::{Film, LightWeights};
 use crate::render::export::{Provenance, metadata};
 use crate::render::schedule::{Schedule, Settings};
 use crate::render::session::Report;
 use crate::render::{Options, RenderState};
-use crate::sampling::SamplerKind;
+use crate::sampling::{SampleSettings, SamplerKind};
 use crate::scene::{Document, Scene};
+use crate::world::{self, AnyWorld};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -63,6 +64,18 @@ impl SampleInputs {
             out.extend(text.bytes());
         }
         (SCENE, out)
+    }
+
+    /// Returns `true` if the samples are valid for `scene`, possibly with other light weights.
+    pub fn fit(&self, scene: &Scene) -> bool {
+        let resolver = scene.resolver.clone();
+        let Ok(compiled) = Scene::parse_in(&self.scene, "checkpoint", resolver) else {
+            return false;
+        };
+        self.contents_hash == compiled.contents_hash()
+            && AnyWorld::compile(&compiled, &world::Options::default())
+                .light_groups()
+                .can_reuse(&compiled, scene)
     }
 
     /// Returns the inputs in a film file. Returns `None` if there are none or they are not valid.
@@ -117,6 +130,14 @@ impl EncodedCheckpoint {
     /// Fails if the file cannot be written; an existing file is then unchanged.
     pub fn write(&self, path: &Path) -> Result<(), WriteError> {
         write_film_file(path, &self.0)
+    }
+
+    /// Writes the checkpoint to a new file.
+    ///
+    /// # Errors
+    /// Fails if the file exists or cannot be written.
+    pub fn create(&self, path: &Path) -> Result<(), WriteError> {
+        create_film_file(path, &self.0)
     }
 }
 
@@ -179,6 +200,19 @@ impl Checkpoint {
     /// Everything in the file but the film.
     pub fn header(&self) -> &FilmFileHeader {
         &self.header
+    }
+
+    /// Seed and sampler of the samples.
+    pub fn sampling(&self) -> SampleSettings {
+        let kind = [SamplerKind::Sobol, SamplerKind::Random]
+            .into_iter()
+            .find(|kind| kind.name() == self.inputs.sampler);
+        SampleSettings { seed: self.header.film.seed, kind: kind.unwrap_or(SamplerKind::Sobol) }
+    }
+
+    /// Inputs of the samples.
+    pub fn inputs(&self) -> &SampleInputs {
+        &self.inputs
     }
 
     /// The film.

@@ -1,6 +1,7 @@
 //! End-to-end tests of the dashboard: the program itself in a pseudo-terminal.
 #![cfg(unix)]
 
+mod checkpoints;
 mod editing;
 mod hostile;
 mod life;

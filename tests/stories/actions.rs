@@ -292,6 +292,9 @@ fn file_stories() -> Vec<Story> {
             d.disk[Path::new(FILE)] == room_with_views().replacen("eye = [0.0", "eye = [7.0", 1)
                 && !d.model.is_unsaved()
         }),
+        story("write a checkpoint, to continue another time", c(), "K", |_, d| {
+            d.asked(|e| matches!(e, Effect::Checkpoint(_))) && d.notice().contains("room-1.zk")
+        }),
         story("save as", c(), "W Ctrl-u `copy` Enter", |_, d| {
             d.disk.contains_key(Path::new("copy.toml")) && d.model.file.name == "copy.toml"
         }),

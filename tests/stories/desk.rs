@@ -173,6 +173,7 @@ impl Desk {
                 noise_codes: Some(2.5),
                 scp: "me@here:room-1.png".into(),
             })),
+            Effect::Checkpoint(_) => Message::CheckpointWritten(Ok("room-1.zk".into())),
             Effect::Pin => {
                 let header = Header {
                     width: 64,

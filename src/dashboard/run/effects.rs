@@ -6,9 +6,9 @@ use crate::dashboard::run::file_worker::Files;
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::{image_viewer, paths};
 use crate::film::LinearImage;
-use crate::render::Options;
 use crate::render::schedule::Settings;
 use crate::render::session::{Session, View};
+use crate::render::{Checkpoint, Options};
 use crate::scene::{Scene, SceneFile};
 use crate::terminal::Capabilities;
 use crossbeam_channel::{Receiver, Sender, unbounded};
@@ -113,6 +113,11 @@ impl EffectRunner {
         self.session.set_scene(scene)
     }
 
+    /// Continues the render of `checkpoint` with `scene`.
+    pub fn resume(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) {
+        self.session.continue_from(scene, checkpoint);
+    }
+
     /// Executes `effect`, whose results come as messages. `frames` is the output to the terminal,
     /// `terminal` its capabilities.
     pub fn run(
@@ -159,6 +164,13 @@ impl EffectRunner {
             Effect::Save { scene, path, overwrite } => self.files.save(scene, path, overwrite),
             Effect::Load => self.files.load(),
             Effect::Export(format) => self.export(format),
+            Effect::Checkpoint(scene) => {
+                let (exporter, results) = (self.exporter.clone(), self.results.clone());
+                self.session.checkpoint(self.exporter.provenance(&scene), move |checkpoint| {
+                    let written = exporter.write_checkpoint(checkpoint);
+                    let _ = results.send(Message::CheckpointWritten(written));
+                });
+            }
             Effect::ExportSized { scene, format, display, stop } => {
                 let request = ExportRequest {
                     scene,

@@ -7,7 +7,7 @@ use crate::film::{Depth, Display, ImageOutput};
 use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Settings, Stop};
 use crate::render::session::{Report, Session, State};
-use crate::render::{Options, RenderState};
+use crate::render::{EncodedCheckpoint, Options, RenderState};
 use crate::sampling::SamplerKind;
 use crate::scene::{Document, Scene};
 use crossbeam_channel::Sender;
@@ -44,13 +44,7 @@ impl Exporter {
         report: &Report,
         format: Format,
     ) -> Result<Exported, String> {
-        let (source, text) = self.source(rendering.scene());
-        let provenance = Provenance {
-            source,
-            scene_hash: scene_hash(&text, rendering.scene()),
-            sampler: self.sampler,
-            adaptive: self.adaptive,
-        };
+        let provenance = self.provenance(rendering.scene());
         let display = rendering.display();
         let write = |path: &Path| {
             let target = ImageOutput::from_path(path)?.create_new();
@@ -66,6 +60,28 @@ impl Exporter {
             spp: report.spp.mean,
             noise_codes: report.noise.map(|noise| noise.rmse_codes),
         })
+    }
+
+    /// Returns the origin of pictures of `scene`.
+    pub fn provenance(&self, scene: &Scene) -> Provenance {
+        let (source, text) = self.source(scene);
+        Provenance {
+            source,
+            scene_hash: scene_hash(&text, scene),
+            sampler: self.sampler,
+            adaptive: self.adaptive,
+        }
+    }
+
+    /// Writes a checkpoint under the next free name.
+    pub fn write_checkpoint(
+        &self,
+        checkpoint: Option<EncodedCheckpoint>,
+    ) -> Result<PathBuf, String> {
+        let checkpoint = checkpoint.ok_or("there are no samples to write")?;
+        paths::numbered(&self.folder, &self.stem, "zk", |path| checkpoint.create(path))
+            .ok_or_else(|| format!("all names for checkpoints of {} are in use", self.stem))?
+            .map_err(|error| error.to_string())
     }
 
     /// Returns the name of the scene file, and the text that it would have if `scene` were saved.

@@ -21,9 +21,9 @@ mod writer;
 use crate::dashboard::message::{Effect, Exported, Message};
 use crate::dashboard::model::{Model, Start};
 use crate::dashboard::update::update;
-use crate::render::Options;
 use crate::render::schedule::{Settings, Stop};
 use crate::render::session::{Snapshot, State};
+use crate::render::{Checkpoint, Options};
 use crate::scene::{SceneErrors, SceneFile};
 use crate::terminal::flow::LinkStatus;
 use crate::terminal::{
@@ -48,6 +48,8 @@ pub use diagnose::{TerminalReport, diagnose};
 pub struct Setup {
     /// The scene file. An unreadable file is represented by its path and errors.
     pub file: Result<SceneFile, (PathBuf, SceneErrors)>,
+    /// Checkpoint of this scene to be continued.
+    pub checkpoint: Option<Checkpoint>,
     /// Folder for recovery files that cannot be written beside their scene file.
     pub state: Option<PathBuf>,
     /// Number of tracing threads, at least 1.
@@ -76,14 +78,16 @@ pub struct Ended {
     /// Path of the recovery file, if there are unsaved edits. The next start offers to recover
     /// them. The error explains why unsaved edits are lost.
     pub kept: Result<Option<PathBuf>, String>,
+    /// Results of checkpoints that were written after the screen was restored.
+    pub checkpoints: Vec<Result<PathBuf, String>>,
     /// Lines of the summary of input latencies; empty unless [`Setup::trace`] is set.
     pub latencies: Vec<String>,
 }
 
 /// Runs a dashboard on the terminal of stdin and stdout until the user quits or a signal arrives.
 pub fn run(setup: Setup) -> io::Result<Ended> {
-    let Setup { file, state, threads, options, settings, colors, surroundings, bandwidth, trace } =
-        setup;
+    let Setup { file, checkpoint, state, threads, options, .. } = setup;
+    let Setup { settings, colors, surroundings, bandwidth, trace, .. } = setup;
     let (start, file) = match file {
         Ok(file) => (Ok(Arc::new(file.document().scene().clone())), Ok(file)),
         Err((path, errors)) => (Err(errors), Err(path)),
@@ -95,7 +99,10 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     let mut effects = EffectRunner::new(EffectSetup { file, state, threads, options, settings })?;
     if let Ok(scene) = &start {
         // Rendering starts while the terminal is probed.
-        effects.show(Arc::clone(scene));
+        match checkpoint {
+            Some(checkpoint) => effects.resume(Arc::clone(scene), checkpoint),
+            None => drop(effects.show(Arc::clone(scene))),
+        }
     }
     let signals = signals::block()?;
     let screen = Screen::enter()?;
@@ -108,6 +115,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
             exported: Vec::new(),
             kept: Ok(None),
             latencies: Vec::new(),
+            checkpoints: Vec::new(),
         });
     };
     let model = Model::new(Start {
@@ -155,12 +163,20 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     // The screen is restored before the remaining files are written, which may take a while.
     drop(screen);
     let (finished, kept) = dashboard.effects.finish();
-    let exported = finished.into_iter().filter_map(|message| match message {
-        Message::Exported(result) => Some(result),
-        _ => None,
-    });
-    let mut ended =
-        Ended { signalled: result?, exported: exported.collect(), kept, latencies: Vec::new() };
+    let mut ended = Ended {
+        signalled: result?,
+        exported: Vec::new(),
+        kept,
+        checkpoints: Vec::new(),
+        latencies: Vec::new(),
+    };
+    for message in finished {
+        match message {
+            Message::Exported(result) => ended.exported.push(result),
+            Message::CheckpointWritten(result) => ended.checkpoints.push(result),
+            _ => {}
+        }
+    }
     if let Some(path) = trace {
         dashboard.latency.write(&path)?;
         ended.latencies = dashboard.latency.summary();

@@ -272,6 +272,7 @@ pub static COMMANDS: &[Command] = &[
     command(C::File, "save as", &[(Anywhere, "W")], |c| c.ask_path()),
     command(C::File, "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(always),
     command(C::File, "recover edits of a crashed session", &[], |c| c.ask_recovery()).available(always),
+    command(C::File, "write a checkpoint, to continue another time", &[(Anywhere, "K")], |c| c.checkpoint()),
     command(C::File, "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).available(always).over_image(),
     command(C::File, "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).available(always).over_image().hints(&[hint(&[H::First], 13, "q", "quit")]),
 

@@ -193,6 +193,16 @@ impl UpdateContext<'_> {
         }
     }
 
+    pub(super) fn checkpoint_written(&mut self, result: Result<PathBuf, String>) {
+        match result {
+            Ok(path) => {
+                let path = path.display();
+                self.notify(Tone::Good, format!("{path}  ·  `zerkalo {path}` continues it"), None);
+            }
+            Err(reason) => self.notify(Tone::Bad, capital(&reason), None),
+        }
+    }
+
     pub(super) fn copy_path(&mut self) {
         let Some(path) = self.model.last_export.clone() else {
             self.say("No picture was written yet · p writes one");

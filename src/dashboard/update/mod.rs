@@ -138,6 +138,7 @@ impl<'a> UpdateContext<'a> {
                 self.notify(Tone::Bad, capital(&text), None);
             }
             Message::Exported(result) => self.exported(result),
+            Message::CheckpointWritten(result) => self.checkpoint_written(result),
             Message::ExportProgress(progress) => {
                 self.follow = false;
                 if let Some(export) = &mut self.model.export {

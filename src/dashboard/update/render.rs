@@ -8,6 +8,7 @@ use crate::dashboard::update::prompt::stop_text;
 use crate::dashboard::update::{UpdateContext, cycled};
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
+use std::sync::Arc;
 
 impl UpdateContext<'_> {
     pub(super) fn pause(&mut self) {
@@ -54,6 +55,12 @@ impl UpdateContext<'_> {
     pub(super) fn export(&mut self, format: Format) {
         self.emit(Effect::Export(format));
         self.say(format!("writing {} …", format.extension()));
+    }
+
+    pub(super) fn checkpoint(&mut self) {
+        let scene = Arc::clone(self.model.scene());
+        self.emit(Effect::Checkpoint(scene));
+        self.say("writing a checkpoint …");
     }
 
     pub(super) fn cancel_export(&mut self) {

@@ -86,7 +86,19 @@ pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
 /// # Errors
 /// Fails if the file cannot be written; an existing file is then unchanged.
 pub fn write_film_file(path: &Path, pieces: &[Vec<u8>]) -> Result<(), WriteError> {
-    let mut replacement = Replacement::begin(path, Existing::Replace)?;
+    write_pieces(path, pieces, Existing::Replace)
+}
+
+/// Writes a film file as [`write_film_file`] does, unless there is a file at `path`.
+///
+/// # Errors
+/// Fails if the file exists or cannot be written.
+pub fn create_film_file(path: &Path, pieces: &[Vec<u8>]) -> Result<(), WriteError> {
+    write_pieces(path, pieces, Existing::Refuse)
+}
+
+fn write_pieces(path: &Path, pieces: &[Vec<u8>], existing: Existing) -> Result<(), WriteError> {
+    let mut replacement = Replacement::begin(path, existing)?;
     let written = pieces.iter().try_for_each(|piece| replacement.temporary().write_all(piece));
     written.map_err(|error| replacement.explain(&error))?;
     replacement.commit()

@@ -30,7 +30,7 @@ mod tests;
 mod tile_record;
 
 pub use decode::{Fields, FilmReader, ReadError, is_film_file};
-pub use encode::{encode_end, encode_tiles, tile_chunks, write_film_file};
+pub use encode::{create_film_file, encode_end, encode_tiles, tile_chunks, write_film_file};
 
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
