@@ -50,11 +50,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
 
 /// Hash of the scene of `document` and of the files that it names.
 pub fn hash(document: &Document) -> String {
-    let text = scene_hash(document.text());
-    match document.scene().contents_hash() {
-        Some(contents) => format!("{text}+{contents:016x}"),
-        None => text,
-    }
+    scene_hash(document.text(), document.scene())
 }
 
 /// Renders the pilot, writes its film, and plans the rest.
