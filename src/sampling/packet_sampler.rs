@@ -138,27 +138,72 @@ impl<L: SimdFloat> SampleBlock<'_, L> {
     /// Creates the sampler of a packet with samples of one pixel. `key` is its [`Sampler::key`].
     #[inline(always)]
     pub fn for_pixel(&self, key: u32) -> PacketSampler<'_, L> {
-        PacketSampler { points: self, key: L::SimdU32::splat(key), single_key: Some(key) }
+        PacketSampler {
+            points: self,
+            key: L::SimdU32::splat(key),
+            single_key: Some(key),
+            first_lobe: 0,
+            first_choice: 0,
+        }
     }
 
     /// Creates the sampler of a packet with samples of several pixels. `keys` holds the
     /// [`Sampler::key`] of the pixel in each lane.
     #[inline(always)]
     pub fn for_pixels(&self, keys: L::SimdU32) -> PacketSampler<'_, L> {
-        PacketSampler { points: self, key: keys, single_key: None }
+        PacketSampler { points: self, key: keys, single_key: None, first_lobe: 0, first_choice: 0 }
     }
 }
 
+/// Number of lobes and of branch choices that each generation of a path with diffuse bounces has for
+/// itself.
+const PER_GENERATION: u32 = 1 << 16;
+
+/// Number of the first branch choice that chooses the hit of a diffuse bounce.
+const RESERVOIR: u32 = 1 << 31;
+
 /// Random numbers of one packet.
+#[derive(Clone, Copy)]
 pub struct PacketSampler<'a, L: SimdFloat> {
     points: &'a SampleBlock<'a, L>,
     /// Key of the pixel in each lane.
     key: L::SimdU32,
     /// Key of the pixel, if all lanes have the same one.
     single_key: Option<u32>,
+    /// Number of the first lobe.
+    first_lobe: u32,
+    /// Number of the first branch choice.
+    first_choice: u32,
 }
 
 impl<L: SimdFloat> PacketSampler<'_, L> {
+    /// Returns the numbers of a generation of paths with diffuse bounces: those after `generation`
+    /// bounces. The direction of the first bounce has the dimensions of the first branch choices.
+    #[inline(always)]
+    pub fn generation(&self, generation: u32) -> Self {
+        let first_lobe = generation * PER_GENERATION;
+        Self { first_lobe, first_choice: first_lobe + CHOICES, ..*self }
+    }
+
+    /// Returns two numbers in [0, 1) for the direction of diffuse bounce `number` of a path, counted
+    /// from 0.
+    #[inline(always)]
+    pub fn diffuse_2d(&self, number: u32) -> (L, L) {
+        if number == 0 {
+            let d = DIMENSIONS - CHOICES as usize;
+            (self.joint(d, 0), self.joint(d + 1, 0))
+        } else {
+            self.padded((number + 1) * PER_GENERATION - 1, 0)
+        }
+    }
+
+    /// Returns a number in [0, 1) for offer `number` of a hit for the diffuse bounce of the
+    /// generation.
+    #[inline(always)]
+    pub fn reservoir_1d(&self, number: u32) -> L {
+        self.padded_choice(RESERVOIR + self.first_choice + number)
+    }
+
     /// Returns the position of each sample in its pixel, two coordinates in [0, 1).
     #[inline(always)]
     pub fn pixel(&self) -> (L, L) {
@@ -193,6 +238,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     #[inline(always)]
     fn pair_2d(&self, bounce: u32, salt: u32) -> (L, L) {
         let Sampler { first_lobe, joint_lobes, .. } = self.points.sampler;
+        let bounce = bounce + self.first_lobe;
         let d = first_lobe + 2 * bounce as usize;
         match bounce.checked_sub(*joint_lobes) {
             None => (self.joint(d, salt), self.joint(d + 1, salt)),
@@ -204,6 +250,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Choices are numbered from 0.
     #[inline(always)]
     pub fn branch_1d(&self, number: u32) -> L {
+        let number = number + self.first_choice;
         if number < CHOICES {
             self.joint(DIMENSIONS - CHOICES as usize + number as usize, 0)
         } else {

@@ -69,6 +69,14 @@ pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     Vec3::new(x * scale, y * scale, L::one() - drop)
 }
 
+/// Samples a direction in the hemisphere around z with the density cos / pi \[1/sr\] (Malley's method:
+/// a uniform point of the disk, lifted to the hemisphere).
+#[inline(always)]
+pub fn cosine_hemisphere<L: SimdFloat>(u: L, v: L) -> Vec3<L> {
+    let (x, y, r2) = disk(u, v);
+    Vec3::new(x, y, (L::one() - r2).max(L::zero()).sqrt())
+}
+
 /// Density of [`cone`] [1/sr] around the unit vector `axis`: constant inside of the cone, 0 outside.
 /// The cosine is compared by the distance between the ends of both unit vectors, which narrow cones
 /// leave more digits.

@@ -8,11 +8,12 @@ use crate::material::{Bsdf, Material};
 use crate::primitive::{
     Acceleration, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
 };
-use crate::scene::{BelowHorizon, Filter, RayTypes, Scene};
+use crate::scene::{BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates};
 use crate::world::integrator::emitter_lighting::EmitterSource;
+use crate::world::integrator::indirect_diffuse::DiffuseLimits;
 use crate::world::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::world::integrator::surface_textures::SurfaceTextures;
 use crate::world::inventory::{Inventory, InventorySources};
@@ -126,6 +127,15 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
     /// Returns `true` if some material reflects ambient light.
     fn has_ambient(&self) -> bool {
         self.materials.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3])
+    }
+
+    /// Returns the limits of diffuse bounces. Returns `None` if the scene asks for none, or if no
+    /// material is matt.
+    fn diffuse_limits(&self, scene: &Scene) -> Option<DiffuseLimits> {
+        let IntegratorSettings { max_diffuse_depth: depth, caustics, .. } = scene.trace;
+        let is_matt = |m: &&Material| m.diffuse > 0.0 && m.color.0 != [0.0; 3];
+        let traced = scene.trace.ray_types == RayTypes::Full && depth > 0;
+        (traced && self.materials.iter().any(is_matt)).then_some(DiffuseLimits { depth, caustics })
     }
 
     /// Returns `true` if some surface reflects or transmits rays.
@@ -332,6 +342,7 @@ impl<L: SimdFloat> World<L> {
                 bsdfs: &materials.bsdfs,
                 groups: &lights.groups.members,
                 lights: lights.count(),
+                diffuse_limits: materials.diffuse_limits(scene),
                 precision: if L::EPSILON > 1e-10 { "single" } else { "double" },
             },
         );
@@ -348,6 +359,7 @@ impl<L: SimdFloat> World<L> {
             surface_textures: textures,
             shadows: level >= RayTypes::Shadows && !geometry.is_empty(),
             depth: if materials.has_secondary() { scene.trace.max_depth } else { 0 },
+            diffuse_limits: materials.diffuse_limits(scene),
             min_weight: scene.trace.min_throughput,
             fold: scene.trace.below_horizon == BelowHorizon::Fold,
             nested_dielectrics,

@@ -3,6 +3,7 @@
 use crate::lanes::Float;
 use crate::material::{Bsdf, ReflectionLobe, SpecularModel, Transmission};
 use crate::scene::{BelowHorizon, Filter, RayTypes, Scene};
+use crate::world::integrator::indirect_diffuse::DiffuseLimits;
 use crate::world::light_groups::LightGroupSource;
 use std::fmt;
 
@@ -22,6 +23,7 @@ pub(super) struct InventorySources<'a, S> {
     pub groups: &'a [LightGroupSource],
     /// Number of lights that emit.
     pub lights: usize,
+    pub diffuse_limits: Option<DiffuseLimits>,
     /// `single` or `double`.
     pub precision: &'static str,
 }
@@ -29,7 +31,15 @@ pub(super) struct InventorySources<'a, S> {
 impl Inventory {
     /// Creates the inventory of a compiled scene.
     pub(super) fn new<S: Float>(scene: &Scene, sources: InventorySources<S>) -> Self {
-        let InventorySources { geometry, textures, bsdfs, groups, lights, precision } = sources;
+        let InventorySources {
+            geometry,
+            textures,
+            bsdfs,
+            groups,
+            lights,
+            precision,
+            diffuse_limits,
+        } = sources;
         let mut parts = vec![geometry];
         parts.extend(textures.into_iter().map(String::from));
         let mut add_if = |present: bool, name: &str| {
@@ -98,6 +108,18 @@ impl Inventory {
         };
         let is_shared = |source: &LightGroupSource| matches!(source, LightGroupSource::Shared(_));
         add_if(scene.camera.lens_radius() > 0.0, "thin lens");
+        if let Some(limits) = diffuse_limits {
+            let plural = if limits.depth == 1 { "" } else { "s" };
+            parts.push(format!("{} diffuse bounce{plural}", limits.depth));
+            if !limits.caustics {
+                parts.push("no caustics".to_string());
+            }
+        }
+        let mut add_if = |present: bool, name: &str| {
+            if present {
+                parts.push(name.to_string());
+            }
+        };
         add_if(groups.iter().any(is_shared), "shared light group");
         add_if(groups.contains(&LightGroupSource::Ambient), "ambient");
         add_if(groups.contains(&LightGroupSource::Background), "background");

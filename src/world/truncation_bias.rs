@@ -1,6 +1,7 @@
-//! Upper bounds of the bias that truncated paths cause (`max_depth` and `min_throughput`).
+//! Upper bounds of the bias that truncated paths cause (`max_depth`, `min_throughput`,
+//! `max_diffuse_depth` and `caustics`).
 
-use crate::material::{Fresnel, Material};
+use crate::material::{Fresnel, Material, Texture};
 use crate::scene::{Object, RayTypes, Scene};
 use glam::DVec3;
 
@@ -20,6 +21,20 @@ fn max_albedo(material: &Material, flat: bool) -> f64 {
         // Past the critical angle all light is reflected.
         _ => (k_r * f + k_t).max(1.0),
     }
+}
+
+/// Returns the largest share of light that a material reflects diffusely, over all channels; infinite
+/// if nothing bounds the colours of a mesh.
+fn max_diffuse_albedo(material: &Material, object: &Object) -> f64 {
+    let mut factor = 1.0f64;
+    if let Some(Texture::Checker(checker)) = &material.texture {
+        factor = factor.max(checker.even.largest()).max(checker.odd.largest());
+    }
+    if object.shape.key() == "mesh" {
+        factor = f64::INFINITY;
+    }
+    let albedo = material.diffuse * material.color.largest();
+    if albedo > 0.0 { albedo * factor } else { 0.0 }
 }
 
 /// Properties of an object's geometry on which the bound depends.
@@ -65,6 +80,7 @@ impl ObjectTraits {
 }
 
 /// Largest factors by which surfaces of the scene multiply the throughput of a path.
+#[derive(Clone, Copy)]
 struct Reach {
     /// Largest factor of one surface.
     first: f64,
@@ -75,7 +91,8 @@ struct Reach {
 }
 
 impl Reach {
-    fn new(scene: &Scene) -> Self {
+    /// Creates the factors of mirrors and glass, and with `diffuse` of matt surfaces as well.
+    fn new(scene: &Scene, diffuse: bool) -> Self {
         let default = Material::default();
         let (mut first, mut second, mut round_trip_albedo) = (0.0f64, 0.0f64, 0.0f64);
         let (mut entered, mut through) = (0, false);
@@ -84,7 +101,8 @@ impl Reach {
             let mut enters = false;
             for name in object.materials() {
                 let material = scene.materials.get(name).unwrap_or(&default);
-                let rho = max_albedo(material, traits.flat);
+                let matt = if diffuse { max_diffuse_albedo(material, object) } else { 0.0 };
+                let rho = max_albedo(material, traits.flat) + matt;
                 if rho > 0.0 && traits.sees_itself(material) {
                     round_trip_albedo = round_trip_albedo.max(rho * rho);
                 }
@@ -121,6 +139,14 @@ impl Reach {
         }
     }
 
+    /// Returns the largest total throughput that is cut off where it falls below `least` in a scene
+    /// with up to `bounces` diffuse bounces. Each generation of a path is cut off at its start and
+    /// then as a path without diffuse bounces.
+    fn ended_by_generation(&self, least: f64, depth: u32, bounces: u32) -> f64 {
+        let rest = if self.through { 8.0 * least * f64::from(depth) } else { least };
+        (least + rest) * (f64::from(bounces) + 1.0)
+    }
+
     /// Returns the largest total throughput that is cut off where it falls below `least`, at up to
     /// `depth` surfaces after the first. A path that never splits is cut off once. Among split
     /// paths, each surface cuts off at most two branches of each of at most four simultaneous
@@ -144,14 +170,21 @@ impl Reach {
 /// brighter). Nothing is truncated only if no surface reflects or transmits, or if the only one
 /// that does is flat or convex, which a path hits once.
 ///
+/// With diffuse bounces the factor of a surface includes its diffuse albedo. A path is cut off by
+/// `max_depth` after at least as many surfaces, by `max_diffuse_depth` after one surface more than
+/// bounces, and by `caustics = false` after two. Without diffuse bounces, ambient light stands for
+/// all indirect light; that is no truncation.
+///
 /// Total internal reflection in a transparent ball is included in the bound, although the angle of
 /// incidence is the same at every hit and light that entered can also leave. At the rim rounding
 /// decides on which side of the critical angle a ray is, and bump maps change the angle.
 pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
-    let reach = Reach::new(scene);
-    if scene.trace.ray_types < RayTypes::Full || reach.first == 0.0 {
+    if scene.trace.ray_types < RayTypes::Full {
         return Vec::new();
     }
+    let specular = Reach::new(scene, false);
+    let bounces = scene.trace.max_diffuse_depth;
+    let reach = if bounces > 0 { Reach::new(scene, true) } else { specular };
     let bound = |sum: f64| {
         if sum.is_finite() {
             format!("at most {} of the brightest surface", rounded_up(sum))
@@ -162,14 +195,33 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
     let mut out = Vec::new();
     let depth = scene.trace.max_depth;
     let cut = reach.from(depth.saturating_add(1));
-    if cut > 0.0 {
+    if cut > 0.0 && specular.first > 0.0 {
         out.push(format!("max_depth {depth} cuts longer paths ({})", bound(cut)));
     }
     let least = scene.trace.min_throughput;
     // At depth 0 no path continues, so that none can be cut off.
-    if least > 0.0 && depth > 0 {
-        let ended = reach.ended(least, depth) * reach.from(0);
+    if least > 0.0 && (depth > 0 && specular.first > 0.0 || bounces > 0) {
+        let ended = match bounces {
+            0 => reach.ended(least, depth),
+            _ => reach.ended_by_generation(least, depth, bounces),
+        };
+        let ended = ended * reach.from(0);
         out.push(format!("min_throughput {least} cuts weaker paths ({})", bound(ended)));
+    }
+    if bounces > 0 {
+        let cut = reach.from(bounces + 1);
+        if cut > 0.0 && reach.first > specular.first {
+            out.push(format!(
+                "max_diffuse_depth {bounces} puts ambient light in place of further bounces ({})",
+                bound(cut)
+            ));
+        }
+        if specular.first > 0.0 && !scene.trace.caustics {
+            out.push(format!(
+                "caustics false leaves out what mirrors and glass send to matt surfaces ({})",
+                bound(reach.from(2))
+            ));
+        }
     }
     out
 }
@@ -256,6 +308,32 @@ mod tests {
         );
         // A path hits a single pane only once.
         assert_eq!(truncation_bounds(&with(0.4, Fresnel::Dielectric, outside, FLOOR)), [""; 0]);
+    }
+
+    #[test]
+    fn diffuse_bounces_have_a_bound() {
+        let mut room = scene("[0.0, 0.0, 5.0]", &[(0.0, BALL), (0.0, FLOOR)]);
+        room.materials.values_mut().for_each(|m| m.color = crate::value::Color([0.5, 0.4, 0.3]));
+        room.materials.values_mut().for_each(|m| m.diffuse = 0.8);
+        assert_eq!(truncation_bounds(&room), [""; 0], "ambient light stands for all of it");
+        room.trace.max_diffuse_depth = 2;
+        // 0.4^3 (1 + 0.4) / (1 - 0.16) without the second surface's share: 0.4^3 / 0.6
+        assert_eq!(
+            truncation_bounds(&room),
+            [
+                "max_diffuse_depth 2 puts ambient light in place of further bounces (at most 1.07e-1 \
+              of the brightest surface)"
+            ]
+        );
+        room.materials.get_mut("m0").unwrap().reflection = 0.5;
+        room.trace.caustics = false;
+        let told = truncation_bounds(&room);
+        assert_eq!(told.len(), 3, "{told:?}");
+        assert!(told[0].starts_with("max_depth 16 cuts") && told[2].starts_with("caustics false"));
+        let alone = scene("[0.0, 0.0, 5.0]", &[(0.0, BALL)]);
+        let trace =
+            crate::scene::IntegratorSettings { max_diffuse_depth: 1, ..alone.trace.clone() };
+        assert_eq!(truncation_bounds(&Scene { trace, ..alone }), [""; 0], "it does not see itself");
     }
 
     #[test]

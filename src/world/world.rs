@@ -11,6 +11,7 @@ use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::tile::{CullingMode, TileCandidates};
 use crate::world::integrator::emitter_lighting::EmitterSource;
 use crate::world::integrator::first_hit::{self, FirstHit};
+use crate::world::integrator::indirect_diffuse::{DiffuseLimits, PathStart, trace_generations};
 use crate::world::integrator::nested_dielectrics::NestedDielectrics;
 use crate::world::integrator::opaque::trace_opaque;
 use crate::world::integrator::path::{Counts, Radiance};
@@ -62,6 +63,8 @@ pub struct World<L: SimdFloat> {
     pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,
     /// Largest number of surfaces on a path after the first; 0 if no surface reflects or transmits.
     pub(super) depth: u32,
+    /// Limits of diffuse bounces. `None` if the scene has no indirect diffuse light.
+    pub(super) diffuse_limits: Option<DiffuseLimits>,
     /// Throughput below which a path is cut off.
     pub(super) min_weight: f64,
     /// `true` if sampled lobe directions that point into the surface are mirrored out of it.
@@ -139,9 +142,9 @@ impl<L: SimdFloat> World<L> {
     }
 
     /// Traces one packet of paths. `origin` and `direction` are those of camera rays, as
-    /// [`PerspectiveCamera::rays`] or [`PerspectiveCamera::lens_rays`] returns them. Lanes outside of `active` stay black. `candidates` are
-    /// the candidates of the camera rays and of the shadow rays from their hit points; `None` if
-    /// they are unknown.
+    /// [`PerspectiveCamera::rays`] or [`PerspectiveCamera::lens_rays`] returns them. Lanes outside of
+    /// `active` stay black. `candidates` are the candidates of the camera rays and of the shadow
+    /// rays from their hit points; `None` if they are unknown.
     #[inline(always)]
     pub fn trace(
         &self,
@@ -156,9 +159,13 @@ impl<L: SimdFloat> World<L> {
         }
         let ray = Ray { origin, direction };
         let candidates = candidates.unwrap_or(&self.all_candidates);
+        if let Some(limits) = self.diffuse_limits {
+            return trace_generations(self, limits, ray, candidates, sampler, active, out);
+        }
+        let start = PathStart::camera(ray, active, self.depth);
         if let Some(nested_dielectrics) = &self.nested_dielectrics {
             TransmissionIntegrator { world: self, nested_dielectrics, sampler }
-                .trace(ray, candidates, active, out)
+                .trace(start, candidates, None, out)
         } else {
             let trace = match (self.simple, self.emitters.is_empty()) {
                 (true, true) => trace_opaque::<_, true, false>,
@@ -166,7 +173,7 @@ impl<L: SimdFloat> World<L> {
                 (true, false) => trace_opaque::<_, true, true>,
                 (false, false) => trace_opaque::<_, false, true>,
             };
-            trace(self, ray, candidates, sampler, active, out)
+            trace(self, start, candidates, sampler, None, out)
         }
     }
 

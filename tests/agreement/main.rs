@@ -122,6 +122,11 @@ fn deliberate_errors_are_detected() {
     ] {
         check_detection(mutation, name, &scene(name), 8 * REFERENCE_SAMPLES);
     }
+    for mutation in [Mutation::UniformBounce, Mutation::AmbientTwice] {
+        let mut scene = scene("mirror-room.toml");
+        scene.trace.max_diffuse_depth = 2;
+        check_detection(mutation, "mirror-room.toml", &scene, 2 * REFERENCE_SAMPLES);
+    }
     for mutation in [Mutation::SquareLens, Mutation::UnfocusedLens] {
         let name = "depth-of-field.toml";
         let scene = compare::zoomed(&scene(name), [0.9, 1.5, -6.5], 6.0);
@@ -137,6 +142,30 @@ fn deliberate_errors_are_detected() {
         scene.materials.values_mut().for_each(|material| material.lobe = lobe);
         check_detection(Mutation::WiderLobe, &format!("{lobe:?}"), &scene, 32 * REFERENCE_SAMPLES);
         check_detection(Mutation::LobeDensity, &format!("{lobe:?}"), &scene, REFERENCE_SAMPLES);
+    }
+}
+
+/// Diffuse bounces among mirrors, glass, textures, bumps and smooth meshes, with and without caustics.
+#[test]
+fn diffuse_bounces_agree_with_reference_tracer() {
+    for (name, bounces, depth, caustics) in [
+        ("mirror-room.toml", 1, 16, true),
+        ("mirror-room.toml", 3, 2, true),
+        ("mirror-room.toml", 2, 16, false),
+        ("gallery-glass.toml", 2, 5, true),
+        ("gallery-glass.toml", 2, 5, false),
+        ("round-room.toml", 3, 3, true),
+        ("texture-checker.toml", 2, 4, true),
+        ("bump.toml", 2, 0, true),
+        ("background.toml", 4, 4, true),
+    ] {
+        let mut scene = small(shipped(name));
+        scene.trace.max_diffuse_depth = bounces;
+        (scene.trace.max_depth, scene.trace.caustics) = (depth, caustics);
+        let reference = reference(&scene, REFERENCE_SAMPLES, Mutation::None).unwrap();
+        let verdict = Picture::new(&scene, SAMPLES / 2).beside(&reference, REFERENCE_SAMPLES);
+        println!("{name}, {bounces} bounces, depth {depth}, caustics {caustics}: {verdict}");
+        assert!(verdict.agree(), "{name}, {bounces} bounces, depth {depth}, {caustics}: {verdict}");
     }
 }
 

@@ -37,6 +37,10 @@ pub enum Mutation {
     SidewaysTexture,
     /// Bump heights are negated.
     SunkenBumps,
+    /// Diffuse bounces are distributed uniformly over the hemisphere.
+    UniformBounce,
+    /// Ambient light is added at diffuse bounces, too.
+    AmbientTwice,
     /// Points of the lens are distributed over the square around it.
     SquareLens,
     /// Rays through the lens keep the direction of the ray through its centre.
@@ -91,6 +95,9 @@ impl<'a> Tracer<'a> {
         let bodies = scene.objects.iter().map(Body::new).collect::<Result<Vec<_>, _>>()?;
         let images = HashMap::new();
         let mut tracer = Self { scene, bodies, images, plain: Material::default(), mutation };
+        if scene.lights.iter().any(|l| l.point.is_none() && l.directional.is_none()) {
+            return Err("lights with a size".to_string());
+        }
         for material in scene.materials.values() {
             unknown_keys(material)?;
             tracer.open_images(material)?;
@@ -127,9 +134,20 @@ impl<'a> Tracer<'a> {
             Filter::Box => (numbers.unit(), numbers.unit()),
             Filter::Point => (0.5, 0.5),
         };
-        let (mut origin, mut direction) =
-            self.camera_ray(f64::from(x) + dx, f64::from(y) + dy, numbers);
+        let (origin, direction) = self.camera_ray(f64::from(x) + dx, f64::from(y) + dy, numbers);
+        self.radiance(origin, direction, 0, numbers)
+    }
+
+    /// Radiance along a ray after `diffuse` diffuse bounces.
+    fn radiance(
+        &self,
+        mut origin: DVec3,
+        mut direction: DVec3,
+        diffuse: u32,
+        numbers: &mut Numbers,
+    ) -> DVec3 {
         let trace = &self.scene.trace;
+        let max_depth = if diffuse > 0 && !trace.caustics { 0 } else { trace.max_depth };
         let mut weight = DVec3::ONE;
         let mut radiance = DVec3::ZERO;
         for bounce in 0.. {
@@ -142,13 +160,13 @@ impl<'a> Tracer<'a> {
             if through && trace.max_depth > 0 {
                 let way = self.through(&hit, direction, numbers);
                 if matches!(way, Way::On(_)) && !hit.bare {
-                    radiance += weight * self.shade(&hit, -direction);
+                    radiance += weight * self.lit(&hit, -direction, diffuse, numbers);
                 }
                 let next = match way {
                     Way::Straight => Some((direction, DVec3::ONE)),
                     Way::On(next) => next,
                 };
-                let Some((next, factor)) = next.filter(|_| bounce < trace.max_depth) else {
+                let Some((next, factor)) = next.filter(|_| bounce < max_depth) else {
                     return radiance;
                 };
                 weight *= factor;
@@ -158,9 +176,9 @@ impl<'a> Tracer<'a> {
             if hit.bare {
                 return radiance;
             }
-            radiance += weight * self.shade(&hit, -direction);
+            radiance += weight * self.lit(&hit, -direction, diffuse, numbers);
             let reflects = hit.material.reflection > 0.0 && trace.ray_types == RayTypes::Full;
-            if !reflects || bounce == trace.max_depth {
+            if !reflects || bounce == max_depth {
                 return radiance;
             }
             let turned = reflect(
@@ -278,11 +296,34 @@ impl<'a> Tracer<'a> {
         self.scene.materials.get(name).unwrap_or(&self.plain)
     }
 
-    /// Ambient light and direct light of all lights.
-    fn shade(&self, hit: &Hit, view: DVec3) -> DVec3 {
+    /// Direct light, and the light of a diffuse bounce, after `diffuse` such bounces.
+    fn lit(&self, hit: &Hit, view: DVec3, diffuse: u32, numbers: &mut Numbers) -> DVec3 {
+        let trace = &self.scene.trace;
+        let albedo = DVec3::from(hit.material.color.0) * hit.tint * hit.material.diffuse;
+        let bounces = trace.ray_types == RayTypes::Full
+            && diffuse < trace.max_diffuse_depth
+            && albedo.max_element() > 0.0;
+        let mut sum = self.shade(hit, view, !bounces || self.mutation == Mutation::AmbientTwice);
+        if bounces {
+            // A point of the unit sphere that touches the surface.
+            let mut onward = (hit.seen + numbers.direction()).normalize_or(hit.seen);
+            if self.mutation == Mutation::UniformBounce {
+                onward = numbers.direction();
+                onward *= onward.dot(hit.seen).signum();
+            }
+            if onward.dot(hit.normal) > 0.0 {
+                sum += albedo * self.radiance(hit.point, onward, diffuse + 1, numbers);
+            }
+        }
+        sum
+    }
+
+    /// Direct light of all lights, with or without ambient light.
+    fn shade(&self, hit: &Hit, view: DVec3, ambient: bool) -> DVec3 {
         let m = hit.material;
         let color = DVec3::from(m.color.0) * hit.tint;
-        let mut sum = color * m.ambient * DVec3::from(self.scene.ambient.color.0);
+        let ambient = if ambient { m.ambient } else { 0.0 };
+        let mut sum = color * ambient * DVec3::from(self.scene.ambient.color.0);
         for (i, light) in self.scene.lights.iter().enumerate().filter(|(_, l)| l.on) {
             let (towards, distance, irradiance) = arrival(light, hit.point, self.mutation);
             let mut cos = hit.seen.dot(towards);

@@ -22,6 +22,7 @@ mod coincident;
 mod compound;
 mod contact;
 mod degenerate;
+mod diffuse;
 mod lengths;
 mod lens;
 mod mesh;

@@ -134,6 +134,7 @@ fn trace(numbers: &mut Numbers) -> IntegratorSettings {
             pick(numbers, &["full", "full", "full", "full", "shadows", "primary"]).to_string(),
         )),
         "max_depth" => Some(Value::Integer(pick(numbers, &[0, 1, 2, 3, 4, 8, 16, 40]))),
+        "max_diffuse_depth" => Some(Value::Integer(pick(numbers, &[0, 0, 0, 1, 2]))),
         "min_throughput" => Some(Value::Float(pick(numbers, &[0.0, 0.01, 0.1]))),
         _ => None,
     };

@@ -10,20 +10,25 @@ use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
 /// Adds the ambient light and the light of all sources that the surfaces reflect to the radiance in
-/// `out`. `transmittance` returns the share of light that the medium before the surfaces lets through on
-/// a way of the given length; `None` if no medium absorbs light.
+/// `out`. Lanes in `bouncing` get no ambient light: a diffuse bounce finds the light that it stands
+/// for. `transmittance` returns the share of light that the medium before the surfaces lets through
+/// on a way of the given length; `None` if no medium absorbs light.
 #[inline(always)]
 pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
     path: &Path<L>,
     interaction: &SurfaceInteraction<L>,
     candidates: &TileCandidates,
+    bouncing: Option<L::Mask>,
     transmittance: impl Fn(L) -> Option<Vec3<L>>,
-    out: &mut Radiance<L>,
-    counts: &mut Counts,
+    (out, counts): (&mut Radiance<L>, &mut Counts),
 ) {
     if let Some(group) = world.ambient {
-        for (index, lanes) in interaction.bsdfs(interaction.has_bsdf) {
+        let lanes = match bouncing {
+            Some(bouncing) => interaction.has_bsdf.and_not(bouncing),
+            None => interaction.has_bsdf,
+        };
+        for (index, lanes) in interaction.bsdfs(lanes) {
             let mut ambient = Vec3::splat(world.bsdfs[index].ambient);
             if !SIMPLE && world.colored {
                 ambient = ambient.component_mul(interaction.albedo_factor);

@@ -4,6 +4,7 @@ pub(crate) mod coincident_surfaces;
 pub(crate) mod direct_lighting;
 pub(crate) mod emitter_lighting;
 pub(crate) mod first_hit;
+pub(crate) mod indirect_diffuse;
 pub(crate) mod interaction;
 pub(crate) mod nested_dielectrics;
 pub(crate) mod opaque;

@@ -10,24 +10,26 @@ use crate::world::integrator::direct_lighting::direct_lighting;
 use crate::world::integrator::emitter_lighting::{
     ReflectingLobes, emitter_lighting, reflected_density, visible_emitters,
 };
+use crate::world::integrator::indirect_diffuse::{DiffuseReservoir, PathStart};
 use crate::world::integrator::interaction::{SurfaceInteraction, interact};
+use crate::world::integrator::nested_dielectrics::MediumStack;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
 /// Traces camera rays in a world without transmissive surfaces. `SIMPLE` is the value of
 /// [`World::simple`], here and in all called functions. `EMITTERS` is `true` if the world has
-/// emitters.
+/// emitters or indirect diffuse light; `reservoir` takes the hits from which the latter may bounce.
 #[inline(never)]
 pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS: bool>(
     world: &'a World<L>,
-    ray: Ray<L>,
+    start: PathStart<L>,
     mut candidates: &'a TileCandidates,
     sampler: &PacketSampler<'_, L>,
-    mut active: L::Mask,
+    mut reservoir: Option<&mut DiffuseReservoir<L>>,
     out: &mut Radiance<L>,
 ) -> Counts {
     let mut counts = Counts::default();
-    let mut path = Path::new(ray);
+    let PathStart { mut path, lanes: mut active, depth, .. } = start;
     let mut bounce = 0;
     loop {
         counts.rays += u64::from(active.bits().count_ones());
@@ -47,16 +49,21 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
         let Some(interaction) = interact::<_, SIMPLE>(world, &path.ray, &hit, active) else {
             return counts;
         };
+        let mut bouncing = None;
+        if EMITTERS && let Some(reservoir) = &mut reservoir {
+            let media = (&MediumStack::vacuum(), None);
+            bouncing = Some(reservoir.offer(&path, &interaction, media, sampler));
+        }
         direct_lighting::<_, SIMPLE>(
             world,
             &path,
             &interaction,
             candidates,
+            bouncing,
             |_| None,
-            out,
-            &mut counts,
+            (&mut *out, &mut counts),
         );
-        let is_last = bounce == world.depth;
+        let is_last = bounce == depth;
         if EMITTERS {
             let lanes = if is_last { L::mask(false) } else { interaction.reflecting };
             emitter_lighting::<_, SIMPLE>(

@@ -11,6 +11,7 @@ use crate::world::integrator::direct_lighting::direct_lighting;
 use crate::world::integrator::emitter_lighting::{
     ReflectingLobes, emitter_lighting, reflected_density, visible_emitters,
 };
+use crate::world::integrator::indirect_diffuse::{DiffuseReservoir, PathStart};
 use crate::world::integrator::interaction::{SurfaceInteraction, interact};
 use crate::world::integrator::nested_dielectrics::{InterfaceHit, MediumStack, NestedDielectrics};
 use crate::world::integrator::opaque::sample_reflection;
@@ -83,25 +84,28 @@ pub(crate) struct TransmissionIntegrator<'a, L: SimdFloat> {
 }
 
 impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
-    /// Traces camera rays. In every lane, the transmitted branch of an interface is traced before
-    /// the reflected one, whatever the other lanes do.
+    /// Traces the rays of `start`. In every lane, the transmitted branch of an interface is traced
+    /// before the reflected one, whatever the other lanes do. `reservoir` takes the hits from which
+    /// indirect diffuse light may bounce.
     #[inline(never)]
     pub fn trace(
         &self,
-        ray: Ray<L>,
+        start: PathStart<L>,
         candidates: &TileCandidates,
-        lanes: L::Mask,
+        mut reservoir: Option<&mut DiffuseReservoir<L>>,
         out: &mut Radiance<L>,
     ) -> Counts {
         let mut counts = Counts::default();
-        let media = self.nested_dielectrics.at_start(&ray);
-        let path = Path::new(ray);
+        let PathStart { path, lanes, media, coincident, depth } = start;
+        let media = media.unwrap_or_else(|| self.nested_dielectrics.at_start(&path.ray));
         let mut waiting = BranchStack { branches: [None; SPLIT_DEPTH] };
-        let mut branch = Branch { path, lanes, media, bounce: 0, coincident: None };
+        let mut branch = Branch { path, lanes, media, bounce: 0, coincident };
         loop {
             let candidates =
                 if branch.bounce == 0 { candidates } else { &self.world.all_candidates };
-            let continues = self.advance(&mut branch, candidates, &mut waiting, out, &mut counts);
+            let limits = (depth, reservoir.as_deref_mut());
+            let results = (&mut *out, &mut counts);
+            let continues = self.advance(&mut branch, candidates, &mut waiting, limits, results);
             if !continues && !waiting.pop_into(&mut branch) {
                 return counts;
             }
@@ -109,14 +113,15 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     }
 
     /// Traces the rays of `branch` and adds the radiance of their hit points to `out`. Replaces
-    /// `branch` by its continuation. Returns `false` if no path continues.
+    /// `branch` by its continuation, of at most `depth` surfaces after the first. Returns `false` if
+    /// no path continues.
     fn advance(
         &self,
         branch: &mut Branch<L>,
         candidates: &TileCandidates,
         waiting: &mut BranchStack<L>,
-        out: &mut Radiance<L>,
-        counts: &mut Counts,
+        (depth, reservoir): (u32, Option<&mut DiffuseReservoir<L>>),
+        (out, counts): (&mut Radiance<L>, &mut Counts),
     ) -> bool {
         let world = self.world;
         let Branch { mut path, media, bounce, .. } = *branch;
@@ -167,17 +172,25 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         if let Some(interface_hit) = &interface_hit {
             interaction.mask_out(interface_hit.suppressed);
         }
+        let bouncing = reservoir.map(|reservoir| {
+            let coincident = coincident.as_ref().map(CoincidentState::reversed);
+            let media = match &interface_hit {
+                Some(hit) => MediumStack::select(hit.lanes, &hit.medium_reflected, &media),
+                None => media,
+            };
+            reservoir.offer(&path, &interaction, (&media, coincident.as_ref()), self.sampler)
+        });
         direct_lighting::<_, false>(
             world,
             &path,
             &interaction,
             candidates,
+            bouncing,
             transmittance,
-            out,
-            counts,
+            (&mut *out, &mut *counts),
         );
         if has_emitters {
-            let lobes = if bounce == world.depth {
+            let lobes = if bounce == depth {
                 ReflectingLobes { lanes: L::mask(false), share: L::one() }
             } else {
                 self.reflecting_lobes(&path, &interaction, interface_hit.as_ref())
@@ -192,7 +205,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 (out, counts),
             );
         }
-        if bounce == world.depth {
+        if bounce == depth {
             return false;
         }
         let bounce = bounce + 1;

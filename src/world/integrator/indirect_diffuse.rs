@@ -1,0 +1,204 @@
+//! Indirect diffuse light: bounces from matt surfaces, in generations.
+//!
+//! The first generation of a path is the tree of mirrors and glass that the camera ray reaches, as in
+//! a scene without indirect diffuse light. One of its hits is chosen for the diffuse bounce, with a
+//! probability in proportion to the light that it can pass on (weighted reservoir sampling, Chao
+//! 1982, *A General Purpose Unequal Probability Sampling Plan*). There the next generation starts, in
+//! a direction whose density is the cosine to the normal, divided by pi. Mirrors stay as free of
+//! noise as without diffuse bounces, and a path has at most one start per generation.
+//!
+//! Points of emitters are sampled at every hit. A ray that starts at a diffuse bounce therefore adds
+//! nothing where it reaches an emitter.
+
+use crate::bvh::Ray;
+use crate::lanes::{Frame, Mask, SimdFloat, Vec3};
+use crate::sampling::PacketSampler;
+use crate::sampling::warp::cosine_hemisphere;
+use crate::world::culling::tile::TileCandidates;
+use crate::world::integrator::coincident_surfaces::CoincidentState;
+use crate::world::integrator::interaction::SurfaceInteraction;
+use crate::world::integrator::nested_dielectrics::MediumStack;
+use crate::world::integrator::opaque::trace_opaque;
+use crate::world::integrator::path::{Counts, Path, Radiance};
+use crate::world::integrator::transmission::TransmissionIntegrator;
+use crate::world::world::World;
+
+/// Density of diffuse bounces for the weight of emitters that they reach: so small that the points
+/// sampled on the emitters have all the weight.
+const NO_DENSITY: f64 = 1e-30;
+
+/// Limits of the diffuse bounces of a world.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DiffuseLimits {
+    /// Largest number of diffuse bounces of a path, greater than 0.
+    pub depth: u32,
+    /// `true` if mirrors reflect and glass transmits after a diffuse bounce.
+    pub caustics: bool,
+}
+
+/// Rays of a generation.
+#[derive(Clone, Copy)]
+pub(crate) struct PathStart<L: SimdFloat> {
+    pub path: Path<L>,
+    pub lanes: L::Mask,
+    /// Media that the rays are inside of. `None` for camera rays.
+    pub media: Option<MediumStack<L>>,
+    /// State of rays that start on one of several coincident surfaces. `None` if no ray does.
+    pub coincident: Option<CoincidentState<L>>,
+    /// Largest number of surfaces after the first that reflect or transmit.
+    pub depth: u32,
+}
+
+impl<L: SimdFloat> PathStart<L> {
+    /// Camera rays.
+    #[inline(always)]
+    pub fn camera(ray: Ray<L>, lanes: L::Mask, depth: u32) -> Self {
+        Self { path: Path::new(ray), lanes, media: None, coincident: None, depth }
+    }
+}
+
+/// The hit that is chosen for the diffuse bounce, in each lane, among those of a generation.
+pub(crate) struct DiffuseReservoir<L: SimdFloat> {
+    /// Number of hits that were offered, over all lanes together.
+    offers: u32,
+    /// Lanes that have a hit.
+    lanes: L::Mask,
+    /// Sum of the weights of all hits that were offered.
+    sum: L,
+    /// Weight of the chosen hit: the largest channel of `throughput`.
+    weight: L,
+    /// Throughput up to the chosen hit, times its diffuse albedo.
+    throughput: Vec3<L>,
+    origin: Vec3<L>,
+    normal: Vec3<L>,
+    geometric: Vec3<L>,
+    media: MediumStack<L>,
+    coincident: Option<CoincidentState<L>>,
+}
+
+impl<L: SimdFloat> DiffuseReservoir<L> {
+    fn new() -> Self {
+        Self {
+            offers: 0,
+            lanes: L::mask(false),
+            sum: L::zero(),
+            weight: L::zero(),
+            throughput: Vec3::zero(),
+            origin: Vec3::zero(),
+            normal: Vec3::zero(),
+            geometric: Vec3::zero(),
+            media: MediumStack::vacuum(),
+            coincident: None,
+        }
+    }
+
+    /// Offers the hits of `path`. `media` and `coincident` are those of a ray that leaves on the
+    /// side from which the path arrived. Returns the lanes whose diffuse light is left to the
+    /// bounce.
+    #[inline(never)]
+    pub fn offer(
+        &mut self,
+        path: &Path<L>,
+        interaction: &SurfaceInteraction<L>,
+        (media, coincident): (&MediumStack<L>, Option<&CoincidentState<L>>),
+        sampler: &PacketSampler<'_, L>,
+    ) -> L::Mask {
+        let throughput = path.throughput.component_mul(interaction.diffuse);
+        let weight = throughput.max_element();
+        let lanes = interaction.direct_mask & weight.gt(L::zero());
+        if lanes.none() {
+            return lanes;
+        }
+        self.sum += weight.masked(lanes);
+        let mut taken = lanes;
+        if (self.lanes & lanes).any() {
+            let keeps = (sampler.reservoir_1d(self.offers) * self.sum).ge(weight);
+            taken = lanes.and_not(self.lanes & keeps);
+        }
+        self.offers += 1;
+        self.lanes = self.lanes | lanes;
+        self.weight = L::select(taken, weight, self.weight);
+        self.throughput = Vec3::select(taken, throughput, self.throughput);
+        self.origin = Vec3::select(taken, interaction.ray_origin(), self.origin);
+        self.normal = Vec3::select(taken, interaction.normal, self.normal);
+        self.geometric = Vec3::select(taken, interaction.geometric, self.geometric);
+        self.media = MediumStack::select(taken, media, &self.media);
+        self.coincident = match (self.coincident.take(), coincident) {
+            (None, None) => None,
+            (old, new) => {
+                let idle = |state: &CoincidentState<L>| CoincidentState {
+                    lanes: L::mask(false),
+                    ..*state
+                };
+                let (new, old) = match (new, old) {
+                    (Some(new), Some(old)) => (*new, old),
+                    (Some(new), None) => (*new, idle(new)),
+                    (None, Some(old)) => (idle(&old), old),
+                    (None, None) => return lanes,
+                };
+                Some(CoincidentState::select(taken, &new, &old))
+            }
+        };
+        lanes
+    }
+
+    /// Returns the rays of the next generation, whose direction comes from the numbers `u` and `v`.
+    fn start(&self, world: &World<L>, (u, v): (L, L), depth: u32) -> PathStart<L> {
+        let direction = Frame::around(self.normal).to_world(cosine_hemisphere(u, v));
+        // The largest channel of the throughput becomes the sum of all weights.
+        let scale = self.sum / L::select(self.lanes, self.weight, L::one());
+        let path = Path {
+            ray: Ray { origin: self.origin, direction },
+            throughput: Path::bounded(self.throughput * scale),
+            lobe_density: L::from_f64(NO_DENSITY),
+        };
+        let lanes = self.lanes
+            & direction.dot(self.geometric).gt(L::zero())
+            & path.throughput.max_element().ge(L::from_f64(world.min_weight));
+        PathStart { path, lanes, media: Some(self.media), coincident: self.coincident, depth }
+    }
+}
+
+/// Traces camera rays in a world with indirect diffuse light.
+#[inline(never)]
+pub(crate) fn trace_generations<L: SimdFloat>(
+    world: &World<L>,
+    limits: DiffuseLimits,
+    ray: Ray<L>,
+    candidates: &TileCandidates,
+    sampler: &PacketSampler<'_, L>,
+    active: L::Mask,
+    out: &mut Radiance<L>,
+) -> Counts {
+    let mut counts = Counts::default();
+    let mut start = PathStart::camera(ray, active, world.depth);
+    for generation in 0..=limits.depth {
+        let sampler = sampler.generation(generation);
+        let candidates = if generation == 0 { candidates } else { &world.all_candidates };
+        let mut reservoir = (generation < limits.depth).then(DiffuseReservoir::new);
+        let traced = match &world.nested_dielectrics {
+            Some(nested_dielectrics) => {
+                TransmissionIntegrator { world, nested_dielectrics, sampler: &sampler }.trace(
+                    start,
+                    candidates,
+                    reservoir.as_mut(),
+                    out,
+                )
+            }
+            None => {
+                let reservoir = reservoir.as_mut();
+                trace_opaque::<_, false, true>(world, start, candidates, &sampler, reservoir, out)
+            }
+        };
+        counts.rays += traced.rays;
+        counts.glossy |= traced.glossy;
+        let Some(reservoir) = reservoir else { break };
+        let depth = if limits.caustics { world.depth } else { 0 };
+        start = reservoir.start(world, sampler.diffuse_2d(generation), depth);
+        if start.lanes.none() {
+            break;
+        }
+        counts.glossy = true;
+    }
+    counts
+}

@@ -1,0 +1,155 @@
+//! Indirect diffuse light in closed forms: a furnace, and the inside of a sphere.
+
+use crate::support::{picture, rendered};
+use std::f64::consts::PI;
+use zerkalo::film::Replicates;
+use zerkalo::scene::Scene;
+use zerkalo::world::Precision;
+
+const SAMPLES: u32 = 64;
+
+fn scene(text: &str, bounces: u32) -> Scene {
+    let mut scene = Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"));
+    scene.trace.max_diffuse_depth = bounces;
+    scene
+}
+
+/// Mean, largest deviation from it, and standard error of the red channel.
+fn moments(scene: &Scene, precision: Precision) -> [f64; 3] {
+    let rendering = rendered(scene, 11, precision, SAMPLES);
+    assert_eq!(rendering.film.bad_samples().count, 0);
+    let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
+    let n = a.len() as f64;
+    let mean = a.iter().zip(&b).map(|(a, b)| 0.5 * (a[0] + b[0])).sum::<f64>() / n;
+    let deviation = a.iter().chain(&b).map(|p| (p[0] - mean).abs()).fold(0.0, f64::max);
+    let variance = a.iter().zip(&b).map(|(a, b)| (0.5 * (a[0] - b[0])).powi(2)).sum::<f64>() / n;
+    [mean, deviation, (variance / n).sqrt()]
+}
+
+/// White surfaces in a white furnace are white, after every number of bounces, in mirrors and behind
+/// glass as well. Ambient light of the same radiance stands for further bounces.
+#[test]
+fn furnace_is_white_at_every_diffuse_depth() {
+    let text = "film.size = [24, 18]
+        background.color = [1.0, 1.0, 1.0]
+        ambient.color = [1.0, 1.0, 1.0]
+        camera = { eye = [0.0, 1.0, 4.0], target = [0.0, 0.4, 0.0] }
+        [materials.white]
+        color = [1.0, 1.0, 1.0]
+        ambient = 1.0
+        diffuse = 1.0
+        [materials.half]
+        color = [1.0, 1.0, 1.0]
+        ambient = 0.5
+        diffuse = 0.5
+        reflection = 0.5
+        roughness = 0.3
+        [materials.glass]
+        color = [1.0, 1.0, 1.0]
+        ambient = 0.25
+        diffuse = 0.25
+        reflection = 0.25
+        transmission = 0.5
+        [[object]]
+        material = \"white\"
+        shape.platform = { center = [0.0, 0.0, 0.0], size = [4.0, 4.0] }
+        [[object]]
+        material = \"half\"
+        shape.sphere = { center = [-0.7, 0.5, 0.0], radius = 0.5 }
+        [[object]]
+        material = \"white\"
+        shape.cube = { corner = [0.1, 0.0, 0.3], edge = 0.7, rotation = 25.0 }
+        ";
+    let glass = "[[object]]
+        material = \"glass\"
+        shape.rectangle = { center = [0.2, 0.5, 1.2], size = [0.8, 0.8], normal = [0.1, 0.0, 1.0] }
+        ";
+    for (name, text) in [("opaque", text.to_string()), ("glass", format!("{text}{glass}"))] {
+        for bounces in [0, 1, 2, 5] {
+            for precision in [Precision::Single, Precision::Double] {
+                let mut scene = scene(&text, bounces);
+                scene.trace.max_depth = 64;
+                let [mean, deviation, _] = moments(&scene, precision);
+                println!("{name}, {bounces} bounces, {precision:?}: {mean} +- {deviation:.1e}");
+                // Every path has throughput 1 where it ends, apart from rounding.
+                assert!((mean - 1.0).abs() < 1e-5 && deviation < 1e-3, "{name}, {bounces}: {mean}");
+            }
+        }
+    }
+}
+
+/// A sphere of albedo rho around a light of intensity I, seen from inside: every bounce adds rho times
+/// the radiance of the one before, which is rho I / (pi R^2).
+#[test]
+fn sphere_from_inside_is_a_geometric_series() {
+    let (rho, radius, intensity) = (0.6, 2.0, 3.0);
+    let text = format!(
+        "film.size = [16, 12]
+        camera = {{ eye = [0.3, 0.2, 0.1], target = [0.0, -1.0, -0.5], view_angle.vertical = 70.0 }}
+        [[light]]
+        point.position = [0.0, 0.0, 0.0]
+        falloff = \"inverse-square\"
+        intensity = {intensity:?}
+        [materials.white]
+        color = [{rho:?}, {rho:?}, {rho:?}]
+        ambient = 0.0
+        diffuse = 1.0
+        [[object]]
+        material = \"white\"
+        shape.sphere = {{ center = [0.0, 0.0, 0.0], radius = {radius:?} }}"
+    );
+    for bounces in [0, 1, 2, 4, 9] {
+        for precision in [Precision::Single, Precision::Double] {
+            let direct = rho * intensity / (PI * radius * radius);
+            let expected: f64 = (0..=bounces).map(|k| direct * f64::powi(rho, k)).sum();
+            let scene = scene(&text, bounces as u32);
+            let [mean, deviation, _] = moments(&scene, precision);
+            println!("{bounces} bounces, {precision:?}: {mean}, expected {expected}");
+            // No sample deviates, because the light is equal everywhere.
+            let tolerance = 1e-4 * expected;
+            assert!(
+                (mean - expected).abs() < tolerance && deviation < tolerance,
+                "{bounces}: {mean}"
+            );
+        }
+    }
+}
+
+/// A floor beside a wall that is lit alone: the form factor between a point of the floor and the wall is
+/// known. The wall is 1 high and infinitely wide, with the radiosity of a directional light.
+#[test]
+fn light_of_a_wall_falls_on_the_floor_by_its_form_factor() {
+    let rho = 0.5;
+    for distance in [0.2, 1.0, 3.0] {
+        let text = format!(
+            "film = {{ size = [8, 8], filter = \"point\" }}
+            camera = {{ eye = [{distance:?}, 0.5, 0.0], target = [{distance:?}, 0.0, 0.0], \
+            up = [0.0, 0.0, 1.0], view_angle.vertical = 0.01 }}
+            [[light]]
+            directional.direction = [-1.0, 0.0, 0.0]
+            [materials.white]
+            color = [{rho:?}, {rho:?}, {rho:?}]
+            ambient = 0.0
+            diffuse = 1.0
+            [[object]]
+            material = \"white\"
+            shape.rectangle = {{ center = [0.0, 0.5, 0.0], size = [8000.0, 1.0], normal = [1.0, 0.0, 0.0] }}
+            [[object]]
+            material = \"white\"
+            shape.platform = {{ center = [5.0, 0.0, 0.0], size = [10.0, 10.0] }}"
+        );
+        // Radiance of the wall: rho times that of a white matt surface, 1. A strip from the floor up
+        // to the angle phi above the horizon has the form factor (1 - cos phi) / 2.
+        let cos = distance / f64::hypot(distance, 1.0);
+        let expected = rho * rho * 0.5 * (1.0 - cos);
+        // The light grazes the floor and leaves it dark.
+        let scene = scene(&text, 1);
+        let [mean, _, error] = moments(&scene, Precision::Double);
+        let z = (mean - expected).abs() / error;
+        println!("distance {distance}: {mean}, expected {expected}, z {z:.2}");
+        assert!(
+            z < 4.5 && error < 0.02 * expected,
+            "distance {distance}: {mean}, {expected}, z {z}"
+        );
+    }
+}
