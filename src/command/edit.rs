@@ -12,7 +12,7 @@ use crate::film::file::is_film_file;
 use crate::render::schedule::{Criterion, Settings};
 use crate::render::{Checkpoint, Options};
 use crate::sampling::{SampleSettings, SamplerKind};
-use crate::scene::{BUILT_IN, Recovery, SceneErrors, SceneFile, state_folder};
+use crate::scene::{OPENING, OPENING_NAME, Recovery, SceneErrors, SceneFile, state_folder};
 use crate::terminal::Environment;
 use crate::value::sanitized;
 use crate::world::{self, Precision};
@@ -20,9 +20,6 @@ use std::env;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// File name of the built-in scene.
-const BUILT_IN_NAME: &str = "mirror-room.toml";
 
 pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let environment = Environment::of(|name| env::var(name).ok());
@@ -46,7 +43,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let file = match (&checkpoint, &args.scene) {
         (Some(checkpoint), _) => Ok(scene_of(checkpoint, reporter.assets.clone())?),
         (None, Some(path)) => open(path, reporter.assets.clone(), state.as_deref())?,
-        (None, None) => SceneFile::untitled(BUILT_IN.to_string(), BUILT_IN_NAME)
+        (None, None) => SceneFile::untitled(OPENING.to_string(), OPENING_NAME)
             .map_err(|errors| (PathBuf::new(), errors)),
     };
     reporter.mute();

@@ -2,6 +2,12 @@
 
 use crate::scene::Scene;
 
+/// Text of the scene that the dashboard opens without a file: `scenes/lamp-and-mirror.toml`.
+pub const OPENING: &str = include_str!("../../scenes/lamp-and-mirror.toml");
+
+/// File name under which [`OPENING`] is saved.
+pub const OPENING_NAME: &str = "lamp-and-mirror.toml";
+
 /// Text of the built-in scene, the mirror room: `scenes/mirror-room.toml`.
 pub const BUILT_IN: &str = include_str!("../../scenes/mirror-room.toml");
 
@@ -22,7 +28,7 @@ mod tests {
     #[test]
     fn builtin_scenes_read_without_warnings() {
         assert!(built_in().objects.len() >= 6);
-        for text in [BUILT_IN, starter()] {
+        for text in [OPENING, BUILT_IN, starter()] {
             let scene = Scene::parse(text, "text").unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(scene.warnings(), []);
             assert!(text.starts_with("# "));

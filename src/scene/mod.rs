@@ -24,7 +24,7 @@ pub use crate::primitive::Acceleration;
 pub use crate::scene::format::schema::FIELDS;
 pub use crate::shape::{Rotate, Scale, TRANSFORM_OP_FIELDS, TransformOp};
 pub use asset_resolver::AssetResolver;
-pub use builtin::{BUILT_IN, built_in, starter};
+pub use builtin::{BUILT_IN, OPENING, OPENING_NAME, built_in, starter};
 pub use diagnostic::{Diagnostic, SceneErrors};
 pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};

@@ -3,7 +3,7 @@
 use crate::first_hits::{RASTER, centers, first_hits, pixel_ray};
 use crate::plain_tracer::{agrees, agrees_exactly, without_chance};
 use crate::row::{Verdict, ensure, material, object, row};
-use crate::support::{shipped, sized};
+use crate::support::{parsed, shipped, sized};
 use glam::DVec3;
 use zerkalo::camera::ViewAngle;
 use zerkalo::light::{Directional, Falloff, Light, Point, Spot};
@@ -325,6 +325,32 @@ fn d2_spot_light() {
             ("another outer angle", &|s| cone(s).outer_angle = 19.0),
             ("without falloff", &|s| s.lights[2].falloff = Falloff::None),
             ("without shadows", &|s| s.trace.ray_types = RayTypes::Primary),
+        ],
+    );
+}
+
+/// `scene` with a point light in place of the panel, which the plain tracer does not have.
+fn with_point_light(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    let light = parsed(
+        "[[light]]\npoint.position = [0.0, 1.9, 0.0]\nfalloff = \"inverse-square\"\nintensity = 2.0",
+    );
+    scene.lights = light.lights;
+    scene
+}
+
+#[test]
+fn d3_indirect_diffuse() {
+    let original = with_point_light(&shipped("indirect-diffuse.toml"));
+    row(
+        "indirect-diffuse.toml",
+        |tested| agrees(&original, &with_point_light(tested), 192),
+        &[
+            ("ambient light alone", &|s| s.trace.max_diffuse_depth = 0),
+            ("a bounce less", &|s| s.trace.max_diffuse_depth = 2),
+            ("a bounce more", &|s| s.trace.max_diffuse_depth = 4),
+            ("without caustics", &|s| s.trace.caustics = false),
+            ("another red", &|s| material(s, "red").color = Color([0.06, 0.06, 0.5])),
         ],
     );
 }

@@ -15,7 +15,7 @@ fn built_in_scene_opens_and_quits() {
     let fixture = Fixture::new();
     let mut terminal = fixture.open(&[], [120, 36]);
     wait_for_picture(&terminal);
-    terminal.wait_for_text("mirror-room");
+    terminal.wait_for_text("lamp-and-mirror");
     terminal.send("q");
     let (status, bytes) = terminal.end();
     assert_eq!(status, 0);

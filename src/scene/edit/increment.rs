@@ -237,7 +237,11 @@ impl StepRule {
             ValueType::Direction => Self::Direction,
             ValueType::Factor => Self::Factor,
             ValueType::Color(range) => Self::Units { unit: 0.05, range },
-            ValueType::Whole(range) if field.name == "rays_per_pixel" => Self::Doubles { range },
+            ValueType::Whole(range)
+                if matches!(field.name, "rays_per_pixel" | "max_diffuse_depth") =>
+            {
+                Self::Doubles { range }
+            }
             ValueType::Wholes(_, range) => Self::Doubles { range },
             ValueType::Whole(range) => Self::Tens { range },
             _ => return None,
