@@ -43,7 +43,8 @@ description! {
     }
 }
 
-fn up() -> [f64; 3] {
+/// Default of [`RectangleLight::up`].
+pub(super) fn up() -> [f64; 3] {
     [0.0, 1.0, 0.0]
 }
 

@@ -8,7 +8,11 @@ pub use area::{DiskLight, EmitterSurface, RectangleLight, SphereLight};
 pub use delta::{DeltaLight, LightSample, SpotCone};
 pub use emitter::{Emitter, EmitterSample};
 
-use crate::value::{Color, Description, Field, ValidationError, choices, description};
+use glam::DVec3;
+
+use crate::value::{
+    Color, Description, Field, ValidationError, choices, description, round_nice, round_significant,
+};
 
 description! {
     /// A light: exactly one of `point`, `directional`, `spot`, `sphere`, `rectangle` and `disk`, a
@@ -99,6 +103,9 @@ choices! {
     }
 }
 
+/// Keys of the kinds, of which each light has exactly one.
+pub const KINDS: &[&str] = &["point", "directional", "spot", "sphere", "rectangle", "disk"];
+
 /// Keys of `[[light]]`.
 pub const FIELDS: &[Field] = Light::FIELDS;
 
@@ -108,16 +115,21 @@ impl Light {
         self.point.map(|point| point.position).or(self.spot.map(|spot| spot.position))
     }
 
-    /// Direction in which a directional light travels, or the axis of a spot light; `None` for any
-    /// other light.
+    /// Direction in which a directional light travels, the axis of a spot light, or the normal of a
+    /// flat light; `None` for any other light.
     pub fn direction(&self) -> Option<[f64; 3]> {
-        self.directional.map(|sun| sun.direction).or(self.spot.map(|spot| spot.direction))
+        let directional = self.directional.map(|sun| sun.direction);
+        let rectangle = self.rectangle.map(|rectangle| rectangle.normal);
+        let flat = rectangle.or(self.disk.map(|disk| disk.normal));
+        directional.or(self.spot.map(|spot| spot.direction)).or(flat)
     }
 
     /// [`Light::direction`], to be changed.
     pub fn direction_mut(&mut self) -> Option<&mut [f64; 3]> {
         let directional = self.directional.as_mut().map(|sun| &mut sun.direction);
-        directional.or(self.spot.as_mut().map(|spot| &mut spot.direction))
+        let rectangle = self.rectangle.as_mut().map(|rectangle| &mut rectangle.normal);
+        let flat = rectangle.or(self.disk.as_mut().map(|disk| &mut disk.normal));
+        directional.or(self.spot.as_mut().map(|spot| &mut spot.direction)).or(flat)
     }
 
     /// Returns the validation errors of the light.
@@ -191,6 +203,28 @@ impl Light {
         let sphere = self.sphere.map(EmitterSurface::Sphere);
         let rectangle = self.rectangle.map(EmitterSurface::Rectangle);
         sphere.or(rectangle).or(self.disk.map(EmitterSurface::Disk))
+    }
+
+    /// Removes the kind of the light.
+    pub fn clear_kind(&mut self) {
+        (self.point, self.directional, self.spot) = (None, None, None);
+        (self.sphere, self.rectangle, self.disk) = (None, None, None);
+    }
+
+    /// Adds a surface of the kind `name` with the given radius; of a rectangle it is half of each
+    /// side. The numbers are rounded. Other names are ignored.
+    pub fn set_surface(&mut self, name: &str, center: DVec3, normal: [f64; 3], radius: f64) {
+        let center = center.map(|x| round_nice(x, radius)).to_array();
+        let radius = round_significant(radius, 2);
+        match name {
+            "sphere" => self.sphere = Some(SphereLight { center, radius }),
+            "rectangle" => {
+                let size = [2.0 * radius; 2];
+                self.rectangle = Some(RectangleLight { center, size, normal, up: area::up() });
+            }
+            "disk" => self.disk = Some(DiskLight { center, radius, normal }),
+            _ => {}
+        }
     }
 
     /// Position of the light: the point, or the centre of the surface. `None` for a directional

@@ -57,6 +57,14 @@ and every key with a default may be left out. Unknown keys are errors.
   of the lit point. So a light on the ceiling lights all of the room; the surface itself stays dark.
   A solid occludes what is behind it. An open surface (plane, platform, rectangle) has no inside, so
   that a light on it lights both sides: to light one, move the light off it.
+- A sphere, rectangle or disk light is a radiating surface without a body: rays pass through it, it
+  casts no shadow, and it vanishes when it is switched off. An object behind or inside it is its
+  housing; on an object's surface it shines outwards. Camera and reflected rays see it unless `visible
+  = false`. `specular` highlights show it as well, so that a material with both `specular` and
+  `reflection` shows it twice: leave `specular` out for the plain reflection.
+- With `unit = \"radiance\"` the intensity of such a light is its radiance [W/(sr m\u{b2})]: a light of
+  intensity 1 is white in the picture. With `unit = \"power\"` it is the emitted power [W], pi x
+  radiance x area. The area is that of the side that shines, or of the whole sphere.
 - A texture multiplies the `color` of its material in the ambient and the diffuse part. White leaves
   it unchanged: `color = [1.0, 1.0, 1.0]` with `texture.image = { file = \"wood.png\", scale =
   [2.0, 2.0] }` or `texture.checker = { even = \"#ffffff\", odd = \"#202020\" }`. A bump,

@@ -84,6 +84,12 @@ fn field_tables_match_deserialised_keys() {
         inner(crate::light::FIELDS, "directional"),
     );
     same_keys::<crate::light::Spot>("spot", inner(crate::light::FIELDS, "spot"));
+    same_keys::<crate::light::SphereLight>("sphere", inner(crate::light::FIELDS, "sphere"));
+    same_keys::<crate::light::RectangleLight>(
+        "rectangle",
+        inner(crate::light::FIELDS, "rectangle"),
+    );
+    same_keys::<crate::light::DiskLight>("disk", inner(crate::light::FIELDS, "disk"));
     same_keys::<Material>("material", crate::material::FIELDS);
     same_keys::<Texture>("texture", inner(crate::material::FIELDS, "texture"));
     same_keys::<Bump>("bump", inner(crate::material::FIELDS, "bump"));

@@ -9,6 +9,7 @@
 //! at each ratio.
 
 use crate::camera::PerspectiveCamera;
+use crate::light::EmitterSurface;
 use crate::primitive::{BoundingSphere, Form, HalfSpace, Proxy, ProxyFace};
 use crate::scene::Scene;
 use crate::world::clearance::clearance;
@@ -69,9 +70,19 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     {
         return false;
     }
-    let lamps = scene.lights.iter().filter(|l| l.on).filter_map(|l| l.apex());
+    let lights = || scene.lights.iter().filter(|light| light.on);
+    let lamps = lights().filter_map(|light| light.apex());
     let mut distances = lamps.map(|lamp| clearance(forms, DVec3::from(lamp) - origin));
     if distances.any(|distance| extent > MAX_EXTENT_PER_LIGHT_DISTANCE * distance) {
+        return false;
+    }
+    let mut surfaces = lights().filter_map(|light| light.surface());
+    let is_fine = |surface: EmitterSurface| {
+        // Rounding of the coordinates may move a part of the surface.
+        let largest = (surface.center() - origin).abs().max_element() + surface.radius();
+        extent.max(largest) > MAX_EXTENT_PER_THICKNESS * surface.thickness()
+    };
+    if surfaces.any(is_fine) {
         return false;
     }
     let rounded = 16.0 * f64::EPSILON * origin.abs().max_element();

@@ -166,8 +166,7 @@ impl Reach {
 /// the largest factor of one surface. The paths that have hit n surfaces therefore have a total
 /// throughput of at most w(n) = r^(n/2) for even n, and w(n) = r^((n-1)/2) f for odd n. The total
 /// over n and all larger numbers is at most (w(n) + w(n + 1)) / (1 - r). The lost radiance is at
-/// most this total times the radiance of the brightest surface (or of the background, if that is
-/// brighter). Nothing is truncated only if no surface reflects or transmits, or if the only one
+/// most this total times the radiance of the brightest surface, light with a size, or background. Nothing is truncated only if no surface reflects or transmits, or if the only one
 /// that does is flat or convex, which a path hits once.
 ///
 /// With diffuse bounces the factor of a surface includes its diffuse albedo. A path is cut off by

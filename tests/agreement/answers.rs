@@ -85,6 +85,42 @@ fn masking(material: &Material, ggx: bool, alpha: f64, n: DVec3, v: DVec3, l: DV
     }
 }
 
+/// Smallest roughness from which the light of a lamp in a lobe is found at points of the lamp.
+const WIDE: f64 = 0.12;
+
+/// Returns the value of the reflection lobe, with the cosine of the light. Returns `None` for lobes
+/// whose lamps are found by reflected rays: narrow ones, and square ones.
+pub fn wide_lobe(
+    material: &Material,
+    n: DVec3,
+    v: DVec3,
+    l: DVec3,
+    horizon: BelowHorizon,
+) -> Option<DVec3> {
+    if material.roughness < WIDE || material.reflection == 0.0 {
+        return None;
+    }
+    match material.lobe {
+        Lobe::Mirror | Lobe::Square => None,
+        Lobe::Cone => {
+            let mirror = 2.0 * n.dot(v) * n - v;
+            let cos = 1.0 / (1.0 + material.roughness.powi(2)).sqrt();
+            let inside = |l: DVec3| if mirror.dot(l) >= cos { 1.0 } else { 0.0 };
+            let folded =
+                if horizon == BelowHorizon::Fold { inside(l - 2.0 * l.dot(n) * n) } else { 0.0 };
+            let density = (inside(l) + folded) / (TAU * (1.0 - cos));
+            let k = material.reflection * density;
+            Some(fresnel(material, v.dot((v + l).normalize())) * k)
+        }
+        Lobe::Beckmann | Lobe::Ggx => {
+            // The highlight of the same microfacets.
+            let (highlight_model, specular) = (Highlight::CookTorrance, material.reflection);
+            let like = Material { highlight: highlight_model, specular, ..material.clone() };
+            Some(highlight(&like, n, v, l))
+        }
+    }
+}
+
 /// Highlight: radiance towards `v` per irradiance of a surface that faces the light.
 pub fn highlight(material: &Material, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
     let k = material.specular;

@@ -7,6 +7,7 @@ mod answers;
 mod common;
 mod compare;
 mod compounds;
+mod lamps;
 mod meshes;
 #[path = "../common/normal.rs"]
 mod normal;
@@ -32,7 +33,7 @@ const REFERENCE_SAMPLES: u32 = 96;
 const SAMPLES: u32 = 512;
 
 /// Scenes that must be compared.
-const GALLERY: [&str; 12] = [
+const GALLERY: [&str; 15] = [
     "mirror-room.toml",
     "gallery-triptych.toml",
     "gallery-metals.toml",
@@ -45,6 +46,9 @@ const GALLERY: [&str; 12] = [
     "texture-uv.toml",
     "bump.toml",
     "depth-of-field.toml",
+    "sphere-light.toml",
+    "rectangle-light.toml",
+    "disk-light.toml",
 ];
 
 #[test]
@@ -119,6 +123,8 @@ fn deliberate_errors_are_detected() {
         (Mutation::SunkenBumps, "bump.toml"),
         (Mutation::NoJacobian, "rough-glass.toml"),
         (Mutation::HalfAbsorption, "absorbing-glass.toml"),
+        (Mutation::NoLampCosine, "disk-light.toml"),
+        (Mutation::LampSeenTwice, "rectangle-light.toml"),
     ] {
         check_detection(mutation, name, &scene(name), 8 * REFERENCE_SAMPLES);
     }

@@ -1,8 +1,9 @@
 //! Reference path tracer in double precision, one sample at a time, optimised for readability.
 
-use crate::answers::{highlight, reflect};
+use crate::answers::{highlight, reflect, wide_lobe};
 use crate::common::Numbers;
 use crate::compounds::Body;
+use crate::lamps::Lamp;
 use crate::meshes;
 use crate::paint::Pixels;
 use crate::through::Way;
@@ -51,12 +52,19 @@ pub enum Mutation {
     OtherIndex,
     /// Absorbed light falls off by the square root of the distance's share.
     HalfAbsorption,
+    /// The cosine at the surface of a lamp is omitted.
+    NoLampCosine,
+    /// Reflected rays see lamps whose light in the lobe was found at points of the lamp, too, as
+    /// if two techniques were added without weights.
+    LampSeenTwice,
 }
 
 /// A scene to trace.
 pub struct Tracer<'a> {
     pub scene: &'a Scene,
     pub bodies: Vec<Body>,
+    /// Lamp of each light of the scene; `None` for a light without a size.
+    lamps: Vec<Option<Lamp>>,
     /// Images by file name.
     pub images: HashMap<String, Pixels>,
     plain: Material,
@@ -93,11 +101,9 @@ impl<'a> Tracer<'a> {
     /// Names a feature of the scene that this tracer does not support.
     pub fn new(scene: &'a Scene, mutation: Mutation) -> Result<Self, String> {
         let bodies = scene.objects.iter().map(Body::new).collect::<Result<Vec<_>, _>>()?;
-        let images = HashMap::new();
-        let mut tracer = Self { scene, bodies, images, plain: Material::default(), mutation };
-        if scene.lights.iter().any(|l| l.point.is_none() && l.directional.is_none()) {
-            return Err("lights with a size".to_string());
-        }
+        let (images, plain) = (HashMap::new(), Material::default());
+        let lamps = scene.lights.iter().map(Lamp::new).collect();
+        let mut tracer = Self { scene, bodies, lamps, images, plain, mutation };
         for material in scene.materials.values() {
             unknown_keys(material)?;
             tracer.open_images(material)?;
@@ -150,12 +156,20 @@ impl<'a> Tracer<'a> {
         let max_depth = if diffuse > 0 && !trace.caustics { 0 } else { trace.max_depth };
         let mut weight = DVec3::ONE;
         let mut radiance = DVec3::ZERO;
+        // `false` after a surface that got the light of lamps from their points.
+        let mut sees_lamps = diffuse == 0;
         for bounce in 0.. {
             let hit = self.meet(origin, direction);
+            let end = hit.as_ref().map_or(f64::INFINITY, |hit| hit.point.distance(origin));
+            // Lamps are outside of absorbing solids.
+            if sees_lamps || self.mutation == Mutation::LampSeenTwice {
+                radiance += weight * self.glow(origin, direction, end);
+            }
             weight *= self.transmittance(origin, hit.as_ref().map(|hit| hit.point), direction);
             let Some(hit) = hit else {
                 return radiance + weight * DVec3::from(self.scene.background.color.0);
             };
+            sees_lamps = true;
             let through = trace.ray_types == RayTypes::Full && hit.material.transmission > 0.0;
             if through && trace.max_depth > 0 {
                 let way = self.through(&hit, direction, numbers);
@@ -181,6 +195,9 @@ impl<'a> Tracer<'a> {
             if !reflects || bounce == max_depth {
                 return radiance;
             }
+            let lamps_in_lobe = self.lamps_in_lobe(&hit, -direction, numbers);
+            radiance += weight * lamps_in_lobe.unwrap_or_default();
+            sees_lamps = lamps_in_lobe.is_none();
             let turned = reflect(
                 hit.material,
                 hit.seen,
@@ -296,6 +313,46 @@ impl<'a> Tracer<'a> {
         self.scene.materials.get(name).unwrap_or(&self.plain)
     }
 
+    /// Radiance of the visible lamps that a ray reaches before the distance `end`.
+    fn glow(&self, origin: DVec3, direction: DVec3, end: f64) -> DVec3 {
+        let lamps = self.scene.lights.iter().zip(&self.lamps).filter(|(l, _)| l.on && l.visible);
+        let seen = lamps.filter_map(|(light, lamp)| {
+            let lamp = lamp.as_ref()?;
+            // Lamps on a surface are in front of it.
+            let t = lamp.meet(origin, direction)? * (1.0 - 1e-9);
+            let radiance = lamp.radiance(light.unit) * light.intensity;
+            (t < end).then_some(DVec3::from(light.color.0) * radiance)
+        });
+        seen.sum()
+    }
+
+    /// Light of the visible lamps that a wide lobe reflects, from a point of each lamp. `None` if
+    /// reflected rays find the lamps.
+    fn lamps_in_lobe(&self, hit: &Hit, view: DVec3, numbers: &mut Numbers) -> Option<DVec3> {
+        let (m, horizon) = (hit.material, self.scene.trace.below_horizon);
+        if hit.seen != hit.normal {
+            return None;
+        }
+        let lamps = self.scene.lights.iter().zip(&self.lamps).filter(|(l, _)| l.on && l.visible);
+        let mut sum = DVec3::ZERO;
+        wide_lobe(m, hit.seen, view, hit.seen, horizon)?;
+        for (light, lamp) in lamps.filter_map(|(light, lamp)| Some((light, lamp.as_ref()?))) {
+            let Some((towards, distance, irradiance)) =
+                lamp.sample(hit.point, self.mutation, numbers)
+            else {
+                continue;
+            };
+            let distance = distance * (1.0 - 1e-9);
+            if hit.normal.dot(towards) <= 0.0 || self.in_shadow(hit.point, towards, distance) {
+                continue;
+            }
+            let value = wide_lobe(m, hit.seen, view, towards, horizon)?;
+            let radiance = light.intensity * lamp.radiance(light.unit);
+            sum += value * DVec3::from(light.color.0) * (radiance * irradiance);
+        }
+        Some(sum)
+    }
+
     /// Direct light, and the light of a diffuse bounce, after `diffuse` such bounces.
     fn lit(&self, hit: &Hit, view: DVec3, diffuse: u32, numbers: &mut Numbers) -> DVec3 {
         let trace = &self.scene.trace;
@@ -303,7 +360,8 @@ impl<'a> Tracer<'a> {
         let bounces = trace.ray_types == RayTypes::Full
             && diffuse < trace.max_diffuse_depth
             && albedo.max_element() > 0.0;
-        let mut sum = self.shade(hit, view, !bounces || self.mutation == Mutation::AmbientTwice);
+        let mut sum =
+            self.shade(hit, view, !bounces || self.mutation == Mutation::AmbientTwice, numbers);
         if bounces {
             // A point of the unit sphere that touches the surface.
             let mut onward = (hit.seen + numbers.direction()).normalize_or(hit.seen);
@@ -319,13 +377,23 @@ impl<'a> Tracer<'a> {
     }
 
     /// Direct light of all lights, with or without ambient light.
-    fn shade(&self, hit: &Hit, view: DVec3, ambient: bool) -> DVec3 {
+    fn shade(&self, hit: &Hit, view: DVec3, ambient: bool, numbers: &mut Numbers) -> DVec3 {
         let m = hit.material;
         let color = DVec3::from(m.color.0) * hit.tint;
         let ambient = if ambient { m.ambient } else { 0.0 };
         let mut sum = color * ambient * DVec3::from(self.scene.ambient.color.0);
         for (i, light) in self.scene.lights.iter().enumerate().filter(|(_, l)| l.on) {
-            let (towards, distance, irradiance) = arrival(light, hit.point, self.mutation);
+            let (towards, distance, irradiance) = match &self.lamps[i] {
+                None => arrival(light, hit.point, self.mutation),
+                Some(lamp) => {
+                    let Some(sample) = lamp.sample(hit.point, self.mutation, numbers) else {
+                        continue;
+                    };
+                    let radiance = light.intensity * lamp.radiance(light.unit);
+                    let irradiance = DVec3::from(light.color.0) * (radiance * sample.2);
+                    (sample.0, sample.1 * (1.0 - 1e-9), irradiance)
+                }
+            };
             let mut cos = hit.seen.dot(towards);
             let behind = cos <= 0.0 || hit.normal.dot(towards) <= 0.0;
             if behind || self.in_shadow(hit.point, towards, distance) {

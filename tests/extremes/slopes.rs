@@ -78,6 +78,13 @@ fn lens_error_converges_like_four_dimensions() {
     check_scene("slope-aa.toml through a lens", &scene, -0.58);
 }
 
+/// Samples have six dimensions: the position in the pixel, the direction in the lobe, and the point
+/// of the light.
+#[test]
+fn light_error_through_a_rough_mirror_converges_like_smooth_dimensions() {
+    check("slope-light.toml", -0.65);
+}
+
 /// Samples have four dimensions: the position in the pixel and the direction in the lobe.
 #[test]
 fn lobe_error_with_anti_aliasing_converges_like_four_dimensions() {

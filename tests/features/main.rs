@@ -16,6 +16,8 @@ mod compare;
 #[path = "../agreement/compounds.rs"]
 mod compounds;
 #[allow(dead_code, reason = "shared with tests/agreement")]
+#[path = "../agreement/lamps.rs"]
+mod lamps;
 #[path = "../agreement/meshes.rs"]
 mod meshes;
 #[path = "../common/normal.rs"]
@@ -41,6 +43,7 @@ mod plain_tracer;
 mod row;
 
 mod camera;
+mod emitters;
 mod extents;
 mod glass;
 mod light;

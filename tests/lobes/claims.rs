@@ -314,3 +314,37 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
     // Densities of the square lobe are stated in its frame.
     assert!(vector(Frame::around(Vec3::<f64>::of(n)).n) == n);
 }
+
+/// Value over density of a lobe in a sampled direction is the weight of the sample, whether
+/// directions below the surface are mirrored up or absorbed.
+#[test]
+fn value_over_density_is_the_weight_of_the_sample() {
+    let n = tilted_normal();
+    let mut compared = 0;
+    for (lobe, masking) in every_lobe().into_iter().filter(|(lobe, _)| *lobe != Lobe::Mirror) {
+        for (fold, degrees) in [true, false].into_iter().flat_map(|f| [(f, 3.0f64), (f, 80.0)]) {
+            let mut material = reflector(lobe, masking, 0.6);
+            material.fresnel = Some(Fresnel::Exact);
+            material.f0 = Some(Color([0.9, 0.5, 0.04]));
+            let finish = Bsdf::<f64>::new(&material, true);
+            let (strength, spread) = finish.reflection.unwrap();
+            let incident = combine(&[(-1.0, at_angle(n, degrees.to_radians(), 1.0))]);
+            let draws = Numbers::sobol(5);
+            each_reflection::<f64>(&material, (incident, n), fold, draws, 400, |d, weight| {
+                if weight == [0.0; 3] {
+                    return;
+                }
+                let (incident, normal) = (Vec3::<f64>::of(incident), Vec3::of(n));
+                let direction = Vec3::of(d);
+                let (value, density) =
+                    finish.evaluate_lobe(strength, &spread, incident, normal, direction, fold);
+                for (w, value) in weight.into_iter().zip(vector(value)) {
+                    let error = (value / density / w - 1.0).abs();
+                    assert!(error < 1e-9, "{lobe:?} {masking:?} {degrees} {fold}: {error:e}");
+                    compared += 1;
+                }
+            });
+        }
+    }
+    assert!(compared > 5000, "{compared}");
+}

@@ -25,6 +25,9 @@ pub fn light_kinds() -> Vec<Word> {
         ("point", "Light from one point, such as a lamp."),
         ("directional", "Light from infinitely far away, such as the sun."),
         ("spot", "Light from one point into a cone, such as a spotlight."),
+        ("sphere", "Light from a sphere, such as a bulb: soft shadows."),
+        ("rectangle", "Light from one side of a rectangle, such as a window."),
+        ("disk", "Light from one side of a disk."),
     ];
     words.map(|(name, doc)| Word { name: name.into(), doc: doc.into() }).to_vec()
 }
@@ -181,17 +184,28 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
             "spot"
         }
         _ => {
-            let found = format!("there is no kind of light called \"{kind}\"");
-            let expected = "Expected \"point\", \"directional\" or \"spot\".";
-            return Err(EditError::new(&found, expected));
+            light.set_surface(kind, center + from * (1.5 * radius), direction, radius / 5.0);
+            if light.surface().is_none() {
+                let found = format!("there is no kind of light called \"{kind}\"");
+                let kinds = crate::light::KINDS.join(", ");
+                return Err(EditError::new(&found, &format!("Expected one of {kinds}.")));
+            }
+            "lamp"
         }
     };
     light.name = free_light(scene, name);
     // A second light adds to the first, so that it gets half the intensity.
     light.intensity = if scene.lights.iter().any(|l| l.on) { 0.5 } else { 1.0 };
+    if let Some(surface) = light.surface() {
+        // As bright in the middle of the scene as a light without falloff.
+        let squared = (from * (1.5 * radius)).length_squared();
+        let seen = std::f64::consts::PI * surface.radius().powi(2);
+        let factor = std::f64::consts::PI * squared / seen;
+        light.intensity = round_significant(light.intensity * factor, 2);
+    }
     let physical = scene.lights.iter().all(|l| l.falloff == Falloff::InverseSquare);
     let mut note = None;
-    if physical && !scene.lights.is_empty() && light.position().is_some() {
+    if physical && !scene.lights.is_empty() && light.apex().is_some() {
         // With the inverse square, as the other lights have, the brightness in the middle stays
         // that of a light without falloff.
         let squared = (from * (1.5 * radius)).length_squared();
@@ -304,8 +318,12 @@ mod tests {
                 (None, None) => panic!(),
             };
             assert!(x < 0.0, "the lamp that is there stands to the right");
-            let names = [("point", "lamp 2"), ("directional", "sun"), ("spot", "spot")];
-            assert!(names.contains(&(word.name.as_str(), light.name.as_str())), "{}", light.name);
+            let name = match word.name.as_str() {
+                "directional" => "sun",
+                "spot" => "spot",
+                _ => "lamp 2",
+            };
+            assert_eq!(light.name, name, "{}", word.name);
         }
         assert!(add_light(&scene, "area").is_err());
         let physical = "light = [{ point.position = [3, 3, 3], intensity = 40, \

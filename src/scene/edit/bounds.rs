@@ -36,8 +36,10 @@ pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
             })
         }
         Target::Light(i) => {
-            let position = scene.lights.get(*i)?.position()?;
-            Some(BoundingSphere { center: position, radius: scene_bounds(scene).radius / 10.0 })
+            let light = scene.lights.get(*i)?;
+            let usual = scene_bounds(scene).radius / 10.0;
+            let radius = light.surface().map_or(usual, |surface| surface.radius().max(usual));
+            Some(BoundingSphere { center: light.position()?, radius })
         }
         Target::Material(name) => {
             let used = scene.objects.iter().filter(|o| o.names_material(name));

@@ -2,7 +2,7 @@
 //! brightness are kept where possible.
 
 use crate::camera::{Camera, Focus, ViewAngle};
-use crate::light::{Directional, Falloff, Light, Point, Spot};
+use crate::light::{Directional, EmitterSurface, Falloff, Light, LightUnit, Point, Spot};
 use crate::material::{Bump, Material, Texture};
 use crate::scene::Scene;
 use crate::scene::edit::bounds::scene_bounds;
@@ -15,16 +15,20 @@ use crate::value::{
     Field, NumberRange, ValueType, number, round_nice, round_significant, rounded_to, unit,
 };
 use glam::DVec3;
+use std::f64::consts::PI;
 use toml::{Table, Value};
 
-/// Field for the choice between the kinds of a light. It is a row of the inspector;
-/// scene files have no such key.
+/// Field for the choice between the kinds of a light. It is a row of the inspector; scene files have
+/// no such key.
 pub(super) const KIND: Field = Field::required(
     "kind",
     ValueType::OneOf(&[
         Field::required("point", ValueType::Text, "", "Light from one point."),
         Field::required("directional", ValueType::Text, "", "Light from infinitely far away."),
         Field::required("spot", ValueType::Text, "", "Light from one point into a cone."),
+        Field::required("sphere", ValueType::Text, "", "Light from a sphere."),
+        Field::required("rectangle", ValueType::Text, "", "Light from one side of a rectangle."),
+        Field::required("disk", ValueType::Text, "", "Light from one side of a disk."),
     ]),
     "",
     "Kind of light source.",
@@ -135,9 +139,13 @@ fn rotation(shape: &Shape) -> f64 {
 /// Angle of the outer cone of spot lights that are added or converted \[degrees\].
 pub(super) const SPOT_ANGLE: f64 = 30.0;
 
-/// Converts a light. Its brightness and its direction at the centre of the scene are kept. A point
-/// light that becomes a spot light is aimed at the centre of the scene.
+/// Converts a light. Its brightness and its direction at the centre of the scene are kept. A light
+/// with a position keeps it and is aimed at the centre of the scene, if it has a direction; a light
+/// with a size keeps its size.
 fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> {
+    if light.kinds() == [name] {
+        return None;
+    }
     let ball = scene_bounds(scene);
     let center = DVec3::from_array(ball.center);
     let along = match (light.direction(), light.position()) {
@@ -149,28 +157,55 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     let direction = light.direction().unwrap_or(along.map(|x| rounded_to(x, -3)).to_array());
     let far = || (center - along * (3.0 * ball.radius)).map(|x| round_nice(x, ball.radius));
     let position = light.position().unwrap_or_else(|| far().to_array());
-    match name {
-        "point" if light.point.is_none() => {
-            (light.directional, light.spot) = (None, None);
-            light.point = Some(Point { position });
-            None
+    let radius = match light.surface() {
+        Some(EmitterSurface::Rectangle(rectangle)) => {
+            0.5 * (rectangle.size[0] * rectangle.size[1]).sqrt()
         }
-        "spot" if light.spot.is_none() => {
-            (light.point, light.directional) = (None, None);
+        Some(surface) => surface.radius(),
+        None => ball.radius / 5.0,
+    };
+    let old = light.clone();
+    light.clear_kind();
+    match name {
+        "point" => light.point = Some(Point { position }),
+        "directional" => light.directional = Some(Directional { direction }),
+        "spot" => {
             let (outer_angle, inner_angle) = (SPOT_ANGLE, 0.5 * SPOT_ANGLE);
             light.spot = Some(Spot { position, direction, outer_angle, inner_angle });
-            None
         }
-        "directional" if light.directional.is_none() => {
-            (light.point, light.spot) = (None, None);
-            light.directional = Some(Directional { direction });
-            (light.falloff == Falloff::InverseSquare).then(|| {
-                light.falloff = Falloff::None;
-                let squared = (center - DVec3::from_array(position)).length_squared();
-                refit(light, 1.0 / (std::f64::consts::PI * squared))
-            })
+        _ => light.set_surface(name, position.into(), direction, radius),
+    }
+    if light.surface().is_none() {
+        (light.unit, light.visible) = (LightUnit::Radiance, true);
+    }
+    if light.apex().is_none() {
+        light.falloff = Falloff::None;
+    }
+    let factor = irradiance_at(&old, center) / irradiance_at(light, center);
+    ((factor - 1.0).abs() > 1e-3 && factor.is_finite()).then(|| refit(light, factor))
+}
+
+/// Returns the irradiance of a light of unit intensity on a surface at `point` that faces it, on the
+/// axis of a spot light. For lights with a size it is that of a distant light of the same area, at
+/// most that of a hemisphere.
+fn irradiance_at(light: &Light, point: DVec3) -> f64 {
+    let Some(position) = light.position() else { return PI };
+    let squared = (DVec3::from_array(position) - point).length_squared();
+    match light.surface() {
+        None if light.falloff == Falloff::None => PI,
+        None => 1.0 / squared,
+        Some(surface) => {
+            let radiance = match light.unit {
+                LightUnit::Radiance => 1.0,
+                LightUnit::Power => 1.0 / (PI * surface.area()),
+            };
+            // A sphere shows a quarter of its area to a distant point.
+            let shown = match surface {
+                EmitterSurface::Sphere(_) => 0.25 * surface.area(),
+                _ => surface.area(),
+            };
+            radiance * (shown / squared).min(PI)
         }
-        _ => None,
     }
 }
 
@@ -329,6 +364,25 @@ mod tests {
         let upright = set(&scene, &Target::Object(3), "shape", "prism").unwrap();
         let Shape::Prism(prism) = &upright.scene.objects[3].shape else { panic!() };
         assert_eq!((prism.rotation, prism.side, prism.corner[1]), (30.0, 0.8, 0.0));
+    }
+
+    #[test]
+    fn lights_of_every_kind_become_each_other() {
+        let scene = built_in();
+        let lamp = Target::Light(0);
+        let center = DVec3::from_array(scene_bounds(&scene).center);
+        let irradiance = |light: &Light| light.intensity * irradiance_at(light, center);
+        for from in crate::light::KINDS {
+            let from = set(&scene, &lamp, "kind", from).unwrap().scene;
+            for to in crate::light::KINDS {
+                let edit = set(&from, &lamp, "kind", to).unwrap();
+                assert_eq!(edit.scene.faults(), []);
+                let light = &edit.scene.lights[0];
+                assert_eq!(light.kinds(), [*to]);
+                let ratio = irradiance(light) / irradiance(&from.lights[0]);
+                assert!((ratio - 1.0).abs() < 0.01, "{to}: {ratio}");
+            }
+        }
     }
 
     #[test]

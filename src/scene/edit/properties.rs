@@ -82,7 +82,15 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
         Target::Camera | Target::View(_) => Some(&AIM),
         _ => None,
     };
+    let has_size = match subject {
+        Target::Light(i) => scene.lights.get(*i).is_some_and(|light| light.surface().is_some()),
+        _ => true,
+    };
     for field in fields(subject) {
+        if !has_size && matches!(field.name, "unit" | "visible") {
+            // Only lights with a size have these.
+            continue;
+        }
         if let Some(kind) = virtual_kind
             && exclusive_keys(subject).contains(&field.name)
         {

@@ -32,6 +32,9 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
             if let Some(direction) = light.direction_mut() {
                 *direction = turned(*direction, degrees);
             }
+            if let Some(rectangle) = &mut light.rectangle {
+                rectangle.up = turned(rectangle.up, degrees);
+            }
             if let Some(position) = light.position_mut() {
                 let pivot = scene_bounds(scene).center;
                 let offset = std::array::from_fn(|i| position[i] - pivot[i]);

@@ -29,7 +29,7 @@ pub(super) fn fields(subject: &Target) -> &'static [Field] {
 pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],
-        Target::Light(_) => &["point", "directional", "spot"],
+        Target::Light(_) => crate::light::KINDS,
         Target::Material(_) => &["f0", "metal"],
         _ => &[],
     }

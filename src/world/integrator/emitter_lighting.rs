@@ -98,7 +98,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
     (out, counts): (&mut Radiance<L>, &mut Counts),
 ) {
     let mut glossy = L::mask(false);
-    for (index, lanes) in interaction.bsdfs(lobes.lanes) {
+    for (index, lanes) in interaction.bsdfs(lobes.lanes.and_not(interaction.shaded)) {
         if !matches!(&world.bsdfs[index].reflection, None | Some((_, ReflectionLobe::Mirror))) {
             glossy = glossy | lanes;
         }

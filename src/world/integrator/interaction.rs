@@ -35,6 +35,8 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     pub highlight_mask: L::Mask,
     /// Lanes whose BSDF reflects rays.
     pub reflecting: L::Mask,
+    /// Lanes that a coincident surface shades from all lights; see [`Self::shade`].
+    pub shaded: L::Mask,
 }
 
 impl<L: SimdFloat> SurfaceInteraction<L> {
@@ -71,10 +73,11 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.reflecting = self.reflecting.and_not(lanes);
     }
 
-    /// Excludes `lanes` from direct lighting.
+    /// Excludes `lanes` from direct lighting, and their lobes from points of emitters.
     #[inline(always)]
     pub fn shade(&mut self, lanes: L::Mask) {
         self.direct_mask = self.direct_mask.and_not(lanes);
+        self.shaded = self.shaded | lanes;
     }
 
     /// Returns `direction`. Where it points into the surface, it is mirrored at the geometric
@@ -182,5 +185,6 @@ fn interact_one<L: SimdFloat, const SIMPLE: bool>(
         direct_mask: lanes_if(bsdf.has_direct),
         highlight_mask: lanes_if(bsdf.has_highlight()),
         reflecting: lanes_if(bsdf.reflection.is_some()),
+        shaded: L::mask(false),
     }
 }

@@ -1,0 +1,124 @@
+//! Lights with a size in the reference tracer: points of the light uniform over its area for direct
+//! light, and rays that hit it for the camera and for mirrors. There is no importance sampling.
+
+use crate::common::Numbers;
+use crate::tracer::Mutation;
+use glam::DVec3;
+use std::f64::consts::PI;
+use zerkalo::light::{Light, LightUnit};
+
+/// A light with a size.
+pub enum Lamp {
+    Sphere { center: DVec3, radius: f64 },
+    Rectangle { center: DVec3, across: DVec3, up: DVec3, normal: DVec3 },
+    Disk { center: DVec3, radius: f64, normal: DVec3 },
+}
+
+/// Light from a point of a lamp: direction, distance and irradiance of a surface that faces it.
+pub type Arrival = (DVec3, f64, f64);
+
+impl Lamp {
+    /// Returns `None` if the light has no size.
+    pub fn new(light: &Light) -> Option<Self> {
+        if let Some(sphere) = &light.sphere {
+            return Some(Self::Sphere { center: sphere.center.into(), radius: sphere.radius });
+        }
+        if let Some(rectangle) = &light.rectangle {
+            let normal = DVec3::from(rectangle.normal).normalize();
+            let given = DVec3::from(rectangle.up);
+            let parallel = given.cross(normal).length() < 1e-6;
+            let given = if parallel { DVec3::Z } else { given };
+            let across = given.cross(normal).normalize();
+            let up = normal.cross(across);
+            return Some(Self::Rectangle {
+                center: rectangle.center.into(),
+                across: across * rectangle.size[0],
+                up: up * rectangle.size[1],
+                normal,
+            });
+        }
+        let disk = light.disk.as_ref()?;
+        let normal = DVec3::from(disk.normal).normalize();
+        Some(Self::Disk { center: disk.center.into(), radius: disk.radius, normal })
+    }
+
+    fn area(&self) -> f64 {
+        match self {
+            Self::Sphere { radius, .. } => 4.0 * PI * radius * radius,
+            Self::Rectangle { across, up, .. } => across.length() * up.length(),
+            Self::Disk { radius, .. } => PI * radius * radius,
+        }
+    }
+
+    /// Radiance of the lamp, white and of intensity 1.
+    pub fn radiance(&self, unit: LightUnit) -> f64 {
+        match unit {
+            LightUnit::Radiance => 1.0,
+            LightUnit::Power => 1.0 / (PI * self.area()),
+        }
+    }
+
+    /// Distance at which a ray sees the lamp.
+    pub fn meet(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
+        let plane = |center: DVec3, normal: DVec3| {
+            let t = (center - origin).dot(normal) / direction.dot(normal);
+            (direction.dot(normal) < 0.0 && t > 0.0).then(|| (t, origin + direction * t - center))
+        };
+        match self {
+            Self::Sphere { center, radius } => {
+                let b = (center - origin).dot(direction);
+                let c = (center - origin).length_squared() - radius * radius;
+                let root = (b * b - c).sqrt();
+                [b - root, b + root].into_iter().find(|t| *t > 0.0)
+            }
+            Self::Rectangle { center, across, up, normal } => {
+                let (t, place) = plane(*center, *normal)?;
+                let inside = |side: &DVec3| place.dot(*side).abs() <= 0.5 * side.length_squared();
+                (inside(across) && inside(up)).then_some(t)
+            }
+            Self::Disk { center, radius, normal } => {
+                let (t, place) = plane(*center, *normal)?;
+                (place.length() <= *radius).then_some(t)
+            }
+        }
+    }
+
+    /// Light of unit radiance at `from` from a uniform point of the lamp; `None` from a point that
+    /// does not face `from`.
+    pub fn sample(
+        &self,
+        from: DVec3,
+        mutation: Mutation,
+        numbers: &mut Numbers,
+    ) -> Option<Arrival> {
+        let (point, normal) = match self {
+            Self::Sphere { center, radius } => {
+                let normal = numbers.direction();
+                // From the inside every point is seen.
+                let inside = from.distance(*center) < *radius;
+                (center + normal * *radius, if inside { -normal } else { normal })
+            }
+            Self::Rectangle { center, across, up, normal } => {
+                let (x, y) = (numbers.between(-0.5, 0.5), numbers.between(-0.5, 0.5));
+                (center + across * x + up * y, *normal)
+            }
+            Self::Disk { center, radius, normal } => {
+                let across = normal.any_orthonormal_vector();
+                let up = normal.cross(across);
+                let (sin, cos) = numbers.between(0.0, 2.0 * PI).sin_cos();
+                let r = radius * numbers.unit().sqrt();
+                (center + across * (r * cos) + up * (r * sin), *normal)
+            }
+        };
+        let distance = point.distance(from);
+        let towards = (point - from) / distance;
+        let mut cos = -normal.dot(towards);
+        if cos <= 0.0 {
+            return None;
+        }
+        if mutation == Mutation::NoLampCosine {
+            cos = 1.0;
+        }
+        Some((towards, distance, self.area() * cos / (distance * distance)))
+    }
+}

@@ -1,0 +1,66 @@
+//! Lights with a size.
+
+use crate::plain_tracer::agrees;
+use crate::row::{Change, material, row};
+use crate::support::shipped;
+use zerkalo::light::{Light, LightUnit, Point};
+use zerkalo::scene::Scene;
+
+/// Asserts that `file` agrees with the plain tracer, and none of its `mutations` does.
+fn alike(file: &str, mutations: &[(&str, Change)]) {
+    let original = shipped(file);
+    row(file, |tested| agrees(&original, tested, 128), mutations);
+}
+
+fn lamp(scene: &mut Scene) -> &mut Light {
+    &mut scene.lights[0]
+}
+
+#[test]
+fn d4_sphere_light() {
+    alike(
+        "sphere-light.toml",
+        &[
+            ("a point", &|s| {
+                let position = lamp(s).position().unwrap();
+                lamp(s).clear_kind();
+                lamp(s).point = Some(Point { position });
+            }),
+            ("a smaller sphere of the same power", &|s| {
+                lamp(s).sphere.as_mut().unwrap().radius *= 0.5;
+                lamp(s).intensity *= 4.0;
+            }),
+            ("invisible", &|s| lamp(s).visible = false),
+            ("another place", &|s| lamp(s).position_mut().unwrap()[0] += 0.3),
+            ("half the radiance", &|s| lamp(s).intensity *= 0.5),
+        ],
+    );
+}
+
+#[test]
+fn d5_rectangle_light() {
+    alike(
+        "rectangle-light.toml",
+        &[
+            ("a visible window", &|s| s.lights[1].visible = true),
+            ("an invisible ceiling lamp", &|s| lamp(s).visible = false),
+            ("the wrong side", &|s| lamp(s).direction_mut().unwrap()[1] = 1.0),
+            ("sides exchanged", &|s| lamp(s).rectangle.as_mut().unwrap().size.reverse()),
+            ("power for radiance", &|s| lamp(s).unit = LightUnit::Power),
+            ("a matt floor", &|s| material(s, "floor").reflection = 0.0),
+        ],
+    );
+}
+
+#[test]
+fn d8_disk_light() {
+    alike(
+        "disk-light.toml",
+        &[
+            ("half the size", &|s| lamp(s).disk.as_mut().unwrap().radius *= 0.5),
+            ("facing the wall", &|s| *lamp(s).direction_mut().unwrap() = [0.0, 0.0, -1.0]),
+            ("radiance for power", &|s| lamp(s).unit = LightUnit::Radiance),
+            ("another place", &|s| lamp(s).position_mut().unwrap()[1] += 0.2),
+        ],
+    );
+}
