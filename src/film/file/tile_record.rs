@@ -8,6 +8,9 @@ use crate::film::tile::{TILE_PIXELS, Tile};
 /// Largest value of a sample in steps of the film's scale.
 const LARGEST_SAMPLE: u64 = 1 << 49;
 
+/// Length of a sum in memory \[bytes\].
+const WORD: usize = 8;
+
 /// Appends the record of a tile to `out`. `None` is a tile without samples.
 pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     let Some(tile) = tile.filter(|tile| tile.counts() != [0; 2]) else {
@@ -22,27 +25,35 @@ pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
         [sample.index, sample.x, sample.y].iter().for_each(|n| out.extend(n.to_le_bytes()));
         out.push(sample.replicate);
     }
-    let mut plane = [0u64; TILE_PIXELS];
     for replicate in 0..2 {
-        for i in 0..tile.pixel(0, 0).len() {
-            let mut all = 0;
-            let mut pixels = 0;
-            for (pixel, sum) in inside(tile.extent()).zip(&mut plane) {
-                *sum = tile.pixel(replicate, pixel)[i] as u64;
-                all |= *sum;
-                pixels += 1;
-            }
-            let bytes = (64 - all.leading_zeros()).div_ceil(8) as usize;
-            out.push(bytes as u8);
-            let start = out.len();
-            out.resize(start + pixels * bytes, 0);
-            if bytes > 0 {
-                for (low, sum) in out[start..].chunks_exact_mut(bytes).zip(&plane) {
-                    low.copy_from_slice(&sum.to_le_bytes()[..bytes]);
-                }
-            }
+        let mut pixels: [&[i64]; TILE_PIXELS] = [&[]; TILE_PIXELS];
+        let [width, height] = tile.extent();
+        let pixels = &mut pixels[..width * height];
+        for (sums, pixel) in pixels.iter_mut().zip(inside([width, height])) {
+            *sums = tile.pixel(replicate, pixel);
+        }
+        for i in 0..pixels[0].len() {
+            encode_plane(pixels, i, out);
         }
     }
+}
+
+/// Appends the plane of the sums `i` of all pixels.
+fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
+    let all = pixels.iter().fold(0, |all, sums| all | sums[i] as u64);
+    let bytes = (64 - all.leading_zeros()).div_ceil(8) as usize;
+    out.push(bytes as u8);
+    if bytes == 0 {
+        return;
+    }
+    let start = out.len();
+    let end = start + pixels.len() * bytes;
+    // Each sum is written with all its bytes. The next one overwrites those that are zero.
+    out.resize(end + WORD, 0);
+    for (n, sums) in pixels.iter().enumerate() {
+        out[start + n * bytes..][..WORD].copy_from_slice(&sums[i].to_le_bytes());
+    }
+    out.truncate(end);
 }
 
 /// Reads a record into `tile`, which is empty. Returns `None` if the record is not valid.
@@ -60,17 +71,25 @@ pub(super) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Opt
         let limit = (u64::from(count).saturating_mul(LARGEST_SAMPLE)).min(i64::MAX as u64);
         for i in 0..3 * groups {
             let bytes = usize::from(fields.u8()?);
-            if bytes > 8 {
+            if bytes > WORD {
                 return None;
             }
             let plane = fields.take(pixels * bytes)?;
             if bytes == 0 {
                 continue;
             }
-            for (pixel, low) in inside(extent).zip(plane.chunks_exact(bytes)) {
-                let mut sum = [0; 8];
-                sum[..bytes].copy_from_slice(low);
-                let sum = u64::from_le_bytes(sum);
+            let mask = u64::MAX >> (64 - 8 * bytes);
+            for (n, pixel) in inside(extent).enumerate() {
+                let rest = &plane[n * bytes..];
+                let sum = match rest.first_chunk::<WORD>() {
+                    Some(word) => u64::from_le_bytes(*word) & mask,
+                    // The last sums of the plane.
+                    None => {
+                        let mut word = [0; WORD];
+                        word[..bytes].copy_from_slice(&rest[..bytes]);
+                        u64::from_le_bytes(word)
+                    }
+                };
                 if sum > limit {
                     return None;
                 }
