@@ -8,7 +8,7 @@
 
 use crate::bvh::Ray;
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
-use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn};
 
 /// Ray packet in the form that slab tests need.
 #[derive(Clone, Copy)]
@@ -85,12 +85,11 @@ impl<S: Float> PacketBounds<S> {
         let (below, _) = min_max(packet.below, mask, first);
         let (low, high) = min_max(d, mask, first);
         let negative = low.map(|d| d < S::default());
-        let origin = |far: bool| {
-            std::array::from_fn(|a| if negative[a] == far { above[a] } else { below[a] })
-        };
+        let origin =
+            |far: bool| array_from_fn(|a| if negative[a] == far { above[a] } else { below[a] });
         Some(Self {
-            near: std::array::from_fn(|a| if negative[a] { a + 3 } else { a }),
-            far: std::array::from_fn(|a| if negative[a] { a } else { a + 3 }),
+            near: array_from_fn(|a| if negative[a] { a + 3 } else { a }),
+            far: array_from_fn(|a| if negative[a] { a } else { a + 3 }),
             near_origin: origin(false),
             far_origin: origin(true),
             inverse: [low, high],

@@ -8,7 +8,7 @@
 
 use crate::bvh::packet::{PacketBounds, SlabPacket, load_wide, valid_lanes};
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
-use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
+use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn, prefetch};
 
 /// Stack frame: children of a node that the ray enters and has not visited yet.
 #[derive(Clone, Copy, Default)]
@@ -124,8 +124,8 @@ impl<S: Float> RayTraversal<S> {
             let negative = negative.map(|bits| bits >> lane & 1);
             ray.limit = limit.lane(lane);
             ray.bounds = PacketBounds {
-                near: std::array::from_fn(|a| a + 3 * negative[a]),
-                far: std::array::from_fn(|a| a + 3 - 3 * negative[a]),
+                near: array_from_fn(|a| a + 3 * negative[a]),
+                far: array_from_fn(|a| a + 3 - 3 * negative[a]),
                 near_origin: near_origin.lane(lane),
                 far_origin: far_origin.lane(lane),
                 inverse: [d.lane(lane); 2],

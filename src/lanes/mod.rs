@@ -42,6 +42,20 @@ pub type Double = wide::f64x8;
 /// Width of the widest instance. Arrays that are indexed by lane have this length.
 pub const MAX_WIDTH: usize = if cfg!(target_feature = "avx512f") { 16 } else { 8 };
 
+/// Returns the array whose element `i` is `f(i)`.
+///
+/// This is `std::array::from_fn` as a plain loop. The standard function compiles to four nested
+/// calls per closure, which the compiler does not always inline into a kernel.
+#[inline(always)]
+pub fn array_from_fn<T: Copy, const N: usize>(mut f: impl FnMut(usize) -> T) -> [T; N] {
+    const { assert!(N > 0) };
+    let mut values = [f(0); N];
+    for (i, value) in values.iter_mut().enumerate().skip(1) {
+        *value = f(i);
+    }
+    values
+}
+
 /// Type of one lane: `f32` or `f64`.
 pub trait Float: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
     /// Distance from 1 to the next larger number of this precision.
@@ -263,7 +277,7 @@ pub trait SimdFloat:
 /// Returns the id in the first lane of `mask`, and all lanes of `mask` that have this id. Returns
 /// `None` if `mask` is empty.
 #[inline(always)]
-pub(crate) fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
+pub fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
     let bits = mask.bits();
     if bits == 0 {
         return None;

@@ -1,6 +1,6 @@
 //! Vector instances, based on the types of the `wide` crate.
 
-use crate::lanes::{MAX_WIDTH, Mask, ROUNDER, SimdFloat, SimdU32};
+use crate::lanes::{MAX_WIDTH, Mask, ROUNDER, SimdFloat, SimdU32, array_from_fn};
 use wide::bytemuck::cast;
 use wide::{f32x4, f32x8, f64x2, f64x4, i32x4, i32x8, i64x4, u32x4, u32x8};
 #[cfg(target_feature = "avx512f")]
@@ -15,7 +15,7 @@ macro_rules! vector_bits {
             }
             #[inline(always)]
             fn from_fn(f: impl FnMut(usize) -> u32) -> Self {
-                $bits::new(std::array::from_fn(f))
+                $bits::new(array_from_fn(f))
             }
             #[inline(always)]
             fn lane(self, i: usize) -> u32 {
@@ -125,7 +125,7 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn from_fn(f: impl FnMut(usize) -> $scalar) -> Self {
-                $vector::new(std::array::from_fn(f))
+                $vector::new(array_from_fn(f))
             }
             #[inline(always)]
             fn lane(self, i: usize) -> $scalar {

@@ -1,7 +1,7 @@
 //! Compiled textures: colours and height gradients at given coordinates.
 
 use crate::asset::Image;
-use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3};
+use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
 use crate::material::texture::{Bump, Texture, TextureFilter, Wrap};
 use std::sync::Arc;
 
@@ -68,7 +68,7 @@ fn color_at(image: &Image, wrap: Wrap, filter: TextureFilter, u: f64, v: f64) ->
         return pixel(x + up(fx), y + up(fy)).map(f64::from);
     }
     let [a, b, c, d] = [pixel(x, y), pixel(x + 1, y), pixel(x, y + 1), pixel(x + 1, y + 1)];
-    std::array::from_fn(|i| {
+    array_from_fn(|i| {
         let lerp = |a: f32, b: f32, f: f64| f64::from(a) + f * (f64::from(b) - f64::from(a));
         let (above, below) = (lerp(a[i], b[i], fx), lerp(c[i], d[i], fx));
         above + fy * (below - above)
@@ -146,8 +146,8 @@ impl BumpMap {
         let wrap = self.wrap;
         let (x, fx) = pixel_position(u, width, wrap);
         let (y, fy) = pixel_position(1.0 - v, height, wrap);
-        let columns: [u32; 4] = std::array::from_fn(|i| wrapped(x + i as i32 - 1, width, wrap));
-        let rows: [u32; 4] = std::array::from_fn(|i| wrapped(y + i as i32 - 1, height, wrap));
+        let columns: [u32; 4] = array_from_fn(|i| wrapped(x + i as i32 - 1, width, wrap));
+        let rows: [u32; 4] = array_from_fn(|i| wrapped(y + i as i32 - 1, height, wrap));
         let height_at = |i: usize, j: usize| f64::from(self.image.height(columns[i], rows[j]));
         let lerp = |f: f64, a: f64, b: f64| a + f * (b - a);
         // Twice the slope per pixel, to the right and downward, at the four pixels around the

@@ -6,7 +6,7 @@
 
 use crate::asset;
 use crate::bvh::{Hit, LEAF_FLAG, Ray};
-use crate::lanes::{Float, Mask, SimdFloat, Vec3};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn};
 use crate::primitive::batch::{SurfacePoint, UvGradients, max_coordinate};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
@@ -302,7 +302,7 @@ impl<S: Float> MeshInstance<S> {
         let triangles = &self.mesh.mesh().triangles;
         // Lanes that hit another item may hold any tag.
         let number = |lane| (triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1);
-        std::array::from_fn(|k| {
+        array_from_fn(|k| {
             Vec3::from_fn(|lane| {
                 attributes[triangles[number(lane)][k] as usize].map(|x| S::from_f64(f64::from(x)))
             })
@@ -323,7 +323,7 @@ impl<S: Float> MeshInstance<S> {
             let pair = |lane| attributes[triangles[number(lane)][vertex] as usize][k];
             L::from_fn(|lane| S::from_f64(f64::from(pair(lane))))
         };
-        std::array::from_fn(|vertex| [component(vertex, 0), component(vertex, 1)])
+        array_from_fn(|vertex| [component(vertex, 0), component(vertex, 1)])
     }
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! Packet sampler: the random numbers of the samples in the lanes of a packet.
 
-use crate::lanes::{MAX_WIDTH, SimdFloat, SimdU32};
+use crate::lanes::{MAX_WIDTH, SimdFloat, SimdU32, array_from_fn};
 use crate::sampling::hash::{
     hash, hash_scalar, hash_words, owen, owen_factor, owen_scramble_prefix, owen_scramble_suffix,
 };
@@ -105,9 +105,9 @@ impl<L: SimdFloat> Sampler<L> {
             lens,
             first_lobe,
             joint_lobes: (free as u32 / 2).min(MAX_JOINT_LOBES),
-            low_bits: std::array::from_fn(|k| std::array::from_fn(|d| low_bits(k, d))),
+            low_bits: array_from_fn(|k| array_from_fn(|d| low_bits(k, d))),
             ramp: L::SimdU32::from_fn(|lane| lane as u32),
-            dimension_salt: std::array::from_fn(|d| hash_scalar(d as u32 + 1)),
+            dimension_salt: array_from_fn(|d| hash_scalar(d as u32 + 1)),
         }
     }
 
@@ -120,7 +120,7 @@ impl<L: SimdFloat> Sampler<L> {
         // Points at aligned indices are the first point XOR constants.
         let low_bits = &self.low_bits[count.ilog2() as usize];
         let point = |d| L::SimdU32::splat(sobol::point(d, first)) ^ low_bits[d];
-        let owen_prefix = std::array::from_fn(|d| owen_scramble_prefix(point(d)));
+        let owen_prefix = array_from_fn(|d| owen_scramble_prefix(point(d)));
         let within = self.ramp & L::SimdU32::splat(count as u32 - 1);
         SampleBlock { sampler: self, index: L::SimdU32::splat(first) + within, owen_prefix }
     }

@@ -7,7 +7,7 @@
 //! glass that is listed after the water. Outside of all solids the index of refraction is 1.
 
 use crate::bvh::Ray;
-use crate::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
+use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, next_distinct};
 use crate::material::Bsdf;
 use crate::primitive::{Aggregate, Form, PrimitiveId};
 use crate::world::compile::RecenteredGeometry;
@@ -72,11 +72,7 @@ impl<L: SimdFloat> MediumStack<L> {
     /// Returns `yes` in lanes where `mask` is true and `no` elsewhere.
     #[inline(always)]
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
-        Self {
-            priorities: std::array::from_fn(|i| {
-                L::select(mask, yes.priorities[i], no.priorities[i])
-            }),
-        }
+        Self { priorities: array_from_fn(|i| L::select(mask, yes.priorities[i], no.priorities[i])) }
     }
 }
 
