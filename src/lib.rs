@@ -1,48 +1,15 @@
 //! zerkalo: a progressive, accumulating ray tracer that lives in a terminal.
 //!
-//! The map of the rooms, and who may import whom, stands in ARCHITECTURE.md; a test holds it.
+//! ARCHITECTURE.md has the map of the folders and the allowed imports, which a test guards. The
+//! library consists of three crates, whose modules are all found here: `zerkalo-scene`,
+//! `zerkalo-render` and this one.
 
-// The modules are left out elsewhere, so that this is the only error.
-#[cfg(not(unix))]
-compile_error!(
-    "zerkalo needs a Unix system (Linux, macOS, BSD): it uses POSIX terminals, signals and file locks."
-);
+pub use zerkalo_render::{
+    asset, bvh, camera, disk, film, lanes, light, material, primitive, render, sampling, scene,
+    shape, value, world,
+};
 
-#[cfg(unix)]
-pub mod asset;
-#[cfg(unix)]
-pub mod bvh;
-#[cfg(unix)]
-pub mod camera;
-#[cfg(unix)]
 pub mod command;
-#[cfg(unix)]
 pub mod dashboard;
-#[cfg(unix)]
-pub mod disk;
-#[cfg(unix)]
-pub mod film;
-#[cfg(unix)]
-pub mod lanes;
-#[cfg(unix)]
-pub mod light;
-#[cfg(unix)]
-pub mod material;
-#[cfg(unix)]
 pub mod measure;
-#[cfg(unix)]
-pub mod primitive;
-#[cfg(unix)]
-pub mod render;
-#[cfg(unix)]
-pub mod sampling;
-#[cfg(unix)]
-pub mod scene;
-#[cfg(unix)]
-pub mod shape;
-#[cfg(unix)]
 pub mod terminal;
-#[cfg(unix)]
-pub mod value;
-#[cfg(unix)]
-pub mod world;

@@ -28,7 +28,9 @@ mod probe;
 mod srgb_table;
 mod store;
 #[cfg(test)]
-pub(crate) mod testing;
+mod test_random;
+#[cfg(test)]
+pub mod testing;
 mod tile;
 
 pub use box_filter::box_means;

@@ -239,7 +239,7 @@ fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::testing::Rng;
+    use crate::measure::test_random::Rng;
 
     /// Returns random pixels with mean 0.5. Grey noise has the standard deviation `s`; independent
     /// noise of a third of that is added to each channel.

@@ -38,9 +38,13 @@ for name in $(ls "$mutations"); do
         }' "$file" > mutated
     cp mutated "$file"
 done
-{ echo '#![allow(unused_parens)]'; cat src/lib.rs; } > mutated
-cp mutated src/lib.rs
-cat >> src/lib.rs <<'RUST'
+for crate in crates/scene crates/render src; do
+    { echo '#![allow(unused_parens)]'; cat $crate/lib.rs; } > mutated
+    cp mutated $crate/lib.rs
+done
+echo 'pub use zerkalo_scene::mutant;' >> crates/render/lib.rs
+echo 'pub use zerkalo_render::mutant;' >> src/lib.rs
+cat >> crates/scene/lib.rs <<'RUST'
 
 /// Returns `true` if the mutation `name` is enabled.
 pub fn mutant(name: &str) -> bool {
