@@ -4,6 +4,7 @@ use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES, read_error};
 use crate::asset::image::Image;
 use crate::asset::mesh::{Mesh, TriangleMesh};
+use crate::asset::radiance_map::RadianceMap;
 use crate::value::{available_memory, megabytes};
 use std::collections::HashMap;
 use std::fmt;
@@ -123,6 +124,7 @@ impl<T> Cache<T> {
 pub struct Assets {
     meshes: Mutex<Cache<Mesh>>,
     images: Mutex<Cache<Image>>,
+    radiance_maps: Mutex<Cache<RadianceMap>>,
     progress: Box<dyn Fn(&LoadProgress) + Send + Sync>,
 }
 
@@ -137,6 +139,7 @@ impl fmt::Debug for Assets {
         f.debug_struct("Assets")
             .field("meshes", &locked(&self.meshes).files.len())
             .field("images", &locked(&self.images).files.len())
+            .field("radiance_maps", &locked(&self.radiance_maps).files.len())
             .finish()
     }
 }
@@ -145,7 +148,12 @@ impl Assets {
     /// Creates an empty cache. `progress` is called at the start of each stage of loading, on the
     /// thread that loads the file.
     pub fn new(progress: impl Fn(&LoadProgress) + Send + Sync + 'static) -> Self {
-        Self { meshes: Mutex::default(), images: Mutex::default(), progress: Box::new(progress) }
+        Self {
+            meshes: Mutex::default(),
+            images: Mutex::default(),
+            radiance_maps: Mutex::default(),
+            progress: Box::new(progress),
+        }
     }
 
     /// Returns the mesh in the file at `path`.
@@ -170,6 +178,15 @@ impl Assets {
     pub fn image(&self, path: &Path) -> Result<Arc<Image>, AssetError> {
         let read = |key: &Key| Image::parse(&self.read(path, key, MAX_IMAGE_BYTES)?);
         load(&self.images, path, read, Image::bytes)
+    }
+
+    /// Returns the image of radiance in the file at `path`.
+    ///
+    /// # Errors
+    /// Any error in the file.
+    pub fn radiance_map(&self, path: &Path) -> Result<Arc<RadianceMap>, AssetError> {
+        let read = |key: &Key| RadianceMap::parse(&self.read(path, key, MAX_IMAGE_BYTES)?);
+        load(&self.radiance_maps, path, read, RadianceMap::bytes)
     }
 
     fn read(&self, path: &Path, key: &Key, limit: u64) -> Result<FileContents, AssetError> {

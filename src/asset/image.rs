@@ -3,7 +3,7 @@
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::value::{Fnv1a64, linear_from_srgb};
-use image::{DynamicImage, ImageDecoder, ImageError, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 use std::sync::LazyLock;
 
@@ -61,7 +61,7 @@ impl Image {
     pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
         let reader = ImageReader::new(Cursor::new(&source.bytes[..])).with_guessed_format();
         let mut reader = reader.map_err(|e| decode_error(source, &ImageError::IoError(e)))?;
-        if reader.format().is_none() {
+        if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg)) {
             let found = "this is neither a PNG nor a JPEG";
             return Err(source.error(FileLocation::Whole, found, "a PNG or JPEG image"));
         }
@@ -162,7 +162,7 @@ fn decode_error(source: &FileContents, error: &ImageError) -> AssetError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{ImageFormat, Luma, Rgba};
+    use image::{Luma, Rgba};
     use std::path::PathBuf;
 
     fn file(image: DynamicImage, format: ImageFormat) -> FileContents {

@@ -12,10 +12,15 @@ mod cache;
 mod error;
 mod file;
 mod image;
+mod loaded;
 mod mesh;
+mod radiance_distribution;
+mod radiance_map;
 
 pub use cache::{Assets, LoadProgress};
 pub use error::{AssetError, FileLocation};
 pub use file::MAX_BYTES;
 pub use image::{Image, MAX_PIXELS, MAX_SIDE};
+pub use loaded::Loaded;
 pub use mesh::{MAX_TRIANGLES, MAX_VERTICES, Mesh, TriangleBlock, TriangleMesh};
+pub use radiance_map::RadianceMap;

@@ -3,10 +3,12 @@
 mod area;
 mod delta;
 mod emitter;
+mod environment;
 
 pub use area::{DiskLight, EmitterSurface, RectangleLight, SphereLight};
 pub use delta::{DeltaLight, LightSample, SpotCone};
 pub use emitter::{Emitter, EmitterSample};
+pub use environment::{Environment, EnvironmentLight, EnvironmentSample};
 
 use glam::DVec3;
 
@@ -15,13 +17,13 @@ use crate::value::{
 };
 
 description! {
-    /// A light: exactly one of `point`, `directional`, `spot`, `sphere`, `rectangle` and `disk`, a
-    /// colour, an intensity.
+    /// A light: exactly one of `point`, `directional`, `spot`, `sphere`, `rectangle`, `disk` and
+    /// `environment`, a colour, an intensity.
     pub struct Light: Default {
         /// Name; no two lights have the same.
         name: String, or "a number";
         /// Light from one point. A light has exactly one of `point`, `directional`, `spot`, `sphere`,
-        /// `rectangle` and `disk`.
+        /// `rectangle`, `disk` and `environment`.
         point: Option<Point>, or "another kind is needed";
         /// Light from infinitely far away.
         directional: Option<Directional>, or "another kind is needed";
@@ -33,9 +35,12 @@ description! {
         rectangle: Option<RectangleLight>, or "another kind is needed";
         /// Light from one side of a disk.
         disk: Option<DiskLight>, or "another kind is needed";
+        /// Light from all directions.
+        environment: Option<Environment>, or "another kind is needed";
         /// Colour; multiplies the intensity.
         color: Color = [1.0, 1.0, 1.0], in LIGHT;
-        /// Radiance or power of a sphere, rectangle or disk, by `unit`. Radiant intensity [W/sr] of
+        /// Radiance or power of a sphere, rectangle or disk, by `unit`. Factor of the radiance of an
+        /// environment. Radiant intensity [W/sr] of
         /// a point, or of a spot inside its inner cone, with falloff `inverse-square`. With `none`,
         /// and for a directional light, the brightness of a white matt surface that faces the light.
         intensity: f64 = 1.0, in LIGHT "W/(sr m²), W, W/sr, or irradiance / π";
@@ -43,8 +48,8 @@ description! {
         unit: LightUnit = "radiance";
         /// Falloff of a point or spot light with the distance.
         falloff: Falloff = "none";
-        /// `false` hides the surface of a sphere, rectangle or disk from the camera and from
-        /// mirrors. It still lights matt surfaces and makes highlights.
+        /// `false` hides an environment, or the surface of a sphere, rectangle or disk, from the camera
+        /// and from mirrors. It still lights matt surfaces and makes highlights.
         visible: bool = true;
         /// `false` switches the light off.
         on: bool = true;
@@ -104,7 +109,8 @@ choices! {
 }
 
 /// Keys of the kinds, of which each light has exactly one.
-pub const KINDS: &[&str] = &["point", "directional", "spot", "sphere", "rectangle", "disk"];
+pub const KINDS: &[&str] =
+    &["point", "directional", "spot", "sphere", "rectangle", "disk", "environment"];
 
 /// Keys of `[[light]]`.
 pub const FIELDS: &[Field] = Light::FIELDS;
@@ -140,7 +146,7 @@ impl Light {
             [] => Some(ValidationError::new(
                 "",
                 "the light has no kind",
-                "one of point, directional, spot, sphere, rectangle and disk, such as \
+                "one of point, directional, spot, sphere, rectangle, disk and environment, such as \
                  point = { position = [2.0, 4.0, 3.0] }",
             )),
             [first, second, ..] => Some(ValidationError::new(
@@ -165,11 +171,11 @@ impl Light {
                 "unit is \"power\", but only a sphere, rectangle or disk has one",
                 "unit \"radiance\", or a light with a size",
             ))
-        } else if !self.visible && !has_size {
+        } else if !self.visible && !has_size && self.environment.is_none() {
             Some(ValidationError::new(
                 "visible",
-                "visible is false, but only a sphere, rectangle or disk is visible",
-                "visible = true, or a light with a size",
+                "visible is false, but no light of this kind is visible",
+                "visible = true, or a sphere, rectangle, disk or environment",
             ))
         } else if let Some(Spot { inner_angle, outer_angle, .. }) =
             self.spot.filter(|spot| spot.inner_angle > spot.outer_angle)
@@ -182,7 +188,9 @@ impl Light {
         } else {
             None
         };
-        self.validator().and(kind_fault).and(other_fault).errors()
+        let file = self.environment.as_ref().and_then(Environment::fault);
+        let file_fault = file.map(|fault| fault.prefixed("environment"));
+        self.validator().and(kind_fault).and(other_fault).and(file_fault).errors()
     }
 
     /// Names of the kinds that are given. A valid light has exactly one.
@@ -194,6 +202,7 @@ impl Light {
             ("sphere", self.sphere.is_some()),
             ("rectangle", self.rectangle.is_some()),
             ("disk", self.disk.is_some()),
+            ("environment", self.environment.is_some()),
         ];
         given.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
     }
@@ -209,6 +218,7 @@ impl Light {
     pub fn clear_kind(&mut self) {
         (self.point, self.directional, self.spot) = (None, None, None);
         (self.sphere, self.rectangle, self.disk) = (None, None, None);
+        self.environment = None;
     }
 
     /// Adds a surface of the kind `name` with the given radius; of a rectangle it is half of each

@@ -7,11 +7,10 @@
 //! bump.image = { file = "bricks.png", height = 0.02 }
 //! ```
 
-use crate::asset::{AssetError, Image};
+use crate::asset::{AssetError, Image, Loaded};
 use crate::value::{Color, Description, Field, FieldValue, ValidationError, ValueType};
 use crate::value::{choices, description};
 use serde::{Deserialize, Serialize};
-use std::fmt;
 use std::sync::Arc;
 
 /// A texture that multiplies a material's colour: one kind with its parameters.
@@ -49,7 +48,7 @@ description! {
         wrap: Wrap = "repeat";
         /// Interpolation between the centres of the pixels.
         filter: TextureFilter = "bilinear";
-        skip content: Loaded;
+        skip content: Loaded<Image>;
     }
 }
 
@@ -88,7 +87,7 @@ description! {
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
         /// Continuation of the image beyond its edges.
         wrap: Wrap = "repeat";
-        skip content: Loaded;
+        skip content: Loaded<Image>;
     }
 }
 
@@ -160,42 +159,6 @@ pub struct Placement {
     pub offset: [f64; 2],
 }
 
-/// Content of a file, or the error of reading it; `None` until the file has been looked for.
-#[derive(Clone, Default)]
-struct Loaded(Option<Result<Arc<Image>, AssetError>>);
-
-/// Compares the pixels only if the images differ in address.
-impl PartialEq for Loaded {
-    fn eq(&self, other: &Self) -> bool {
-        match (&self.0, &other.0) {
-            (Some(Ok(a)), Some(Ok(b))) => Arc::ptr_eq(a, b) || a == b,
-            (a, b) => a == b,
-        }
-    }
-}
-
-/// Prints the size instead of the pixels.
-impl fmt::Debug for Loaded {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match &self.0 {
-            None => f.write_str("not loaded"),
-            Some(Ok(image)) => write!(f, "{} x {} pixels", image.size()[0], image.size()[1]),
-            Some(Err(error)) => write!(f, "{error}"),
-        }
-    }
-}
-
-impl Loaded {
-    fn image(&self) -> Option<&Arc<Image>> {
-        self.0.as_ref()?.as_ref().ok()
-    }
-
-    fn fault(&self) -> Option<ValidationError> {
-        let error = self.0.as_ref()?.as_ref().err()?;
-        Some(ValidationError::new("file", error.what(), error.expected.clone()))
-    }
-}
-
 /// Implements `placement` for textures with the common placement keys.
 macro_rules! placed {
     ($($kind:ident),+) => {$(
@@ -214,14 +177,14 @@ placed!(ImageTexture, Checker, HeightImage);
 impl ImageTexture {
     /// Returns the pixels; `None` if no readable file has been loaded.
     pub fn image(&self) -> Option<&Arc<Image>> {
-        self.content.image()
+        self.content.content()
     }
 }
 
 impl HeightImage {
     /// Returns the pixels; `None` if no readable file has been loaded.
     pub fn image(&self) -> Option<&Arc<Image>> {
-        self.content.image()
+        self.content.content()
     }
 }
 
@@ -340,7 +303,7 @@ impl FieldValue for Bump {
 
 impl crate::material::Material {
     /// Returns the names of the files of texture and bump map, each with its content.
-    fn files_mut(&mut self) -> impl Iterator<Item = (&String, &mut Loaded)> {
+    fn files_mut(&mut self) -> impl Iterator<Item = (&String, &mut Loaded<Image>)> {
         let texture = match &mut self.texture {
             Some(Texture::Image(image)) => Some((&image.file, &mut image.content)),
             _ => None,
@@ -373,7 +336,7 @@ impl crate::material::Material {
     /// already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Image>, AssetError>) {
         for (file, content) in self.files_mut() {
-            content.0.get_or_insert_with(|| load(file));
+            content.resolve(|| load(file));
         }
     }
 

@@ -1,6 +1,6 @@
 //! Resolver of the mesh and image files that a scene refers to.
 
-use crate::asset::{AssetError, Assets, Image, Mesh};
+use crate::asset::{AssetError, Assets, Image, Mesh, RadianceMap};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
@@ -49,6 +49,11 @@ impl AssetResolver {
     /// Returns the image in the file `name`.
     pub(super) fn image(&self, name: &str) -> Result<Arc<Image>, AssetError> {
         self.assets.image(&self.folder().join(name))
+    }
+
+    /// Returns the image of radiance in the file `name`.
+    pub(super) fn radiance_map(&self, name: &str) -> Result<Arc<RadianceMap>, AssetError> {
+        self.assets.radiance_map(&self.folder().join(name))
     }
 
     /// Returns `true` if `name` is a file relative to the present folder, but not the same file

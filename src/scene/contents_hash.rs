@@ -18,7 +18,7 @@ impl Scene {
             cameras: _,
             background: _,
             ambient: _,
-            lights: _,
+            lights,
             materials,
             objects,
             resolver: _,
@@ -32,6 +32,12 @@ impl Scene {
         let mut known = HashMap::new();
         for image in materials.values().flat_map(|material| material.images()) {
             let value = once(&mut known, Arc::as_ptr(image), |hash| image.hash_contents(hash));
+            hash.update(&value.to_le_bytes());
+        }
+        let mut known = HashMap::new();
+        let environments = lights.iter().filter_map(|light| light.environment.as_ref());
+        for map in environments.filter_map(|environment| environment.map()) {
+            let value = once(&mut known, Arc::as_ptr(map), |hash| map.hash_contents(hash));
             hash.update(&value.to_le_bytes());
         }
         (hash != Fnv1a64::default()).then(|| hash.value())

@@ -215,7 +215,12 @@ impl SceneFile {
         let resolver = &scene.resolver;
         let meshes = scene.objects.iter().filter_map(|object| object.shape.file());
         let images = scene.materials.values().flat_map(|material| material.files());
-        if let Some(file) = meshes.chain(images).find(|file| resolver.breaks_when_moved(file, path))
+        let environments =
+            scene.lights.iter().filter_map(|light| light.environment.as_ref()?.file());
+        if let Some(file) = meshes
+            .chain(images)
+            .chain(environments)
+            .find(|file| resolver.breaks_when_moved(file, path))
         {
             let file = sanitized(file);
             return Err(SaveError::Failed {

@@ -85,6 +85,11 @@ and every key with a default may be left out. Unknown keys are errors.
   are read, so that no device or pipe blocks; their content goes into the picture and into messages
   only. A file that a mesh file names in turn lies in the folder of that mesh file or below: such a
   name has no `..`, is not absolute, and is no URL.
+- An environment light is infinitely far away in all directions. It adds to the background, lights matt
+  surfaces, makes highlights, and is seen by the camera and in mirrors unless `visible = false`. Its image
+  is equirectangular: the top row is up (+y), the middle is towards -z, a quarter to the right of the middle
+  is +x. Numbers of Radiance and OpenEXR files are radiances, with negative ones taken as 0; numbers of PNG
+  and JPEG files are sRGB levels. An image has at most 33554432 pixels.
 - A spot light has its full intensity inside the cone of `inner_angle` about its axis and none outside the
   cone of `outer_angle`. Between them the factor is t^2 (3 - 2t), where t rises linearly with the cosine of
   the angle from 0 at the outer to 1 at the inner cone. Equal angles make a sharp edge.

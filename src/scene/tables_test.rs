@@ -90,6 +90,10 @@ fn field_tables_match_deserialised_keys() {
         inner(crate::light::FIELDS, "rectangle"),
     );
     same_keys::<crate::light::DiskLight>("disk", inner(crate::light::FIELDS, "disk"));
+    same_keys::<crate::light::Environment>(
+        "environment",
+        inner(crate::light::FIELDS, "environment"),
+    );
     same_keys::<Material>("material", crate::material::FIELDS);
     same_keys::<Texture>("texture", inner(crate::material::FIELDS, "texture"));
     same_keys::<Bump>("bump", inner(crate::material::FIELDS, "bump"));
@@ -111,6 +115,11 @@ fn field_tables_match_defaults() {
     same_defaults::<Ambient>("ambient", AMBIENT_FIELDS, "");
     same_defaults::<Camera>("camera", crate::camera::FIELDS, "");
     same_defaults::<Light>("light", crate::light::FIELDS, "");
+    same_defaults::<crate::light::Environment>(
+        "environment",
+        inner(crate::light::FIELDS, "environment"),
+        "",
+    );
     same_defaults::<Material>("material", crate::material::FIELDS, "");
     same_defaults::<ImageTexture>("texture.image", texture("texture", "image"), "");
     same_defaults::<Checker>("texture.checker", texture("texture", "checker"), "");

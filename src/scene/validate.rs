@@ -118,6 +118,9 @@ impl Scene {
         for object in &mut self.objects {
             object.shape.resolve(|name| resolver.mesh(name));
         }
+        for environment in self.lights.iter_mut().filter_map(|light| light.environment.as_mut()) {
+            environment.resolve(|name| resolver.radiance_map(name));
+        }
         for material in self.materials.values_mut() {
             material.resolve(|name| resolver.image(name));
         }

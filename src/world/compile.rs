@@ -3,7 +3,7 @@
 
 use crate::camera::PerspectiveCamera;
 use crate::lanes::{Float, SimdFloat};
-use crate::light::{DeltaLight, Emitter};
+use crate::light::{DeltaLight, Emitter, EnvironmentLight};
 use crate::material::{Bsdf, Material};
 use crate::primitive::{
     Acceleration, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
@@ -13,6 +13,7 @@ use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates};
 use crate::world::integrator::emitter_lighting::EmitterSource;
+use crate::world::integrator::environment_lighting::EnvironmentSource;
 use crate::world::integrator::indirect_diffuse::DiffuseLimits;
 use crate::world::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::world::integrator::surface_textures::SurfaceTextures;
@@ -159,6 +160,7 @@ struct CompiledLights<S> {
     scales: Vec<f64>,
     sources: Vec<LightSource<S>>,
     emitters: Vec<EmitterSource<S>>,
+    environments: Vec<EnvironmentSource<S>>,
 }
 
 impl<S: Float> CompiledLights<S> {
@@ -197,7 +199,17 @@ impl<S: Float> CompiledLights<S> {
                 Some(EmitterSource { emitter, group, emission, visible: light.visible })
             })
             .collect();
-        Self { groups, scales, sources, emitters }
+        let environments = groups
+            .lights(scene)
+            .into_iter()
+            .filter_map(|(index, group, emission)| {
+                let light = EnvironmentLight::new(&scene.lights[index])?;
+                let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
+                let visible = scene.lights[index].visible;
+                Some(EnvironmentSource { light, group, emission, visible })
+            })
+            .collect();
+        Self { groups, scales, sources, emitters, environments }
     }
 
     /// Target of the shadow rays to each light without a size.
@@ -221,7 +233,7 @@ impl<S: Float> CompiledLights<S> {
         self.emitters.iter().map(bounds_of).collect()
     }
 
-    /// Number of lights and emitters.
+    /// Number of lights without a size and of emitters. Environments have no lists of occluders.
     fn count(&self) -> usize {
         self.sources.len() + self.emitters.len()
     }
@@ -341,7 +353,7 @@ impl<L: SimdFloat> World<L> {
                 textures: textures.as_ref().map(SurfaceTextures::features).unwrap_or_default(),
                 bsdfs: &materials.bsdfs,
                 groups: &lights.groups.members,
-                lights: lights.count(),
+                lights: lights.count() + lights.environments.len(),
                 diffuse_limits: materials.diffuse_limits(scene),
                 precision: if L::EPSILON > 1e-10 { "single" } else { "double" },
             },
@@ -373,6 +385,7 @@ impl<L: SimdFloat> World<L> {
             scales: lights.scales,
             sources: lights.sources,
             emitters: lights.emitters,
+            environments: lights.environments,
             culling: culling.mode,
             all_candidates: culling.all_candidates,
             light_buffers: culling.light_buffers,

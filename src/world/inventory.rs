@@ -98,7 +98,7 @@ impl Inventory {
             let is_kind = |i: &usize| scene.lights[*i].kinds() == [kind];
             groups.iter().flat_map(lights_of).filter(is_kind).count()
         };
-        for kind in ["point", "directional", "spot", "sphere", "rectangle", "disk"] {
+        for kind in ["point", "directional", "spot", "sphere", "rectangle", "disk", "environment"] {
             parts.extend(counted(light_count(kind), &format!("{kind} light")));
         }
         let mut add_if = |present: bool, name: &str| {

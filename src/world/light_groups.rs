@@ -3,7 +3,7 @@
 //! separately, so that colour and intensity can change without new samples.
 
 use crate::lanes::Float;
-use crate::light::{DeltaLight, Emitter, Light};
+use crate::light::{DeltaLight, Emitter, EnvironmentLight, Light};
 use crate::scene::Scene;
 use crate::value::Color;
 use crate::world::radiance_range::{RadianceRange, SceneDistances};
@@ -140,6 +140,9 @@ impl LightGroups {
     ) -> Vec<f64> {
         let range_of_light = |i: usize| {
             let light = &scene.lights[i];
+            if let Some(environment) = EnvironmentLight::new(light) {
+                return Some(distances.environment(environment.map(), light.visible));
+            }
             if let Some(emitter) = Emitter::<S>::new(light, origin, lift) {
                 return Some(distances.emitter(&emitter, light.visible));
             }
@@ -182,7 +185,8 @@ pub(super) fn emits(light: &Light) -> bool {
 /// Returns `true` if the light changes the picture: it emits, and surfaces reflect its light or it
 /// is visible. `lit` is `true` if some surface reflects direct light.
 pub(super) fn contributes(light: &Light, lit: bool) -> bool {
-    emits(light) && (lit || light.visible && light.surface().is_some())
+    let has_radiance = light.surface().is_some() || light.environment.is_some();
+    emits(light) && (lit || light.visible && has_radiance)
 }
 
 #[cfg(test)]

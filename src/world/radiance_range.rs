@@ -20,6 +20,7 @@
 //! over two kinds of bright light: spots smaller than a pixel, and light amplified by mirrors. Such
 //! samples may saturate; the film counts saturated samples.
 
+use crate::asset::RadianceMap;
 use crate::camera::PerspectiveCamera;
 use crate::lanes::Float;
 use crate::light::{DeltaLight, Emitter};
@@ -321,6 +322,28 @@ impl<'a> SceneDistances<'a> {
             brightest: or_typical(brightest),
             spots: or_typical(spots),
             extreme: or_typical(extreme),
+        }
+    }
+
+    /// Range of an environment of unit intensity.
+    pub fn environment(&self, map: &RadianceMap, visible: bool) -> RadianceRange {
+        let mean = map.mean().into_iter().fold(0.0, f64::max);
+        let typical = if mean > 0.0 { mean } else { 1.0 };
+        let all = self.responses.iter().flatten().copied().reduce(Response::or);
+        let Response { least, most, peak } =
+            all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 });
+        let range = self.range_of(typical, (least, most, peak));
+        if !visible {
+            return range;
+        }
+        // Bright pixels of the image may be smaller than a pixel of the picture.
+        let dimmest = map.min().unwrap_or(typical).max(1e-6 * typical);
+        RadianceRange {
+            dimmest: range.dimmest.min(dimmest * self.faintest),
+            brightest: range.brightest.max(typical),
+            spots: range.spots.max(map.max()),
+            extreme: range.extreme.max(map.max() * self.gain),
+            ..range
         }
     }
 

@@ -10,6 +10,7 @@ use crate::sampling::{CameraDimensions, PacketSampler, SampleSettings};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::tile::{CullingMode, TileCandidates};
 use crate::world::integrator::emitter_lighting::EmitterSource;
+use crate::world::integrator::environment_lighting::EnvironmentSource;
 use crate::world::integrator::first_hit::{self, FirstHit};
 use crate::world::integrator::indirect_diffuse::{DiffuseLimits, PathStart, trace_generations};
 use crate::world::integrator::nested_dielectrics::NestedDielectrics;
@@ -44,6 +45,8 @@ pub struct World<L: SimdFloat> {
     pub(super) sources: Vec<LightSource<L::Scalar>>,
     /// Lights with a size.
     pub(super) emitters: Vec<EmitterSource<L::Scalar>>,
+    /// Environment lights.
+    pub(super) environments: Vec<EnvironmentSource<L::Scalar>>,
     /// Light group of ambient light. `None` if no surface reflects ambient light.
     pub(super) ambient: Option<usize>,
     /// Light group of the background. `None` if the background is black.
@@ -132,6 +135,12 @@ impl<L: SimdFloat> World<L> {
         self.culling.candidates(&self.geometry, lights, &self.camera, (origin, extent))
     }
 
+    /// Returns `true` if the world has emitters or environment lights.
+    #[inline(always)]
+    pub(super) fn has_emitters(&self) -> bool {
+        !self.emitters.is_empty() || !self.environments.is_empty()
+    }
+
     /// Returns `true` if the samples of a tile with these candidates are certainly black: no
     /// primitive is a candidate of its camera rays, the background is black, and no emitter is
     /// visible.
@@ -139,6 +148,7 @@ impl<L: SimdFloat> World<L> {
         self.background.is_none()
             && candidates.primary.is_empty()
             && !self.emitters.iter().any(|source| source.visible)
+            && !self.environments.iter().any(|source| source.visible)
     }
 
     /// Traces one packet of paths. `origin` and `direction` are those of camera rays, as
@@ -167,7 +177,7 @@ impl<L: SimdFloat> World<L> {
             TransmissionIntegrator { world: self, nested_dielectrics, sampler }
                 .trace(start, candidates, None, out)
         } else {
-            let trace = match (self.simple, self.emitters.is_empty()) {
+            let trace = match (self.simple, !self.has_emitters()) {
                 (true, true) => trace_opaque::<_, true, false>,
                 (false, true) => trace_opaque::<_, false, false>,
                 (true, false) => trace_opaque::<_, true, true>,

@@ -33,7 +33,7 @@ const REFERENCE_SAMPLES: u32 = 96;
 const SAMPLES: u32 = 512;
 
 /// Scenes that must be compared.
-const GALLERY: [&str; 15] = [
+const GALLERY: [&str; 16] = [
     "mirror-room.toml",
     "gallery-triptych.toml",
     "gallery-metals.toml",
@@ -49,6 +49,7 @@ const GALLERY: [&str; 15] = [
     "sphere-light.toml",
     "rectangle-light.toml",
     "disk-light.toml",
+    "environment.toml",
 ];
 
 #[test]
@@ -125,6 +126,7 @@ fn deliberate_errors_are_detected() {
         (Mutation::HalfAbsorption, "absorbing-glass.toml"),
         (Mutation::NoLampCosine, "disk-light.toml"),
         (Mutation::LampSeenTwice, "rectangle-light.toml"),
+        (Mutation::NoSky, "environment.toml"),
     ] {
         check_detection(mutation, name, &scene(name), 8 * REFERENCE_SAMPLES);
     }
@@ -151,6 +153,46 @@ fn deliberate_errors_are_detected() {
     }
 }
 
+/// A box that is open towards the eye, with a rough ball and a glass ball, in a gradient.
+const OPEN_BOX: &str = "
+    camera = { eye = [0.2, 1.2, 5.0], target = [0.0, 0.9, 0.0] }
+    [[light]]
+    environment = { zenith = [0.3, 0.6, 1.5], horizon = [1.0, 0.8, 0.6], nadir = [0.3, 0.1, 0.1] }
+    [materials.wall]
+    color = [0.9, 0.8, 0.7]
+    ambient = 0.0
+    diffuse = 1.0
+    [materials.rough]
+    diffuse = 0.5
+    reflection = 0.4
+    roughness = 0.3
+    [materials.glass]
+    diffuse = 0.1
+    reflection = 0.9
+    transmission = 0.9
+    fresnel = \"dielectric\"
+    [[object]]
+    material = \"wall\"
+    shape.rectangle = { center = [0.0, 0.0, 0.0], size = [2.0, 2.0], normal = [0.0, 1.0, 0.0], up = [0.0, 0.0, 1.0] }
+    [[object]]
+    material = \"wall\"
+    shape.rectangle = { center = [0.0, 2.0, 0.0], size = [2.0, 2.0], normal = [0.0, -1.0, 0.0], up = [0.0, 0.0, 1.0] }
+    [[object]]
+    material = \"wall\"
+    shape.rectangle = { center = [0.0, 1.0, -1.0], size = [2.0, 2.0], normal = [0.0, 0.0, 1.0] }
+    [[object]]
+    material = \"wall\"
+    shape.rectangle = { center = [-1.0, 1.0, 0.0], size = [2.0, 2.0], normal = [1.0, 0.0, 0.0] }
+    [[object]]
+    material = \"wall\"
+    shape.rectangle = { center = [1.0, 1.0, 0.0], size = [2.0, 2.0], normal = [-1.0, 0.0, 0.0] }
+    [[object]]
+    material = \"rough\"
+    shape.sphere = { center = [-0.4, 0.45, -0.3], radius = 0.4 }
+    [[object]]
+    material = \"glass\"
+    shape.sphere = { center = [0.45, 0.4, 0.3], radius = 0.35 }";
+
 /// Diffuse bounces among mirrors, glass, textures, bumps and smooth meshes, with and without caustics.
 #[test]
 fn diffuse_bounces_agree_with_reference_tracer() {
@@ -164,8 +206,12 @@ fn diffuse_bounces_agree_with_reference_tracer() {
         ("texture-checker.toml", 2, 4, true),
         ("bump.toml", 2, 0, true),
         ("background.toml", 4, 4, true),
+        ("environment.toml", 1, 16, true),
+        ("environment.toml", 3, 4, false),
+        ("open box in an environment", 3, 4, true),
     ] {
-        let mut scene = small(shipped(name));
+        let mut scene =
+            if name.contains(' ') { small(parsed(OPEN_BOX)) } else { small(shipped(name)) };
         scene.trace.max_diffuse_depth = bounces;
         (scene.trace.max_depth, scene.trace.caustics) = (depth, caustics);
         let reference = reference(&scene, REFERENCE_SAMPLES, Mutation::None).unwrap();

@@ -54,6 +54,8 @@ pub enum Mutation {
     HalfAbsorption,
     /// The cosine at the surface of a lamp is omitted.
     NoLampCosine,
+    /// Rays that miss all surfaces do not see environments.
+    NoSky,
     /// Reflected rays see lamps whose light in the lobe was found at points of the lamp, too, as
     /// if two techniques were added without weights.
     LampSeenTwice,
@@ -104,6 +106,9 @@ impl<'a> Tracer<'a> {
         let (images, plain) = (HashMap::new(), Material::default());
         let lamps = scene.lights.iter().map(Lamp::new).collect();
         let mut tracer = Self { scene, bodies, lamps, images, plain, mutation };
+        if scene.lights.iter().any(|l| l.environment.as_ref().is_some_and(|e| e.file().is_some())) {
+            return Err("an image around the scene".to_string());
+        }
         for material in scene.materials.values() {
             unknown_keys(material)?;
             tracer.open_images(material)?;
@@ -158,6 +163,8 @@ impl<'a> Tracer<'a> {
         let mut radiance = DVec3::ZERO;
         // `false` after a surface that got the light of lamps from their points.
         let mut sees_lamps = diffuse == 0;
+        // `false` after a diffuse bounce: the direct light of its surface has the environments.
+        let mut sees_sky = diffuse == 0;
         for bounce in 0.. {
             let hit = self.meet(origin, direction);
             let end = hit.as_ref().map_or(f64::INFINITY, |hit| hit.point.distance(origin));
@@ -167,9 +174,10 @@ impl<'a> Tracer<'a> {
             }
             weight *= self.transmittance(origin, hit.as_ref().map(|hit| hit.point), direction);
             let Some(hit) = hit else {
-                return radiance + weight * DVec3::from(self.scene.background.color.0);
+                let sky = if sees_sky { self.sky(direction) } else { DVec3::ZERO };
+                return radiance + weight * (sky + DVec3::from(self.scene.background.color.0));
             };
-            sees_lamps = true;
+            (sees_lamps, sees_sky) = (true, true);
             let through = trace.ray_types == RayTypes::Full && hit.material.transmission > 0.0;
             if through && trace.max_depth > 0 {
                 let way = self.through(&hit, direction, numbers);
@@ -353,6 +361,15 @@ impl<'a> Tracer<'a> {
         Some(sum)
     }
 
+    /// Radiance of the visible environments.
+    fn sky(&self, direction: DVec3) -> DVec3 {
+        if self.mutation == Mutation::NoSky {
+            return DVec3::ZERO;
+        }
+        let visible = self.scene.lights.iter().filter(|light| light.on && light.visible);
+        visible.map(|light| sky(light, direction)).sum()
+    }
+
     /// Direct light, and the light of a diffuse bounce, after `diffuse` such bounces.
     fn lit(&self, hit: &Hit, view: DVec3, diffuse: u32, numbers: &mut Numbers) -> DVec3 {
         let trace = &self.scene.trace;
@@ -384,6 +401,11 @@ impl<'a> Tracer<'a> {
         let mut sum = color * ambient * DVec3::from(self.scene.ambient.color.0);
         for (i, light) in self.scene.lights.iter().enumerate().filter(|(_, l)| l.on) {
             let (towards, distance, irradiance) = match &self.lamps[i] {
+                None if light.environment.is_some() => {
+                    // Uniform directions of the whole sphere.
+                    let towards = numbers.direction();
+                    (towards, f64::INFINITY, sky(light, towards) * (4.0 * PI))
+                }
                 None => arrival(light, hit.point, self.mutation),
                 Some(lamp) => {
                     let Some(sample) = lamp.sample(hit.point, self.mutation, numbers) else {
@@ -418,6 +440,15 @@ impl<'a> Tracer<'a> {
             body.meet(point, towards, from).is_some_and(|(t, ..)| t < distance * (1.0 - 1e-12))
         })
     }
+}
+
+/// Radiance of an environment; black for other lights.
+fn sky(light: &Light, direction: DVec3) -> DVec3 {
+    let Some(environment) = &light.environment else { return DVec3::ZERO };
+    let end = if direction.y > 0.0 { environment.zenith } else { environment.nadir };
+    let (horizon, height) = (DVec3::from(environment.horizon.0), direction.y.abs());
+    let radiance = horizon * (1.0 - height) + DVec3::from(end.0) * height;
+    radiance * DVec3::from(light.color.0) * light.intensity
 }
 
 /// Direction to the light, distance, and irradiance of a surface that faces it.

@@ -3,7 +3,7 @@
 use crate::plain_tracer::agrees;
 use crate::row::{Change, material, row};
 use crate::support::shipped;
-use zerkalo::light::{Light, LightUnit, Point};
+use zerkalo::light::{Environment, Light, LightUnit, Point};
 use zerkalo::scene::Scene;
 
 /// Asserts that `file` agrees with the plain tracer, and none of its `mutations` does.
@@ -63,4 +63,28 @@ fn d8_disk_light() {
             ("another place", &|s| lamp(s).position_mut().unwrap()[1] += 0.2),
         ],
     );
+}
+
+#[test]
+fn d9_environment() {
+    fn sky(scene: &mut Scene) -> &mut Environment {
+        lamp(scene).environment.as_mut().unwrap()
+    }
+    alike(
+        "environment.toml",
+        &[
+            ("no environment", &|s| lamp(s).on = false),
+            ("invisible", &|s| lamp(s).visible = false),
+            ("upside down", &|s| {
+                let (zenith, nadir) = (sky(s).zenith, sky(s).nadir);
+                (sky(s).zenith, sky(s).nadir) = (nadir, zenith);
+            }),
+            ("a constant", &|s| sky(s).horizon = sky(s).zenith),
+            ("half the intensity", &|s| lamp(s).intensity *= 0.5),
+        ],
+    );
+    // Diffuse bounces that escape add nothing.
+    let mut bouncing = shipped("environment.toml");
+    bouncing.trace.max_diffuse_depth = 2;
+    agrees(&bouncing, &bouncing, 128).unwrap_or_else(|e| panic!("two diffuse bounces: {e}"));
 }

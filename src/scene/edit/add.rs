@@ -1,6 +1,6 @@
 //! Adding objects, lights and materials, with defaults that fit the scene.
 
-use crate::light::{Directional, Falloff, Light, Point, Spot};
+use crate::light::{Directional, Environment, Falloff, Light, Point, Spot};
 use crate::material::Material;
 use crate::primitive::{Form, ParallelogramForm};
 use crate::scene::edit::bounds::{BoundingSphere, scene_bounds};
@@ -28,6 +28,7 @@ pub fn light_kinds() -> Vec<Word> {
         ("sphere", "Light from a sphere, such as a bulb: soft shadows."),
         ("rectangle", "Light from one side of a rectangle, such as a window."),
         ("disk", "Light from one side of a disk."),
+        ("environment", "Light from all directions, such as the sky."),
     ];
     words.map(|(name, doc)| Word { name: name.into(), doc: doc.into() }).to_vec()
 }
@@ -183,6 +184,10 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
             light.spot = Some(Spot { position, direction, outer_angle, inner_angle });
             "spot"
         }
+        "environment" => {
+            light.environment = Some(Environment::default());
+            "sky"
+        }
         _ => {
             light.set_surface(kind, center + from * (1.5 * radius), direction, radius / 5.0);
             if light.surface().is_none() {
@@ -315,7 +320,10 @@ mod tests {
             let x = match (light.position(), light.direction()) {
                 (Some(position), _) => position[0],
                 (None, Some(direction)) => -direction[0],
-                (None, None) => panic!(),
+                (None, None) => {
+                    assert!(light.environment.is_some() && light.name == "sky");
+                    continue;
+                }
             };
             assert!(x < 0.0, "the lamp that is there stands to the right");
             let name = match word.name.as_str() {

@@ -2,7 +2,9 @@
 //! brightness are kept where possible.
 
 use crate::camera::{Camera, Focus, ViewAngle};
-use crate::light::{Directional, EmitterSurface, Falloff, Light, LightUnit, Point, Spot};
+use crate::light::{
+    Directional, EmitterSurface, Environment, Falloff, Light, LightUnit, Point, Spot,
+};
 use crate::material::{Bump, Material, Texture};
 use crate::scene::Scene;
 use crate::scene::edit::bounds::scene_bounds;
@@ -29,6 +31,7 @@ pub(super) const KIND: Field = Field::required(
         Field::required("sphere", ValueType::Text, "", "Light from a sphere."),
         Field::required("rectangle", ValueType::Text, "", "Light from one side of a rectangle."),
         Field::required("disk", ValueType::Text, "", "Light from one side of a disk."),
+        Field::required("environment", ValueType::Text, "", "Light from all directions."),
     ]),
     "",
     "Kind of light source.",
@@ -173,6 +176,7 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
             let (outer_angle, inner_angle) = (SPOT_ANGLE, 0.5 * SPOT_ANGLE);
             light.spot = Some(Spot { position, direction, outer_angle, inner_angle });
         }
+        "environment" => light.environment = Some(Environment::default()),
         _ => light.set_surface(name, position.into(), direction, radius),
     }
     if light.surface().is_none() {
@@ -186,7 +190,7 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
 }
 
 /// Returns the irradiance of a light of unit intensity on a surface at `point` that faces it, on the
-/// axis of a spot light. For lights with a size it is that of a distant light of the same area, at
+/// axis of a spot light; of an environment that of a white one. For lights with a size it is that of a distant light of the same area, at
 /// most that of a hemisphere.
 fn irradiance_at(light: &Light, point: DVec3) -> f64 {
     let Some(position) = light.position() else { return PI };

@@ -87,8 +87,9 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
         _ => true,
     };
     for field in fields(subject) {
-        if !has_size && matches!(field.name, "unit" | "visible") {
-            // Only lights with a size have these.
+        let is_environment = values.contains_key("environment");
+        if !has_size && (field.name == "unit" || field.name == "visible" && !is_environment) {
+            // Only lights with a size have a unit; only they and environments are visible.
             continue;
         }
         if let Some(kind) = virtual_kind

@@ -71,7 +71,14 @@ pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Sc
         Target::View(name) => fill(next.cameras.get_mut(name), values)?,
         Target::Ambient => fill(Some(&mut next.ambient), values)?,
         Target::Background => fill(Some(&mut next.background), values)?,
-        Target::Light(i) => fill(next.lights.get_mut(*i), values)?,
+        Target::Light(i) => {
+            fill(next.lights.get_mut(*i), values)?;
+            let environment = next.lights.get_mut(*i).and_then(|light| light.environment.as_mut());
+            let old = scene.lights.get(*i).and_then(|light| light.environment.as_ref());
+            if let (Some(new), Some(old)) = (environment, old) {
+                new.resolve_as(old);
+            }
+        }
         Target::Object(i) => {
             fill(next.objects.get_mut(*i), values)?;
             if let (Some(new), Some(old)) = (next.objects.get_mut(*i), scene.objects.get(*i)) {

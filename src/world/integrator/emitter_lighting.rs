@@ -11,6 +11,7 @@ use crate::light::Emitter;
 use crate::material::ReflectionLobe;
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
+use crate::world::integrator::environment_lighting::{environment_lighting, visible_environments};
 use crate::world::integrator::interaction::SurfaceInteraction;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
@@ -74,6 +75,10 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
         }
         out.groups[source.group] += source.emitted(radiance).masked(seen);
     }
+    let escaped = lanes.and_not(t_max.lt(L::from_f64(L::MAX)));
+    if !world.environments.is_empty() && escaped.any() {
+        visible_environments(world, path, transmittance(L::from_f64(L::MAX)), escaped, out);
+    }
 }
 
 /// Reflection lobes in the direction of an emitter.
@@ -105,6 +110,12 @@ pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
     }
     if (interaction.direct_mask | glossy).none() {
         return;
+    }
+    if !world.environments.is_empty() {
+        counts.glossy = true;
+        let random = (sampler, bounce);
+        let sums = (&mut *out, &mut *counts);
+        environment_lighting::<_, SIMPLE>(world, path, interaction, random, (glossy, lobes), sums);
     }
     let origin = interaction.ray_origin();
     let view = -path.ray.direction;
@@ -163,7 +174,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
 /// Returns the value of the reflection lobe of BSDF `index` in the given direction, with the cosine
 /// of the light, and the density \[1/sr\] of the reflected ray in this direction.
 #[inline(always)]
-fn lobe_value<L: SimdFloat, const SIMPLE: bool>(
+pub(crate) fn lobe_value<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
     path: &Path<L>,
     interaction: &SurfaceInteraction<L>,

@@ -7,8 +7,8 @@
 //! a direction whose density is the cosine to the normal, divided by pi. Mirrors stay as free of
 //! noise as without diffuse bounces, and a path has at most one start per generation.
 //!
-//! Points of emitters are sampled at every hit. A ray that starts at a diffuse bounce therefore adds
-//! nothing where it reaches an emitter.
+//! Emitters and environments are sampled at every hit. A ray that starts at a diffuse bounce therefore
+//! adds nothing where it reaches an emitter or escapes to an environment.
 
 use crate::bvh::Ray;
 use crate::lanes::{Frame, Mask, SimdFloat, Vec3};
@@ -24,8 +24,8 @@ use crate::world::integrator::transmission::TransmissionIntegrator;
 use crate::world::world::World;
 
 /// Density of diffuse bounces for the weight of emitters that they reach: so small that the points
-/// sampled on the emitters have all the weight.
-const NO_DENSITY: f64 = 1e-30;
+/// sampled on the emitters have all the weight. Environments leave out rays of this density.
+pub(crate) const NO_DENSITY: f64 = 1e-30;
 
 /// Limits of the diffuse bounces of a world.
 #[derive(Clone, Copy, Debug)]

@@ -3,6 +3,7 @@
 pub(crate) mod coincident_surfaces;
 pub(crate) mod direct_lighting;
 pub(crate) mod emitter_lighting;
+pub(crate) mod environment_lighting;
 pub(crate) mod first_hit;
 pub(crate) mod indirect_diffuse;
 pub(crate) mod interaction;

@@ -141,7 +141,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             behind = Some(next);
         }
         let transmittance = |distance| self.nested_dielectrics.transmittance(&media, distance);
-        let has_emitters = !world.emitters.is_empty();
+        let has_emitters = world.has_emitters();
         if has_emitters {
             visible_emitters(world, &path, hit.t, branch.lanes, transmittance, out);
         }
@@ -461,7 +461,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 bsdf.sample(*strength, lobe, incident, interaction.normal, uv, self.world.fold);
             let weight = path.throughput.component_mul(sample.weight) * reflected_share;
             directions.reflected = Vec3::select(lanes, sample.direction, directions.reflected);
-            if !self.world.emitters.is_empty() && !matches!(lobe, ReflectionLobe::Mirror) {
+            if self.world.has_emitters() && !matches!(lobe, ReflectionLobe::Mirror) {
                 let mut direction = sample.direction;
                 if self.world.smooth {
                     direction = interaction.reflect_into_hemisphere(direction);

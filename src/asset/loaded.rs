@@ -1,0 +1,57 @@
+//! Content of a file that a description names.
+
+use crate::asset::error::AssetError;
+use crate::value::ValidationError;
+use std::fmt;
+use std::sync::Arc;
+
+/// Content of a file, or the error of reading it; `None` until the file has been looked for.
+#[derive(Clone)]
+pub struct Loaded<T>(Option<Result<Arc<T>, AssetError>>);
+
+impl<T> Default for Loaded<T> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+/// Compares the pixels only if the contents differ in address.
+impl<T: PartialEq> PartialEq for Loaded<T> {
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Some(Ok(a)), Some(Ok(b))) => Arc::ptr_eq(a, b) || a == b,
+            (Some(Err(a)), Some(Err(b))) => a == b,
+            (None, None) => true,
+            _ => false,
+        }
+    }
+}
+
+/// Prints the state instead of the pixels.
+impl<T> fmt::Debug for Loaded<T> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match &self.0 {
+            None => f.write_str("not loaded"),
+            Some(Ok(_)) => f.write_str("loaded"),
+            Some(Err(error)) => write!(f, "{error}"),
+        }
+    }
+}
+
+impl<T> Loaded<T> {
+    /// Returns the content; `None` if no readable file has been loaded.
+    pub fn content(&self) -> Option<&Arc<T>> {
+        self.0.as_ref()?.as_ref().ok()
+    }
+
+    /// Loads the content with `load`, unless content or an error is there already.
+    pub fn resolve(&mut self, load: impl FnOnce() -> Result<Arc<T>, AssetError>) {
+        self.0.get_or_insert_with(load);
+    }
+
+    /// Returns the error of reading the file as a fault of the key `file`.
+    pub fn fault(&self) -> Option<ValidationError> {
+        let error = self.0.as_ref()?.as_ref().err()?;
+        Some(ValidationError::new("file", error.what(), error.expected.clone()))
+    }
+}

@@ -1,0 +1,153 @@
+//! Light of environments, by multiple importance sampling.
+//!
+//! Three techniques find the light of an environment: a direction sampled by luminance, the direction of
+//! the reflected ray for glossy lobes, and a cosine-weighted direction for matt surfaces. Each pair is
+//! weighted by the power heuristic. Highlights of lights use the luminance alone, mirrors and the camera the
+//! ray alone. A ray that starts at a diffuse bounce adds nothing where it escapes: the surface that it
+//! left has the light of all environments already.
+
+use crate::bvh::Ray;
+use crate::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
+use crate::light::EnvironmentLight;
+use crate::sampling::{PacketSampler, warp};
+use crate::world::integrator::emitter_lighting::{ReflectingLobes, lobe_value, power_heuristic};
+use crate::world::integrator::indirect_diffuse::NO_DENSITY;
+use crate::world::integrator::interaction::SurfaceInteraction;
+use crate::world::integrator::path::{Counts, Path, Radiance};
+use crate::world::world::World;
+use std::f64::consts::FRAC_1_PI;
+
+/// Number of the random numbers of the first environment; emitters have smaller ones.
+const ENVIRONMENT_SALT: u32 = 1 << 30;
+
+/// An environment light of the world, with its light group.
+pub(crate) struct EnvironmentSource<S> {
+    pub light: EnvironmentLight,
+    /// Index of the light group.
+    pub group: usize,
+    /// Emission that is multiplied into the samples of the group. `None` means 1 in every channel.
+    pub emission: Option<[S; 3]>,
+    /// `true` if the camera and reflected rays see the environment.
+    pub visible: bool,
+}
+
+impl<S: Float> EnvironmentSource<S> {
+    /// Returns `value` times the emission that the group's samples contain, with finite channels.
+    #[inline(always)]
+    fn emitted<L: SimdFloat<Scalar = S>>(&self, value: Vec3<L>) -> Vec3<L> {
+        match self.emission {
+            Some(emission) => value.component_mul(Vec3::splat(emission)),
+            None => value,
+        }
+    }
+}
+
+/// Adds the radiance of the visible environments to the rays of `lanes`, which hit no surface. A medium
+/// in which the rays escape leaves the share `transmittance` of the light; `None` means all.
+pub(crate) fn visible_environments<L: SimdFloat>(
+    world: &World<L>,
+    path: &Path<L>,
+    transmittance: Option<Vec3<L>>,
+    lanes: L::Mask,
+    out: &mut Radiance<L>,
+) {
+    let lanes = lanes & path.lobe_density.gt(L::from_f64(NO_DENSITY));
+    if lanes.none() {
+        return;
+    }
+    for source in world.environments.iter().filter(|source| source.visible) {
+        let (radiance, density) = source.light.radiance(path.ray.direction, lanes);
+        let weight = power_heuristic(path.lobe_density, density);
+        let mut radiance = path.throughput.component_mul(radiance) * weight;
+        if let Some(left) = transmittance {
+            radiance = radiance.component_mul(left);
+        }
+        out.groups[source.group] += source.emitted(radiance).masked(lanes);
+    }
+}
+
+/// Adds the light of all environments that the surfaces reflect. `bounce` is the number of earlier
+/// surfaces of the path. `glossy` selects lanes with a lobe that has a density.
+#[inline(never)]
+pub(crate) fn environment_lighting<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    path: &Path<L>,
+    interaction: &SurfaceInteraction<L>,
+    (sampler, bounce): (&PacketSampler<'_, L>, u32),
+    (glossy, lobes): (L::Mask, &ReflectingLobes<L>),
+    (out, counts): (&mut Radiance<L>, &mut Counts),
+) {
+    let normal = interaction.normal;
+    let view = -path.ray.direction;
+    let cosine_density = |cos: L| cos * L::from_f64(FRAC_1_PI);
+    let is_matt = interaction.direct_mask & interaction.diffuse.max_element().gt(L::zero());
+    for (index, source) in (0..).zip(&world.environments) {
+        let salt = ENVIRONMENT_SALT + 2 * index;
+        let numbers = sampler.light_2d(bounce, salt);
+        let light = source.light.sample(numbers, interaction.direct_mask | glossy);
+        let arrives = interaction.geometric.dot(light.wi).gt(L::zero());
+        let cos_light = normal.dot(light.wi);
+        let direct = interaction.direct_mask & arrives & cos_light.gt(L::zero());
+        let mut value = Vec3::zero();
+        if direct.any() {
+            let density = cosine_density(cos_light);
+            value = interaction.diffuse * (density * power_heuristic(light.density, density));
+            for (index, lanes) in interaction.bsdfs(interaction.highlight_mask & direct) {
+                let (bsdf, cos_view) = (&world.bsdfs[index], normal.dot(view));
+                let highlight = bsdf.highlight(normal, view, light.wi, cos_light, cos_view);
+                value += highlight.masked(lanes);
+            }
+            value = value.masked(direct);
+        }
+        if source.visible {
+            for (index, lanes) in interaction.bsdfs(glossy & arrives) {
+                let lobe = lobe_value::<_, SIMPLE>(world, path, interaction, index, light.wi);
+                let (lobe, density) = lobe;
+                let weight = power_heuristic(light.density, density) * lobes.share;
+                value += (lobe * weight).masked(lanes);
+            }
+        }
+        let value = value.component_mul(light.irradiance);
+        add::<_, SIMPLE>(world, path, interaction, source, light.wi, value, (out, counts));
+        if is_matt.none() {
+            continue;
+        }
+        let (u, v) = sampler.light_2d(bounce, salt + 1);
+        let (x, y, r2) = warp::disk(u, v);
+        let cos = (L::one() - r2).max(L::zero()).sqrt();
+        let wi = Frame::around(normal).to_world(Vec3::new(x, y, cos)).renormalize();
+        let arrives = is_matt & interaction.geometric.dot(wi).gt(L::zero()) & cos.gt(L::zero());
+        let (radiance, density) = source.light.radiance(wi, arrives);
+        let weight = power_heuristic(cosine_density(cos), density).masked(arrives);
+        let value = interaction.diffuse.component_mul(radiance) * weight;
+        let value = value.masked(arrives);
+        add::<_, SIMPLE>(world, path, interaction, source, wi, value, (out, counts));
+    }
+}
+
+/// Adds the reflected radiance `value` from the directions `wi` to the sums, where no surface occludes it.
+#[inline(always)]
+fn add<L: SimdFloat, const SIMPLE: bool>(
+    world: &World<L>,
+    path: &Path<L>,
+    interaction: &SurfaceInteraction<L>,
+    source: &EnvironmentSource<L::Scalar>,
+    wi: Vec3<L>,
+    value: Vec3<L>,
+    (out, counts): (&mut Radiance<L>, &mut Counts),
+) {
+    let mut lit = value.max_element().gt(L::zero());
+    if lit.any() && world.shadows {
+        counts.rays += u64::from(lit.bits().count_ones());
+        let ray = Ray { origin: interaction.ray_origin(), direction: wi };
+        let (t_max, occluders) = (L::from_f64(L::MAX), world.geometry.all());
+        let occluded = if SIMPLE {
+            world.geometry.occluded_linear(&ray, t_max, lit, occluders)
+        } else {
+            world.geometry.occluded(&ray, t_max, lit, occluders)
+        };
+        lit = lit.and_not(occluded);
+    }
+    let radiance = path.throughput.component_mul(value);
+    out.groups[source.group] += source.emitted(radiance).masked(lit);
+}

@@ -1,0 +1,320 @@
+//! Environment lights: furnaces, very bright pixels, scaled and turned images, hostile files.
+
+#[path = "common/normal.rs"]
+mod normal;
+mod support;
+
+use normal::two_sided_z;
+use std::fs;
+use std::path::Path;
+use support::{parsed, picture, rendered};
+use zerkalo::camera::ViewAngle;
+use zerkalo::film::Replicates;
+use zerkalo::scene::Scene;
+use zerkalo::world::Precision;
+
+/// Mean of a channel over the picture, and its standard error from the difference of the replicates,
+/// whose pixels are independent.
+fn mean(scene: &Scene, seed: u64, precision: Precision, count: u32) -> [(f64, f64); 3] {
+    let rendering = rendered(scene, seed, precision, count);
+    assert_eq!(rendering.film.bad_samples().count, 0, "{:?}", rendering.film.bad_samples().first);
+    let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
+    let n = a.len() as f64;
+    std::array::from_fn(|c| {
+        let sum: f64 = a.iter().zip(&b).map(|(a, b)| 0.5 * (a[c] + b[c])).sum();
+        let squares: f64 = a.iter().zip(&b).map(|(a, b)| (0.5 * (a[c] - b[c])).powi(2)).sum();
+        (sum / n, squares.sqrt() / n)
+    })
+}
+
+/// A ball of the material in front of `light`, filling most of the picture.
+fn ball(material: &str, trace: &str, light: &str) -> Scene {
+    parsed(&format!(
+        "[film]
+         size = [24, 16]
+         [trace]
+         {trace}
+         [camera]
+         eye = [0.0, 0.0, 4.0]
+         target = [0.0, 0.0, 0.0]
+         view_angle.vertical = 36.0
+         {light}
+         [materials.tested]
+         color = [1.0, 1.0, 1.0]
+         ambient = 0.0
+         {material}
+         [[object]]
+         material = \"tested\"
+         shape.sphere = {{ center = [0.0, 0.0, 0.0], radius = 1.0 }}"
+    ))
+}
+
+const WHITE_SKY: &str = "[[light]]\nenvironment = {}";
+
+/// Materials that reflect all light that arrives.
+const WHITE: &[&str] = &[
+    "diffuse = 1.0",
+    "diffuse = 0.0\nreflection = 1.0",
+    "diffuse = 0.0\nreflection = 1.0\nroughness = 0.4",
+    "diffuse = 0.0\nreflection = 1.0\nroughness = 0.4\nlobe = \"square\"",
+    "diffuse = 0.5\nreflection = 0.5\nroughness = 0.2",
+    "diffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\nfresnel = \"dielectric\"\nior = 1.5",
+];
+
+/// Inside a white environment white objects are white, at every depth that the paths need.
+#[test]
+fn white_objects_in_a_white_environment_are_white() {
+    let threshold = two_sided_z(1e-4 / (WHITE.len() * 3 * 2) as f64);
+    for material in WHITE {
+        for depth in [1, 2, 16] {
+            if material.contains("dielectric") && depth < 16 {
+                continue;
+            }
+            for precision in [Precision::Single, Precision::Double] {
+                let scene = ball(material, &format!("max_depth = {depth}"), WHITE_SKY);
+                let [(mean, error), ..] = mean(&scene, 1, precision, 64);
+                // Paths in glass end at the depth; rounding of the film and of the image.
+                let bias = if material.contains("dielectric") { 1e-4 } else { 1e-6 };
+                assert!(
+                    (mean - 1.0).abs() <= threshold * error + bias,
+                    "{material}, depth {depth}, {precision:?}: {mean} +- {error}"
+                );
+            }
+        }
+    }
+}
+
+/// A diffuse bounce that escapes adds no light of an environment a second time: a white convex body in a white
+/// environment is white at every diffuse depth.
+#[test]
+fn white_ball_in_a_white_environment_is_white_at_every_diffuse_depth() {
+    let threshold = two_sided_z(1e-4 / (2 * 2 * 3 * 2) as f64);
+    for material in ["diffuse = 1.0", "diffuse = 0.5\nreflection = 0.5\nroughness = 0.2"] {
+        for light in [WHITE_SKY, "[[light]]\nenvironment = {}\nvisible = false"] {
+            if light != WHITE_SKY && material.contains("reflection") {
+                continue;
+            }
+            for bounces in [0, 1, 3] {
+                for precision in [Precision::Single, Precision::Double] {
+                    let trace = format!("max_diffuse_depth = {bounces}");
+                    let mut scene = ball(material, &trace, light);
+                    scene.camera.view_angle = ViewAngle::Vertical(10.0);
+                    let [(mean, error), ..] = mean(&scene, 6, precision, 64);
+                    let z = (mean - 1.0) / error;
+                    println!(
+                        "{material:?}, {light:?}, {bounces} bounces, {precision:?}: {mean}, z {z:.2}"
+                    );
+                    assert!(
+                        (mean - 1.0).abs() <= threshold * error + 1e-6 && error < 5e-3,
+                        "{material}, {light}, {bounces}, {precision:?}: {mean} +- {error}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// A floor beside a wall that is 1 high, both endless, in a white environment. From the floor the wall has the
+/// form factor F = (1 - cos phi) / 2, where phi is the angle of its upper edge above the horizon. The wall sees
+/// the environment in half of its hemisphere, the floor in the share 1 - F. With the albedo rho the radiance
+/// of the floor is rho (1 - F) from the environment, and F rho^2 / 2 after one bounce.
+#[test]
+fn diffuse_bounce_between_floor_and_wall_in_an_environment_has_its_form_factor() {
+    let rho = 0.8;
+    let threshold = two_sided_z(1e-4 / 12.0);
+    for distance in [0.2, 1.0, 3.0] {
+        let text = format!(
+            "film = {{ size = [12, 12], filter = \"point\" }}
+            camera = {{ eye = [{distance:?}, 0.5, 0.0], target = [{distance:?}, 0.0, 0.0], \
+            up = [0.0, 0.0, 1.0], view_angle.vertical = 0.01 }}
+            {WHITE_SKY}
+            [materials.gray]
+            color = [{rho:?}, {rho:?}, {rho:?}]
+            ambient = 0.0
+            diffuse = 1.0
+            [[object]]
+            material = \"gray\"
+            shape.rectangle = {{ center = [0.0, 0.5, 0.0], size = [1000.0, 1.0], normal = [1.0, 0.0, 0.0] }}
+            [[object]]
+            material = \"gray\"
+            shape.platform = {{ center = [500.0, 0.0, 0.0], size = [1000.0, 1000.0] }}"
+        );
+        let cos = distance / f64::hypot(distance, 1.0);
+        let wall = 0.5 * (1.0 - cos);
+        for (bounces, expected) in
+            [(0, rho * (1.0 - wall)), (1, rho * (1.0 - wall) + wall * rho * rho * 0.5)]
+        {
+            for precision in [Precision::Single, Precision::Double] {
+                let mut scene = parsed(&text);
+                scene.trace.max_diffuse_depth = bounces;
+                let [(mean, error), ..] = mean(&scene, 7, precision, 512);
+                let z = (mean - expected) / error;
+                println!(
+                    "{distance}, {bounces} bounces, {precision:?}: {mean}, {expected}, z {z:.2}"
+                );
+                // Floor and wall end at a distance of 500, which leaves out less than 1e-5.
+                assert!(
+                    (mean - expected).abs() <= threshold * error + 1e-5 && error < 1e-3,
+                    "{distance}, {bounces}, {precision:?}: {mean} +- {error}, expected {expected}"
+                );
+            }
+        }
+    }
+}
+
+/// Lobes that lose light lose the same share of a white environment as of a white background, which no
+/// light is sampled for.
+#[test]
+fn lobes_reflect_a_white_environment_like_a_white_background() {
+    let background = "[background]\ncolor = [1.0, 1.0, 1.0]";
+    let mut compared = 0.0;
+    for lobe in ["cone", "square", "beckmann", "ggx"] {
+        for roughness in [0.02, 0.3, 1.0] {
+            for horizon in ["fold", "absorb"] {
+                let material = format!(
+                    "diffuse = 0.0\nreflection = 1.0\nroughness = {roughness}\nlobe = \"{lobe}\""
+                );
+                let trace = format!("below_horizon = \"{horizon}\"");
+                let [by_light, by_background] = [WHITE_SKY, background]
+                    .map(|light| mean(&ball(&material, &trace, light), 2, Precision::Auto, 64)[0]);
+                let error = by_light.1.hypot(by_background.1);
+                let difference = by_light.0 - by_background.0;
+                compared += 1.0;
+                assert!(
+                    difference.abs() <= two_sided_z(1e-4 / 24.0) * error + 1e-6,
+                    "{lobe}, {roughness}, {horizon}: {by_light:?}, {by_background:?}"
+                );
+            }
+        }
+    }
+    assert_eq!(compared, 24.0);
+}
+
+/// Writes a Radiance file without compression; `texel` returns mantissas and exponent.
+fn write_hdr(path: &Path, [width, height]: [usize; 2], texel: impl Fn(usize, usize) -> [u8; 4]) {
+    let mut bytes =
+        format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes();
+    for y in 0..height {
+        (0..width).for_each(|x| bytes.extend(texel(x, y)));
+    }
+    fs::write(path, bytes).unwrap();
+}
+
+/// A scene file beside the image `sky.hdr`, with a white floor that faces up and fills the picture.
+fn floor(folder: &Path, environment: &str) -> Scene {
+    let path = folder.join("scene.toml");
+    let text = format!(
+        "[film]
+         size = [16, 16]
+         [camera]
+         eye = [0.0, 3.0, 0.0]
+         target = [0.0, 0.0, 0.0]
+         up = [0.0, 0.0, -1.0]
+         [[light]]
+         environment = {{ file = \"sky.hdr\", {environment} }}
+         [materials.white]
+         ambient = 0.0
+         color = [1.0, 1.0, 1.0]
+         [[object]]
+         material = \"white\"
+         shape.platform = {{ center = [0.0, 0.0, 0.0], size = [9.0, 9.0] }}"
+    );
+    fs::write(&path, text).unwrap();
+    Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A pixel that is 1e6 times as bright as the others: no invalid sample, and the radiance of a white floor
+/// is the irradiance of the image divided by pi, integrated over the directions.
+#[test]
+fn image_with_a_very_bright_pixel_gives_its_irradiance() {
+    let folder = tempfile::tempdir().unwrap();
+    let [width, height] = [64, 32];
+    // 2^-7 and 2^13: a ratio of 2^20.
+    let exponent = |x: usize, y: usize| if (x, y) == (20, 9) { 142 } else { 122 };
+    write_hdr(&folder.path().join("sky.hdr"), [width, height], |x, y| {
+        [128, 128, 128, exponent(x, y)]
+    });
+    let radiance = |x: usize, y: usize| 2f64.powi(i32::from(exponent(x % width, y)) - 129);
+    // Integral of the interpolated image by the midpoint rule.
+    let (n, mut irradiance) = (32, 0.0);
+    for row in 0..height * n / 2 {
+        let v = (row as f64 + 0.5) / n as f64 - 0.5;
+        let theta = std::f64::consts::PI * (v + 0.5) / height as f64;
+        for column in 0..width * n {
+            let u = (column as f64 + 0.5) / n as f64 - 0.5 + width as f64;
+            let (x, y) = (u.floor(), v.floor().max(0.0));
+            let (s, t) = (u - x, if v < 0.0 { 0.0 } else { v - y });
+            let (x, y) = (x as usize, y as usize);
+            let mixed = |y: usize| radiance(x, y) * (1.0 - s) + radiance(x + 1, y) * s;
+            let value = mixed(y) * (1.0 - t) + mixed((y + 1).min(height - 1)) * t;
+            irradiance += value * theta.cos() * theta.sin();
+        }
+    }
+    let cell =
+        (std::f64::consts::PI / (height * n) as f64) * (std::f64::consts::TAU / (width * n) as f64);
+    let expected = irradiance * cell / std::f64::consts::PI;
+    for precision in [Precision::Single, Precision::Double] {
+        for rotation in [0.0, 77.0] {
+            let scene = floor(folder.path(), &format!("rotation = {rotation}"));
+            let [(mean, error), ..] = mean(&scene, 3, precision, 128);
+            assert!(
+                (mean - expected).abs() <= 4.0 * error + 2e-4 * expected,
+                "{precision:?}, {rotation}: {mean} +- {error}, expected {expected}"
+            );
+            assert!(error < 0.02 * expected, "{error} of {expected}");
+        }
+    }
+}
+
+/// Twice the intensity is twice the picture, sample by sample.
+#[test]
+fn intensity_scales_the_picture_of_an_environment() {
+    let sky = "[[light]]\nenvironment = { zenith = [0.2, 0.5, 1.0] }\nintensity = ";
+    let material = "diffuse = 0.5\nreflection = 0.5\nroughness = 0.3";
+    let [one, two] = ["1.0", "2.0"].map(|intensity| {
+        let scene = ball(material, "", &format!("{sky}{intensity}"));
+        picture(&rendered(&scene, 4, Precision::Auto, 16), Replicates::Both)
+    });
+    for (one, two) in one.iter().zip(&two) {
+        for c in 0..3 {
+            assert_eq!(2.0 * one[c], two[c]);
+        }
+    }
+}
+
+/// A hidden environment lights surfaces, but neither the camera nor mirrors see it.
+#[test]
+fn invisible_environment_lights_but_is_not_seen() {
+    let hidden = format!("{WHITE_SKY}\nvisible = false");
+    let values = |material: &str| {
+        let rendering = rendered(&ball(material, "", &hidden), 5, Precision::Auto, 64);
+        let pixels = picture(&rendering, Replicates::Both);
+        // A corner, and the middle of the ball.
+        [pixels[0][0], pixels[8 * 24 + 12][0]]
+    };
+    assert_eq!(values("diffuse = 0.0\nreflection = 1.0"), [0.0, 0.0]);
+    let [corner, middle] = values("diffuse = 1.0");
+    assert!(corner == 0.0 && (middle - 1.0).abs() < 0.1, "{corner}, {middle}");
+}
+
+#[test]
+fn hostile_environment_images_are_located_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("scene.toml");
+    fs::write(&scene, "[[light]]\nname = \"sky\"\nenvironment.file = \"sky.hdr\"\n").unwrap();
+    let error = || Scene::read(&scene).expect_err("an error").to_string();
+    assert!(error().contains("there is no such file"), "{}", error());
+    let header = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n";
+    for (content, words) in [
+        (format!("{header}-Y 60000 +X 60000\n"), "60000 x 60000 pixels"),
+        (format!("{header}-Y 64 +X 64\nabcd"), "cannot be read"),
+        (header.to_string(), "cannot be read"),
+        ("no image".to_string(), "no image of a known format"),
+    ] {
+        // Another length, so that the cache of files notices the change.
+        fs::write(folder.path().join("sky.hdr"), content).unwrap();
+        let error = error();
+        assert!(error.contains(words), "{words}: {error}");
+        assert!(error.contains("scene.toml:3:") && error.contains("\"sky\""), "{error}");
+    }
+}
