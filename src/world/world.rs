@@ -15,7 +15,7 @@ use crate::world::integrator::first_hit::{self, FirstHit};
 use crate::world::integrator::indirect_diffuse::{DiffuseLimits, PathStart, trace_generations};
 use crate::world::integrator::nested_dielectrics::NestedDielectrics;
 use crate::world::integrator::opaque::trace_opaque;
-use crate::world::integrator::path::{Counts, Radiance};
+use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::integrator::surface_textures::SurfaceTextures;
 use crate::world::integrator::transmission::TransmissionIntegrator;
 use crate::world::inventory::Inventory;
@@ -172,18 +172,17 @@ impl<L: SimdFloat> World<L> {
         if let Some(limits) = self.diffuse_limits {
             return trace_generations(self, limits, ray, candidates, sampler, active, out);
         }
-        let start = PathStart::camera(ray, active, self.depth);
         if let Some(nested_dielectrics) = &self.nested_dielectrics {
+            let start = PathStart::camera(ray, active, self.depth);
             TransmissionIntegrator { world: self, nested_dielectrics, sampler }
                 .trace(start, candidates, None, out)
         } else {
             let trace = match (self.simple, !self.has_emitters()) {
                 (true, true) => trace_opaque::<_, true, false>,
                 (false, true) => trace_opaque::<_, false, false>,
-                (true, false) => trace_opaque::<_, true, true>,
-                (false, false) => trace_opaque::<_, false, true>,
+                (_, false) => trace_opaque::<_, false, true>,
             };
-            trace(self, start, candidates, sampler, None, out)
+            trace(self, (Path::new(ray), active, self.depth), candidates, sampler, None, out)
         }
     }
 

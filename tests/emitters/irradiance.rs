@@ -183,7 +183,7 @@ fn power_is_independent_of_the_size() {
 
 /// Lights that touch the receiver's surface, or are far larger or smaller than the scene.
 #[test]
-fn extreme_lights_keep_their_irradiance() {
+fn tiny_and_huge_lights_keep_their_irradiance() {
     let mut cases = Vec::new();
     for radius in [1e-7, 1e-6, 1e-3, 1e3, 1e6] {
         let center = DVec3::Y * f64::max(2.0 * radius, 1.0);

@@ -120,7 +120,7 @@ fn sphere_from_inside_is_a_geometric_series() {
 #[test]
 fn light_of_a_wall_falls_on_the_floor_by_its_form_factor() {
     let rho = 0.5;
-    for distance in [0.2, 1.0, 3.0] {
+    for distance in [0.2, 0.5, 1.0] {
         let text = format!(
             "film = {{ size = [8, 8], filter = \"point\" }}
             camera = {{ eye = [{distance:?}, 0.5, 0.0], target = [{distance:?}, 0.0, 0.0], \

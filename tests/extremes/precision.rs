@@ -12,7 +12,7 @@ use zerkalo::world::{AnyWorld, Options, Precision};
 const SIZE: [u32; 2] = [48, 36];
 /// Samples enough that paths diverted by rounding, equally often to either side, add no visible
 /// noise.
-const SAMPLES: u32 = 64;
+const SAMPLES: u32 = 128;
 
 /// Largest error of single precision where `auto` takes it: a quarter of the noise at which
 /// pictures count as converged by default.

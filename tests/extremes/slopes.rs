@@ -79,10 +79,14 @@ fn lens_error_converges_like_four_dimensions() {
 }
 
 /// Samples have six dimensions: the position in the pixel, the direction in the lobe, and the point
-/// of the light.
+/// of the light. The error falls in steps, because the points fill these dimensions at some powers of
+/// two and not at others. With 24 seeds in place of 6 the slope is -0.733 +- 0.045: the standard error
+/// is that of the steps, so that the slope alone is compared.
 #[test]
 fn light_error_through_a_rough_mirror_converges_like_smooth_dimensions() {
-    check("slope-light.toml", -0.65);
+    let [sobol, random] = slopes("slope-light.toml", &sized(shipped("slope-light.toml"), SIZE));
+    assert!(sobol.value <= -0.65, "{sobol:?}");
+    assert!((random.value + 0.5).abs() <= 3.0 * random.standard_error, "{random:?}");
 }
 
 /// Samples have four dimensions: the position in the pixel and the direction in the lobe.

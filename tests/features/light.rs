@@ -347,8 +347,7 @@ fn d3_indirect_diffuse() {
         |tested| agrees(&original, &with_point_light(tested), 192),
         &[
             ("ambient light alone", &|s| s.trace.max_diffuse_depth = 0),
-            ("a bounce less", &|s| s.trace.max_diffuse_depth = 2),
-            ("a bounce more", &|s| s.trace.max_diffuse_depth = 4),
+            ("one bounce", &|s| s.trace.max_diffuse_depth = 1),
             ("without caustics", &|s| s.trace.caustics = false),
             ("another red", &|s| material(s, "red").color = Color([0.06, 0.06, 0.5])),
         ],

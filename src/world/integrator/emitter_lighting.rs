@@ -93,13 +93,13 @@ pub(crate) struct ReflectingLobes<L: SimdFloat> {
 /// surfaces of the path. `transmittance` is that of
 /// [`direct_lighting`](super::direct_lighting::direct_lighting).
 #[inline(never)]
-pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
+pub(crate) fn emitter_lighting<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
     interaction: &SurfaceInteraction<L>,
     candidates: &TileCandidates,
     (sampler, bounce): (&PacketSampler<'_, L>, u32),
-    (lobes, transmittance): (&ReflectingLobes<L>, impl Fn(L) -> Option<Vec3<L>>),
+    (lobes, transmittance): (&ReflectingLobes<L>, &dyn Fn(L) -> Option<Vec3<L>>),
     (out, counts): (&mut Radiance<L>, &mut Counts),
 ) {
     let mut glossy = L::mask(false);
@@ -115,7 +115,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
         counts.glossy = true;
         let random = (sampler, bounce);
         let sums = (&mut *out, &mut *counts);
-        environment_lighting::<_, SIMPLE>(world, path, interaction, random, (glossy, lobes), sums);
+        environment_lighting(world, path, interaction, random, (glossy, lobes), sums);
     }
     let origin = interaction.ray_origin();
     let view = -path.ray.direction;
@@ -139,8 +139,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
         }
         if source.visible {
             for (index, lanes) in interaction.bsdfs(glossy & arrives) {
-                let lobe = lobe_value::<_, SIMPLE>(world, path, interaction, index, light.wi);
-                let (lobe, density) = lobe;
+                let (lobe, density) = lobe_value(world, path, interaction, index, light.wi);
                 let weight = power_heuristic(light.density, density) * lobes.share;
                 value += (lobe * weight).masked(lanes);
             }
@@ -153,11 +152,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
         if world.shadows {
             counts.rays += u64::from(lit.bits().count_ones());
             let ray = Ray { origin, direction: light.wi };
-            let occluded = if SIMPLE {
-                world.geometry.occluded_linear(&ray, light.distance, lit, occluders)
-            } else {
-                world.geometry.occluded(&ray, light.distance, lit, occluders)
-            };
+            let occluded = world.geometry.occluded(&ray, light.distance, lit, occluders);
             lit = lit.and_not(occluded);
             if lit.none() {
                 continue;
@@ -173,8 +168,8 @@ pub(crate) fn emitter_lighting<L: SimdFloat, const SIMPLE: bool>(
 
 /// Returns the value of the reflection lobe of BSDF `index` in the given direction, with the cosine
 /// of the light, and the density \[1/sr\] of the reflected ray in this direction.
-#[inline(always)]
-pub(crate) fn lobe_value<L: SimdFloat, const SIMPLE: bool>(
+#[inline(never)]
+pub(crate) fn lobe_value<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
     interaction: &SurfaceInteraction<L>,
@@ -191,7 +186,7 @@ pub(crate) fn lobe_value<L: SimdFloat, const SIMPLE: bool>(
         bsdf.evaluate_lobe(*strength, lobe, incident, normal, direction, world.fold)
     };
     let (value, density) = evaluate(direction);
-    if SIMPLE || !world.smooth {
+    if !world.smooth {
         return (value, density);
     }
     // Reflected rays that point into the surface are mirrored out of it.
@@ -204,7 +199,7 @@ pub(crate) fn lobe_value<L: SimdFloat, const SIMPLE: bool>(
 /// Returns the density \[1/sr\] of reflected rays of BSDF `index` in their directions; the largest
 /// finite number for a mirror.
 #[inline(always)]
-pub(crate) fn reflected_density<L: SimdFloat, const SIMPLE: bool>(
+pub(crate) fn reflected_density<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
     interaction: &SurfaceInteraction<L>,
@@ -213,6 +208,6 @@ pub(crate) fn reflected_density<L: SimdFloat, const SIMPLE: bool>(
 ) -> L {
     match &world.bsdfs[index].reflection {
         None | Some((_, ReflectionLobe::Mirror)) => L::from_f64(L::MAX),
-        Some(_) => lobe_value::<_, SIMPLE>(world, path, interaction, index, direction).1,
+        Some(_) => lobe_value(world, path, interaction, index, direction).1,
     }
 }

@@ -69,7 +69,7 @@ pub(crate) fn visible_environments<L: SimdFloat>(
 /// Adds the light of all environments that the surfaces reflect. `bounce` is the number of earlier
 /// surfaces of the path. `glossy` selects lanes with a lobe that has a density.
 #[inline(never)]
-pub(crate) fn environment_lighting<L: SimdFloat, const SIMPLE: bool>(
+pub(crate) fn environment_lighting<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
     interaction: &SurfaceInteraction<L>,
@@ -101,14 +101,13 @@ pub(crate) fn environment_lighting<L: SimdFloat, const SIMPLE: bool>(
         }
         if source.visible {
             for (index, lanes) in interaction.bsdfs(glossy & arrives) {
-                let lobe = lobe_value::<_, SIMPLE>(world, path, interaction, index, light.wi);
-                let (lobe, density) = lobe;
+                let (lobe, density) = lobe_value(world, path, interaction, index, light.wi);
                 let weight = power_heuristic(light.density, density) * lobes.share;
                 value += (lobe * weight).masked(lanes);
             }
         }
         let value = value.component_mul(light.irradiance);
-        add::<_, SIMPLE>(world, path, interaction, source, light.wi, value, (out, counts));
+        add(world, path, interaction, source, light.wi, value, (out, counts));
         if is_matt.none() {
             continue;
         }
@@ -121,13 +120,13 @@ pub(crate) fn environment_lighting<L: SimdFloat, const SIMPLE: bool>(
         let weight = power_heuristic(cosine_density(cos), density).masked(arrives);
         let value = interaction.diffuse.component_mul(radiance) * weight;
         let value = value.masked(arrives);
-        add::<_, SIMPLE>(world, path, interaction, source, wi, value, (out, counts));
+        add(world, path, interaction, source, wi, value, (out, counts));
     }
 }
 
 /// Adds the reflected radiance `value` from the directions `wi` to the sums, where no surface occludes it.
 #[inline(always)]
-fn add<L: SimdFloat, const SIMPLE: bool>(
+fn add<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
     interaction: &SurfaceInteraction<L>,
@@ -141,11 +140,7 @@ fn add<L: SimdFloat, const SIMPLE: bool>(
         counts.rays += u64::from(lit.bits().count_ones());
         let ray = Ray { origin: interaction.ray_origin(), direction: wi };
         let (t_max, occluders) = (L::from_f64(L::MAX), world.geometry.all());
-        let occluded = if SIMPLE {
-            world.geometry.occluded_linear(&ray, t_max, lit, occluders)
-        } else {
-            world.geometry.occluded(&ray, t_max, lit, occluders)
-        };
+        let occluded = world.geometry.occluded(&ray, t_max, lit, occluders);
         lit = lit.and_not(occluded);
     }
     let radiance = path.throughput.component_mul(value);

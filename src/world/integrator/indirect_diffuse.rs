@@ -187,7 +187,8 @@ pub(crate) fn trace_generations<L: SimdFloat>(
             }
             None => {
                 let reservoir = reservoir.as_mut();
-                trace_opaque::<_, false, true>(world, start, candidates, &sampler, reservoir, out)
+                let paths = (start.path, start.lanes, start.depth);
+                trace_opaque::<_, false, true>(world, paths, candidates, &sampler, reservoir, out)
             }
         };
         counts.rays += traced.rays;

@@ -10,26 +10,28 @@ use crate::world::integrator::direct_lighting::direct_lighting;
 use crate::world::integrator::emitter_lighting::{
     ReflectingLobes, emitter_lighting, reflected_density, visible_emitters,
 };
-use crate::world::integrator::indirect_diffuse::{DiffuseReservoir, PathStart};
+use crate::world::integrator::indirect_diffuse::DiffuseReservoir;
 use crate::world::integrator::interaction::{SurfaceInteraction, interact};
 use crate::world::integrator::nested_dielectrics::MediumStack;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
-/// Traces camera rays in a world without transmissive surfaces. `SIMPLE` is the value of
-/// [`World::simple`], here and in all called functions. `EMITTERS` is `true` if the world has
-/// emitters or indirect diffuse light; `reservoir` takes the hits from which the latter may bounce.
+/// Traces paths in a world without transmissive surfaces. The paths start in the given lanes and
+/// end after `depth` reflections.
+///
+/// `EMITTERS` is `true` if the world has emitters or indirect diffuse light; `reservoir` takes the
+/// hits from which the latter may bounce. `SIMPLE` is `true` if the world has neither and
+/// [`World::simple`] is `true`, here and in all called functions.
 #[inline(never)]
 pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS: bool>(
     world: &'a World<L>,
-    start: PathStart<L>,
+    (mut path, mut active, depth): (Path<L>, L::Mask, u32),
     mut candidates: &'a TileCandidates,
     sampler: &PacketSampler<'_, L>,
     mut reservoir: Option<&mut DiffuseReservoir<L>>,
     out: &mut Radiance<L>,
 ) -> Counts {
     let mut counts = Counts::default();
-    let PathStart { mut path, lanes: mut active, depth, .. } = start;
     let mut bounce = 0;
     loop {
         counts.rays += u64::from(active.bits().count_ones());
@@ -66,13 +68,13 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
         let is_last = bounce == depth;
         if EMITTERS {
             let lanes = if is_last { L::mask(false) } else { interaction.reflecting };
-            emitter_lighting::<_, SIMPLE>(
+            emitter_lighting(
                 world,
                 &path,
                 &interaction,
                 candidates,
                 (sampler, bounce),
-                (&ReflectingLobes { lanes, share: L::one() }, |_| None),
+                (&ReflectingLobes { lanes, share: L::one() }, &|_| None),
                 (out, &mut counts),
             );
         }
@@ -125,8 +127,7 @@ pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool, const EMITTERS
             direction = interaction.reflect_into_hemisphere(direction);
         }
         if EMITTERS {
-            let density =
-                reflected_density::<_, SIMPLE>(world, &incoming, interaction, index, direction);
+            let density = reflected_density(world, &incoming, interaction, index, direction);
             path.lobe_density = L::select(lanes, density, path.lobe_density);
         }
         path.ray.direction = Vec3::select(lanes, direction, path.ray.direction);

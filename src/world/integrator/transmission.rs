@@ -195,13 +195,13 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             } else {
                 self.reflecting_lobes(&path, &interaction, interface_hit.as_ref())
             };
-            emitter_lighting::<_, false>(
+            emitter_lighting(
                 world,
                 &path,
                 &interaction,
                 candidates,
                 (self.sampler, bounce),
-                (&lobes, transmittance),
+                (&lobes, &transmittance),
                 (out, counts),
             );
         }
@@ -466,8 +466,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 if self.world.smooth {
                     direction = interaction.reflect_into_hemisphere(direction);
                 }
-                let density =
-                    reflected_density::<_, false>(self.world, path, interaction, index, direction);
+                let density = reflected_density(self.world, path, interaction, index, direction);
                 directions.reflected_density =
                     L::select(lanes, density, directions.reflected_density);
             }
