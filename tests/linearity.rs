@@ -6,6 +6,7 @@ mod support;
 use support::{
     all_shipped, begin, follow, parsed, picture, pool, rendered, settings, shipped, sized,
 };
+use zerkalo::camera::Focus;
 use zerkalo::film::{Display, LightWeights, Replicates};
 use zerkalo::render::schedule::{Stop, StoppedBy};
 use zerkalo::scene::{BelowHorizon, RayTypes, Scene, TransformOp};
@@ -135,8 +136,18 @@ fn translated(scene: &Scene, by: [f64; 3]) -> Scene {
     for object in &mut scene.objects {
         object.transform.push(TransformOp::Translate(by));
     }
-    for point in scene.lights.iter_mut().filter_map(|light| light.point.as_mut()) {
-        shift(&mut point.position);
+    for light in &mut scene.lights {
+        let positions = [
+            light.point.as_mut().map(|point| &mut point.position),
+            light.spot.as_mut().map(|spot| &mut spot.position),
+            light.sphere.as_mut().map(|sphere| &mut sphere.center),
+            light.rectangle.as_mut().map(|rectangle| &mut rectangle.center),
+            light.disk.as_mut().map(|disk| &mut disk.center),
+        ];
+        positions.into_iter().flatten().for_each(&shift);
+    }
+    if let Some(Focus::Point(point)) = &mut scene.camera.focus {
+        shift(point);
     }
     shift(&mut scene.camera.eye);
     if let Some(target) = &mut scene.camera.target {

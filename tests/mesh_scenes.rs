@@ -361,7 +361,7 @@ fn invalid_file_name_is_rejected_and_valid_file_read_once() {
         ("bell.obj", "there is no such file"),
         ("broken.obj", "broken.obj:2: "),
         ("scene.toml", "\"toml\" is not a kind of mesh file"),
-        (".", "this is no regular file"),
+        (".", "it is a directory, not a regular file"),
     ] {
         let refusal = typed(&edit.scene, text).unwrap_err().to_string();
         assert!(refusal.contains(words), "{text}: {refusal}");

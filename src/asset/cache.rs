@@ -293,7 +293,7 @@ mod tests {
             assert!(assets.mesh(&path).unwrap_err().found.contains("vertex 1"));
         }
         assert_eq!(reads.load(Ordering::SeqCst), 1);
-        assert!(assets.mesh(folder.path()).unwrap_err().found.contains("no regular file"));
+        assert!(assets.mesh(folder.path()).unwrap_err().found.contains("not a regular file"));
     }
 
     #[test]

@@ -180,7 +180,9 @@ fn shape_examples_and_tables_are_valid() {
         let shape = read(kind, &given).unwrap_or_else(|e| panic!("{key}: {e}"));
         assert_eq!(shape.key(), *key);
         assert_eq!(shape.faults(), [], "{key}");
-        let scene = Scene::parse(&format!("[[object]]\n{text}\n"), key);
+        // Files in examples are relative to the folder of the project.
+        let name = format!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../{}.toml"), key);
+        let scene = Scene::parse(&format!("[[object]]\n{text}\n"), &name);
         assert!(scene.is_ok(), "{key}: {}", scene.unwrap_err());
 
         let written = toml::Table::try_from(&shape).unwrap();

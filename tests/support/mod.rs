@@ -98,11 +98,19 @@ pub fn accelerated(
     rendering
 }
 
-/// Removes all random choices from a scene: anti-aliasing, the lens, blurred lobes, and the choice between
-/// reflection and refraction, which begins behind the second transmitting surface.
+/// Removes all random choices from a scene: anti-aliasing, the lens, blurred lobes, lights with a size,
+/// diffuse bounces, and the choice between reflection and refraction, which begins behind the second
+/// transmitting surface.
 pub fn without_chance(scene: &mut Scene) {
     scene.film.filter = Filter::Point;
     scene.camera.aperture = None;
+    scene.trace.max_diffuse_depth = 0;
+    scene.lights.retain(|light| {
+        light.sphere.is_none()
+            && light.rectangle.is_none()
+            && light.disk.is_none()
+            && light.environment.is_none()
+    });
     for material in scene.materials.values_mut() {
         (material.roughness, material.alpha) = (0.0, None);
         if material.transmission > 0.0 {

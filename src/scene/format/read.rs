@@ -271,9 +271,10 @@ mod tests {
 
     #[test]
     fn parts_of_a_file_give_the_scene_and_the_errors_of_the_whole() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         for folder in ["scenes", "tests/bad-scenes"] {
             let mut count = 0;
-            for entry in fs::read_dir(folder).unwrap() {
+            for entry in fs::read_dir(root.join(folder)).unwrap() {
                 let path = entry.unwrap().path();
                 let is_toml = path.extension().is_some_and(|e| e == "toml");
                 let Ok(text) = fs::read_to_string(&path) else { continue };
