@@ -73,9 +73,13 @@ fn single_is_double(scene: &Scene) -> Verdict {
     paired(scene.film.size, ["single", "double"], [&single, &double], FLOOR)
 }
 
+/// Seeds of scenes in which two opaque surfaces of different colours coincide. Rounding decides which of
+/// them is in front. In seed 36 the cap of a cylinder lies in a plane.
+const COINCIDENT: [u64; 1] = [36];
+
 #[test]
 fn precisions() {
-    compare("precisions", 0..48, single_is_double);
+    compare("precisions", (0..48).filter(|seed| !COINCIDENT.contains(seed)), single_is_double);
 }
 
 #[test]
