@@ -329,9 +329,11 @@ fn d2_spot_light() {
     );
 }
 
-/// `scene` with a point light in place of the panel, which the plain tracer does not have.
+/// `scene` with a point light in place of the panel, which the plain tracer does not have with diffuse
+/// bounces, and with a side that reflects, so that caustics light much of the room.
 fn with_point_light(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
+    material(&mut scene, "green").reflection = 0.8;
     let light = parsed(
         "[[light]]\npoint.position = [0.0, 1.9, 0.0]\nfalloff = \"inverse-square\"\nintensity = 2.0",
     );
