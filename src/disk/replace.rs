@@ -66,7 +66,7 @@ impl Replacement {
     /// # Errors
     /// Fails if the file could not be replaced now: it is not a regular file, it is read-only, it
     /// exists and `existing` refuses that, the folder is not writable, or the path is a symbolic
-    /// link that [`may_follow`] does not permit.
+    /// link that `may_follow` does not permit.
     pub fn begin(path: &Path, existing: Existing) -> Result<Self, WriteError> {
         let error = |kind, what: &str, remedy: &str| WriteError {
             path: path.to_path_buf(),
@@ -175,7 +175,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     replacement.commit()
 }
 
-/// Checks that [`write`] could write the file at `path` now, without changing it.
+/// Checks that [`write()`] could write the file at `path` now, without changing it.
 ///
 /// # Errors
 /// Returns the error that writing would return now.

@@ -65,7 +65,7 @@ pub(crate) fn append(out: &mut String, command: impl Command) {
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Full-screen use of the terminal. Dropping this value restores the terminal, as does a panic in
-/// any thread. After any other end of the process a [`Restorer`] does so, if one could be started.
+/// any thread. After any other end of the process a `Restorer` does so, if one could be started.
 pub struct Screen {
     tty: Arc<Tty>,
     left: Receiver<()>,

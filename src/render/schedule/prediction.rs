@@ -74,7 +74,7 @@ impl Schedule {
 
     /// Predicts the sample counts at which the picture meets its error target. Samples go to the
     /// tiles in which they reduce the error most per ray, as in an adaptive render; the share
-    /// [`EXPLORATION`] of the rays goes to the tiles with the fewest samples. `usual_slopes` are
+    /// `EXPLORATION` of the rays goes to the tiles with the fewest samples. `usual_slopes` are
     /// the slopes of tiles without and with glossy lobes, as long as none of them has doubled its
     /// sample count. Returns `None` without a target, or before the first estimate of the noise.
     pub fn predict(&self, usual_slopes: [f64; 2]) -> Option<Prediction> {
