@@ -190,7 +190,7 @@ fn doctor_reports_after_restoring_the_terminal() {
     }
 }
 
-/// Whoever opens a pipe without another end waits for ever.
+/// Opening a pipe whose other end is closed blocks without end.
 #[test]
 fn pipe_in_place_of_the_scene_blocks_neither_edits_nor_the_end() {
     let fixture = Fixture::with_room();

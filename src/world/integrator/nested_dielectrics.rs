@@ -1,10 +1,10 @@
 //! Nested dielectrics with priorities (Schmidt and Budge 2002, *Simple Nested Dielectrics in Ray
 //! Traced Images*).
 //!
-//! Where transparent solids overlap, the solid that the scene lists last has the highest priority
-//! and fills the common space. The boundaries of the other solids are suppressed there. A bubble is
-//! therefore listed after the glass ball that contains it, and water may overlap the wall of a
-//! glass that is listed after the water. Outside of all solids the index of refraction is 1.
+//! Transparent solids may overlap. The solid that comes last in the scene file has the highest
+//! priority: it fills the common space, and rays pass the boundaries of the other solids there. A
+//! bubble therefore comes after the glass ball that contains it. Water may overlap the wall of a
+//! glass that comes after the water. Outside of all solids the index of refraction is 1.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn, next_distinct};
