@@ -20,4 +20,4 @@ echo "machine: $(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | xargs), $(n
 echo "connections by rate and round trip; 160x45 cells; from a key to the first change of the picture"
 cargo bench --quiet --bench link "$@"
 echo "on a simulated connection, one wave at a time to 1,024 samples per pixel:"
-cargo test --quiet --test link -- --nocapture --test-threads 1 | grep -E "room|noisy|acting"
+cargo test --quiet --test program link:: -- --nocapture --test-threads 1 | grep -E "room|noisy|acting"

@@ -1,7 +1,7 @@
 //! Acceleration structures: every choice renders the same image, bit for bit.
 
-mod common;
-mod support;
+use crate::common;
+use crate::support;
 
 use common::Numbers;
 use glam::{DAffine3, DQuat, DVec3};

@@ -1,11 +1,9 @@
 //! A sample is a pure function of seed, pixel, replicate and index. The bytes of the film do not depend on
 //! thread, order, packet layout or division into parts.
 
-#[path = "common/mod.rs"]
-mod common;
-#[path = "common/report.rs"]
-mod report;
-mod support;
+use crate::common;
+use crate::common::report;
+use crate::support;
 
 use common::Numbers;
 use report::report;

@@ -1,8 +1,7 @@
 //! Environment lights: furnaces, very bright pixels, scaled and turned images, hostile files.
 
-#[path = "common/normal.rs"]
-mod normal;
-mod support;
+use crate::common::normal;
+use crate::support;
 
 use normal::two_sided_z;
 use std::fs;

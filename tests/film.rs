@@ -1,9 +1,7 @@
 //! The film's public interface: order of addition, precision of sums, contents of files.
 
-#[path = "common/mod.rs"]
-mod common;
-#[path = "common/report.rs"]
-mod report;
+use crate::common;
+use crate::common::report;
 
 use common::Numbers;
 use proptest::prelude::*;

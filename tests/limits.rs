@@ -1,8 +1,7 @@
 //! Reported truncation bias of `depth` and `min_weight`, against pictures without these limits.
 
-#[path = "common/mod.rs"]
-mod common;
-mod support;
+use crate::common;
+use crate::support;
 
 use common::Numbers;
 use std::fmt::Write;

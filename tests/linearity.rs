@@ -1,7 +1,7 @@
 //! Invariances of pictures (light weights, unit of light, translation) and effects of the tracing limits
 //! (ray types, depth, least weight, horizon, cap on glossy tiles).
 
-mod support;
+use crate::support;
 
 use support::{
     all_shipped, begin, follow, parsed, picture, pool, rendered, settings, shipped, sized,

@@ -1,7 +1,6 @@
 //! Ray/mesh intersection: meshes are watertight, and hits are independent of packets and vector width.
 
-#[path = "common/mod.rs"]
-mod common;
+use crate::common;
 
 use common::Numbers;
 use std::sync::Arc;

@@ -1,7 +1,7 @@
 //! Meshes in scenes: shipped files, pictures against analytic shapes, watertightness, normals, colours,
 //! and files that are invalid or change.
 
-mod support;
+use crate::support;
 
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};

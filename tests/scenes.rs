@@ -1,11 +1,10 @@
 //! Every scene of the folder `scenes`: its inventory and its picture.
 //!
-//! `ZERKALO_BLESS=1 cargo test --test scenes` writes the expected values, `ZERKALO_BLESS=NAME.toml` those of
+//! `ZERKALO_BLESS=1 cargo test --test engine scenes::` writes the expected values, `ZERKALO_BLESS=NAME.toml` those of
 //! one scene and the stored ones of all others.
 
-#[path = "common/normal.rs"]
-mod normal;
-mod support;
+use crate::common::normal;
+use crate::support;
 
 use normal::{tail, two_sided_z};
 use std::collections::BTreeMap;

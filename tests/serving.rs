@@ -1,11 +1,9 @@
 //! Relighting: if a film can be reused for an edited scene, its samples mixed for that scene are
 //! the picture of a fresh render. Every key of every description, from the field tables, is edited.
 
-#[path = "common/mod.rs"]
-mod common;
-mod support;
-#[path = "common/tables.rs"]
-mod tables;
+use crate::common;
+use crate::common::tables;
+use crate::support;
 
 use common::Numbers;
 use std::collections::BTreeSet;

@@ -114,7 +114,7 @@ fn interruptions_and_earlier_scenes_do_not_change_the_film() {
 /// Prints the cost of a checkpoint of 1920x1080 pixels: seconds in which no samples are traced, and
 /// speed of writing and reading.
 #[test]
-#[ignore = "prints figures: cargo test --test session -- --ignored --nocapture checkpoint_cost"]
+#[ignore = "prints figures: cargo test --test program session:: -- --ignored --nocapture checkpoint_cost"]
 fn checkpoint_cost() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/mirror-room.toml");
     let mut scene = Scene::read(&path).unwrap();

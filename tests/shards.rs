@@ -180,7 +180,7 @@ fn planned_noise_is_near_the_target() {
 }
 
 /// The acceptance of plans, in some minutes:
-/// `cargo test --test shards -- --ignored --nocapture planned`
+/// `cargo test --test engine shards:: -- --ignored --nocapture planned`
 #[test]
 #[ignore = "takes minutes"]
 fn planned_runs_of_eight_shards_meet_their_target() {

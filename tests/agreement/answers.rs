@@ -1,7 +1,7 @@
 //! Surface reflection of the reference tracer, formula by formula.
 
+use crate::agreement::tracer::Mutation;
 use crate::common::Numbers;
-use crate::tracer::Mutation;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Material};

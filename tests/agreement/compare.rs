@@ -1,9 +1,9 @@
 //! Statistical comparison of two programs' pictures of a scene.
 
+use crate::agreement::tracer::{Estimate, Mutation, Tracer};
 use crate::common::Numbers;
-use crate::normal::two_sided_z;
+use crate::common::normal::two_sided_z;
 use crate::support::{begin_with, picture, pool, sized, uniform};
-use crate::tracer::{Estimate, Mutation, Tracer};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::fmt;

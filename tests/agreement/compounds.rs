@@ -1,9 +1,9 @@
 //! Compounds of the reference tracer. At each crossing of a part's surface, point tests just in
 //! front and just behind decide if the ray enters or leaves the compound.
 
-use crate::meshes::Triangles;
-use crate::paint::{Canvas, Spot};
-use crate::surfaces::{Piece, map, pieces};
+use crate::agreement::meshes::Triangles;
+use crate::agreement::paint::{Canvas, Spot};
+use crate::agreement::surfaces::{Piece, map, pieces};
 use glam::{DAffine3, DMat3, DVec3};
 use zerkalo::scene::Object;
 use zerkalo::shape::{CsgOperand, Shape};

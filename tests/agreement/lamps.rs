@@ -1,8 +1,8 @@
 //! Lights with a size in the reference tracer: points of the light uniform over its area for direct
 //! light, and rays that hit it for the camera and for mirrors. There is no importance sampling.
 
+use crate::agreement::tracer::Mutation;
 use crate::common::Numbers;
-use crate::tracer::Mutation;
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::light::{Light, LightUnit};

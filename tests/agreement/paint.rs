@@ -1,10 +1,10 @@
 //! Textures and bump maps of the reference tracer. Texture coordinates follow from formulas, their
 //! derivatives from finite differences.
 
-use crate::compounds::Leaf;
-use crate::meshes::Triangles;
-use crate::surfaces::Piece;
-use crate::tracer::{Mutation, Tracer};
+use crate::agreement::compounds::Leaf;
+use crate::agreement::meshes::Triangles;
+use crate::agreement::surfaces::Piece;
+use crate::agreement::tracer::{Mutation, Tracer};
 use glam::{DMat3, DVec2, DVec3};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;

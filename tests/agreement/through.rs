@@ -1,10 +1,12 @@
 //! Transmission of the reference tracer. The media on both sides of a surface are found by point
 //! tests just in front of and just behind it.
 
-use crate::answers::{Indices, fresnel, has_facets, is_sharp, reflect, refracted_at_facet, spread};
+use crate::agreement::answers::{
+    Indices, fresnel, has_facets, is_sharp, reflect, refracted_at_facet, spread,
+};
+use crate::agreement::compounds::Body;
+use crate::agreement::tracer::{Hit, Mutation, Tracer};
 use crate::common::Numbers;
-use crate::compounds::Body;
-use crate::tracer::{Hit, Mutation, Tracer};
 use glam::DVec3;
 use zerkalo::material::{Fresnel, Material};
 use zerkalo::scene::{BelowHorizon, RayTypes};

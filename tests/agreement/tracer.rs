@@ -1,12 +1,12 @@
 //! Reference path tracer in double precision, one sample at a time, optimised for readability.
 
-use crate::answers::{highlight, reflect, wide_lobe};
+use crate::agreement::answers::{highlight, reflect, wide_lobe};
+use crate::agreement::compounds::Body;
+use crate::agreement::lamps::Lamp;
+use crate::agreement::meshes;
+use crate::agreement::paint::Pixels;
+use crate::agreement::through::Way;
 use crate::common::Numbers;
-use crate::compounds::Body;
-use crate::lamps::Lamp;
-use crate::meshes;
-use crate::paint::Pixels;
-use crate::through::Way;
 use glam::DVec3;
 use std::collections::HashMap;
 use std::f64::consts::PI;

@@ -55,7 +55,7 @@ fn object_takes_at_most_a_kilobyte_beyond_its_text() {
 /// A million objects and a million copies of a triangle, by ratios: twice the input takes at most
 /// 2.3 times the time.
 ///
-///     cargo test --release --test command_line -- --ignored --nocapture million
+///     cargo test --release --test program command_line:: -- --ignored --nocapture million
 #[test]
 #[ignore = "takes minutes, and needs an optimised build and an idle machine"]
 #[cfg(target_os = "linux")]

@@ -1,6 +1,6 @@
 //! Plans, shards and merging.
 
-use crate::Desk;
+use crate::command_line::Desk;
 use std::fs;
 
 /// Runs `args` and returns what the command printed on stdout.

@@ -1,5 +1,10 @@
 //! Random numbers for tests: a fixed seed gives the same numbers everywhere.
-#![allow(dead_code, reason = "each test file uses its part")]
+#![allow(dead_code, reason = "each of the two test programs uses a part")]
+
+pub mod normal;
+pub mod rays;
+pub mod report;
+pub mod tables;
 
 use glam::DVec3;
 

@@ -1,5 +1,5 @@
 //! Tails of the normal distribution and of Student's t-distribution.
-#![allow(dead_code, reason = "each test file uses its part")]
+#![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 /// Two-sided probability that the magnitude of a standard normal number exceeds `z`, by its continued
 /// fraction.

@@ -1,6 +1,6 @@
 //! Rays in double precision, traced in packets of any lane type.
 
-#![allow(dead_code, reason = "each test target uses its part")]
+#![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 use crate::common::Numbers;
 use glam::{DAffine3, DQuat, DVec3};

@@ -1,6 +1,6 @@
 //! Cells of the table of extremes in docs/accuracy.md, which `benches/accuracy.sh extremes` collects
 //! from the output of the tests. A test prints its result once it has passed.
-#![allow(dead_code, reason = "each test file uses its part")]
+#![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 use zerkalo::lanes::SimdFloat;
 

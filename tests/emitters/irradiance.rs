@@ -1,7 +1,7 @@
 //! Irradiance of spheres, rectangles and disks on matt surfaces, with and without an occluder.
 
-use crate::forms;
-use crate::setup::{array, check, scene};
+use crate::emitters::forms;
+use crate::emitters::setup::{array, check, scene};
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::scene::Scene;
@@ -135,7 +135,8 @@ fn flat_lights_shine_from_one_side_only() {
             let light =
                 format!("{shape}center = [0.0, 1.0, 0.0], normal = [0.0, {normal:?}, 0.0] }}");
             let scene = receiver(DVec3::Y, &light, "");
-            let (mean, _) = crate::setup::radiance::<zerkalo::lanes::Single>(&scene, 64, 1);
+            let (mean, _) =
+                crate::emitters::setup::radiance::<zerkalo::lanes::Single>(&scene, 64, 1);
             assert_eq!(mean > 0.0, lit, "{light}");
         }
     }

@@ -1,6 +1,6 @@
 //! Lights seen by the camera, in mirrors and in glossy lobes.
 
-use crate::setup::{check, radiance, scene};
+use crate::emitters::setup::{check, radiance, scene};
 use std::f64::consts::TAU;
 use zerkalo::lanes::{Double, Single};
 use zerkalo::scene::Scene;

@@ -1,6 +1,6 @@
 //! Scenes with one receiver and one light, and their radiance with its standard error.
 
-use crate::normal::two_sided_z;
+use crate::common::normal::two_sided_z;
 use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;

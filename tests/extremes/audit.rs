@@ -1,6 +1,6 @@
 //! Audit of the thirty numbered tests: each exists once, in the file that the table names.
 
-use crate::report::report;
+use crate::common::report::report;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -185,7 +185,7 @@ const EXTREMES: [(&str, &str, &str, &str); 30] = [
         "the estimated error is the true error",
         "true / estimated 0.9 .. 1.1; at most 1.1 times the target",
         "estimator_honesty",
-        "tests/honesty/main.rs",
+        "tests/honesty/mod.rs",
     ),
 ];
 

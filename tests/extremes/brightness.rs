@@ -1,6 +1,6 @@
 //! Extremes of brightness: samples within the range of the film, and samples beyond it.
 
-use crate::report::report;
+use crate::common::report::report;
 use crate::support::{begin, parsed, picture, pool, rendered, uniform};
 use std::fs;
 use zerkalo::film::{Display, Replicates};

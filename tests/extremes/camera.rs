@@ -1,8 +1,8 @@
 //! Extremes of cameras and of orthonormal frames.
 
 use crate::common::Numbers;
-use crate::rays::to_dvec3;
-use crate::report::{precision, report};
+use crate::common::rays::to_dvec3;
+use crate::common::report::{precision, report};
 use glam::DVec3;
 use zerkalo::camera::{Camera, PerspectiveCamera, ViewAngle};
 use zerkalo::lanes::{Double, Frame, SimdFloat, Single, Vec3};

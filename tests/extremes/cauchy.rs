@@ -3,8 +3,8 @@
 //! is 4 V / S (Cauchy, Crofton). Every registered kind is tested.
 
 use crate::common::Numbers;
-use crate::rays::{Line, bounding_sphere, closest, every_kind};
-use crate::report::{LEFT_TO_DOUBLE, report};
+use crate::common::rays::{Line, bounding_sphere, closest, every_kind};
+use crate::common::report::{LEFT_TO_DOUBLE, report};
 use glam::{DMat3, DVec3};
 use std::f64::consts::{PI, TAU};
 use zerkalo::lanes::{Double, SimdFloat, Single};

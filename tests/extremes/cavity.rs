@@ -1,8 +1,8 @@
 //! Cameras in the cavity of a compound solid.
 
 use crate::common::Numbers;
-use crate::compound::{block, difference, geometry};
-use crate::rays::{Line, closest};
+use crate::common::rays::{Line, closest};
+use crate::extremes::compound::{block, difference, geometry};
 use glam::DVec3;
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::primitive::{Form, SphereForm};

@@ -1,9 +1,9 @@
 //! Compound solids with coincident faces, and with a light inside.
 
 use crate::common::Numbers;
-use crate::compound::{block, difference, geometry, union};
-use crate::rays::{Line, Traced, blocked, closest, scene};
-use crate::report::report;
+use crate::common::rays::{Line, Traced, blocked, closest, scene};
+use crate::common::report::report;
+use crate::extremes::compound::{block, difference, geometry, union};
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::lanes::{Double, SimdFloat, Single};
@@ -129,7 +129,7 @@ fn coincident_faces_show_the_first_part() {
         let at = DVec3::new(numbers.between(-0.7, 0.7), 0.5, numbers.between(-0.4, 0.4));
         let from = at + DVec3::new(numbers.between(-1.0, 1.0), 1.0, numbers.between(-1.0, 1.0));
         let line = (from, (at - from).normalize());
-        let (ray, _) = crate::rays::packets::<Single>(&[line]).next().unwrap();
+        let (ray, _) = crate::common::rays::packets::<Single>(&[line]).next().unwrap();
         let hit = geometry.closest(&ray, geometry.all());
         let item = geometry.sources()[hit.item.id_lane(0) as usize];
         assert_eq!((item.form, item.part), (0, 0), "{line:?}");

@@ -1,8 +1,8 @@
 //! Compound solids: volumes, parity, algebra.
 
 use crate::common::Numbers;
-use crate::rays::{Line, LineHit, blocked, closest};
-use crate::report::report;
+use crate::common::rays::{Line, LineHit, blocked, closest};
+use crate::common::report::report;
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::primitive::{

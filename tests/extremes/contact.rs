@@ -1,7 +1,7 @@
 //! Transparent objects in contact with others: the picture is the limit of a vanishing gap.
 
 use crate::common::Numbers;
-use crate::rays::{Line, Traced};
+use crate::common::rays::{Line, Traced};
 use glam::{DAffine3, DQuat, DVec3};
 use std::fs;
 use std::path::Path;

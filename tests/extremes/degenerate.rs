@@ -1,8 +1,8 @@
 //! Rays that start inside solids or on faces, or run in planes of faces or along axes.
 
 use crate::common::Numbers;
-use crate::rays::{Line, any_line, blocked, bounding_sphere, closest, every_kind, forms};
-use crate::report::{precision, report};
+use crate::common::rays::{Line, any_line, blocked, bounding_sphere, closest, every_kind, forms};
+use crate::common::report::{precision, report};
 use glam::DVec3;
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::primitive::{

@@ -1,7 +1,7 @@
 //! Directions of every length that a file can hold render the same picture.
 
+use crate::common::tables::{keys, scene, table, value_at};
 use crate::support::{parsed, rendered};
-use crate::tables::{keys, scene, table, value_at};
 use std::collections::BTreeSet;
 use toml::Value;
 use zerkalo::scene::{FIELDS, Scene};

@@ -1,8 +1,8 @@
 //! Watertight meshes: no ray passes between two triangles, at edges, at corners or in slivers.
 
 use crate::common::Numbers;
-use crate::rays::{Line, closest, packets};
-use crate::report::{LEFT_TO_DOUBLE, report};
+use crate::common::rays::{Line, closest, packets};
+use crate::common::report::{LEFT_TO_DOUBLE, report};
 use glam::{DAffine3, DQuat, DVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -158,7 +158,7 @@ fn extreme_14_mesh_watertight() {
 }
 
 #[test]
-#[ignore = "2e7 rays, a minute: cargo test --test extremes -- --ignored"]
+#[ignore = "2e7 rays, a minute: cargo test --test engine extremes:: -- --ignored"]
 fn extreme_14_mesh_watertight_at_length() {
     check(2_000_000);
 }

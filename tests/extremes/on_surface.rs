@@ -1,7 +1,7 @@
 //! Lamps that lie exactly on surfaces.
 
 use crate::common::Numbers;
-use crate::rays::{Line, Traced};
+use crate::common::rays::{Line, Traced};
 use glam::{DAffine3, DQuat, DVec3};
 use std::fs;
 use std::path::Path;

@@ -2,7 +2,7 @@
 //! elsewhere. In each family of scenes one proportion shrinks; the error of single precision is
 //! measured as the RMSE against double precision with the same samples, in 8-bit levels.
 
-use crate::report::report;
+use crate::common::report::report;
 use crate::support::{all_shipped, parsed, picture, rendered, shipped, sized};
 use std::collections::BTreeMap;
 use zerkalo::film::{Display, Replicates};

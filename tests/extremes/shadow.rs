@@ -1,8 +1,8 @@
 //! Shadows of surfaces on themselves and on each other.
 
 use crate::common::Numbers;
-use crate::rays::{Line, Traced, scene};
-use crate::report::report;
+use crate::common::rays::{Line, Traced, scene};
+use crate::common::report::report;
 use glam::{DMat3, DVec3};
 use zerkalo::world::Precision;
 

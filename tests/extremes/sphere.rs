@@ -1,8 +1,8 @@
 //! Spheres seen from afar, from inside, as ground, and at the limb.
 
 use crate::common::Numbers;
-use crate::rays::{Line, Traced, closest, scene};
-use crate::report::{LEFT_TO_DOUBLE, precision, report};
+use crate::common::rays::{Line, Traced, closest, scene};
+use crate::common::report::{LEFT_TO_DOUBLE, precision, report};
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::camera::{Camera, PerspectiveCamera, ViewAngle};

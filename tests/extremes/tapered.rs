@@ -1,8 +1,8 @@
 //! Extremes of cylinders, cones and conical frusta.
 
 use crate::common::Numbers;
-use crate::rays::{Line, LineHit, closest};
-use crate::report::{LEFT_TO_DOUBLE, precision, report};
+use crate::common::rays::{Line, LineHit, closest};
+use crate::common::report::{LEFT_TO_DOUBLE, precision, report};
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::primitive::{Aggregate, Form};

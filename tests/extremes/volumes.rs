@@ -1,9 +1,9 @@
 //! Volumes of compounds from the chords of lines.
 
 use crate::common::Numbers;
-use crate::compound::{ball, block, chords, difference, intersection, lines, union};
-use crate::rays::Line;
-use crate::report::report;
+use crate::common::rays::Line;
+use crate::common::report::report;
+use crate::extremes::compound::{ball, block, chords, difference, intersection, lines, union};
 use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::PI;
 use zerkalo::lanes::Double;

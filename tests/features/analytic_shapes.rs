@@ -1,7 +1,7 @@
 //! Analytic shapes, independent of the program. Solids are implicit functions, negative inside; rectangles and
 //! triangles are intersected directly.
 
-use crate::surfaces::map;
+use crate::agreement::surfaces::map;
 use glam::{DAffine3, DVec3};
 use zerkalo::scene::{Object, TransformOp};
 use zerkalo::shape::{CsgOperand, Shape};

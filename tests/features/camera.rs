@@ -1,9 +1,9 @@
 //! The camera's frame and navigation.
 
-use crate::compare::zoomed;
-use crate::first_hits::hits_agree;
-use crate::plain_tracer::agrees;
-use crate::row::{Verdict, ensure, row};
+use crate::agreement::compare::zoomed;
+use crate::features::first_hits::hits_agree;
+use crate::features::plain_tracer::agrees;
+use crate::features::row::{Verdict, ensure, row};
 use crate::support::shipped;
 use glam::DVec3;
 use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};

@@ -1,7 +1,7 @@
 //! Lights with a size.
 
-use crate::plain_tracer::agrees;
-use crate::row::{Change, material, row};
+use crate::features::plain_tracer::agrees;
+use crate::features::row::{Change, material, row};
 use crate::support::shipped;
 use zerkalo::light::{Environment, Light, LightUnit, Point};
 use zerkalo::scene::Scene;

@@ -1,7 +1,7 @@
 //! Bounding boxes and the other acceleration structures.
 
-use crate::first_hits::hits_agree;
-use crate::row::{Verdict, ensure, row};
+use crate::features::first_hits::hits_agree;
+use crate::features::row::{Verdict, ensure, row};
 use crate::support::{rendered, shipped, sized};
 use zerkalo::primitive::Acceleration;
 use zerkalo::scene::Scene;

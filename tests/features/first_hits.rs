@@ -1,7 +1,7 @@
 //! First hits of the program at each pixel centre, compared with analytic shapes.
 
-use crate::analytic_shapes::AnalyticShape;
-use crate::row::Verdict;
+use crate::features::analytic_shapes::AnalyticShape;
+use crate::features::row::Verdict;
 use crate::support::sized;
 use glam::DVec3;
 use rayon::prelude::*;

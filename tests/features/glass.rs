@@ -1,7 +1,7 @@
 //! Rough transmission and absorption.
 
-use crate::plain_tracer::agrees;
-use crate::row::{material, row};
+use crate::features::plain_tracer::agrees;
+use crate::features::row::{material, row};
 use crate::support::shipped;
 use zerkalo::material::Lobe;
 use zerkalo::value::Color;

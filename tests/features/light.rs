@@ -1,8 +1,8 @@
 //! Materials, lights and shading formulas.
 
-use crate::first_hits::{RASTER, centers, first_hits, pixel_ray};
-use crate::plain_tracer::{agrees, agrees_exactly, without_chance};
-use crate::row::{Verdict, ensure, material, object, row};
+use crate::features::first_hits::{RASTER, centers, first_hits, pixel_ray};
+use crate::features::plain_tracer::{agrees, agrees_exactly, without_chance};
+use crate::features::row::{Verdict, ensure, material, object, row};
 use crate::support::{parsed, shipped, sized};
 use glam::DVec3;
 use zerkalo::camera::ViewAngle;
@@ -12,7 +12,7 @@ use zerkalo::scene::{RayTypes, Scene};
 use zerkalo::value::Color;
 
 /// Asserts that `file` agrees exactly with the plain tracer, and none of its `mutations` does.
-fn exact(file: &str, mutations: &[(&str, crate::row::Change)]) {
+fn exact(file: &str, mutations: &[(&str, crate::features::row::Change)]) {
     let original = shipped(file);
     row(file, |tested| agrees_exactly(&original, tested), mutations);
 }

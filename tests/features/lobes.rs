@@ -1,8 +1,8 @@
 //! Mirrors and blurred reflection.
 
-use crate::first_hits::{RASTER, centers, first_hits, pixel_ray};
-use crate::plain_tracer::{agrees, without_chance};
-use crate::row::{Verdict, ensure, material, number, object, row, shape};
+use crate::features::first_hits::{RASTER, centers, first_hits, pixel_ray};
+use crate::features::plain_tracer::{agrees, without_chance};
+use crate::features::row::{Verdict, ensure, material, number, object, row, shape};
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
 use std::f64::consts::PI;

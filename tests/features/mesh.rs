@@ -1,8 +1,8 @@
 //! Meshes from files, compared with a direct intersection of all triangles.
 
-use crate::analytic_shapes::{AnalyticShape, placement, triangles};
-use crate::first_hits::hits_agree_with;
-use crate::row::{object, row, shape};
+use crate::features::analytic_shapes::{AnalyticShape, placement, triangles};
+use crate::features::first_hits::hits_agree_with;
+use crate::features::row::{object, row, shape};
 use crate::support::{parsed, shipped};
 use glam::DVec3;
 use std::fs;

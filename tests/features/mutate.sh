@@ -56,7 +56,7 @@ if [ "${1:-}" = --check ]; then
     cargo check --quiet
     exit
 fi
-cargo test --quiet --test features --no-run
+cargo test --quiet --test engine --no-run
 
 if [ $# -eq 0 ]; then
     set -- $(ls "$mutations")
@@ -65,9 +65,9 @@ status=0
 for name in "$@"; do
     test=$(value "$name" test)
     # Without the mutation the copy equals the original.
-    if ! cargo test --quiet --test features "$test" > before.log 2>&1; then
+    if ! cargo test --quiet --test engine "$test" > before.log 2>&1; then
         outcome="FAILS WITHOUT IT, TOO"
-    elif ZERKALO_MUTANT=$name cargo test --quiet --test features "$test" > mutate.log 2>&1; then
+    elif ZERKALO_MUTANT=$name cargo test --quiet --test engine "$test" > mutate.log 2>&1; then
         outcome="NOT NOTICED"
     else
         # The message after the location of the panic.

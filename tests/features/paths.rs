@@ -1,8 +1,8 @@
 //! Path depth, transmission, and faults of earlier ray tracers that this one must not have.
 
-use crate::first_hits::{RASTER, centers, hits_agree, pixel_ray};
-use crate::plain_tracer::{agrees, agrees_exactly, without_chance};
-use crate::row::{Verdict, ensure, material, row};
+use crate::features::first_hits::{RASTER, centers, hits_agree, pixel_ray};
+use crate::features::plain_tracer::{agrees, agrees_exactly, without_chance};
+use crate::features::row::{Verdict, ensure, material, row};
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
 use zerkalo::film::Replicates;
@@ -14,7 +14,7 @@ use zerkalo::world::Precision;
 
 #[test]
 fn b1_tracing_depth() {
-    let levels: [(&str, crate::row::Change); 3] = [
+    let levels: [(&str, crate::features::row::Change); 3] = [
         ("camera rays only", &|s| s.trace.ray_types = RayTypes::Primary),
         ("shadows", &|s| s.trace.ray_types = RayTypes::Shadows),
         ("everything", &|s| s.trace.ray_types = RayTypes::Full),
@@ -226,7 +226,9 @@ fn c4_old_faults() {
         &[
             ("the room not seen from inside", &|s| material(s, "plaster").two_sided = false),
             ("the ball before the lamp", &|s| {
-                let Shape::Sphere(ball) = &mut crate::row::object(s, "above the lamp").shape else {
+                let Shape::Sphere(ball) =
+                    &mut crate::features::row::object(s, "above the lamp").shape
+                else {
                     unreachable!()
                 };
                 ball.center[1] = 1.6;

@@ -1,11 +1,11 @@
 //! Comparison of the program's pictures with those of the plain tracer of tests/agreement.
 
+use crate::agreement::compare::{Picture, reference, small};
+use crate::agreement::tracer::{Mutation, Tracer};
 use crate::common::Numbers;
-use crate::compare::{Picture, reference, small};
-use crate::first_hits::RASTER;
-use crate::row::Verdict;
+use crate::features::first_hits::RASTER;
+use crate::features::row::Verdict;
 use crate::support::{picture, rendered, sized};
-use crate::tracer::{Mutation, Tracer};
 use glam::DVec3;
 use zerkalo::film::Replicates;
 use zerkalo::scene::{Filter, Scene};

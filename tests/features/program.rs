@@ -1,8 +1,8 @@
 //! Features of the program: cap on rays per pixel, threads, edits during rendering, demonstrations.
 
-use crate::first_hits::{RASTER, first_hits, hits_agree};
-use crate::plain_tracer::agrees;
-use crate::row::{Verdict, ensure, material, number};
+use crate::features::first_hits::{RASTER, first_hits, hits_agree};
+use crate::features::plain_tracer::agrees;
+use crate::features::row::{Verdict, ensure, material, number};
 use crate::support::{begin, follow, picture, pool, settings, shipped, sized};
 use std::path::Path;
 use std::sync::Arc;
@@ -281,7 +281,8 @@ fn left_to_right(scene: &Scene) -> f64 {
     scene.camera.view_angle = zerkalo::camera::ViewAngle::Vertical(14.0);
     scene.objects.retain(|o| ["floor", "ball"].contains(&o.name.as_str()));
     let floor = number(&scene, "floor") as u32;
-    let (hits, pixels) = (first_hits(&scene), crate::plain_tracer::without_chance(&scene));
+    let (hits, pixels) =
+        (first_hits(&scene), crate::features::plain_tracer::without_chance(&scene));
     let side = |left: bool| -> f64 {
         let half = RASTER[0] as usize / 2;
         let indices = (0..hits.len()).filter(|i| (i % RASTER[0] as usize >= half) != left);

@@ -1,7 +1,7 @@
 //! Shapes, transforms and compounds, compared with the formulas of the shapes.
 
-use crate::first_hits::hits_agree;
-use crate::row::{object, row, shape};
+use crate::features::first_hits::hits_agree;
+use crate::features::row::{object, row, shape};
 use crate::support::shipped;
 use zerkalo::scene::Scene;
 use zerkalo::shape::{Difference, Intersection, Shape, Union};
@@ -17,8 +17,10 @@ fn shapes(file: &str, mutations: &[(&str, &str, &str)]) {
             (*name, change)
         })
         .collect();
-    let changes: Vec<_> =
-        changes.iter().map(|(name, change)| (*name, change as crate::row::Change)).collect();
+    let changes: Vec<_> = changes
+        .iter()
+        .map(|(name, change)| (*name, change as crate::features::row::Change))
+        .collect();
     row(file, |tested| hits_agree(&original, tested), &changes);
 }
 
@@ -253,7 +255,7 @@ fn replace_operation(
 
 #[test]
 fn b7_compound() {
-    let files: [(&str, [(&str, crate::row::Change); 2]); 4] = [
+    let files: [(&str, [(&str, crate::features::row::Change); 2]); 4] = [
         (
             "compound-union.toml",
             [("intersections", &as_intersection), ("differences", &as_difference)],

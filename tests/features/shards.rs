@@ -1,6 +1,6 @@
 //! Features of renders that are divided among machines.
 
-use crate::row::{Verdict, ensure, material, row};
+use crate::features::row::{Verdict, ensure, material, row};
 use crate::support::{begin, begin_with, follow, pool, settings, shipped, sized};
 use zerkalo::film::{Display, Film};
 use zerkalo::render::plan::{Plan, PlanSettings, PlannedTile, ShardRender};

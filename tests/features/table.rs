@@ -1,6 +1,6 @@
 //! Guard of the table in docs/features.md: it has every row, and all files and tests that it names exist.
 
-use crate::mutations;
+use crate::features::mutations;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};

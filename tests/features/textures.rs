@@ -1,9 +1,9 @@
 //! Textures and bumps, compared with image lookups by the formulas of the mappings.
 
-use crate::first_hits::{RASTER, centers, first_hits, pixel_ray};
-use crate::paint::Pixels;
-use crate::plain_tracer::without_chance;
-use crate::row::{Verdict, ensure, number, row};
+use crate::agreement::paint::Pixels;
+use crate::features::first_hits::{RASTER, centers, first_hits, pixel_ray};
+use crate::features::plain_tracer::without_chance;
+use crate::features::row::{Verdict, ensure, number, row};
 use crate::support::{shipped, sized};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{PI, TAU};

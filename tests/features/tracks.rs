@@ -1,8 +1,8 @@
 //! The scene of the reflecting tracks.
 
-use crate::first_hits::hits_agree;
-use crate::plain_tracer::{agrees, agrees_exactly};
-use crate::row::{ensure, row, shape};
+use crate::features::first_hits::hits_agree;
+use crate::features::plain_tracer::{agrees, agrees_exactly};
+use crate::features::row::{ensure, row, shape};
 use crate::support::parsed;
 use std::fmt::Write;
 use zerkalo::scene::{RayTypes, Scene};

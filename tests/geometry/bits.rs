@@ -1,8 +1,8 @@
 //! Packets and the width-1 instances return equal bits.
 
 use crate::common::Numbers;
-use crate::rays::{Line, packets, surface};
-pub use crate::rays::{any_line, forms};
+use crate::common::rays::{Line, packets, surface};
+pub use crate::common::rays::{any_line, forms};
 use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
 use zerkalo::primitive::{Aggregate, Form};

@@ -1,7 +1,7 @@
 //! Point light over a plane: irradiance, radiance, the edge of a shadow.
 
 use crate::common::Numbers;
-use crate::rays::{Line, Traced, scene};
+use crate::common::rays::{Line, Traced, scene};
 use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::world::Precision;

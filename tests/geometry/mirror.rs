@@ -1,7 +1,7 @@
 //! Perfect mirrors show the view of the mirrored camera: the image of P is P - 2 (n.P - d) n.
 
 use crate::common::Numbers;
-use crate::rays::{Line, Traced, closest, scene};
+use crate::common::rays::{Line, Traced, closest, scene};
 use glam::DVec3;
 use zerkalo::lanes::Double;
 use zerkalo::primitive::Aggregate;

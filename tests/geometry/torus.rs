@@ -2,7 +2,7 @@
 //! closed forms, self-shadowing, and compounds.
 
 use crate::common::Numbers;
-use crate::rays::{Line, blocked, closest};
+use crate::common::rays::{Line, blocked, closest};
 use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::PI;
 use zerkalo::lanes::{Double, SimdFloat, Single};
@@ -145,7 +145,7 @@ fn torus_hits_are_roots_of_the_quartic() {
 fn torus_hits_do_not_depend_on_other_lanes() {
     let mut numbers = Numbers::new(3);
     let lines: Vec<Line> = (0..4000).map(|_| line(&mut numbers, 0.3)).collect();
-    let bits = |all: Vec<Option<crate::rays::LineHit>>| -> Vec<Option<u64>> {
+    let bits = |all: Vec<Option<crate::common::rays::LineHit>>| -> Vec<Option<u64>> {
         all.into_iter().map(|hit| hit.map(|hit| hit.t.to_bits())).collect()
     };
     let form = torus(0.3);

@@ -2,7 +2,7 @@
 //! object.
 
 use crate::common::Numbers;
-use crate::rays::{Line, bounding_sphere, closest, every_kind, scene};
+use crate::common::rays::{Line, bounding_sphere, closest, every_kind, scene};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use zerkalo::lanes::Double;
 use zerkalo::primitive::Aggregate;

@@ -1,8 +1,8 @@
 //! BVHs, and boxes in object or scene space, return the hits of a linear list.
 
-use crate::bits::{any_line, forms};
 use crate::common::Numbers;
-use crate::rays::{Line, packets};
+use crate::common::rays::{Line, packets};
+use crate::geometry::bits::{any_line, forms};
 use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single};
 use zerkalo::primitive::{Acceleration, Aggregate, Form, SphereForm};

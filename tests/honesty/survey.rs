@@ -2,9 +2,9 @@
 //! uniform ones with the same true error.
 //!
 //! The short form runs with all tests. The long form prints a table of 200 scenes:
-//! `cargo test --test honesty survey -- --ignored --nocapture`.
+//! `cargo test --test engine honesty::survey -- --ignored --nocapture`.
 
-use crate::scenes::{Sample, scene};
+use crate::honesty::scenes::{Sample, scene};
 use crate::support::{begin, picture, pool, rendered, settings, trace};
 use zerkalo::film::{Display, Replicates};
 use zerkalo::render::RenderState;
@@ -168,7 +168,7 @@ fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
 
 /// 200 scenes, or `ZERKALO_SCENES` from `ZERKALO_FIRST` on.
 #[test]
-#[ignore = "hours: cargo test --test honesty survey_of_200 -- --ignored --nocapture"]
+#[ignore = "hours: cargo test --test engine honesty::survey_of_200 -- --ignored --nocapture"]
 fn survey_of_200_scenes() {
     let variable =
         |name: &str, default| std::env::var(name).map_or(default, |v| v.parse().unwrap());

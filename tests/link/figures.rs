@@ -1,7 +1,7 @@
 //! Bytes and errors of complete convergences.
 
-use crate::connection::Connection;
-use crate::picture::{SCREEN, Work};
+use crate::link::connection::Connection;
+use crate::link::picture::{SCREEN, Work};
 use crate::support;
 use std::time::Duration;
 use zerkalo::scene::Scene;

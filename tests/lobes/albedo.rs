@@ -1,7 +1,7 @@
 //! Extreme test 23: albedo of Cook-Torrance in a white furnace.
 
-use crate::report::{precision, report};
-use crate::setup::*;
+use crate::common::report::{precision, report};
+use crate::lobes::setup::*;
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::material::{Lobe, Masking};
 

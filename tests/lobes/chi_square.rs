@@ -1,8 +1,8 @@
 //! Chi-square tests of sampled directions against the integrated density of their lobe (extreme test 22).
 
-use crate::report::{precision, report};
-use crate::setup::*;
-use crate::stats::chi_square_p;
+use crate::common::report::{precision, report};
+use crate::lobes::setup::*;
+use crate::lobes::stats::chi_square_p;
 use std::f64::consts::{PI, TAU};
 use zerkalo::lanes::{Double, Frame, SimdFloat, Single, Vec3};
 use zerkalo::material::{Bsdf, Lobe, Material, ReflectionLobe};

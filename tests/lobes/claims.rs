@@ -1,6 +1,6 @@
 //! Physical properties of the reflection models: every lobe, highlight and masking.
 
-use crate::setup::*;
+use crate::lobes::setup::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use zerkalo::lanes::{Double, Frame, Vec3};
 use zerkalo::material::{

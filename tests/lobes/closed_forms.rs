@@ -1,8 +1,8 @@
 //! Fraction of a lobe inside a half-space: closed forms against sampled lobes.
 
-use crate::report::{precision, report};
-use crate::setup::*;
-use crate::stats::slope;
+use crate::common::report::{precision, report};
+use crate::lobes::setup::*;
+use crate::lobes::stats::slope;
 use std::f64::consts::{FRAC_PI_2, PI};
 use zerkalo::lanes::{Double, Float, Frame, SimdFloat, Single, Vec3};
 use zerkalo::material::{Bsdf, Lobe, Masking, ReflectionLobe};

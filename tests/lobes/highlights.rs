@@ -1,6 +1,6 @@
 //! Phong highlights, from wide ones to those of a single pixel.
 
-use crate::setup::{across, combine, dot, tilted_normal, unit};
+use crate::lobes::setup::{across, combine, dot, tilted_normal, unit};
 use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo::material::{Bsdf, Material};
 

@@ -1,6 +1,6 @@
 //! Rough interfaces: energy, Walter's formula, extremes, and worlds with rough and absorbing glass.
 
-use crate::setup::*;
+use crate::lobes::setup::*;
 use std::f64::consts::{PI, TAU};
 use zerkalo::lanes::{Double, SimdFloat, Single, Vec3};
 use zerkalo::material::{Bsdf, Lobe, Masking, ReflectionLobe};

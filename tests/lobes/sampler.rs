@@ -1,6 +1,6 @@
 //! Numbers of the samplers: nets, independence, moments, order of convergence.
 
-use crate::stats::slope;
+use crate::lobes::stats::slope;
 use std::f64::consts::PI;
 use zerkalo::lanes::{Double, Float, SimdFloat, SimdU32, Single};
 use zerkalo::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};

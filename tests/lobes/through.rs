@@ -1,7 +1,7 @@
 //! Transparent objects against closed forms: slabs, furnaces, cameras inside.
 
-use crate::report::report;
-use crate::setup::*;
+use crate::common::report::report;
+use crate::lobes::setup::*;
 use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
 use zerkalo::material::{Interface, Lobe};

@@ -1,7 +1,7 @@
 //! Whole paths: furnaces, parallel mirrors, scalar samples against packets.
 
-use crate::report::report;
-use crate::setup::*;
+use crate::common::report::report;
+use crate::lobes::setup::*;
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::material::{Lobe, Masking};
 use zerkalo::scene::Scene;

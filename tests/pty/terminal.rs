@@ -1,5 +1,5 @@
 //! Test terminal: a pseudo-terminal and an emulator of its screen.
-#![allow(dead_code, reason = "each test crate uses a part")]
+#![allow(dead_code, reason = "the benches use it, too")]
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
 use std::io::{Read, Write};

@@ -1,6 +1,6 @@
 //! Acceleration structures render identical films, byte for byte.
 
-use crate::driver::{Verdict, compare, compare_many};
+use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::support::{accelerated, picture};
 use zerkalo::film::Replicates;
 use zerkalo::scene::{Acceleration, Scene};

@@ -1,7 +1,7 @@
 //! Test driver: compares scenes, and writes and shrinks those that fail.
 
-use crate::scene::{Random, scene};
-use crate::shrink::shrunk;
+use crate::random_scenes::scene::{Random, scene};
+use crate::random_scenes::shrink::shrunk;
 use crate::support::parsed;
 use std::collections::BTreeMap;
 use std::fs;
@@ -74,7 +74,7 @@ pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
         let path = keep(name, seed, &what, &text, &last, &small);
         let line = format!(
             "seed {seed}, {layout:?}: {what}\n    {}\n    ZERKALO_SEED={seed} cargo test --test \
-             random_scenes -- {name}",
+             engine random_scenes::{name}",
             path.display()
         );
         println!("{line}");

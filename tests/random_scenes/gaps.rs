@@ -1,11 +1,11 @@
 //! Objects in exact contact against objects with a gap that is too narrow to be visible.
 
 use crate::common::Numbers;
-use crate::driver::{Verdict, compare, many};
-use crate::layouts::Layout;
-use crate::precisions::{codes, paired};
-use crate::scene::seeds_of;
-use crate::words::log;
+use crate::random_scenes::driver::{Verdict, compare, many};
+use crate::random_scenes::layouts::Layout;
+use crate::random_scenes::precisions::{codes, paired};
+use crate::random_scenes::scene::seeds_of;
+use crate::random_scenes::words::log;
 use glam::DVec3;
 use zerkalo::scene::{Filter, Scale, Scene, TransformOp};
 use zerkalo::world::Precision;

@@ -1,8 +1,8 @@
 //! Arrangement of the objects of a random scene.
 
 use crate::common::Numbers;
-use crate::objects::{Finish, Stock, combined, named, object, resolved};
-use crate::words::{chance, log, pick};
+use crate::random_scenes::objects::{Finish, Stock, combined, named, object, resolved};
+use crate::random_scenes::words::{chance, log, pick};
 use glam::DVec3;
 use zerkalo::scene::{Object, Scale, TransformOp};
 use zerkalo::shape::Shape;

@@ -1,7 +1,7 @@
 //! Random materials, shapes of every registered kind, and objects.
 
 use crate::common::Numbers;
-use crate::words::{chance, direction, list, log, pick, table};
+use crate::random_scenes::words::{chance, direction, list, log, pick, table};
 use glam::DVec3;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};

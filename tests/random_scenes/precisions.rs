@@ -1,7 +1,7 @@
 //! Single precision, where `auto` selects it, against double precision.
 
-use crate::driver::{Verdict, compare, compare_many};
-use crate::statistics::{Worst, blocks, mean_and_error, mean_of};
+use crate::random_scenes::driver::{Verdict, compare, compare_many};
+use crate::random_scenes::statistics::{Worst, blocks, mean_and_error, mean_of};
 use crate::support::{picture, rendered};
 use zerkalo::film::{Display, Replicates};
 use zerkalo::scene::{Filter, Scene};

@@ -1,10 +1,10 @@
 //! Adaptive and uniform pictures against a reference of other seeds with more samples: equal means,
 //! errors as reported, and no more rays for equal errors.
 
-use crate::driver::{Verdict, compare, compare_many, many};
-use crate::layouts::Layout;
-use crate::scene::seeds_of;
-use crate::statistics::{BLOCK, Worst, blocks, mean_and_error, mean_of};
+use crate::random_scenes::driver::{Verdict, compare, compare_many, many};
+use crate::random_scenes::layouts::Layout;
+use crate::random_scenes::scene::seeds_of;
+use crate::random_scenes::statistics::{BLOCK, Worst, blocks, mean_and_error, mean_of};
 use crate::support::{begin, picture, pool, rendered, settings, trace};
 use zerkalo::film::{Display, Replicates, TILE};
 use zerkalo::render::RenderState;

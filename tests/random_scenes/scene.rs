@@ -1,9 +1,9 @@
 //! Random scenes: objects, camera, lights and settings.
 
 use crate::common::Numbers;
-use crate::layouts::Layout;
-use crate::objects::{Stock, library, material, resolved};
-use crate::words::{KeyValue, chance, direction, log, pick, table};
+use crate::random_scenes::layouts::Layout;
+use crate::random_scenes::objects::{Stock, library, material, resolved};
+use crate::random_scenes::words::{KeyValue, chance, direction, log, pick, table};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::ops::Range;

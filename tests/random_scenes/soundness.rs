@@ -1,9 +1,9 @@
 //! Soundness: no panic, no invalid sample, finite noise; equal replicates in scenes without random
 //! choices.
 
-use crate::driver::{Verdict, compare, compare_many};
-use crate::layouts::Layout;
-use crate::scene::seeds_of;
+use crate::random_scenes::driver::{Verdict, compare, compare_many};
+use crate::random_scenes::layouts::Layout;
+use crate::random_scenes::scene::seeds_of;
 use crate::support::{parsed, picture, pool, rendered, uniform, without_chance};
 use zerkalo::film::{Display, Replicates};
 use zerkalo::scene::Scene;

@@ -1,7 +1,7 @@
 //! Comparison of pictures of several seeds by block means. Seeds are independent: the spread of
 //! their means estimates the error of the overall mean, for every sampler.
 
-use crate::normal::{two_sided_z, z_of_t};
+use crate::common::normal::{two_sided_z, z_of_t};
 
 /// Probability of a false alarm in the comparison of a scene.
 const LEVEL: f64 = 1e-6;

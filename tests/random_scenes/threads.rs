@@ -1,6 +1,6 @@
 //! Adaptive renderings with different numbers of threads: equal films and decisions.
 
-use crate::driver::{Verdict, compare, compare_many};
+use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::support::{begin, pool, settings, trace};
 use zerkalo::film::Noise;
 use zerkalo::render::schedule::{Step, Stop, StoppedBy};

@@ -1,6 +1,6 @@
 //! At least one story for every command of the command table.
 
-use crate::desk::{Desk, FILE, ROOM};
+use crate::stories::desk::{Desk, FILE, ROOM};
 use std::collections::HashSet;
 use std::path::Path;
 use zerkalo::camera::{Camera, Focus as LensFocus};

@@ -1,6 +1,6 @@
 //! Stories of typing, forms, gestures and refusals.
 
-use crate::desk::{Desk, ROOM};
+use crate::stories::desk::{Desk, ROOM};
 use std::time::Duration;
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{Effect, Message};

@@ -1,6 +1,6 @@
 //! Stories of files: saving, changes by other programs, errors in the file, quitting.
 
-use crate::desk::{Desk, FILE, ROOM};
+use crate::stories::desk::{Desk, FILE, ROOM};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! Stories with the mouse.
 
-use crate::desk::{Desk, ROOM};
+use crate::stories::desk::{Desk, ROOM};
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{Effect, Message};
 use zerkalo::dashboard::overlay::Overlay;

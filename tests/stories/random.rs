@@ -1,7 +1,7 @@
 //! Ten thousand random key and mouse events on three scenes: the model stays valid and every edit
 //! can be undone.
 
-use crate::desk::{Desk, ROOM};
+use crate::stories::desk::{Desk, ROOM};
 use std::collections::HashSet;
 use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message};

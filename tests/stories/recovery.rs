@@ -1,6 +1,6 @@
 //! Stories of unsaved edits: autosave, and recovery at the next start.
 
-use crate::desk::{Desk, ROOM};
+use crate::stories::desk::{Desk, ROOM};
 use std::sync::Arc;
 use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};

@@ -1,6 +1,6 @@
 //! The roughness keys change the mirror's pixels and leave all others equal to the bit.
 
-use crate::desk::Desk;
+use crate::stories::desk::Desk;
 use crate::support::{pool, rendered, sized};
 use zerkalo::render::{FeatureBuffer, RenderState};
 use zerkalo::scene::{BUILT_IN, Scene};

@@ -32,7 +32,7 @@ fn every_command_has_a_label_of_its_own() {
     }
 }
 
-/// `ZERKALO_BLESS=1 cargo test --test stories` rewrites the page.
+/// `ZERKALO_BLESS=1 cargo test --test program stories::` rewrites the page.
 #[test]
 fn keys_page_matches_command_table() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/keys.md");
@@ -43,6 +43,6 @@ fn keys_page_matches_command_table() {
     let written = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         written == page,
-        "docs/keys.md differs from the command table: ZERKALO_BLESS=1 cargo test --test stories"
+        "docs/keys.md differs from the command table: ZERKALO_BLESS=1 cargo test --test program stories::"
     );
 }

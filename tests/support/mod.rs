@@ -1,5 +1,5 @@
 //! Renderings that tests drive wave by wave, without a clock or channels.
-#![allow(dead_code, reason = "each test file uses its part")]
+#![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

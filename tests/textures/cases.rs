@@ -2,8 +2,8 @@
 //! variants of each object, whose pictures must differ.
 
 use crate::common::Numbers;
-use crate::direct::{self, Colors, Lay, SIZE, Solid, TO_LIGHT, TexturedObject};
 use crate::support::{picture, rendered};
+use crate::textures::direct::{self, Colors, Lay, SIZE, Solid, TO_LIGHT, TexturedObject};
 use glam::{DAffine3, DVec3};
 use image::RgbImage;
 use std::f64::consts::PI;

@@ -1,11 +1,11 @@
 //! Pictures of textured objects against the direct evaluation, for every mapping, wrap and kind.
 
-use crate::cases::{
+use crate::support::{picture, rendered};
+use crate::textures::cases::{
     ALLOWED, Case, Desk, TOLD, ball, block, check, differences, differing, lay, mappings, moved,
     sheet,
 };
-use crate::direct::{Lay, Solid};
-use crate::support::{picture, rendered};
+use crate::textures::direct::{Lay, Solid};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;

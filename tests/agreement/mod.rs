@@ -2,22 +2,17 @@
 //! the scene description only. The pictures agree within noise, and deliberate errors of the
 //! reference are detected.
 
-mod answers;
-#[path = "../common/mod.rs"]
-mod common;
-mod compare;
-mod compounds;
-mod lamps;
-mod meshes;
-#[path = "../common/normal.rs"]
-mod normal;
-mod paint;
-#[path = "../support/mod.rs"]
-mod support;
-mod surfaces;
-mod through;
-mod tracer;
+pub(crate) mod answers;
+pub(crate) mod compare;
+pub(crate) mod compounds;
+pub(crate) mod lamps;
+pub(crate) mod meshes;
+pub(crate) mod paint;
+pub(crate) mod surfaces;
+pub(crate) mod through;
+pub(crate) mod tracer;
 
+use crate::support;
 use compare::{Picture, keep, reference, rendered, small, variances_differ_by};
 use support::{all_shipped, parsed, shipped};
 use tracer::{Mutation, Tracer};

@@ -9,6 +9,4 @@ mod mouse;
 mod random;
 mod recovery;
 mod roughness;
-#[path = "../support/mod.rs"]
-mod support;
 mod table;

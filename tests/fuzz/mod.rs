@@ -1,7 +1,5 @@
 //! Fuzz tests: seeded mutations of valid files cause no panic, no hang and no large allocation.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod files;
 mod mutate;
 

@@ -2,17 +2,6 @@
 //! lists the file of each), the choice of precision, scaled and shifted scenes, and the rate at
 //! which the error falls.
 
-#[path = "../common/mod.rs"]
-mod common;
-#[path = "../common/rays.rs"]
-mod rays;
-#[path = "../common/report.rs"]
-mod report;
-#[path = "../support/mod.rs"]
-mod support;
-#[path = "../common/tables.rs"]
-mod tables;
-
 mod audit;
 mod brightness;
 mod camera;

@@ -2,11 +2,7 @@
 //! files.
 
 mod cases;
-#[path = "../common/mod.rs"]
-mod common;
 mod direct;
 mod files;
 mod limits;
 mod pictures;
-#[path = "../support/mod.rs"]
-mod support;

@@ -1,15 +1,11 @@
 //! Estimated errors against true errors, and unbiasedness of the picture, on a scene with a closed form for
 //! every pixel and on the mirror room.
 
-#[path = "../common/mod.rs"]
-mod common;
-#[path = "../common/report.rs"]
-mod report;
 mod scenes;
-#[path = "../support/mod.rs"]
-mod support;
 mod survey;
 
+use crate::common::report;
+use crate::support;
 use std::f64::consts::PI;
 use support::{begin, follow, parsed, picture, pool, rendered, settings, shipped, sized};
 use zerkalo::film::{Display, Estimator, Replicates, TILE};
@@ -398,7 +394,7 @@ fn linear_target_is_met() {
 
 /// The picture of the speed figures.
 #[test]
-#[ignore = "half a minute: cargo test --test honesty -- --ignored --nocapture"]
+#[ignore = "half a minute: cargo test --test engine honesty:: -- --ignored --nocapture"]
 fn linear_target_is_met_at_full_size() {
     assert_linear_target_is_met([640, 480], 3);
 }

@@ -4,5 +4,3 @@
 mod connection;
 mod figures;
 mod picture;
-#[path = "../support/mod.rs"]
-mod support;

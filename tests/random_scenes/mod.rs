@@ -8,13 +8,9 @@
 //! `ZERKALO_SHRINK` seconds (default 10) to the smallest scene that still differs.
 
 mod accelerations;
-#[path = "../common/mod.rs"]
-mod common;
 mod driver;
 mod gaps;
 mod layouts;
-#[path = "../common/normal.rs"]
-mod normal;
 mod objects;
 mod precisions;
 mod samples;
@@ -22,7 +18,5 @@ mod scene;
 mod shrink;
 mod soundness;
 mod statistics;
-#[path = "../support/mod.rs"]
-mod support;
 mod threads;
 mod words;

@@ -7,8 +7,6 @@ mod claims;
 mod closed_forms;
 mod highlights;
 mod lanes;
-#[path = "../common/report.rs"]
-mod report;
 mod rough;
 mod sampler;
 mod setup;

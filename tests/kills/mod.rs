@@ -2,15 +2,14 @@
 //! SIGTERM, SIGHUP, SIGKILL, or a closed terminal. No file is damaged, no edit older than a limit is lost,
 //! and the terminal is restored unless SIGKILL prevents it.
 //!
-//! A failure names its run; `ZERKALO_KILL=17 cargo test --test kills` repeats run 17 alone, with the same
+//! A failure names its run; `ZERKALO_KILL=17 cargo test --test program kills::` repeats run 17 alone, with the same
 //! keys at the same times as far as the machine permits.
 #![cfg(unix)]
 
-#[path = "../common/mod.rs"]
-mod common;
 mod pty;
 mod states;
 
+use crate::common;
 use common::Numbers;
 use pty::{Pty, find, screen};
 use states::{KEYS, SAVE, SCENE, states};
@@ -305,7 +304,7 @@ fn random_ends_damage_no_file_and_lose_no_old_edit() {
             let plan = Plan::of(*number);
             failures.push(format!(
                 "run {number}, {:?} after {:.3} s: {what}\n  again: ZERKALO_KILL={number} cargo test \
-                 --test kills",
+                 --test program kills::",
                 plan.end,
                 plan.moment.as_secs_f64()
             ));

@@ -1,0 +1,26 @@
+//! Tests of pictures: what is traced, sampled, accumulated and written.
+//!
+//! They are one program, so that the kernels are compiled once for all of them.
+
+mod acceleration;
+mod agreement;
+mod common;
+mod determinism;
+mod emitters;
+mod environment;
+mod extremes;
+mod features;
+mod film;
+mod geometry;
+mod honesty;
+mod limits;
+mod linearity;
+mod lobes;
+mod mesh;
+mod mesh_scenes;
+mod random_scenes;
+mod scenes;
+mod serving;
+mod shards;
+mod support;
+mod textures;

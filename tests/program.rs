@@ -1,0 +1,17 @@
+//! Tests of the program around the pictures: scene files, editing, sessions, the command line, the dashboard,
+//! and the rules for the source.
+
+mod architecture;
+mod command_line;
+mod common;
+mod fuzz;
+mod kills;
+mod link;
+mod live_session;
+mod prose;
+mod pty;
+mod scene_editing;
+mod scene_files;
+mod session;
+mod stories;
+mod support;
