@@ -214,11 +214,9 @@ fn first_names(code: &str, prefix: &str) -> BTreeSet<String> {
 #[test]
 fn imported_names_are_found() {
     let source = r#"
-        use crate::architecture::film::{Film, Mix};  // crate::architecture::comment
-        use crate::architecture::architecture::lanes;
-use crate::architecture::architecture::scene::{Scene, light};
-use crate::architecture::architecture::value::Color;
-        fn f() -> crate::architecture::world::AnyWorld { "crate::architecture::string"; '"'; my_crate::no() }
+        use crate::film::{Film, Mix};  // crate::comment
+        use crate::{lanes, scene::{Scene, light}, value::Color};
+        fn f() -> crate::world::AnyWorld { "crate::string"; '"'; my_crate::no() }
     "#;
     let found = first_names(&code(source), "crate::");
     let expected = ["film", "lanes", "scene", "value", "world"].map(String::from);

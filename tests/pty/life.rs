@@ -53,7 +53,7 @@ fn panic_message_follows_restored_terminal() {
     let this = std::env::current_exe().unwrap();
     let command = [
         this.to_str().unwrap(),
-        "life::program_that_panics",
+        "pty::life::program_that_panics",
         "--exact",
         "--ignored",
         "--nocapture",
