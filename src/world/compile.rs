@@ -3,7 +3,7 @@
 
 use crate::camera::PerspectiveCamera;
 use crate::lanes::{Float, SimdFloat};
-use crate::light::{DeltaLight, Emitter, EnvironmentLight};
+use crate::light::{DeltaLight, Emitter, EnvironmentLight, Light};
 use crate::material::{Bsdf, Material};
 use crate::primitive::{
     Acceleration, Aggregate, BoundingSphere, F32_RAY_ERROR, Form, LightTarget, PrimitiveId,
@@ -12,8 +12,6 @@ use crate::scene::{BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates};
-use crate::world::integrator::emitter_lighting::EmitterSource;
-use crate::world::integrator::environment_lighting::EnvironmentSource;
 use crate::world::integrator::indirect_diffuse::DiffuseLimits;
 use crate::world::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::world::integrator::surface_textures::SurfaceTextures;
@@ -22,7 +20,9 @@ use crate::world::light_groups::{LightGroupSource, LightGroups};
 use crate::world::lights_on_surfaces::OnSurface;
 use crate::world::radiance_range::SceneDistances;
 use crate::world::truncation_bias;
-use crate::world::world::{LightSource, World};
+use crate::world::world::{
+    DeltaSource, EmitterSource, EnvironmentSource, LightSource, ShadowRayTarget, World,
+};
 use glam::{DAffine3, DVec3};
 use std::collections::HashMap;
 
@@ -154,11 +154,26 @@ fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
     EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
 }
 
+/// Compiles those of the lights `emitting` for which `compile` returns a light. Each entry has the
+/// index of the light in the scene, its group and the emission that the group's samples contain.
+fn light_sources<T, S: Float>(
+    scene: &Scene,
+    emitting: &[(usize, usize, [f64; 3])],
+    compile: impl Fn(&Light) -> Option<T>,
+) -> Vec<LightSource<T, S>> {
+    let source = |&(index, group, emission): &(usize, usize, [f64; 3])| {
+        let light = compile(&scene.lights[index])?;
+        let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
+        Some(LightSource { light, group, emission, visible: scene.lights[index].visible })
+    };
+    emitting.iter().filter_map(source).collect()
+}
+
 /// The lights of a scene, their groups, and the groups' fixed-point scales.
 struct CompiledLights<S> {
     groups: LightGroups,
     scales: Vec<f64>,
-    sources: Vec<LightSource<S>>,
+    sources: Vec<DeltaSource<S>>,
     emitters: Vec<EmitterSource<S>>,
     environments: Vec<EnvironmentSource<S>>,
 }
@@ -175,47 +190,26 @@ impl<S: Float> CompiledLights<S> {
         let materials_of = |object: usize| materials.of_parts(object);
         let distances = SceneDistances::new(scene, geometry, materials_of, camera, S::EPSILON);
         let scales = groups.scales::<S>(scene, (geometry.origin, lift), &distances);
-        let sources = groups
-            .lights(scene)
-            .into_iter()
-            .filter_map(|(index, group, emission)| {
-                let light = DeltaLight::new(&scene.lights[index], geometry.origin)?;
-                let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
-                let on_surface = scene.lights[index].apex().and_then(|position| {
-                    let origin = geometry.origin;
-                    let position = DVec3::from(position) - origin;
-                    OnSurface::new(&geometry.forms, position, origin, S::EPSILON)
-                });
-                Some(LightSource { light, group, emission, on_surface })
-            })
-            .collect();
-        let emitters = groups
-            .lights(scene)
-            .into_iter()
-            .filter_map(|(index, group, emission)| {
-                let light = &scene.lights[index];
-                let emitter = Emitter::new(light, geometry.origin, lift)?;
-                let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
-                Some(EmitterSource { emitter, group, emission, visible: light.visible })
-            })
-            .collect();
-        let environments = groups
-            .lights(scene)
-            .into_iter()
-            .filter_map(|(index, group, emission)| {
-                let light = EnvironmentLight::new(&scene.lights[index])?;
-                let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
-                let visible = scene.lights[index].visible;
-                Some(EnvironmentSource { light, group, emission, visible })
-            })
-            .collect();
+        let emitting = groups.lights(scene);
+        let delta_light = |light: &Light| {
+            let delta = DeltaLight::new(light, geometry.origin)?;
+            let on_surface = light.apex().and_then(|position| {
+                let position = DVec3::from(position) - geometry.origin;
+                OnSurface::new(&geometry.forms, position, geometry.origin, S::EPSILON)
+            });
+            Some(ShadowRayTarget { light: delta, on_surface })
+        };
+        let sources = light_sources(scene, &emitting, delta_light);
+        let emitter = |light: &Light| Emitter::new(light, geometry.origin, lift);
+        let emitters = light_sources(scene, &emitting, emitter);
+        let environments = light_sources(scene, &emitting, EnvironmentLight::new);
         Self { groups, scales, sources, emitters, environments }
     }
 
     /// Target of the shadow rays to each light without a size.
     fn targets(&self) -> Vec<LightTarget> {
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
-        let target_of_source = |source: &LightSource<S>| match &source.light {
+        let target_of_source = |source: &DeltaSource<S>| match &source.light.light {
             DeltaLight::InverseSquare { position }
             | DeltaLight::Constant { position }
             | DeltaLight::Spot { position, .. } => LightTarget::Point(vector(position)),
@@ -227,7 +221,7 @@ impl<S: Float> CompiledLights<S> {
     /// Bounding sphere of each emitter.
     fn emitter_bounds(&self) -> Vec<BoundingSphere> {
         let bounds_of = |source: &EmitterSource<S>| {
-            let (center, radius) = (source.emitter.center(), source.emitter.radius());
+            let (center, radius) = (source.light.center(), source.light.radius());
             BoundingSphere { center, radius }
         };
         self.emitters.iter().map(bounds_of).collect()
@@ -240,7 +234,7 @@ impl<S: Float> CompiledLights<S> {
 
     /// Largest distance between a light and the end point of its shadow rays.
     fn max_end_offset(&self) -> f64 {
-        let on_surfaces = self.sources.iter().filter_map(|source| source.on_surface.as_ref());
+        let on_surfaces = self.sources.iter().filter_map(|source| source.light.on_surface.as_ref());
         on_surfaces.map(OnSurface::farthest).fold(0.0, f64::max)
     }
 }

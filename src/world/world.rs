@@ -2,15 +2,13 @@
 
 use crate::bvh::Ray;
 use crate::camera::PerspectiveCamera;
-use crate::lanes::{SimdFloat, Vec3};
-use crate::light::DeltaLight;
+use crate::lanes::{Float, SimdFloat, Vec3};
+use crate::light::{DeltaLight, Emitter, EnvironmentLight};
 use crate::material::Bsdf;
 use crate::primitive::Aggregate;
 use crate::sampling::{CameraDimensions, PacketSampler, SampleSettings};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::tile::{CullingMode, TileCandidates};
-use crate::world::integrator::emitter_lighting::EmitterSource;
-use crate::world::integrator::environment_lighting::EnvironmentSource;
 use crate::world::integrator::first_hit::{self, FirstHit};
 use crate::world::integrator::indirect_diffuse::{DiffuseLimits, PathStart, trace_generations};
 use crate::world::integrator::nested_dielectrics::NestedDielectrics;
@@ -23,16 +21,44 @@ use crate::world::light_groups::LightGroups;
 use crate::world::lights_on_surfaces::OnSurface;
 use crate::world::tile_tracer::CameraTracer;
 
-/// A light without a size, with its light group.
-pub(super) struct LightSource<S> {
-    pub light: DeltaLight<S>,
+/// A light of the world, with its light group. `T` is the compiled light, `S` the type of numbers.
+pub(super) struct LightSource<T, S> {
+    pub light: T,
     /// Index of the light group.
     pub group: usize,
     /// Emission that is multiplied into the samples of the group. `None` means 1 in every channel.
     pub emission: Option<[S; 3]>,
+    /// `true` if the camera and reflected rays see the light. Lights without a size are invisible
+    /// whatever it says.
+    pub visible: bool,
+}
+
+impl<T, S: Float> LightSource<T, S> {
+    /// Returns `value` times the emission that the group's samples contain.
+    #[inline(always)]
+    pub fn emitted<L: SimdFloat<Scalar = S>>(&self, value: Vec3<L>) -> Vec3<L> {
+        match self.emission {
+            Some(emission) => value.component_mul(Vec3::splat(emission)),
+            None => value,
+        }
+    }
+}
+
+/// A light without a size.
+pub(super) struct ShadowRayTarget<S> {
+    pub light: DeltaLight<S>,
     /// End points of shadow rays. `None` for a light that is not on a surface.
     pub on_surface: Option<OnSurface<S>>,
 }
+
+/// A light without a size, with its light group.
+pub(super) type DeltaSource<S> = LightSource<ShadowRayTarget<S>, S>;
+
+/// A light with a size, with its light group.
+pub(super) type EmitterSource<S> = LightSource<Emitter<S>, S>;
+
+/// An environment light, with its light group.
+pub(super) type EnvironmentSource<S> = LightSource<EnvironmentLight, S>;
 
 /// A scene compiled for the lane type `L`. Fields of features that the scene does not use are empty
 /// or `None`.
@@ -42,7 +68,7 @@ pub struct World<L: SimdFloat> {
     /// BSDF of each primitive, as an index into `bsdfs`.
     pub(super) bsdf_of: Vec<u32>,
     pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
-    pub(super) sources: Vec<LightSource<L::Scalar>>,
+    pub(super) sources: Vec<DeltaSource<L::Scalar>>,
     /// Lights with a size.
     pub(super) emitters: Vec<EmitterSource<L::Scalar>>,
     /// Environment lights.

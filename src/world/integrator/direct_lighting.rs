@@ -42,13 +42,14 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
     let origin = interaction.ray_origin();
     for (index, (source, occluders)) in world.sources.iter().zip(&candidates.occluders).enumerate()
     {
-        let light = source.light.sample_li(origin);
+        let target = &source.light;
+        let light = target.light.sample_li(origin);
         let cos_light = interaction.normal.dot(light.wi);
         let mut lit = interaction.direct_mask & cos_light.gt(L::zero());
         if !SIMPLE && world.smooth {
             lit = lit & interaction.geometric.dot(light.wi).gt(L::zero());
         }
-        if let DeltaLight::Spot { .. } = source.light {
+        if let DeltaLight::Spot { .. } = target.light {
             lit = lit & light.irradiance.gt(L::zero());
         }
         if lit.none() {
@@ -56,7 +57,7 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
         }
         if world.shadows {
             counts.rays += u64::from(lit.bits().count_ones());
-            let (direction, t_max) = match &source.on_surface {
+            let (direction, t_max) = match &target.on_surface {
                 None => (light.wi, light.distance),
                 Some(on_surface) => on_surface.end(origin),
             };
@@ -85,9 +86,6 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
         if let Some(left) = transmittance(light.distance) {
             value = value.component_mul(left);
         }
-        if let Some(emission) = source.emission {
-            value = value.component_mul(Vec3::splat(emission));
-        }
-        out.groups[source.group] += value.masked(lit);
+        out.groups[source.group] += source.emitted(value).masked(lit);
     }
 }

@@ -6,8 +6,7 @@
 //! surfaces and highlights of lights use the point alone, mirrors and the camera the ray alone.
 
 use crate::bvh::Ray;
-use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::light::Emitter;
+use crate::lanes::{Mask, SimdFloat, Vec3};
 use crate::material::ReflectionLobe;
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
@@ -16,28 +15,6 @@ use crate::world::integrator::interaction::SurfaceInteraction;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
-
-/// An emitter of the world, with its light group.
-pub(crate) struct EmitterSource<S> {
-    pub emitter: Emitter<S>,
-    /// Index of the light group.
-    pub group: usize,
-    /// Emission that is multiplied into the samples of the group. `None` means 1 in every channel.
-    pub emission: Option<[S; 3]>,
-    /// `true` if the camera and reflected rays see the emitter.
-    pub visible: bool,
-}
-
-impl<S: Float> EmitterSource<S> {
-    /// Returns `value` times the emission that the group's samples contain.
-    #[inline(always)]
-    fn emitted<L: SimdFloat<Scalar = S>>(&self, value: Vec3<L>) -> Vec3<L> {
-        match self.emission {
-            Some(emission) => value.component_mul(Vec3::splat(emission)),
-            None => value,
-        }
-    }
-}
 
 /// Weight of a sample by the power heuristic: p^2 / (p^2 + q^2) for its density `p` and the density
 /// `q` of the other technique. It is 1 for the largest finite `p`.
@@ -60,14 +37,14 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
 ) {
     for source in world.emitters.iter().filter(|source| source.visible) {
         let Ray { origin, direction } = path.ray;
-        let t = source.emitter.hit(origin, direction);
+        let t = source.light.hit(origin, direction);
         let seen = lanes & t.lt(t_max);
         if seen.none() {
             continue;
         }
-        let mut radiance = path.throughput * L::splat(source.emitter.radiance());
+        let mut radiance = path.throughput * L::splat(source.light.radiance());
         if path.lobe_density.lt(L::from_f64(L::MAX)).any() {
-            let density = source.emitter.density(origin, t);
+            let density = source.light.density(origin, t);
             radiance = radiance * power_heuristic(path.lobe_density, density);
         }
         if let Some(left) = transmittance(t) {
@@ -121,7 +98,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
     let view = -path.ray.direction;
     let occluders = &candidates.occluders[world.sources.len()..];
     for (index, (source, occluders)) in world.emitters.iter().zip(occluders).enumerate() {
-        let light = source.emitter.sample(origin, sampler.light_2d(bounce, index as u32));
+        let light = source.light.sample(origin, sampler.light_2d(bounce, index as u32));
         let arrives = light.irradiance.gt(L::zero());
         let arrives = arrives & interaction.geometric.dot(light.wi).gt(L::zero());
         let cos_light = interaction.normal.dot(light.wi);

@@ -7,40 +7,17 @@
 //! left has the light of all environments already.
 
 use crate::bvh::Ray;
-use crate::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
-use crate::light::EnvironmentLight;
+use crate::lanes::{Frame, Mask, SimdFloat, Vec3};
 use crate::sampling::{PacketSampler, warp};
 use crate::world::integrator::emitter_lighting::{ReflectingLobes, lobe_value, power_heuristic};
 use crate::world::integrator::indirect_diffuse::NO_DENSITY;
 use crate::world::integrator::interaction::SurfaceInteraction;
 use crate::world::integrator::path::{Counts, Path, Radiance};
-use crate::world::world::World;
+use crate::world::world::{EnvironmentSource, World};
 use std::f64::consts::FRAC_1_PI;
 
 /// Number of the random numbers of the first environment; emitters have smaller ones.
 const ENVIRONMENT_SALT: u32 = 1 << 30;
-
-/// An environment light of the world, with its light group.
-pub(crate) struct EnvironmentSource<S> {
-    pub light: EnvironmentLight,
-    /// Index of the light group.
-    pub group: usize,
-    /// Emission that is multiplied into the samples of the group. `None` means 1 in every channel.
-    pub emission: Option<[S; 3]>,
-    /// `true` if the camera and reflected rays see the environment.
-    pub visible: bool,
-}
-
-impl<S: Float> EnvironmentSource<S> {
-    /// Returns `value` times the emission that the group's samples contain, with finite channels.
-    #[inline(always)]
-    fn emitted<L: SimdFloat<Scalar = S>>(&self, value: Vec3<L>) -> Vec3<L> {
-        match self.emission {
-            Some(emission) => value.component_mul(Vec3::splat(emission)),
-            None => value,
-        }
-    }
-}
 
 /// Adds the radiance of the visible environments to the rays of `lanes`, which hit no surface. A medium
 /// in which the rays escape leaves the share `transmittance` of the light; `None` means all.

@@ -81,12 +81,12 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
         if is_last || interaction.reflecting.none() {
             return counts;
         }
-        active = sample_reflection::<_, SIMPLE, EMITTERS>(
+        active = sample_reflection::<_, SIMPLE>(
             world,
             &mut path,
             &interaction,
-            sampler,
-            bounce,
+            (sampler, bounce),
+            EMITTERS,
             &mut counts,
         );
         if active.none() {
@@ -98,15 +98,16 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
 }
 
 /// Replaces the rays of `path` by reflected rays, with directions sampled from the reflection
-/// lobes. `bounce` is the number of earlier reflections. Returns the lanes whose new throughput is
-/// at least [`min_weight`](World::min_weight).
+/// lobes. `bounce` is the number of earlier reflections. `emitters` is `true` if the density of the
+/// directions is needed. Returns the lanes whose new throughput is at least
+/// [`min_weight`](World::min_weight).
 #[inline(always)]
-pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool, const EMITTERS: bool>(
+pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
     path: &mut Path<L>,
     interaction: &SurfaceInteraction<L>,
-    sampler: &PacketSampler<'_, L>,
-    bounce: u32,
+    (sampler, bounce): (&PacketSampler<'_, L>, u32),
+    emitters: bool,
     counts: &mut Counts,
 ) -> L::Mask {
     let mut lobe_sample = None;
@@ -126,7 +127,7 @@ pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool, const EMITTERS
         if !SIMPLE && world.smooth {
             direction = interaction.reflect_into_hemisphere(direction);
         }
-        if EMITTERS {
+        if emitters {
             let density = reflected_density(world, &incoming, interaction, index, direction);
             path.lobe_density = L::select(lanes, density, path.lobe_density);
         }

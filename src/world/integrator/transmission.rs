@@ -212,25 +212,15 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let Some(interface_hit) = interface_hit else {
             let path = &mut branch.path;
             let sampler = self.sampler;
-            branch.lanes = if has_emitters {
-                sample_reflection::<_, false, true>(
-                    world,
-                    path,
-                    &interaction,
-                    sampler,
-                    bounce - 1,
-                    counts,
-                )
-            } else {
-                sample_reflection::<_, false, false>(
-                    world,
-                    path,
-                    &interaction,
-                    sampler,
-                    bounce - 1,
-                    counts,
-                )
-            };
+            let random = (sampler, bounce - 1);
+            branch.lanes = sample_reflection::<_, false>(
+                world,
+                path,
+                &interaction,
+                random,
+                has_emitters,
+                counts,
+            );
             branch.bounce = bounce;
             branch.coincident = coincident.as_ref().map(CoincidentState::reversed);
             return branch.lanes.any();
