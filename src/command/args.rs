@@ -95,7 +95,7 @@ pub enum Command {
     Measure(Box<MeasureArgs>),
     /// Validate a scene and print its contents
     Check(CheckArgs),
-    /// Print the origin of a picture or a checkpoint: scene, samples, noise, seed, precision
+    /// Print the origin of a picture, checkpoint or plan: scene, samples, noise, seed, shards
     Info(InfoArgs),
     /// Write a commented starter scene
     New(NewArgs),
@@ -272,7 +272,7 @@ pub struct CheckArgs {
 /// Arguments of `zerkalo info`.
 #[derive(Debug, Args)]
 pub struct InfoArgs {
-    /// A PNG, OpenEXR or checkpoint file
+    /// A PNG, OpenEXR, checkpoint or plan file
     pub file: PathBuf,
     /// Compare the file with this scene; exit status 1 if it shows another one
     #[arg(long, value_name = "SCENE")]

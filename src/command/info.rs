@@ -1,51 +1,134 @@
-//! `zerkalo info`: prints the origin of a picture or film file, and compares it with a scene.
+//! `zerkalo info`: prints the origin of a picture, film or plan file, and compares it with a scene.
 
 use crate::command::args::InfoArgs;
 use crate::command::load_progress::LoadReporter;
-use crate::command::{Failure, print_line};
+use crate::command::{Failure, part_file, print_line};
 use crate::film::FileMetadata;
 use crate::render::SampleInputs;
-use crate::render::export::scene_hash;
+use crate::render::export::{scene_hash, settings_text};
+use crate::render::plan::{BASE, Part, Plan, is_plan_file};
 use crate::scene::Document;
 use std::path::Path;
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
-    let metadata = FileMetadata::read(&args.file).map_err(Failure::Failed)?;
-    let [width, height] = metadata.size;
-    let groups = metadata.film.as_ref().map(|film| film.group_names.join(", "));
-    let first = format!("{}: {}, {width} x {height} pixels", args.file.display(), metadata.format);
-    print_line(&first)?;
-    let groups = groups.map(|names| ("Light groups".to_string(), names));
-    let widest = metadata.entries.iter().map(|(key, _)| key.len()).max().unwrap_or(0);
-    for (key, value) in metadata.entries.iter().chain(&groups) {
+    let origin = match is_plan_file(&args.file) {
+        true => Origin::of_plan(&part_file::read_plan(&args.file)?),
+        false => Origin::of_picture(&args.file)?,
+    };
+    let [width, height] = origin.size;
+    let (path, format) = (args.file.display(), origin.format);
+    print_line(&format!("{path}: {format}, {width} x {height} pixels"))?;
+    let widest = origin.entries.iter().map(|(key, _)| key.len()).max().unwrap_or(0);
+    for (key, value) in &origin.entries {
         print_line(&format!("  {key:widest$}  {value}"))?;
     }
     match &args.scene {
-        Some(path) => compare(&metadata, path, args),
+        Some(path) => compare(&origin, path, args),
         None => Ok(()),
     }
 }
 
+/// Origin of a picture, of a film, or of the films that a plan describes.
+struct Origin {
+    /// Format of the file.
+    format: &'static str,
+    /// Width and height in pixels.
+    size: [usize; 2],
+    /// Keys and values.
+    entries: Vec<(String, String)>,
+    /// Hash of the scene. `None` if another program wrote the file.
+    scene_hash: Option<String>,
+    /// Inputs of the samples of a checkpoint.
+    inputs: Option<SampleInputs>,
+}
+
+impl Origin {
+    /// Reads a PNG, OpenEXR or film file.
+    fn of_picture(path: &Path) -> Result<Self, Failure> {
+        let metadata = FileMetadata::read(path).map_err(Failure::Failed)?;
+        let scene_hash = metadata.get("Scene hash").map(str::to_string);
+        let mut entries = metadata.entries;
+        if let Some(film) = &metadata.film {
+            entries.push(("Light groups".to_string(), film.group_names.join(", ")));
+            if let Some(part) = Part::of_header(path, film).map_err(Failure::Failed)? {
+                entries.push(("Rays".to_string(), part.rays.to_string()));
+                entries.push(("Plan".to_string(), target(&part.plan)));
+            }
+        }
+        let inputs = metadata.film.as_ref().and_then(SampleInputs::of);
+        Ok(Self { format: metadata.format, size: metadata.size, entries, scene_hash, inputs })
+    }
+
+    fn of_plan(plan: &Plan) -> Self {
+        let settings = &plan.settings;
+        let base = match settings.base_plan {
+            Some(merged) => format!("merged film of the plan {merged:016x}"),
+            None => "pilot".to_string(),
+        };
+        let (total, base_rays) = (plan.all_rays(), plan.rays(BASE));
+        let each = (total - base_rays) / f64::from(settings.shards);
+        let entries = [
+            ("Source", settings.source.clone()),
+            ("Scene hash", settings.scene_hash.clone()),
+            ("Seed", settings.seed.to_string()),
+            (
+                "Settings",
+                settings_text(
+                    settings.sampler.name(),
+                    &settings.precision,
+                    true,
+                    &settings.display,
+                ),
+            ),
+            ("Plan", target(plan)),
+            ("Base", base),
+            (
+                "Expected rays",
+                format!("{total:.3e}: base {base_rays:.3e}, each shard about {each:.3e}"),
+            ),
+            ("Checksum", format!("{:016x}", plan.checksum())),
+        ];
+        Self {
+            format: "plan",
+            size: settings.size.map(|n| n as usize),
+            entries: entries.into_iter().map(|(key, value)| (key.to_string(), value)).collect(),
+            scene_hash: Some(settings.scene_hash.clone()),
+            inputs: None,
+        }
+    }
+}
+
+/// Formats number of shards, samples and noise of a plan.
+fn target(plan: &Plan) -> String {
+    let settings = &plan.settings;
+    format!(
+        "{} shards, {:.2} samples per pixel, target {} 8-bit levels of noise, expected {:.3}",
+        settings.shards,
+        plan.spp(),
+        settings.noise_codes,
+        plan.predicted_codes
+    )
+}
+
 /// Compares the file with the scene at `path`.
-fn compare(metadata: &FileMetadata, path: &Path, args: &InfoArgs) -> Result<(), Failure> {
+fn compare(origin: &Origin, path: &Path, args: &InfoArgs) -> Result<(), Failure> {
     let document = Document::read_with(path, LoadReporter::new().assets)
         .map_err(|e| Failure::Failed(e.to_string()))?;
     let scene = document.scene();
     let [file, shown] = [&args.file, path].map(|path| path.display());
-    let Some(hash) = metadata.get("Scene hash") else {
+    let Some(hash) = &origin.scene_hash else {
         let what = format!("{file} has no scene hash; zerkalo did not write it");
         return Err(Failure::Failed(what));
     };
-    if hash == scene_hash(document.text(), scene) {
+    if *hash == scene_hash(document.text(), scene) {
         return print_line(&format!(
             "scene: {shown} and the files that it names are those of {file}"
         ));
     }
     // The size is an option of `render`.
     let mut sized = scene.clone();
-    sized.film.size = metadata.size.map(|n| n as u32);
-    let inputs = metadata.film.as_ref().and_then(SampleInputs::of);
-    match inputs.map(|inputs| inputs.fit(&sized)) {
+    sized.film.size = origin.size.map(|n| n as u32);
+    match origin.inputs.as_ref().map(|inputs| inputs.fit(&sized)) {
         Some(true) => print_line(&format!(
             "scene: the pictures of {shown} and {file} differ in light weights, names or layout of \
              the text only; --resume keeps the samples"

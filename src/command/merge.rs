@@ -11,18 +11,12 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let output = FilmOutput::new(&args.output, args.bits)?;
     let mut merged = Merged::of_files(&args.parts, args.partial).map_err(Failure::Failed)?;
     let report = Report::of_film(&merged.film, &merged.header.weights, &merged.header.display);
-    let missing = merged.missing();
-    let header = &mut merged.header;
-    update_metadata(&mut header.metadata, &report);
+    update_metadata(&mut merged.header.metadata, &report);
+    output.write(&merged.film, &merged.header)?;
     let plan = &merged.part.plan;
-    if let Some(missing) = &missing {
-        let shards = format!("missing of {}: {missing}", plan.settings.shards);
-        header.metadata.push(("Shards".to_string(), shards));
-    }
-    output.write(&merged.film, header)?;
     let path = args.output.display();
     print_line(&format!("{path}  {}  {} rays", part_file::summary(&report), merged.part.rays))?;
-    if let Some(missing) = missing {
+    if let Some(missing) = merged.part.missing() {
         print_line(&format!(
             "missing of {} shards: {missing}; {}",
             plan.settings.shards,

@@ -66,8 +66,6 @@ pub fn metadata(
 ) -> Vec<(String, String)> {
     let [spp, noise, bad_samples, saturated_samples, saturated_pixels] = film_entries(report);
     let biases = rendering.world.biases();
-    let tone =
-        Tone::NAMED.iter().find(|(_, tone)| *tone == display.tone).map_or("", |(name, _)| name);
     let header = rendering.film.header();
     let entries = [
         ("Software", format!("zerkalo {}", env!("CARGO_PKG_VERSION"))),
@@ -82,18 +80,30 @@ pub fn metadata(
         ("Biased", if biases.is_empty() { "no".to_string() } else { biases.join("; ") }),
         (
             "Settings",
-            format!(
-                "sampler {}, {} precision, {}, exposure {} EV, tone {}",
+            settings_text(
                 provenance.sampler.name(),
-                header.precision,
-                if provenance.adaptive { "adaptive" } else { "uniform" },
-                display.exposure_ev,
-                tone,
+                &header.precision,
+                provenance.adaptive,
+                display,
             ),
         ),
     ];
     entries.into_iter().map(|(key, value)| (key.to_string(), value)).collect()
 }
+
+/// Formats the metadata entry `Settings`.
+pub fn settings_text(sampler: &str, precision: &str, adaptive: bool, display: &Display) -> String {
+    let tone =
+        Tone::NAMED.iter().find(|(_, tone)| *tone == display.tone).map_or("", |(name, _)| name);
+    let allocation = if adaptive { "adaptive" } else { "uniform" };
+    let exposure = display.exposure_ev;
+    format!(
+        "sampler {sampler}, {precision} precision, {allocation}{DISPLAY}{exposure} EV, tone {tone}"
+    )
+}
+
+/// Text between sample allocation and display transform in the metadata entry `Settings`.
+const DISPLAY: &str = ", exposure ";
 
 /// Metadata that depend on the film alone.
 fn film_entries(report: &Report) -> [(&'static str, String); 5] {

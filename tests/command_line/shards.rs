@@ -2,6 +2,7 @@
 
 use crate::command_line::Desk;
 use std::fs;
+use zerkalo::film::file::FilmReader;
 
 /// Runs `args` and returns what the command printed on stdout.
 fn done(desk: &Desk, args: &[&str]) -> String {
@@ -49,15 +50,15 @@ fn merge(desk: &Desk, parts: &[String], output: &str) -> Vec<u8> {
 #[test]
 fn shards_merged_in_any_order_equal_one_run_of_the_plan() {
     let desk = Desk::new();
-    plan(&desk, "one", 5);
-    let whole = ["render", "scene.toml", "--plan", "one.plan", "-o"];
-    let one = ["one.png", "one.exr"].map(|output| {
-        done(&desk, &[&whole[..], &[output]].concat());
-        fs::read(desk.path(output)).unwrap()
-    });
     let mut random = 1u64;
+    let mut films = Vec::new();
     for shards in [1, 3, 16] {
         let mut parts = traced(&desk, &format!("of{shards}"), shards);
+        let plan = format!("of{shards}.plan");
+        let one = ["one.png", "one.exr"].map(|output| {
+            done(&desk, &["render", "scene.toml", "--plan", &plan, "-o", output]);
+            fs::read(desk.path(output)).unwrap()
+        });
         for order in 0..3 {
             for i in (1..parts.len()).rev() {
                 random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -73,7 +74,48 @@ fn shards_merged_in_any_order_equal_one_run_of_the_plan() {
         done(&desk, &[&args[..], &first.iter().map(String::as_str).collect::<Vec<_>>()].concat());
         let steps = [&["half.zk".to_string()], rest].concat();
         assert!(merge(&desk, &steps, "steps.png") == one[0], "{shards} shards in two steps");
+        merge(&desk, &parts, "merged.zk");
+        let film = FilmReader::open(&desk.path("merged.zk")).and_then(FilmReader::read);
+        films.push(film.unwrap().1.bytes());
     }
+    // The number of shards has no influence on the film.
+    assert!(films.iter().all(|film| *film == films[0]));
+}
+
+#[test]
+fn info_names_the_shards_of_pictures_films_and_plans() {
+    let desk = Desk::new();
+    let parts = traced(&desk, "job", 3);
+    for output in ["a.png", "a.exr", "a.zk"] {
+        merge(&desk, &parts, output);
+        let info = done(&desk, &["info", output, "--scene", "scene.toml"]);
+        assert!(info.contains("0-3 of 3, plan "), "{output}: {info}");
+        assert!(info.contains("are those of"), "{output}: {info}");
+    }
+    let some = ["job-0.zk", "job-2.zk"];
+    for output in ["b.png", "b.exr", "b.zk"] {
+        done(&desk, &[&["merge", "--partial", "-o", output], &some[..]].concat());
+        let info = done(&desk, &["info", output]);
+        assert!(info.contains("0, 2 of 3, missing 1, 3, plan "), "{output}: {info}");
+    }
+    let info = done(&desk, &["info", "job-3.zk"]);
+    let plan = done(&desk, &["info", "job.plan", "--scene", "scene.toml"]);
+    assert!(plan.starts_with("job.plan: plan, 64 x 48 pixels\n"), "{plan}");
+    assert!(plan.contains("pilot") && plan.contains("are those of job.plan"), "{plan}");
+    for text in [&info, &plan] {
+        assert!(text.contains("3 shards, ") && text.contains("target 0.5 8-bit levels"), "{text}");
+    }
+    let checksum = plan.lines().find_map(|line| line.trim().strip_prefix("Checksum")).unwrap();
+    assert!(info.contains(&format!("3 of 3, missing 0-2, plan {}", checksum.trim())), "{info}");
+    let text = fs::read_to_string(desk.path("scene.toml")).unwrap();
+    fs::write(desk.path("other.toml"), text.replace("0.8, 0.2", "0.7, 0.2")).unwrap();
+    for file in ["a.png", "a.zk", "job-3.zk", "job.plan"] {
+        let error = refused(&desk, &["info", file, "--scene", "other.toml"]);
+        assert!(error.contains(&format!("{file} shows another scene than other.toml")), "{error}");
+    }
+    let plan = fs::read(desk.path("job.plan")).unwrap();
+    fs::write(desk.path("cut.plan"), &plan[..plan.len() / 2]).unwrap();
+    assert!(refused(&desk, &["info", "cut.plan"]).contains("it is damaged, altered or incomplete"));
 }
 
 #[test]
@@ -121,7 +163,7 @@ fn gaps_and_overlaps_are_refused_by_name() {
     assert!(text.contains("missing of 5 shards: 2; noise 0."), "{text}");
     assert!(text.contains(" instead of about 0."), "{text}");
     let picture = String::from_utf8_lossy(&fs::read(desk.path("a.png")).unwrap()).into_owned();
-    assert!(picture.contains("Shards\0missing of 5: 2"));
+    assert!(picture.contains("Shards\x000-1, 3-5 of 5, missing 2, plan "));
 
     plan(&desk, "other", 4);
     let error = refused(&desk, &[&["merge", "-o", "a.png", "other-0.zk"], &all[1..]].concat());

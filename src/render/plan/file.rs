@@ -24,6 +24,15 @@ const MAX_SIDE: u32 = 1 << 14;
 /// Length of the shortest line of a tile in bytes.
 const MIN_TILE_BYTES: usize = 8;
 
+/// Beginning of the first line of every version of the format.
+const START: &[u8] = b"zerkalo plan ";
+
+/// Returns `true` if the file at `path` begins like a plan file.
+pub fn is_plan_file(path: &Path) -> bool {
+    let mut start = [0; START.len()];
+    open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == START
+}
+
 /// Reason for which a plan cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlanError {
@@ -129,7 +138,7 @@ impl Plan {
             remedy,
             ..lines.error(what.to_string())
         };
-        if !bytes.starts_with(b"zerkalo plan ") {
+        if !bytes.starts_with(START) {
             let remedy = "name a file that `zerkalo plan` has written";
             return Err(whole(&lines, "it is no plan: its first line is another", remedy));
         }

@@ -11,13 +11,14 @@
 
 mod division;
 mod file;
+mod members;
 mod merge;
 mod part;
 mod shard_render;
 #[cfg(test)]
 mod testing;
 
-pub use file::PlanError;
+pub use file::{PlanError, is_plan_file};
 pub use merge::Merged;
 pub use part::{Part, PartShard};
 pub use shard_render::ShardRender;
@@ -112,11 +113,29 @@ impl Plan {
 
     /// Expected number of rays of `shard`.
     pub fn rays(&self, shard: u32) -> f64 {
+        self.rays_of(self.ranges(shard).into_iter())
+    }
+
+    /// Expected number of rays of base and shards together.
+    pub fn all_rays(&self) -> f64 {
+        self.rays_of(self.tiles.iter().map(|tile| 0..tile.end))
+    }
+
+    /// Expected number of rays of the sample indices `ranges` of all tiles.
+    fn rays_of(&self, ranges: impl Iterator<Item = std::ops::Range<u32>>) -> f64 {
         let rays = |(tile, range): (usize, std::ops::Range<u32>)| {
             let samples = 2.0 * range.len() as f64 * pixels_of(self.settings.size, tile) as f64;
             samples * f64::from(self.tiles[tile].rays_per_sample)
         };
-        self.ranges(shard).into_iter().enumerate().map(rays).sum()
+        ranges.enumerate().map(rays).sum()
+    }
+
+    /// Number of samples of `shard`, over all pixels and both replicates.
+    pub fn samples(&self, shard: u32) -> u64 {
+        let samples = |(tile, range): (usize, std::ops::Range<u32>)| {
+            2 * range.len() as u64 * pixels_of(self.settings.size, tile)
+        };
+        self.ranges(shard).into_iter().enumerate().map(samples).sum()
     }
 
     /// Mean number of samples per pixel in the merged picture, both replicates together.

@@ -32,7 +32,8 @@ pub struct PartShard {
 }
 
 impl Part {
-    /// Adds the plan and the shards to the header of a film file.
+    /// Adds the plan and the shards to the header of a film file, and the metadata entry `Shards` for
+    /// pictures of the film.
     pub fn record(&self, header: &mut FilmFileHeader) {
         let mut text = format!("rays {}\n", self.rays);
         for PartShard { number, complete } in &self.shards {
@@ -40,6 +41,9 @@ impl Part {
             // Writing into a string cannot fail.
             let _ = writeln!(text, "shard {number} {state}");
         }
+        let (key, shards) = self.origin();
+        header.metadata.retain(|(k, _)| *k != key);
+        header.metadata.push((key, shards));
         header.chunks.insert(PLAN_TAG, self.plan.text().into_bytes());
         header.chunks.insert(PART_TAG, text.into_bytes());
     }
@@ -91,8 +95,58 @@ impl Part {
 
     /// Returns `true` if the film holds all samples of the plan.
     pub fn is_whole(&self) -> bool {
-        let numbers = BASE..=self.plan.settings.shards;
-        self.shards.iter().map(|shard| shard.number).eq(numbers)
-            && self.shards.iter().all(|shard| shard.complete)
+        self.plan.is_whole(&self.shards)
     }
+
+    /// Returns the shards that the film does not hold completely, such as `3, 5-7`. `None` if it
+    /// holds all.
+    pub fn missing(&self) -> Option<String> {
+        let complete = |number: &u32| {
+            let found = self.shards.binary_search_by_key(number, |shard| shard.number);
+            found.is_ok_and(|i| self.shards[i].complete)
+        };
+        let missing = (BASE..=self.plan.settings.shards).filter(|number| !complete(number));
+        let missing: Vec<u32> = missing.collect();
+        (!missing.is_empty()).then(|| ranges(&missing))
+    }
+
+    /// Returns the metadata entry with the shards in the film, the other ones, and the plan, such
+    /// as `0-2, 4 of 5, unfinished 4, missing 3, 5, plan 0123456789abcdef`.
+    fn origin(&self) -> (String, String) {
+        let numbers = |wanted: &dyn Fn(&PartShard) -> bool| -> Vec<u32> {
+            self.shards.iter().filter(|shard| wanted(shard)).map(|shard| shard.number).collect()
+        };
+        let here = numbers(&|_| true);
+        let mut text = format!("{} of {}", ranges(&here), self.plan.settings.shards);
+        let unfinished = numbers(&|shard| !shard.complete);
+        let absent = (BASE..=self.plan.settings.shards).filter(|n| here.binary_search(n).is_err());
+        for (state, numbers) in [("unfinished", unfinished), ("missing", absent.collect())] {
+            if !numbers.is_empty() {
+                text += &format!(", {state} {}", ranges(&numbers));
+            }
+        }
+        ("Shards".to_string(), format!("{text}, plan {:016x}", self.plan.checksum()))
+    }
+}
+
+impl Plan {
+    /// Returns `true` if a film with `shards` holds all samples of the plan.
+    pub(super) fn is_whole(&self, shards: &[PartShard]) -> bool {
+        let numbers = BASE..=self.settings.shards;
+        shards.iter().map(|shard| shard.number).eq(numbers)
+            && shards.iter().all(|shard| shard.complete)
+    }
+}
+
+/// Formats ascending numbers: `3, 5-7`.
+pub(super) fn ranges(numbers: &[u32]) -> String {
+    let mut text = Vec::new();
+    for run in numbers.chunk_by(|a, b| a + 1 == *b) {
+        match run {
+            [one] => text.push(one.to_string()),
+            [first, .., last] => text.push(format!("{first}-{last}")),
+            [] => {}
+        }
+    }
+    text.join(", ")
 }
