@@ -3,9 +3,9 @@
 use crate::asset::Assets;
 use crate::command::args::{ColorArg, EditArgs};
 use crate::command::load_progress::LoadReporter;
-use crate::command::{Failure, print_line, warn};
+use crate::command::{Failure, warn, write_line};
 use crate::dashboard::message::Exported;
-use crate::dashboard::run::{Colors, DEFAULT_STOP, Setup, run as run_dashboard};
+use crate::dashboard::run::{Colors, DEFAULT_STOP, Ended, Setup, run as run_dashboard};
 use crate::disk::open_regular;
 use crate::film::Display;
 use crate::film::file::is_film_file;
@@ -17,7 +17,7 @@ use crate::terminal::Environment;
 use crate::value::sanitized;
 use crate::world::{self, Precision};
 use std::env;
-use std::io::{self, IsTerminal};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -80,18 +80,27 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         trace: args.trace.clone(),
     };
     let ended = run_dashboard(setup).map_err(|error| Failure::Failed(error.to_string()))?;
+    conclude(&ended, io::stdout().lock())
+}
+
+/// Prints the results of a dashboard that has ended: files that were written on `out`, everything
+/// else on stderr. A signal determines the exit status even if `out` cannot be written, as after
+/// the loss of the terminal.
+fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
+    let mut lines = Vec::new();
     for exported in &ended.exported {
         match exported {
-            Ok(exported) => print_line(&summary(exported))?,
+            Ok(exported) => lines.push(summary(exported)),
             Err(reason) => warn(reason),
         }
     }
     for written in &ended.checkpoints {
         match written {
-            Ok(path) => print_line(&format!("{}  checkpoint", path.display()))?,
+            Ok(path) => lines.push(format!("{}  checkpoint", path.display())),
             Err(reason) => warn(reason),
         }
     }
+    let printed = lines.iter().try_for_each(|line| write_line(&mut out, line));
     match &ended.kept {
         Ok(Some(path)) => {
             let path = path.display();
@@ -101,7 +110,10 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         Err(reason) => warn(reason),
     }
     ended.latencies.iter().for_each(|line| warn(line));
-    ended.signalled.map_or(Ok(()), |status| Err(Failure::Signalled(status)))
+    match ended.signalled {
+        Some(status) => Err(Failure::Signalled(status)),
+        None => printed,
+    }
 }
 
 fn read_checkpoint(path: &Path) -> Result<Checkpoint, Failure> {
@@ -185,5 +197,56 @@ fn colors(requested: ColorArg) -> Option<Colors> {
         ColorArg::Sixteen => Some(Colors::Sixteen),
         ColorArg::None => Some(Colors::Mono),
         ColorArg::Auto => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Writer to a terminal that is gone.
+    struct Gone;
+
+    impl Write for Gone {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(io::Error::from_raw_os_error(5))
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn ended(signalled: Option<u8>) -> Ended {
+        let exported = Exported {
+            path: PathBuf::from("room.png"),
+            size: [60, 40],
+            spp: 4.0,
+            noise_codes: None,
+            scp: String::new(),
+        };
+        Ended {
+            signalled,
+            exported: vec![Ok(exported)],
+            kept: Ok(None),
+            checkpoints: vec![Ok(PathBuf::from("room.film"))],
+            latencies: Vec::new(),
+        }
+    }
+
+    /// A picture may be complete only after the connection is lost.
+    #[test]
+    fn status_of_a_signal_does_not_depend_on_stdout() {
+        let status = |signalled, out: &mut dyn Write| match conclude(&ended(signalled), out) {
+            Ok(()) => 0,
+            Err(Failure::Signalled(status)) => status,
+            Err(Failure::Failed(_) | Failure::Usage(_)) => 1,
+        };
+        assert_eq!(status(Some(129), &mut Gone), 129);
+        assert_eq!(status(None, &mut Gone), 1, "a result that is not shown is a failure");
+        let mut text = Vec::new();
+        assert_eq!(status(None, &mut text), 0);
+        let expected = "room.png  60x40  4 spp  noise unknown\nroom.film  checkpoint\n";
+        assert_eq!(String::from_utf8(text).unwrap(), expected);
     }
 }

@@ -115,10 +115,15 @@ fn warn(message: &str) {
     let _ = writeln!(std::io::stderr(), "{}", sanitized_lines(message));
 }
 
-/// Prints a line on stdout. A reader that has closed the pipe, such as `head`, is no failure.
+/// Prints a line on stdout.
 fn print_line(message: &str) -> Result<(), Failure> {
-    let mut stdout = std::io::stdout().lock();
-    let printed = writeln!(stdout, "{}", sanitized_lines(message)).and_then(|()| stdout.flush());
+    write_line(std::io::stdout().lock(), message)
+}
+
+/// Writes a line to `out`, which is stdout. A reader that has closed the pipe, such as `head`, is no
+/// failure.
+fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
+    let printed = writeln!(out, "{}", sanitized_lines(message)).and_then(|()| out.flush());
     match printed {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(Failure::Failed(format!("cannot write to stdout: {error}")))

@@ -318,3 +318,17 @@ fn random_ends_damage_no_file_and_lose_no_old_edit() {
         failures.join("\n")
     );
 }
+
+/// The result of the export is printed when stdout is gone already.
+#[test]
+fn lost_terminal_during_an_export_ends_with_status_of_sighup() {
+    for _ in 0..4 {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+        let mut pty = Pty::open(folder.path());
+        pty.wait_for("first picture", |bytes| bytes.len() > ENTER.len() + 2000).unwrap();
+        pty.send(b"p");
+        pty.hang_up();
+        assert_eq!(pty.end(), Ok(129));
+    }
+}

@@ -109,7 +109,8 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     let signals = signals::watch(signals, screen.tty(), signals::PATIENCE)?;
     let mut keyboard = Keyboard::new(&surroundings);
     let ending = || signals.is_ending();
-    let Ok(terminal) = probe(&screen.tty(), &mut keyboard, surroundings, &ending) else {
+    let probed = probe(&screen.tty(), &mut keyboard, surroundings, &ending);
+    let Ok((terminal, screen_size)) = probed.and_then(|terminal| Ok((terminal, size()?))) else {
         return Ok(Ended {
             signalled: Some(HUNG_UP),
             exported: Vec::new(),
@@ -122,7 +123,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         path,
         name,
         scene: start,
-        screen: size()?,
+        screen: screen_size,
         colors: colors.unwrap_or(terminal.colors),
         stop: settings.stop,
         threads,
