@@ -16,7 +16,7 @@ pub struct Available {
 pub fn available_memory() -> Option<Available> {
     let limits = [
         (free_address_space(), "the limit on address space, `ulimit -v`"),
-        (free_in_control_group(Path::new("/sys/fs/cgroup")), "the limit of the control group"),
+        (free_in_own_control_groups(), "the limit of the control group"),
         (free_in_machine(), "the free memory of this machine"),
     ];
     let known =
@@ -47,19 +47,65 @@ fn free_address_space() -> Option<u64> {
     None
 }
 
-/// Memory that the control groups (version 2) of this process leave, from its own group up to
-/// `root`. Pages of files that are not in use count as free.
-fn free_in_control_group(root: &Path) -> Option<u64> {
+/// Files of one version of control groups.
+struct ControlGroupFiles {
+    /// Mount point of the memory controller.
+    root: &'static str,
+    /// File of the limit \[bytes\].
+    limit: &'static str,
+    /// File of the memory in use \[bytes\].
+    in_use: &'static str,
+    /// Entry of `memory.stat` for pages of files that are not in use.
+    reclaimable: &'static str,
+}
+
+const VERSION_1: ControlGroupFiles = ControlGroupFiles {
+    root: "/sys/fs/cgroup/memory",
+    limit: "memory.limit_in_bytes",
+    in_use: "memory.usage_in_bytes",
+    reclaimable: "total_inactive_file",
+};
+
+const VERSION_2: ControlGroupFiles = ControlGroupFiles {
+    root: "/sys/fs/cgroup",
+    limit: "memory.max",
+    in_use: "memory.current",
+    reclaimable: "inactive_file",
+};
+
+/// Memory that the control groups of this process leave.
+fn free_in_own_control_groups() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
-    let own = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
-    let free = |folder: &Path| -> Option<u64> {
-        let number = |file: &str| first_number(&fs::read_to_string(folder.join(file)).ok()?);
-        let statistics = fs::read_to_string(folder.join("memory.stat")).unwrap_or_default();
-        let reclaimable = value_of(&statistics, "inactive_file").unwrap_or(0);
-        let in_use = number("memory.current")?.saturating_sub(reclaimable);
-        Some(number("memory.max")?.saturating_sub(in_use))
+    free_in_control_groups(&groups, |path| fs::read_to_string(path).ok())
+}
+
+/// Memory that the control groups of a process leave, each from the group of the process up to the
+/// mount point. `groups` is the text of `/proc/PID/cgroup`; `read` returns the text of a file. Pages
+/// of files that are not in use count as free.
+fn free_in_control_groups(groups: &str, read: impl Fn(&Path) -> Option<String>) -> Option<u64> {
+    let own = groups.lines().filter_map(|line| {
+        let mut fields = line.splitn(3, ':');
+        let (hierarchy, controllers, path) = (fields.next()?, fields.next()?, fields.next()?);
+        let files = match hierarchy {
+            "0" => VERSION_2,
+            _ if controllers.split(',').any(|name| name == "memory") => VERSION_1,
+            _ => return None,
+        };
+        Some((files, path.trim_start_matches('/')))
+    });
+    let free = |(files, path): (ControlGroupFiles, &str)| {
+        let root = Path::new(files.root);
+        let free_in = |folder: &Path| -> Option<u64> {
+            let number = |file: &str| first_number(&read(&folder.join(file))?);
+            let statistics = read(&folder.join("memory.stat")).unwrap_or_default();
+            let reclaimable = value_of(&statistics, files.reclaimable).unwrap_or(0);
+            let in_use = number(files.in_use)?.saturating_sub(reclaimable);
+            Some(number(files.limit)?.saturating_sub(in_use))
+        };
+        let folder = root.join(path);
+        folder.ancestors().take_while(|folder| folder.starts_with(root)).filter_map(free_in).min()
     };
-    root.join(own).ancestors().take_while(|folder| folder.starts_with(root)).filter_map(free).min()
+    own.filter_map(free).min()
 }
 
 /// Memory and swap of the machine that programs can get without others being stopped.
@@ -98,6 +144,37 @@ mod tests {
         assert_eq!(value_of(text, "MemAvailable:"), Some(42));
         assert_eq!((value_of(text, "SwapFree:"), value_of(text, "Mem")), (None, None));
         assert_eq!((first_number("max\n"), first_number("77 12\n")), (None, Some(77)));
+    }
+
+    #[test]
+    fn limits_of_both_versions_of_control_groups_are_read() {
+        let file = |path: &Path| {
+            let text = match path.to_str()? {
+                "/sys/fs/cgroup/memory/jobs/7/memory.limit_in_bytes" => "9223372036854771712\n",
+                "/sys/fs/cgroup/memory/jobs/7/memory.usage_in_bytes" => "3000\n",
+                "/sys/fs/cgroup/memory/jobs/memory.limit_in_bytes" => "10000\n",
+                "/sys/fs/cgroup/memory/jobs/memory.usage_in_bytes" => "4000\n",
+                "/sys/fs/cgroup/memory/jobs/memory.stat" => {
+                    "inactive_file 7\ntotal_inactive_file 500\n"
+                }
+                "/sys/fs/cgroup/slice/memory.max" => "8000\n",
+                "/sys/fs/cgroup/slice/memory.current" => "1000\n",
+                "/sys/fs/cgroup/slice/memory.stat" => "inactive_file 30\n",
+                "/sys/fs/cgroup/slice/run/memory.max" => "max\n",
+                "/sys/fs/cgroup/slice/run/memory.current" => "900\n",
+                _ => return None,
+            };
+            Some(text.to_string())
+        };
+        let version_1 = "6:cpu:/jobs/7\n5:hugetlb,memory:/jobs/7\n1:name=systemd:/\n";
+        let version_2 = "0::/slice/run\n";
+        let free = |groups: &str| free_in_control_groups(groups, file);
+        assert_eq!(free(version_1), Some(6500));
+        assert_eq!(free(version_2), Some(7030));
+        assert_eq!(free(&(version_1.to_string() + version_2)), Some(6500));
+        // A container may not see the groups above its own.
+        assert_eq!(free("5:memory:/docker/0/deep\n0::/../outside\n"), None);
+        assert_eq!(free(""), None);
     }
 
     #[test]
