@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Latency over a slow connection: `cargo bench --bench link` behind an OpenSSH server, plain and inside
-# tmux and screen. Installs missing programs if it may.
+# tmux and screen, through a relay and through a tunnel. Installs missing programs if it may.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 missing=()
@@ -18,6 +18,9 @@ if [ ${#missing[@]} -gt 0 ]; then
 fi
 echo "machine: $(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | xargs), $(nproc) cores; $(date +%F)"
 echo "connections by rate and round trip; 160x45 cells; from a key to the first change of the picture"
-cargo bench --quiet --bench link "$@"
+echo "through a relay, which acknowledges the server's bytes at once:"
+cargo bench --quiet --bench link -- "$@"
+echo "through a tunnel, so that the client acknowledges them a round trip later (needs root and python3):"
+cargo bench --quiet --bench link -- --tunnel "$@"
 echo "on a simulated connection, one wave at a time to 1,024 samples per pixel:"
 cargo test --quiet --test program link:: -- --nocapture --test-threads 1 | grep -E "room|noisy|acting"

@@ -1,23 +1,27 @@
 //! Latency from a key to the first change of the picture over a slow connection. The program runs behind
-//! an OpenSSH server on loopback, plain and inside tmux and screen; a relay limits the rate and delays
-//! all bytes. `benches/link.sh` installs the requirements. Arguments: a part of the names of rows, and the
-//! number of keys. `ZERKALO_PROGRAM` is the path of another build of the program, for comparison.
+//! an OpenSSH server, plain and inside tmux and screen. A relay on loopback limits the rate and delays
+//! all bytes; with `--tunnel` a pair of TUN devices does so, and the server's TCP connection has the
+//! round trip. `benches/link.sh` installs the requirements. Arguments: a part of the names of rows, and
+//! the number of keys. `ZERKALO_PROGRAM` is the path of another build of the program, for comparison.
 
 #[path = "../../tests/pty/terminal.rs"]
 mod terminal;
 
 mod relay;
 mod server;
+mod tunnel;
 
 use relay::Relay;
 use server::Server;
 use std::collections::BTreeMap;
 use std::fs;
+use std::net::SocketAddr;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use terminal::{Start, Terminal};
+use tunnel::Tunnel;
 use zerkalo::scene::BUILT_IN;
 use zerkalo::terminal::cells::Oklab;
 
@@ -43,25 +47,35 @@ fn main() {
     let part = arguments.iter().find(|a| !a.starts_with('-') && a.parse::<usize>().is_err());
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("room.toml"), BUILT_IN).unwrap();
-    let server = match Server::start(folder.path()) {
-        Ok(server) => server,
-        Err(why) => return println!("skipped: {why}"),
-    };
+    let has_tunnel = arguments.iter().any(|argument| argument == "--tunnel");
     println!(
         "{:50} {:>7} {:>7} {:>7} {:>5}  rate reported while and after the picture converges",
         "", "median", "p95", "max", "keys"
     );
     for link in LINKS {
-        for row in ROWS {
-            let name = format!("{}: {}", link.0, row.name);
-            if part.is_some_and(|part| !name.contains(part.as_str())) {
-                continue;
-            }
+        let rows = ROWS.iter().map(|row| (format!("{}: {}", link.0, row.name), row));
+        let rows: Vec<_> = rows.filter(|(name, _)| part.is_none_or(|p| name.contains(p))).collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let tunnel = match has_tunnel.then(|| Tunnel::start(link.1, link.2)).transpose() {
+            Ok(tunnel) => tunnel,
+            Err(why) => return println!("skipped: {why}"),
+        };
+        let server = match Server::start(folder.path(), tunnel.as_ref()) {
+            Ok(server) => server,
+            Err(why) => return println!("skipped: {why}"),
+        };
+        let address = match &tunnel {
+            Some(_) => server.address,
+            None => Relay::start(server.address, link.1, link.2).unwrap().address,
+        };
+        for (name, row) in rows {
             if row.host.is_missing() {
                 println!("{name:50} skipped, there is no such program");
                 continue;
             }
-            measure(&name, &row, link, keys, &server, folder.path());
+            measure(&name, row, keys, &server, address, folder.path());
         }
     }
 }
@@ -167,16 +181,15 @@ const ROWS: [Row; 7] = [
 fn measure(
     name: &str,
     row: &Row,
-    (_, rate, one_way): (&str, f64, Duration),
     keys: usize,
     server: &Server,
+    address: SocketAddr,
     folder: &Path,
 ) {
-    let relay = Relay::start(server.address, rate, one_way).unwrap();
     let program = std::env::var("ZERKALO_PROGRAM").unwrap_or(PROGRAM.to_string());
     let room = folder.join("room.toml");
     let program = format!("COLORTERM=truecolor {program} {} {}", room.display(), row.options);
-    let command = server.ssh(relay.address, &row.host.command(folder, &program));
+    let command = server.ssh(address, &row.host.command(folder, &program));
     let words: Vec<&str> = command.iter().map(String::as_str).collect();
     let replies = row.replies != Replies::Never;
     let start = Start { command: &words, folder, size: SIZE, env: &[], replies };

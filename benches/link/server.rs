@@ -1,5 +1,6 @@
-//! OpenSSH server on loopback.
+//! OpenSSH server.
 
+use crate::tunnel::{NAMESPACE, SERVER_IP, Tunnel};
 use std::fs;
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -14,17 +15,21 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts `sshd` with keys and settings in `folder`.
+    /// Starts `sshd` with keys and settings in `folder`, on loopback or in the network namespace of a
+    /// tunnel.
     ///
     /// # Errors
     /// If a program is missing or the server does not start.
-    pub fn start(folder: &Path) -> Result<Self, String> {
+    pub fn start(folder: &Path, tunnel: Option<&Tunnel>) -> Result<Self, String> {
         let daemon = ["/usr/sbin/sshd", "/usr/local/sbin/sshd", "/usr/bin/sshd"]
             .into_iter()
             .find(|path| Path::new(path).exists())
             .ok_or("there is no sshd: install openssh-server")?;
         for key in ["host", "user"] {
             let file = folder.join(key);
+            if file.exists() {
+                continue;
+            }
             let status = Command::new("ssh-keygen")
                 .args(["-q", "-t", "ed25519", "-N", "", "-f"])
                 .arg(&file)
@@ -35,7 +40,10 @@ impl Server {
             }
         }
         let port = TcpListener::bind("127.0.0.1:0").and_then(|l| l.local_addr());
-        let address = port.map_err(|error| error.to_string())?;
+        let mut address = port.map_err(|error| error.to_string())?;
+        if tunnel.is_some() {
+            address.set_ip(SERVER_IP.into());
+        }
         let settings = format!(
             "ListenAddress {address}\nHostKey {0}/host\nAuthorizedKeysFile {0}/user.pub\n\
              StrictModes no\nUsePAM no\nPidFile none\nPasswordAuthentication no\n",
@@ -46,7 +54,12 @@ impl Server {
         // Folder for privilege separation, which the system creates only at boot.
         let _ = fs::create_dir_all("/run/sshd");
         let log = fs::File::create(folder.join("sshd.log")).map_err(|error| error.to_string())?;
-        let child = Command::new(daemon)
+        let mut command = Command::new(daemon);
+        if tunnel.is_some() {
+            command = Command::new("ip");
+            command.args(["netns", "exec", NAMESPACE, daemon]);
+        }
+        let child = command
             .args(["-D", "-e", "-f"])
             .arg(&file)
             .stderr(log)
