@@ -5,6 +5,7 @@ mod checkpoints;
 mod editing;
 mod hostile;
 mod life;
+mod limits;
 mod picture;
 mod stills;
 mod stopping;

@@ -4,6 +4,7 @@ use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport, stem};
 use crate::dashboard::run::file_worker::Files;
 use crate::dashboard::run::frames::FramePipeline;
+use crate::dashboard::run::worker::Worker;
 use crate::dashboard::run::{image_viewer, paths};
 use crate::film::LinearImage;
 use crate::render::schedule::Settings;
@@ -15,7 +16,7 @@ use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Niceness of tracing threads with low priority, the lowest of Linux. Such threads take little
 /// more than idle processor time.
@@ -222,17 +223,31 @@ impl EffectRunner {
     }
 
     /// Completes pending writes and ends the threads. Returns the remaining results, and the result
-    /// of [`Files::finish`].
-    pub fn finish(mut self) -> (Vec<Message>, Result<Option<PathBuf>, String>) {
-        if let Some(resized) = self.resized.take() {
-            resized.end();
-        }
+    /// of [`Files::finish`]. Pictures that are being written and the renderer are given up at
+    /// `deadline`; `None` waits for them without limit. Unsaved edits never wait for them.
+    pub fn finish(
+        mut self,
+        deadline: Option<Instant>,
+    ) -> (Vec<Message>, Result<Option<PathBuf>, String>) {
+        let resized = self.resized.take();
         let Self { session, files, results, done, .. } = self;
         let kept = files.finish();
-        // The session runs its tasks in order, so all requested exports are written after this one.
-        session.with(|_, _| ());
-        drop((session, results));
-        (done.into_iter().collect(), kept)
+        let end = move || {
+            if let Some(resized) = resized {
+                resized.end();
+            }
+            // The session runs its tasks in order, so all requested exports are written after this
+            // one.
+            session.with(|_, _| ());
+            drop((session, results));
+        };
+        let patience = deadline
+            .map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()));
+        // If there is no thread, the session ends here, without the pictures.
+        if let Ok(ending) = Worker::spawn("end", end) {
+            ending.join_within(patience);
+        }
+        (done.try_iter().collect(), kept)
     }
 
     fn export(&mut self, format: Format) {

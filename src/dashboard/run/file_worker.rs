@@ -6,13 +6,14 @@ use crate::dashboard::message::Message;
 use crate::dashboard::run::autosave::Autosave;
 use crate::dashboard::run::autosave_worker::{AutosaveJob, AutosaveWorker};
 use crate::dashboard::run::shared_file::SharedFile;
+use crate::dashboard::run::worker::Worker;
 use crate::scene::{DiskState, Recovery, SaveError, Scene, SceneErrors, SceneFile};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::thread::{self, JoinHandle};
+use std::thread;
 use std::time::{Duration, Instant, SystemTime};
 
 /// Interval between checks of the scene file for changes by other programs.
@@ -48,35 +49,6 @@ pub struct Files {
     /// Newest unsaved scene.
     unsaved: Option<Arc<Scene>>,
     threads: Option<[Worker; 2]>,
-}
-
-/// Thread that may never end, because a disk does not respond.
-struct Worker {
-    thread: JoinHandle<()>,
-    /// Disconnected at the end of the thread.
-    ended: Receiver<()>,
-}
-
-impl Worker {
-    fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> io::Result<Self> {
-        let (running, ended) = bounded(0);
-        let thread = thread::Builder::new().name(name.into()).spawn(move || {
-            let _running = running;
-            run();
-        })?;
-        Ok(Self { thread, ended })
-    }
-
-    /// Waits for the end of the thread. Returns `false` if it has not ended after `patience`.
-    fn join_within(self, patience: Duration) -> bool {
-        if self.ended.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {
-            return false;
-        }
-        match self.thread.join() {
-            Err(panic) if !thread::panicking() => std::panic::resume_unwind(panic),
-            _ => true,
-        }
-    }
 }
 
 impl Files {

@@ -16,6 +16,7 @@ mod latency;
 mod paths;
 mod shared_file;
 mod signals;
+mod worker;
 mod writer;
 
 use crate::dashboard::message::{Effect, Exported, Message};
@@ -155,6 +156,8 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         left: screen.left().clone(),
     };
     let result = dashboard.watch(&terminal_io);
+    // Only the user's own end waits for pictures that are being written.
+    let deadline = (!matches!(result, Ok(None))).then(|| Instant::now() + signals::ENDED_WITHIN);
     // The file thread starts to write unsaved edits before anything here may block. A timeout of 0
     // does not wait for that write.
     dashboard.effects.flush(Duration::ZERO);
@@ -163,7 +166,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     }
     // The screen is restored before the remaining files are written, which may take a while.
     drop(screen);
-    let (finished, kept) = dashboard.effects.finish();
+    let (finished, kept) = dashboard.effects.finish(deadline);
     let mut ended = Ended {
         signalled: result?,
         exported: Vec::new(),

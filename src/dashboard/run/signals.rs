@@ -15,6 +15,10 @@ use std::time::Duration;
 /// Grace period of the dashboard after a terminating signal.
 pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 
+/// Time within which the dashboard ends after a terminating signal even if the renderer is busy, so
+/// that it can report where unsaved edits are kept.
+pub(super) const ENDED_WITHIN: Duration = Duration::from_secs(4);
+
 /// Difference between the exit status that shells report for a killed program and the number of the
 /// signal.
 const SIGNALLED: i32 = 128;
