@@ -1,10 +1,12 @@
 //! Command-line arguments.
 
+use crate::dashboard::run::{Colors, TerminalSetup};
 use crate::film::{Display, Tone};
 use crate::measure::Experiment;
 use crate::render::plan::MAX_SHARDS;
 use crate::sampling::SamplerKind;
 use crate::scene::{Acceleration, Scene};
+use crate::terminal::Environment;
 use crate::world::Precision;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -36,17 +38,24 @@ pub struct EditArgs {
     pub compute: ComputeArgs,
     #[command(flatten)]
     pub precision: PrecisionArgs,
-    /// Colours of the terminal: 24-bit, 256, 16 or none; auto: from the environment and the
-    /// terminal's replies
-    #[arg(long, value_enum, default_value_t = ColorArg::Auto)]
-    pub color: ColorArg,
-    /// Kilobytes per second sent to the terminal [default: over SSH the measured rate of the
-    /// connection; else unlimited]
-    #[arg(long, value_name = "KB", value_parser = bandwidth, allow_negative_numbers = true)]
-    pub bandwidth: Option<f64>,
+    #[command(flatten)]
+    pub terminal: TerminalArgs,
     /// Write the latencies of keys and mouse as CSV, and print their distribution at the end
     #[arg(long, value_name = "FILE.csv", hide = true)]
     pub trace: Option<PathBuf>,
+}
+
+/// Options of every command that shows the dashboard.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct TerminalArgs {
+    /// Colours of the terminal: 24-bit, 256, 16 or none; auto: from the environment and the
+    /// terminal's replies
+    #[arg(long, value_enum, default_value_t = ColorArg::Auto)]
+    color: ColorArg,
+    /// Kilobytes per second sent to the terminal [default: over SSH the measured rate of the
+    /// connection; else unlimited]
+    #[arg(long, value_name = "KB", value_parser = bandwidth, allow_negative_numbers = true)]
+    bandwidth: Option<f64>,
 }
 
 /// Options of every command that traces.
@@ -91,6 +100,8 @@ pub enum Command {
     Plan(Box<PlanArgs>),
     /// Add the parts that the shards of a plan have traced
     Merge(MergeArgs),
+    /// Show renders of other processes or machines while they run, from their film files
+    Watch(WatchArgs),
     /// Measure the cost of accuracy on a scene: seconds to a given noise, gain and cost of settings
     Measure(Box<MeasureArgs>),
     /// Validate a scene and print its contents
@@ -269,6 +280,22 @@ pub struct CheckArgs {
     pub scene: PathBuf,
 }
 
+/// Arguments of `zerkalo watch`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Shows the sum of the samples, its noise, and the files that are late or missing. \
+                        The files are read again when they are replaced. Nothing is edited or \
+                        rendered; `p` and `P` write the picture, `q` quits."
+)]
+pub struct WatchArgs {
+    /// Parts of one plan, or one checkpoint; the name of a plan file stands for its parts beside it
+    /// (job.plan: job-0.zk, job-1.zk, ..)
+    #[arg(required = true, value_name = "FILE.zk")]
+    pub files: Vec<PathBuf>,
+    #[command(flatten)]
+    pub terminal: TerminalArgs,
+}
+
 /// Arguments of `zerkalo info`.
 #[derive(Debug, Args)]
 pub struct InfoArgs {
@@ -348,6 +375,21 @@ fn max_threads() -> usize {
     THREADS_ANYWHERE.max(THREADS_PER_PROCESSOR * processors())
 }
 
+impl TerminalArgs {
+    /// Returns the settings of a terminal with this environment.
+    pub fn setup(&self, surroundings: Environment) -> TerminalSetup {
+        let colors = match self.color {
+            ColorArg::True => Some(Colors::True),
+            ColorArg::Indexed => Some(Colors::Indexed),
+            ColorArg::Sixteen => Some(Colors::Sixteen),
+            ColorArg::None => Some(Colors::Mono),
+            ColorArg::Auto => None,
+        };
+        let bandwidth = self.bandwidth.map(|kilobytes| 1e3 * kilobytes);
+        TerminalSetup { colors, surroundings, bandwidth }
+    }
+}
+
 impl ComputeArgs {
     /// Returns the number of tracing threads: one per processor, or the number of `--threads` up to
     /// a small multiple of the processors.
@@ -379,6 +421,7 @@ impl Cli {
             Some(Command::Measure(args)) => args.compute.warning(),
             Some(
                 Command::Merge(_)
+                | Command::Watch(_)
                 | Command::Check(_)
                 | Command::Info(_)
                 | Command::New(_)
@@ -556,10 +599,10 @@ mod tests {
         assert_eq!(cli.edit.scene, Some(PathBuf::from("a.toml")));
         let cli = Cli::try_parse_from(["zerkalo", "a.toml", "--color", "256", "--threads", "2"]);
         let edit = cli.unwrap().edit;
-        assert_eq!((edit.color, edit.compute.threads()), (ColorArg::Indexed, 2));
+        assert_eq!((edit.terminal.color, edit.compute.threads()), (ColorArg::Indexed, 2));
         assert!(Cli::try_parse_from(["zerkalo", "--color", "17"]).is_err());
         let slow = Cli::try_parse_from(["zerkalo", "--bandwidth", "12.5"]).unwrap().edit;
-        assert_eq!(slow.bandwidth, Some(12.5));
+        assert_eq!(slow.terminal.bandwidth, Some(12.5));
         for wrong in ["0", "-3", "inf", "nan", "fast"] {
             assert!(Cli::try_parse_from(["zerkalo", "--bandwidth", wrong]).is_err(), "{wrong}");
         }

@@ -1,11 +1,11 @@
 //! `zerkalo [SCENE]`: the dashboard.
 
 use crate::asset::Assets;
-use crate::command::args::{ColorArg, EditArgs};
+use crate::command::args::EditArgs;
 use crate::command::load_progress::LoadReporter;
 use crate::command::{Failure, warn, write_line};
 use crate::dashboard::message::Exported;
-use crate::dashboard::run::{Colors, DEFAULT_STOP, Ended, Setup, run as run_dashboard};
+use crate::dashboard::run::{DEFAULT_STOP, Ended, Setup, run as run_dashboard};
 use crate::disk::open_regular;
 use crate::film::Display;
 use crate::film::file::is_film_file;
@@ -22,18 +22,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub fn run(args: &EditArgs) -> Result<(), Failure> {
-    let environment = Environment::of(|name| env::var(name).ok());
-    let terminals = io::stdin().is_terminal() && io::stdout().is_terminal();
-    if !terminals || environment.term == "dumb" {
+    let environment = terminal_environment().map_err(|reason| {
         let scene = args.scene.as_deref().map_or("SCENE".into(), |s| s.to_string_lossy());
-        let reason = match terminals {
-            true => "TERM=dumb: a terminal that cannot place text shows no dashboard",
-            false => "the dashboard needs a terminal",
-        };
-        return Err(Failure::Usage(format!(
-            "{reason}; `zerkalo render {scene} -o PICTURE.png` renders without one"
-        )));
-    }
+        let remedy = format!("`zerkalo render {scene} -o PICTURE.png` renders without one");
+        Failure::Usage(format!("{reason}; {remedy}"))
+    })?;
     let reporter = LoadReporter::new();
     let state = state_folder(|name| env::var_os(name));
     let checkpoint = match args.scene.as_deref().filter(|path| is_film_file(path)) {
@@ -74,9 +67,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
             rays_per_pixel: 0,
             stop: DEFAULT_STOP,
         },
-        colors: colors(args.color),
-        surroundings: environment,
-        bandwidth: args.bandwidth.map(|kilobytes| 1e3 * kilobytes),
+        terminal: args.terminal.setup(environment),
         trace: args.trace.clone(),
     };
     let ended = run_dashboard(setup).map_err(|error| Failure::Failed(error.to_string()))?;
@@ -86,7 +77,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
 /// Prints the results of a dashboard that has ended: files that were written on `out`, everything
 /// else on stderr. A signal determines the exit status even if `out` cannot be written, as after
 /// the loss of the terminal.
-fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
+pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     let mut lines = Vec::new();
     for exported in &ended.exported {
         match exported {
@@ -113,6 +104,19 @@ fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     match ended.signalled {
         Some(status) => Err(Failure::Signalled(status)),
         None => printed,
+    }
+}
+
+/// Returns the environment of a terminal that can show the dashboard, or the reason why there is
+/// none.
+pub fn terminal_environment() -> Result<Environment, &'static str> {
+    let environment = Environment::of(|name| env::var(name).ok());
+    if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
+        return Err("the dashboard needs a terminal");
+    }
+    match environment.term.as_str() {
+        "dumb" => Err("TERM=dumb: a terminal that cannot place text shows no dashboard"),
+        _ => Ok(environment),
     }
 }
 
@@ -187,17 +191,6 @@ fn summary(exported: &Exported) -> String {
     };
     let path = exported.path.display();
     format!("{path}  {width}x{height}  {:.0} spp  noise {noise}", exported.spp)
-}
-
-/// Converts the value of `--color`. Returns `None` for `auto`.
-fn colors(requested: ColorArg) -> Option<Colors> {
-    match requested {
-        ColorArg::True => Some(Colors::True),
-        ColorArg::Indexed => Some(Colors::Indexed),
-        ColorArg::Sixteen => Some(Colors::Sixteen),
-        ColorArg::None => Some(Colors::Mono),
-        ColorArg::Auto => None,
-    }
 }
 
 #[cfg(test)]

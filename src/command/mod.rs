@@ -18,6 +18,7 @@ mod render;
 mod shard;
 mod signals;
 mod stats;
+mod watch;
 
 pub use cpu::require as require_cpu;
 
@@ -58,6 +59,7 @@ pub fn main() -> ExitCode {
         Some(Command::Render(args)) => render::run(args, started),
         Some(Command::Plan(args)) => plan::run(args),
         Some(Command::Merge(args)) => merge::run(args),
+        Some(Command::Watch(args)) => watch::run(args),
         Some(Command::Measure(args)) => measure::run(args),
         Some(Command::Check(args)) => check::run(args),
         Some(Command::Info(args)) => info::run(args),

@@ -29,6 +29,9 @@ fn hint_line(model: &Model) -> Option<HintLine> {
         Some(Overlay::Form(form)) if form.editor.is_none() => HintLine::Form,
         Some(Overlay::Form(_) | Overlay::Prompt(_)) => HintLine::Typing,
         None if model.inspector.editor.is_some() => HintLine::Typing,
+        None if model.watch.is_some() && model.context() != KeyContext::Probing => {
+            HintLine::Watching
+        }
         None => match model.context() {
             KeyContext::Moving => HintLine::Moving,
             KeyContext::Turning => HintLine::Turning,
@@ -58,16 +61,26 @@ pub fn hints(model: &Model) -> Vec<&'static Hint> {
     hint_line(model).map_or_else(Vec::new, hints_of)
 }
 
-/// Returns the lines of the help, with every command of the table.
-pub fn help() -> Vec<HelpLine> {
+/// Returns the lines of the help, with every command of the table, or with those that run while
+/// files are watched.
+pub fn help(watching: bool) -> Vec<HelpLine> {
     let line = |command: &Command| {
-        let keys = command.all_keys(str::to_string);
+        let keys = match watching {
+            true => command.watch_keys(str::to_string),
+            false => command.all_keys(str::to_string),
+        };
         HelpLine::Keys(if keys.is_empty() { ":".to_string() } else { keys }, command.label)
     };
-    let lines = Chapter::ALL.iter().flat_map(|(chapter, title)| {
-        [HelpLine::Heading(title)].into_iter().chain(chapter.commands().map(line))
-    });
-    lines.collect()
+    let offered = |command: &&Command| command.while_watching || !watching;
+    let mut lines = Vec::new();
+    for (chapter, title) in Chapter::ALL {
+        let commands: Vec<_> = chapter.commands().filter(offered).map(line).collect();
+        if !commands.is_empty() {
+            lines.push(HelpLine::Heading(title));
+            lines.extend(commands);
+        }
+    }
+    lines
 }
 
 /// Returns the text of docs/keys.md.
@@ -83,6 +96,11 @@ pub fn reference() -> String {
         for command in chapter.commands() {
             page += &format!("| {} | {} |\n", command.all_keys(quoted), command.label);
         }
+    }
+    page += "\n## While watching\n\n`zerkalo watch` edits and renders nothing. It has these keys:\n\n\
+             | keys | action |\n|---|---|\n";
+    for command in COMMANDS.iter().filter(|command| command.while_watching) {
+        page += &format!("| {} | {} |\n", command.watch_keys(quoted), command.label);
     }
     page += "\n## Mouse\n\n| mouse | effect |\n|---|---|\n";
     for (mouse, effect) in MOUSE {
@@ -117,7 +135,7 @@ mod tests {
                         HintLine::Turning => KeyContext::Turning,
                         HintLine::Flying => KeyContext::Flying,
                         HintLine::Probing => KeyContext::Probing,
-                        HintLine::Outline => KeyContext::Outline,
+                        HintLine::Outline | HintLine::Watching => KeyContext::Outline,
                         HintLine::Inspector => KeyContext::Inspector,
                         HintLine::List | HintLine::Form | HintLine::Typing | HintLine::Reading => {
                             KeyContext::Overlay
@@ -135,11 +153,14 @@ mod tests {
 
     #[test]
     fn help_lists_every_command() {
-        let lines = help();
+        let lines = help(false);
         let rows = lines.iter().filter(|line| matches!(line, HelpLine::Keys(..))).count();
         assert_eq!(rows, COMMANDS.len());
         assert_eq!(lines.len() - rows, Chapter::ALL.len());
         let in_order = Chapter::ALL.iter().enumerate().all(|(i, (c, _))| *c as usize == i);
         assert!(in_order);
+        let watching = help(true);
+        assert!(watching.len() < lines.len() / 2, "{watching:?}");
+        assert!(watching.contains(&HelpLine::Keys("q Ctrl-c".into(), "quit")), "{watching:?}");
     }
 }

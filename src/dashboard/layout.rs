@@ -24,6 +24,8 @@ pub struct Request {
     pub focus: Focus,
     /// Only the picture is visible.
     pub fullscreen: bool,
+    /// The table of watched files takes the place of outline and inspector.
+    pub watching: bool,
 }
 
 /// Areas of the screen. Panels include their borders; folded panels are `None`.
@@ -37,7 +39,7 @@ pub struct Layout {
     /// cell and counts as square. If the number of rows is odd, the last row of half cells is the
     /// upper half of a row of cells.
     pub raster: [usize; 2],
-    /// Panel of the outline.
+    /// Panel of the outline, or of the table of watched files.
     pub outline: Option<Area>,
     /// Panel of the inspector.
     pub inspector: Option<Area>,
@@ -67,9 +69,11 @@ pub fn layout(request: &Request) -> Option<Layout> {
     let status = Area { x: 0, y: height - 2, width, height: 1 };
     let hints = Area { x: 0, y: height - 1, width, height: 1 };
     let rows = height - 2;
-    let mut side = match width {
-        0..100 => 28,
-        100..160 => 38,
+    let mut side = match (width, request.watching) {
+        (0..100, false) => 28,
+        (0..100, true) => 34,
+        (100..160, false) => 38,
+        (100..160, true) => 46,
         _ => 52,
     };
     if request.fullscreen || width < SIDE_FROM && request.focus == Focus::Picture {
@@ -80,14 +84,17 @@ pub fn layout(request: &Request) -> Option<Layout> {
     let (image, raster) = fitted(inside, request.film);
     let [outline, inspector, plot] = match side {
         0 => [None; 3],
-        _ => column(Area { x: width - side, y: 0, width: side, height: rows }, request.focus),
+        _ => {
+            let column = Area { x: width - side, y: 0, width: side, height: rows };
+            if request.watching { watch_column(column) } else { edit_column(column, request.focus) }
+        }
     };
     Some(Layout { picture, image, raster, outline, inspector, plot, status, hints })
 }
 
 /// Divides the side column into outline, inspector and plot, from top to bottom. Panels without
 /// room are folded.
-fn column(side: Area, focus: Focus) -> [Option<Area>; 3] {
+fn edit_column(side: Area, focus: Focus) -> [Option<Area>; 3] {
     let rows = side.height;
     let part = |y: u16, height: u16| Some(Area { y: side.y + y, height, ..side });
     if rows < 16 {
@@ -97,7 +104,7 @@ fn column(side: Area, focus: Focus) -> [Option<Area>; 3] {
             _ => [None, part(0, rows), None],
         };
     }
-    let plot = if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 };
+    let plot = plot_rows(rows);
     let left = rows - plot;
     // With little room the focused panel gets the larger part.
     let outline = match focus {
@@ -107,6 +114,20 @@ fn column(side: Area, focus: Focus) -> [Option<Area>; 3] {
     };
     let plot = if plot > 0 { part(left, plot) } else { None };
     [part(0, outline), part(outline, left - outline), plot]
+}
+
+/// Divides the side column into the table of watched files, in the place of the outline, and the
+/// plot.
+fn watch_column(side: Area) -> [Option<Area>; 3] {
+    let plot = plot_rows(side.height);
+    let table = Area { height: side.height - plot, ..side };
+    let plot = (plot > 0).then(|| Area { y: side.y + table.height, height: plot, ..side });
+    [Some(table), None, plot]
+}
+
+/// Returns the height of the plot in a column of `rows` rows, or 0 if there is no room.
+fn plot_rows(rows: u16) -> u16 {
+    if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 }
 }
 
 /// Returns the largest centred area with the film's aspect ratio inside `inside`, and its columns
@@ -150,7 +171,8 @@ mod tests {
 
     fn at(width: u16, height: u16, focus: Focus) -> Option<Layout> {
         let film = [640, 480];
-        layout(&Request { screen: [width, height], film, focus, fullscreen: false })
+        let screen = [width, height];
+        layout(&Request { screen, film, focus, fullscreen: false, watching: false })
     }
 
     const FOCI: [Focus; 3] = [Focus::Picture, Focus::Outline, Focus::Inspector];
@@ -194,7 +216,8 @@ mod tests {
         for film in [[640, 480], [480, 640], [1920, 800], [1, 1], [8192, 1], [1, 8192]] {
             for screen in [[80, 24], [120, 36], [200, 60], [40, 12]] {
                 for fullscreen in [false, true] {
-                    let request = Request { screen, film, focus: Focus::Picture, fullscreen };
+                    let focus = Focus::Picture;
+                    let request = Request { screen, film, focus, fullscreen, watching: false };
                     let l = layout(&request).unwrap();
                     let inside = if fullscreen { l.picture } else { l.picture.inner() };
                     let [columns, halves] = l.raster;

@@ -2,7 +2,7 @@
 
 use crate::film::{Display, LinearImage};
 use crate::render::schedule::Stop;
-use crate::render::session::Snapshot;
+use crate::render::session::{Snapshot, WatchReport};
 use crate::scene::{SaveError, Scene, SceneErrors};
 use crate::terminal::event::{Key, Mouse};
 use crate::terminal::flow::LinkStatus;
@@ -24,6 +24,8 @@ pub enum Message {
     Resize([u16; 2]),
     /// Latest snapshot of the renderer.
     Snapshot(Box<Snapshot>),
+    /// State of the files that `zerkalo watch` shows.
+    Watched(Box<WatchReport>),
     /// Result of [`Effect::Pin`]: the picture and its mean samples per pixel.
     Pinned(Arc<LinearImage>, f64),
     /// Result of [`Effect::Save`] for this scene.
@@ -118,6 +120,9 @@ impl DisplayChannel {
     /// Every channel, in the order in which the key cycles through them.
     pub const ALL: [Self; 6] =
         [Self::Beauty, Self::Noise, Self::Samples, Self::Objects, Self::Normals, Self::Depth];
+
+    /// Channels of a film, which need no scene.
+    pub const OF_FILM: [Self; 3] = [Self::Beauty, Self::Noise, Self::Samples];
 
     /// Returns the name of the channel.
     pub fn name(self) -> &'static str {

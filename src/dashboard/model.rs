@@ -9,7 +9,7 @@ use crate::dashboard::overlay::Overlay;
 use crate::dashboard::overlay_layout::wrapped;
 use crate::film::{Display, LinearImage, Probe};
 use crate::render::schedule::Stop;
-use crate::render::session::Snapshot;
+use crate::render::session::{Snapshot, WatchReport};
 use crate::scene::edit::Target;
 use crate::scene::{History, Scene, SceneErrors};
 pub use crate::terminal::cells::Colors;
@@ -102,6 +102,17 @@ pub struct Notice {
     pub tone: Tone,
     /// Time at which the notice disappears; `None` if it stays until the next key.
     pub until: Option<Duration>,
+}
+
+/// Table of the files that `zerkalo watch` shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WatchTable {
+    /// State of the files.
+    pub report: WatchReport,
+    /// Index of the row under the cursor.
+    pub cursor: usize,
+    /// Index of the first visible row.
+    pub scroll: usize,
 }
 
 /// A running export, which renders at another size.
@@ -202,6 +213,9 @@ pub struct Model {
     pub raster: Option<[usize; 2]>,
     /// Counter that increases whenever the picture's cells may have changed.
     pub picture_version: u64,
+    /// Files that are watched instead of a scene being rendered. Commands that edit or render are
+    /// then refused.
+    pub watch: Option<WatchTable>,
 }
 
 /// Parameters of a new model.
@@ -277,6 +291,7 @@ impl Model {
             autosaved: None,
             raster: None,
             picture_version: 0,
+            watch: None,
         }
     }
 
@@ -300,6 +315,7 @@ impl Model {
             film: self.scene().film.size,
             focus: self.focus,
             fullscreen: self.fullscreen,
+            watching: self.watch.is_some(),
         })
     }
 
@@ -307,6 +323,8 @@ impl Model {
     pub fn context(&self) -> KeyContext {
         match (&self.overlay, self.focus, self.mode) {
             (Some(_), ..) => KeyContext::Overlay,
+            // The keys of the table are those of the outline. There is no camera to orbit.
+            (None, _, Mode::Orbit) if self.watch.is_some() => KeyContext::Outline,
             (None, Focus::Outline, _) => KeyContext::Outline,
             (None, Focus::Inspector, _) => KeyContext::Inspector,
             (None, Focus::Picture, mode) => match mode {

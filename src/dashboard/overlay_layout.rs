@@ -112,6 +112,17 @@ impl Model {
         self.layout()?.outline.map(|area| area.inner())
     }
 
+    /// Returns the area of the rows of the table of watched files, and the area for details on the
+    /// row under the cursor. Returns `None` if the panel is folded.
+    pub fn watch_rows(&self) -> Option<(Area, Area)> {
+        let inner = self.layout()?.outline?.inner();
+        let details = if inner.height >= 10 { 5 } else { 0 };
+        // The first row has the titles of the columns.
+        let rows = inner.height.saturating_sub(1 + details);
+        let table = Area { y: inner.y + 1, height: rows, ..inner };
+        Some((table, Area { y: table.y + rows, height: details, ..inner }))
+    }
+
     /// Returns the area of the inspector's lines, and the area for help on the field under the
     /// cursor. Returns `None` if the panel is folded.
     pub fn inspector_rows(&self) -> Option<(Area, Area)> {

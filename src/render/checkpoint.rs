@@ -24,7 +24,8 @@ use std::sync::Arc;
 
 const SCENE: Tag = *b"SCEN";
 const SCHEDULE: Tag = *b"SCHD";
-const CLOCK: Tag = *b"TIME";
+/// Tag of the chunk with the seconds of rendering.
+pub(super) const CLOCK: Tag = *b"TIME";
 
 /// Version of the program. Samples of other versions may differ.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");

@@ -79,7 +79,7 @@ pub fn metadata(
         saturated_pixels,
         ("Biased", if biases.is_empty() { "no".to_string() } else { biases.join("; ") }),
         (
-            "Settings",
+            SETTINGS,
             settings_text(
                 provenance.sampler.name(),
                 &header.precision,
@@ -91,18 +91,23 @@ pub fn metadata(
     entries.into_iter().map(|(key, value)| (key.to_string(), value)).collect()
 }
 
-/// Formats the metadata entry `Settings`.
+/// Formats the metadata entry [`SETTINGS`].
 pub fn settings_text(sampler: &str, precision: &str, adaptive: bool, display: &Display) -> String {
-    let tone =
-        Tone::NAMED.iter().find(|(_, tone)| *tone == display.tone).map_or("", |(name, _)| name);
     let allocation = if adaptive { "adaptive" } else { "uniform" };
-    let exposure = display.exposure_ev;
-    format!(
-        "sampler {sampler}, {precision} precision, {allocation}{DISPLAY}{exposure} EV, tone {tone}"
-    )
+    let display = display_text(display);
+    format!("sampler {sampler}, {precision} precision, {allocation}{display}")
 }
 
-/// Text between sample allocation and display transform in the metadata entry `Settings`.
+/// Formats the display transform as the end of the entry [`SETTINGS`].
+fn display_text(display: &Display) -> String {
+    let tone =
+        Tone::NAMED.iter().find(|(_, tone)| *tone == display.tone).map_or("", |(name, _)| name);
+    format!("{DISPLAY}{} EV, tone {tone}", display.exposure_ev)
+}
+
+/// Key of the metadata entry with sampler, precision, sample allocation and display transform.
+const SETTINGS: &str = "Settings";
+/// Beginning of the display transform in the entry [`SETTINGS`].
 const DISPLAY: &str = ", exposure ";
 
 /// Metadata that depend on the film alone.
@@ -128,5 +133,15 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
 pub fn update_metadata(metadata: &mut [(String, String)], report: &Report) {
     for (key, value) in film_entries(report) {
         metadata.iter_mut().filter(|(k, _)| k == key).for_each(|(_, v)| v.clone_from(&value));
+    }
+}
+
+/// Replaces the display transform in the metadata.
+pub fn update_display(metadata: &mut [(String, String)], display: &Display) {
+    for (_, settings) in metadata.iter_mut().filter(|(key, _)| key == SETTINGS) {
+        if let Some(end) = settings.find(DISPLAY) {
+            settings.truncate(end);
+            *settings += &display_text(display);
+        }
     }
 }

@@ -9,6 +9,7 @@ mod scale;
 mod shards;
 #[cfg(unix)]
 mod signals;
+mod watch;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -5,7 +5,7 @@ use std::fs;
 use zerkalo::film::file::FilmReader;
 
 /// Runs `args` and returns what the command printed on stdout.
-fn done(desk: &Desk, args: &[&str]) -> String {
+pub fn done(desk: &Desk, args: &[&str]) -> String {
     let run = desk.run(args);
     assert_eq!(run.status, 0, "{args:?}: {}", run.err);
     run.out
@@ -19,14 +19,14 @@ fn refused(desk: &Desk, args: &[&str]) -> String {
 }
 
 /// Plans `shards` shards of the scene in 64x48 pixels as `NAME.plan`, with the base `NAME-0.zk`.
-fn plan(desk: &Desk, name: &str, shards: usize) {
+pub fn plan(desk: &Desk, name: &str, shards: usize) {
     let (output, shards) = (format!("{name}.plan"), shards.to_string());
     let args = ["plan", "scene.toml", "-o", &output, "--size", "64x48"];
     done(desk, &[&args[..], &["--noise", "0.5", "--pilot", "2", "--shards", &shards]].concat());
 }
 
 /// Traces shard `number` of `NAME.plan` to `NAME-number.zk`, which is returned.
-fn trace(desk: &Desk, name: &str, number: usize) -> String {
+pub fn trace(desk: &Desk, name: &str, number: usize) -> String {
     let (plan, part, number) =
         (format!("{name}.plan"), format!("{name}-{number}.zk"), number.to_string());
     done(desk, &["render", "scene.toml", "--plan", &plan, "--shard", &number, "-o", &part]);
@@ -34,13 +34,13 @@ fn trace(desk: &Desk, name: &str, number: usize) -> String {
 }
 
 /// Plans and traces all shards. Returns the files of base and shards.
-fn traced(desk: &Desk, name: &str, shards: usize) -> Vec<String> {
+pub fn traced(desk: &Desk, name: &str, shards: usize) -> Vec<String> {
     plan(desk, name, shards);
     let parts = (1..=shards).map(|number| trace(desk, name, number));
     [format!("{name}-0.zk")].into_iter().chain(parts).collect()
 }
 
-fn merge(desk: &Desk, parts: &[String], output: &str) -> Vec<u8> {
+pub fn merge(desk: &Desk, parts: &[String], output: &str) -> Vec<u8> {
     let mut args = vec!["merge", "-o", output];
     args.extend(parts.iter().map(String::as_str));
     done(desk, &args);

@@ -2,12 +2,19 @@
 
 use crate::features::row::{Verdict, ensure, material, row};
 use crate::support::{begin, begin_with, follow, pool, settings, shipped, sized};
-use zerkalo::film::{Display, Film};
-use zerkalo::render::plan::{Plan, PlanSettings, PlannedTile, ShardRender};
+use zerkalo::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
+use zerkalo::film::{Display, Film, LightWeights};
+use zerkalo::render::plan::{
+    Part, PartShard, Plan, PlanSettings, PlannedTile, ShardRender, WatchedFilms, WatchedState,
+};
 use zerkalo::render::schedule::Stop;
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
+
+use std::fs;
+use std::path::Path;
+use std::time::SystemTime;
 
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;
@@ -94,4 +101,80 @@ fn e1_shards() {
     }
     assert!(left_out.bytes() != one.bytes(), "a shard left out");
     assert!(plan.differing_tile(&left_out, &[0, 1, 2]).is_none());
+}
+
+/// Bytes of the part file of a shard.
+fn part_file(plan: &Plan, number: u32, complete: bool, film: &Film) -> Vec<u8> {
+    let mut header = FilmFileHeader {
+        film: film.header().clone(),
+        weights: LightWeights { weights: vec![[1.0; 3]; film.groups()] },
+        group_names: vec![String::new(); film.groups()],
+        display: Display::default(),
+        metadata: Vec::new(),
+        chunks: Default::default(),
+    };
+    let shards = vec![PartShard { number, complete }];
+    Part { plan: plan.clone(), shards, rays: 0 }.record(&mut header);
+    let mut pieces = vec![header.encode()];
+    pieces.extend((0..tile_chunks(film)).map(|i| encode_tiles(film, i)));
+    pieces.push(encode_end(film, &pieces));
+    pieces.concat()
+}
+
+/// Watches the parts of `scene` while they are written, first damaged, then unfinished, then
+/// complete, and compares the sum with the film `one`.
+fn watched_parts_add_to(one: &Film, scene: &Scene, folder: &Path) -> Verdict {
+    let plan = plan(one, 3);
+    let parts = parts(scene, &plan)?;
+    let path = |number: u32| folder.join(format!("job-{number}.zk"));
+    let write = |number: u32, bytes: &[u8]| {
+        write_film_file(&path(number), &[bytes.to_vec()]).map_err(|e| e.to_string())
+    };
+    fs::write(folder.join("job.plan"), plan.text()).map_err(|e| e.to_string())?;
+    (0..4).for_each(|number| drop(fs::remove_file(path(number))));
+    let mut films = WatchedFilms::open(&[folder.join("job.plan")])?;
+    ensure(films.film().is_none(), || "a film without files".to_string())?;
+    let mut sum = Film::new(one.header().clone());
+    for (number, film) in (0..).zip(&parts) {
+        let whole = part_file(&plan, number, true, film);
+        write(number, &whole[..whole.len() - 1])?;
+        films.poll();
+        let refused = |state: &WatchedState| matches!(state, WatchedState::Refused(_));
+        let rows = films.shards(SystemTime::now());
+        ensure(refused(&rows[0].state), || format!("a damaged part is {:?}", rows[0].state))?;
+        let empty = Film::new(film.header().clone());
+        write(number, &part_file(&plan, number, false, &empty))?;
+        films.poll();
+        ensure(films.film().is_some_and(|film| film.bytes() == sum.bytes()), || {
+            format!("samples of shard {number} before they are traced")
+        })?;
+        write(number, &whole)?;
+        films.poll();
+        sum.add(film).map_err(|e| e.to_string())?;
+        ensure(films.film().is_some_and(|film| film.bytes() == sum.bytes()), || {
+            format!("the sum lacks samples of shard {number}")
+        })?;
+    }
+    let film = films.film().ok_or("no film")?;
+    ensure(film.bytes() == one.bytes(), || "another film".to_string())
+}
+
+#[test]
+fn e2_watching() {
+    let one = film_of_one(&shipped("mirror-room.toml"));
+    let folder = tempfile::tempdir().unwrap();
+    row(
+        "mirror-room.toml",
+        |scene: &Scene| watched_parts_add_to(&one, scene, folder.path()),
+        &[
+            ("another mirror", &|s| material(s, "mirror").roughness = 0.3),
+            ("no lights", &|s| s.lights.clear()),
+        ],
+    );
+    // The neighbours have left their parts: those of the scene again.
+    watched_parts_add_to(&one, &shipped("mirror-room.toml"), folder.path()).unwrap();
+    // A part that vanishes leaves the sum.
+    let mut films = WatchedFilms::open(&[folder.path().join("job.plan")]).unwrap();
+    fs::remove_file(folder.path().join("job-2.zk")).unwrap();
+    assert!(films.poll() && films.film().unwrap().bytes() != one.bytes(), "a shard left out");
 }

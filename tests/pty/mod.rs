@@ -10,6 +10,7 @@ mod picture;
 mod stills;
 mod stopping;
 mod terminal;
+mod watch;
 
 use std::fs;
 use std::path::PathBuf;
@@ -50,12 +51,15 @@ impl Fixture {
         })
     }
 
+    /// Runs a command that succeeds.
+    fn run(&self, args: &[&str]) {
+        let run = Command::new(PROGRAM).args(args).current_dir(self.0.path()).output().unwrap();
+        assert!(run.status.success(), "{args:?}: {}", String::from_utf8_lossy(&run.stderr));
+    }
+
     /// Runs `zerkalo render`. Returns the file that it writes.
     fn rendered(&self, args: &[&str], output: &str) -> Vec<u8> {
-        let mut command = Command::new(PROGRAM);
-        command.arg("render").args(args).args(["-o", output]).current_dir(self.0.path());
-        let run = command.output().unwrap();
-        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        self.run(&[&["render"], args, &["-o", output]].concat());
         fs::read(self.path(output)).unwrap()
     }
 }

@@ -87,7 +87,8 @@ fn distance(screen: &vt100::Screen, layout: &Layout, picture: &Picture) -> Optio
 }
 
 fn room_layout() -> Layout {
-    let request = Request { screen: SIZE, film: FILM, focus: Focus::Picture, fullscreen: false };
+    let focus = Focus::Picture;
+    let request = Request { screen: SIZE, film: FILM, focus, fullscreen: false, watching: false };
     layout(&request).unwrap()
 }
 

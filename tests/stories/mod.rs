@@ -10,3 +10,4 @@ mod random;
 mod recovery;
 mod roughness;
 mod table;
+mod watch;

@@ -8,7 +8,7 @@ use crate::dashboard::run::worker::Worker;
 use crate::dashboard::run::{image_viewer, paths};
 use crate::film::LinearImage;
 use crate::render::schedule::Settings;
-use crate::render::session::{Session, View};
+use crate::render::session::{Session, Snapshot, View};
 use crate::render::{Checkpoint, Options};
 use crate::scene::{Scene, SceneFile};
 use crate::terminal::Capabilities;
@@ -49,7 +49,49 @@ pub enum Outcome {
     Quit,
 }
 
-/// Executor of effects. It owns the renderer, the thread of the scene file and the exports.
+/// Executor of effects, which is also the source of snapshots.
+pub trait Effects {
+    /// Returns the channel that receives a message whenever a new snapshot is published.
+    fn wakeup(&self) -> &Receiver<()>;
+
+    /// Takes the latest snapshot. Returns `None` if it has been taken already.
+    fn take_snapshot(&self) -> Option<Snapshot>;
+
+    /// Pauses (`true`) or resumes (`false`) rendering while the connection is silent.
+    fn rest(&self, resting: bool);
+
+    /// Returns the receiver of the results of effects, as messages. Each message must be passed to
+    /// [`Effects::observe`] before it updates the model.
+    fn done(&self) -> &Receiver<Message>;
+
+    /// Notes a result.
+    fn observe(&mut self, message: &Message);
+
+    /// Executes `effect`, whose results come as messages. `frames` is the output to the terminal,
+    /// `terminal` its capabilities.
+    fn run(
+        &mut self,
+        effect: Effect,
+        frames: &mut FramePipeline,
+        terminal: &Capabilities,
+    ) -> Outcome;
+
+    /// Writes unsaved edits to the recovery file without waiting for a pause. Blocks until the
+    /// edits are written, at most for `patience`.
+    fn flush(&self, patience: Duration);
+
+    /// Completes pending writes and ends the threads. Returns the remaining results, and the path of
+    /// the recovery file if there are unsaved edits, or the reason why they are lost. Pictures that
+    /// are being written and the renderer are given up at `deadline`; `None` waits for them without
+    /// limit. Unsaved edits never wait for them.
+    fn finish(
+        self: Box<Self>,
+        deadline: Option<Instant>,
+    ) -> (Vec<Message>, Result<Option<PathBuf>, String>);
+}
+
+/// Executor of effects that edits and renders a scene. It owns the renderer, the thread of the scene
+/// file and the exports.
 pub struct EffectRunner {
     session: Session,
     files: Files,
@@ -97,17 +139,6 @@ impl EffectRunner {
         })
     }
 
-    /// Returns the session of the renderer.
-    pub fn session(&self) -> &Session {
-        &self.session
-    }
-
-    /// Returns the receiver of the results of effects, as messages. Each message must be passed to
-    /// [`EffectRunner::observe`] before it updates the model.
-    pub fn done(&self) -> &Receiver<Message> {
-        &self.done
-    }
-
     /// Starts rendering `scene`. Returns its generation number, which the reports about this scene
     /// contain.
     pub fn show(&mut self, scene: Arc<Scene>) -> u64 {
@@ -119,9 +150,53 @@ impl EffectRunner {
         self.session.continue_from(scene, checkpoint);
     }
 
-    /// Executes `effect`, whose results come as messages. `frames` is the output to the terminal,
-    /// `terminal` its capabilities.
-    pub fn run(
+    fn export(&mut self, format: Format) {
+        let (exporter, results) = (self.exporter.clone(), self.results.clone());
+        self.session.submit(move |film| {
+            let written = match film {
+                Some((rendering, report)) => exporter.write(rendering, report, format),
+                None => Err("there is no picture to write".to_string()),
+            };
+            let _ = results.send(Message::Exported(written));
+        });
+    }
+
+    fn set_threads(&self) {
+        // On failure the old threads stay. The renderer's reports contain their number.
+        let _ = self.session.set_threads(self.threads, self.niceness);
+    }
+
+    fn refuse(&self, error: &io::Error) {
+        let why = format!("no thread to render with: {error}");
+        let _ = self.results.send(Message::Exported(Err(why)));
+    }
+}
+
+impl Effects for EffectRunner {
+    fn wakeup(&self) -> &Receiver<()> {
+        self.session.wakeup()
+    }
+
+    fn take_snapshot(&self) -> Option<Snapshot> {
+        self.session.take()
+    }
+
+    fn rest(&self, resting: bool) {
+        if resting { self.session.pause() } else { self.session.resume() }
+    }
+
+    fn done(&self) -> &Receiver<Message> {
+        &self.done
+    }
+
+    /// Renames future exports when `message` reports that the scene was saved at another path.
+    fn observe(&mut self, message: &Message) {
+        if let Message::Saved(_, Ok(path)) = message {
+            self.exporter.stem = stem(Some(path), "");
+        }
+    }
+
+    fn run(
         &mut self,
         effect: Effect,
         frames: &mut FramePipeline,
@@ -197,40 +272,21 @@ impl EffectRunner {
             Effect::Autosave(scene) => self.files.autosave(scene),
             Effect::Recover => self.files.recover(),
             Effect::Discard => self.files.discard(),
-            Effect::ViewImage { path, display, screen } => {
-                let line_rate = frames.reading().map(|link| link.rate);
-                let viewport = image_viewer::viewport(terminal, screen, line_rate);
-                image_viewer::prepare(path, display, viewport, self.results.clone());
-            }
-            Effect::Copy(path) => frames.copy(&paths::full(&path)),
-            Effect::Suspend => return Outcome::Suspend,
-            Effect::Quit => return Outcome::Quit,
+            effect => return run_on_terminal(effect, frames, terminal, &self.results),
         }
         Outcome::Done
     }
 
-    /// Renames future exports when `message` reports that the scene was saved at another path.
-    pub fn observe(&mut self, message: &Message) {
-        if let Message::Saved(_, Ok(path)) = message {
-            self.exporter.stem = stem(Some(path), "");
-        }
-    }
-
-    /// Writes unsaved edits to the recovery file without waiting for a pause. Blocks until the
-    /// edits are written, at most for `patience`.
-    pub fn flush(&self, patience: Duration) {
+    fn flush(&self, patience: Duration) {
         self.files.flush(patience);
     }
 
-    /// Completes pending writes and ends the threads. Returns the remaining results, and the result
-    /// of [`Files::finish`]. Pictures that are being written and the renderer are given up at
-    /// `deadline`; `None` waits for them without limit. Unsaved edits never wait for them.
-    pub fn finish(
-        mut self,
+    fn finish(
+        mut self: Box<Self>,
         deadline: Option<Instant>,
     ) -> (Vec<Message>, Result<Option<PathBuf>, String>) {
         let resized = self.resized.take();
-        let Self { session, files, results, done, .. } = self;
+        let Self { session, files, results, done, .. } = *self;
         let kept = files.finish();
         let end = move || {
             if let Some(resized) = resized {
@@ -249,25 +305,25 @@ impl EffectRunner {
         }
         (done.try_iter().collect(), kept)
     }
+}
 
-    fn export(&mut self, format: Format) {
-        let (exporter, results) = (self.exporter.clone(), self.results.clone());
-        self.session.submit(move |film| {
-            let written = match film {
-                Some((rendering, report)) => exporter.write(rendering, report, format),
-                None => Err("there is no picture to write".to_string()),
-            };
-            let _ = results.send(Message::Exported(written));
-        });
+/// Executes an effect on the terminal, or one that shows an image file. Ignores others.
+pub fn run_on_terminal(
+    effect: Effect,
+    frames: &mut FramePipeline,
+    terminal: &Capabilities,
+    results: &Sender<Message>,
+) -> Outcome {
+    match effect {
+        Effect::ViewImage { path, display, screen } => {
+            let line_rate = frames.reading().map(|link| link.rate);
+            let viewport = image_viewer::viewport(terminal, screen, line_rate);
+            image_viewer::prepare(path, display, viewport, results.clone());
+        }
+        Effect::Copy(path) => frames.copy(&paths::full(&path)),
+        Effect::Suspend => return Outcome::Suspend,
+        Effect::Quit => return Outcome::Quit,
+        _ => {}
     }
-
-    fn set_threads(&self) {
-        // On failure the old threads stay. The renderer's reports contain their number.
-        let _ = self.session.set_threads(self.threads, self.niceness);
-    }
-
-    fn refuse(&self, error: &io::Error) {
-        let why = format!("no thread to render with: {error}");
-        let _ = self.results.send(Message::Exported(Err(why)));
-    }
+    Outcome::Done
 }

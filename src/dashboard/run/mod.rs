@@ -16,12 +16,14 @@ mod latency;
 mod paths;
 mod shared_file;
 mod signals;
+mod watch_runner;
 mod worker;
 mod writer;
 
 use crate::dashboard::message::{Effect, Exported, Message};
 use crate::dashboard::model::{Model, Start};
 use crate::dashboard::update::update;
+use crate::render::plan::WatchedFilms;
 use crate::render::schedule::{Settings, Stop};
 use crate::render::session::{Snapshot, State};
 use crate::render::{Checkpoint, Options};
@@ -31,7 +33,7 @@ use crate::terminal::{
     Capabilities, Environment, Event, Keyboard, Reply, Screen, Timed, probe, size,
 };
 use crossbeam_channel::{Receiver, after, never, select};
-use effects::{EffectRunner, EffectSetup, Outcome};
+use effects::{EffectRunner, EffectSetup, Effects, Outcome};
 use frames::{DrawOutcome, FramePipeline};
 use input::Input;
 use job_control::{ResizeDebounce, TerminalIo};
@@ -41,6 +43,7 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use watch_runner::WatchRunner;
 
 pub use crate::dashboard::model::Colors;
 pub use diagnose::{TerminalReport, diagnose};
@@ -59,14 +62,21 @@ pub struct Setup {
     pub options: Options,
     /// Settings of sample allocation, and the initial stop criteria.
     pub settings: Settings,
+    /// Settings of the terminal.
+    pub terminal: TerminalSetup,
+    /// CSV file to write input latencies to; `None` to measure none.
+    pub trace: Option<PathBuf>,
+}
+
+/// Settings of the terminal.
+#[derive(Debug)]
+pub struct TerminalSetup {
     /// Colour depth of the terminal; `None` to use the detected one.
     pub colors: Option<Colors>,
     /// Terminal-related environment variables.
     pub surroundings: Environment,
     /// Fixed bandwidth in bytes per second; `None` to adapt to the connection.
     pub bandwidth: Option<f64>,
-    /// CSV file to write input latencies to; `None` to measure none.
-    pub trace: Option<PathBuf>,
 }
 
 /// Result of running a dashboard.
@@ -87,8 +97,7 @@ pub struct Ended {
 
 /// Runs a dashboard on the terminal of stdin and stdout until the user quits or a signal arrives.
 pub fn run(setup: Setup) -> io::Result<Ended> {
-    let Setup { file, checkpoint, state, threads, options, .. } = setup;
-    let Setup { settings, colors, surroundings, bandwidth, trace, .. } = setup;
+    let Setup { file, checkpoint, state, threads, options, settings, terminal, trace } = setup;
     let (start, file) = match file {
         Ok(file) => (Ok(Arc::new(file.document().scene().clone())), Ok(file)),
         Err((path, errors)) => (Err(errors), Err(path)),
@@ -105,6 +114,44 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
             None => drop(effects.show(Arc::clone(scene))),
         }
     }
+    let start = Start {
+        path,
+        name,
+        scene: start,
+        screen: [0; 2],
+        colors: Colors::True,
+        stop: settings.stop,
+        threads,
+        max_threads: std::thread::available_parallelism().map_or(threads, usize::from),
+    };
+    run_on_terminal(Box::new(effects), start, terminal, trace)
+}
+
+/// Shows `films`, which other processes write, until the user quits or a signal arrives. `threads`
+/// is the number of threads that compute the picture.
+pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
+    let start = Start {
+        path: None,
+        name: String::new(),
+        scene: Ok(Arc::default()),
+        screen: [0; 2],
+        colors: Colors::True,
+        stop: Stop::default(),
+        threads,
+        max_threads: threads,
+    };
+    let effects = WatchRunner::new(films, threads)?;
+    run_on_terminal(Box::new(effects), start, terminal, None)
+}
+
+/// Runs a dashboard. Size and colours of the terminal replace those of `start`.
+fn run_on_terminal(
+    effects: Box<dyn Effects>,
+    start: Start,
+    terminal: TerminalSetup,
+    trace: Option<PathBuf>,
+) -> io::Result<Ended> {
+    let TerminalSetup { colors, surroundings, bandwidth } = terminal;
     let signals = signals::block()?;
     let screen = Screen::enter()?;
     let signals = signals::watch(signals, screen.tty(), signals::PATIENCE)?;
@@ -120,16 +167,8 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
             checkpoints: Vec::new(),
         });
     };
-    let model = Model::new(Start {
-        path,
-        name,
-        scene: start,
-        screen: screen_size,
-        colors: colors.unwrap_or(terminal.colors),
-        stop: settings.stop,
-        threads,
-        max_threads: std::thread::available_parallelism().map_or(threads, usize::from),
-    });
+    let colors = colors.unwrap_or(terminal.colors);
+    let model = Model::new(Start { screen: screen_size, colors, ..start });
     let mut dashboard = Dashboard {
         model,
         effects,
@@ -190,7 +229,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
 
 struct Dashboard {
     model: Model,
-    effects: EffectRunner,
+    effects: Box<dyn Effects>,
     frames: FramePipeline,
     /// Capabilities of the terminal that are known so far.
     terminal: Capabilities,
@@ -219,7 +258,7 @@ impl Dashboard {
     /// Runs the event loop until the program is to end. Returns the exit status if a signal or the
     /// loss of the terminal ends the program, and `None` if the user quits.
     fn watch(&mut self, terminal_io: &TerminalIo) -> io::Result<Option<u8>> {
-        let wakeup = self.effects.session().wakeup().clone();
+        let wakeup = self.effects.wakeup().clone();
         let done = self.effects.done().clone();
         let written = self.frames.written().clone();
         let silence = never();
@@ -365,7 +404,7 @@ impl Dashboard {
     }
 
     fn take_snapshot(&mut self) {
-        if let Some(snapshot) = self.effects.session().take() {
+        if let Some(snapshot) = self.effects.take_snapshot() {
             let failed = matches!(snapshot.report.state, State::Failed(_));
             let raster = |s: &Snapshot| s.picture.as_ref().map(|p| [p.cols, p.rows]);
             if snapshot.picture.is_some() || failed {
@@ -454,8 +493,7 @@ impl Dashboard {
         let silent_at = self.frames.silent_at();
         let is_silent = silent_at.is_some_and(|at| at <= now);
         if std::mem::replace(&mut self.resting, is_silent) != is_silent && !self.model.paused {
-            let session = self.effects.session();
-            if is_silent { session.pause() } else { session.resume() }
+            self.effects.rest(is_silent);
         }
         silent_at.filter(|_| !is_silent)
     }

@@ -64,6 +64,8 @@ pub enum HintLine {
     Typing,
     /// The help or the inventory is open.
     Reading,
+    /// Files are watched.
+    Watching,
 }
 
 /// Short description of a command for the hint line. It may stand for related commands as well,
@@ -96,6 +98,8 @@ pub struct Command {
     pub(super) while_typing: bool,
     /// The command also runs in the viewer of exported images. Any other key closes the viewer.
     pub(super) over_image: bool,
+    /// The command also runs in `zerkalo watch`, where nothing is edited or rendered.
+    pub while_watching: bool,
     /// Returns `true` if the command can run on the model.
     pub(super) available: fn(&Model) -> bool,
     /// Runs the command.
@@ -115,6 +119,7 @@ const fn command(
         hints: &[],
         while_typing: false,
         over_image: false,
+        while_watching: false,
         available: with_scene,
         run,
     }
@@ -231,16 +236,16 @@ pub static COMMANDS: &[Command] = &[
     command(C::Objects, "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::Moving], 4, "g", "snap to ground")]),
     command(C::Objects, "give it a material of its own", &[(Anywhere, "M")], |c| c.own_material()),
 
-    command(C::Panels, "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).hints(&[hint(&[H::Picture], 8, "Tab", "panels")]),
-    command(C::Panels, "panel or field before", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)),
-    command(C::Panels, "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Turning, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).available(always).while_typing().hints(&[
+    command(C::Panels, "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).while_watching().hints(&[hint(&[H::Picture], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
+    command(C::Panels, "panel or field before", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).while_watching(),
+    command(C::Panels, "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Turning, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).while_watching().available(always).while_typing().hints(&[
         hint(&[H::Moving, H::Turning, H::Flying, H::Probing], 9, "Esc", "done"),
         hint(&[H::Outline, H::Inspector], 9, "Esc", "picture"),
         hint(&[H::List, H::Form], 9, "Esc", "cancel"),
         hint(&[H::Typing], 9, "Esc", "leave as it was"),
         hint(&[H::Reading], 9, "Esc", "close"),
     ]),
-    command(C::Panels, "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).available(with_scene_or_choice).while_typing().hints(&[
+    command(C::Panels, "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).while_watching().available(with_scene_or_choice).while_typing().hints(&[
         hint(&[H::Outline], 2, "Enter", "inspect"),
         hint(&[H::Inspector], 4, "Enter 0-9", "type"),
         hint(&[H::List], 2, "Enter", "take"),
@@ -248,23 +253,24 @@ pub static COMMANDS: &[Command] = &[
         hint(&[H::Form], 4, "Enter", "add"),
         hint(&[H::Typing], 1, "Enter", "apply"),
     ]),
-    command(C::Panels, "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).available(always).hints(&[
+    command(C::Panels, "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).while_watching().available(always).hints(&[
         hint(&[H::Outline], 1, "Up Down", "select"),
         hint(&[H::Inspector, H::Form], 1, "Up Down", "field"),
         hint(&[H::List], 1, "Up Down", "choose"),
         hint(&[H::Reading], 1, "Up Down", "scroll"),
+        hint(&[H::Watching], 2, "Up Down", "select"),
     ]),
-    command(C::Panels, "line below", &[(Outline, "Down"), (Inspector, "Down"), (Overlay, "Down")], |c| c.move_cursor(1)).available(always),
-    command(C::Panels, "page up", &[(Outline, "PageUp"), (Inspector, "PageUp"), (Overlay, "PageUp")], |c| c.page(-1)).available(always),
-    command(C::Panels, "page down", &[(Outline, "PageDown"), (Inspector, "PageDown"), (Overlay, "PageDown")], |c| c.page(1)).available(always),
-    command(C::Panels, "first line", &[(Outline, "Home"), (Inspector, "Home"), (Overlay, "Home")], |c| c.move_cursor(isize::MIN / 2)).available(always),
-    command(C::Panels, "last line", &[(Outline, "End"), (Inspector, "End"), (Overlay, "End")], |c| c.move_cursor(isize::MAX / 2)).available(always),
+    command(C::Panels, "line below", &[(Outline, "Down"), (Inspector, "Down"), (Overlay, "Down")], |c| c.move_cursor(1)).while_watching().available(always),
+    command(C::Panels, "page up", &[(Outline, "PageUp"), (Inspector, "PageUp"), (Overlay, "PageUp")], |c| c.page(-1)).while_watching().available(always),
+    command(C::Panels, "page down", &[(Outline, "PageDown"), (Inspector, "PageDown"), (Overlay, "PageDown")], |c| c.page(1)).while_watching().available(always),
+    command(C::Panels, "first line", &[(Outline, "Home"), (Inspector, "Home"), (Overlay, "Home")], |c| c.move_cursor(isize::MIN / 2)).while_watching().available(always),
+    command(C::Panels, "last line", &[(Outline, "End"), (Inspector, "End"), (Overlay, "End")], |c| c.move_cursor(isize::MAX / 2)).while_watching().available(always),
     command(C::Panels, "field up", &[(Inspector, "Right"), (Overlay, "Right")], |c| c.step_field(1.0)).hints(&[hint(&[H::Inspector, H::Form], 2, "Left Right", "step")]),
     command(C::Panels, "field down", &[(Inspector, "Left"), (Overlay, "Left")], |c| c.step_field(-1.0)),
     command(C::Panels, "field up, fine", &[(Inspector, "Shift-Right"), (Overlay, "Shift-Right")], |c| c.step_field(0.1)).hints(&[hint(&[H::Inspector], 3, "Shift", "fine")]),
     command(C::Panels, "field down, fine", &[(Inspector, "Shift-Left"), (Overlay, "Shift-Left")], |c| c.step_field(-0.1)),
     command(C::Panels, "field back to its default", &[(Inspector, "Backspace")], |c| c.clear_field()).hints(&[hint(&[H::Inspector], 5, "Backspace", "default")]),
-    command(C::Panels, "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()),
+    command(C::Panels, "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()).while_watching(),
 
     command(C::File, "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::Picture], 9, "u", "undo")]),
     command(C::File, "redo", &[(Anywhere, "U Ctrl-r")], |c| c.redo()),
@@ -273,33 +279,33 @@ pub static COMMANDS: &[Command] = &[
     command(C::File, "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(always),
     command(C::File, "recover edits of a crashed session", &[], |c| c.ask_recovery()).available(always),
     command(C::File, "write a checkpoint, to continue another time", &[(Anywhere, "K")], |c| c.checkpoint()),
-    command(C::File, "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).available(always).over_image(),
-    command(C::File, "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).available(always).over_image().hints(&[hint(&[H::First], 13, "q", "quit")]),
+    command(C::File, "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).while_watching().available(always).over_image(),
+    command(C::File, "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).while_watching().available(always).over_image().hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
 
-    command(C::Picture, "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).hints(&[hint(&[H::Picture], 10, "p", "PNG")]),
-    command(C::Picture, "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)),
-    command(C::Picture, "look at the last picture", &[(Anywhere, "o")], |c| c.view_last_export()),
-    command(C::Picture, "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()),
+    command(C::Picture, "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).while_watching().hints(&[hint(&[H::Picture, H::Watching], 10, "p", "PNG")]),
+    command(C::Picture, "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).while_watching().hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
+    command(C::Picture, "look at the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).while_watching(),
+    command(C::Picture, "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()).while_watching(),
     command(C::Picture, "render at another size", &[(Anywhere, "Ctrl-e")], |c| c.ask_export_size()),
     command(C::Picture, "cancel the running export", &[(Anywhere, "Ctrl-x")], |c| c.cancel_export()),
-    command(C::Picture, "exposure up", &[(Anywhere, "= +")], |c| c.exposure(1.0)),
-    command(C::Picture, "exposure down", &[(Anywhere, "-")], |c| c.exposure(-1.0)),
-    command(C::Picture, "exposure 0", &[(Anywhere, "0")], |c| c.reset_exposure()),
-    command(C::Picture, "next tone curve", &[(Anywhere, "t")], |c| c.next_tone()),
-    command(C::Picture, "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).hints(&[hint(&[H::Probing], 3, "v", "views")]),
-    command(C::Picture, "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)),
-    command(C::Picture, "probe a pixel", &[(Anywhere, "i")], |c| c.toggle_probe()),
-    command(C::Picture, "probe left", &[(Probing, "Left")], |c| c.move_probe(Left, Coarse)).hints(&[hint(&[H::Probing], 1, "arrows", "move")]),
-    command(C::Picture, "probe right", &[(Probing, "Right")], |c| c.move_probe(Right, Coarse)),
-    command(C::Picture, "probe up", &[(Probing, "Up")], |c| c.move_probe(Up, Coarse)),
-    command(C::Picture, "probe down", &[(Probing, "Down")], |c| c.move_probe(Down, Coarse)),
-    command(C::Picture, "probe left by one pixel", &[(Probing, "Shift-Left")], |c| c.move_probe(Left, Fine)).hints(&[hint(&[H::Probing], 2, "Shift", "one pixel")]),
-    command(C::Picture, "probe right by one pixel", &[(Probing, "Shift-Right")], |c| c.move_probe(Right, Fine)),
-    command(C::Picture, "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe(Up, Fine)),
-    command(C::Picture, "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe(Down, Fine)),
-    command(C::Picture, "pin this picture", &[(Anywhere, "k")], |c| c.pin()),
-    command(C::Picture, "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(CompareView::Pinned)),
-    command(C::Picture, "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(CompareView::Difference)),
+    command(C::Picture, "exposure up", &[(Anywhere, "= +")], |c| c.exposure(1.0)).while_watching(),
+    command(C::Picture, "exposure down", &[(Anywhere, "-")], |c| c.exposure(-1.0)).while_watching(),
+    command(C::Picture, "exposure 0", &[(Anywhere, "0")], |c| c.reset_exposure()).while_watching(),
+    command(C::Picture, "next tone curve", &[(Anywhere, "t")], |c| c.next_tone()).while_watching(),
+    command(C::Picture, "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).while_watching().hints(&[hint(&[H::Probing, H::Watching], 3, "v", "views")]),
+    command(C::Picture, "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)).while_watching(),
+    command(C::Picture, "probe a pixel", &[(Anywhere, "i")], |c| c.toggle_probe()).while_watching().hints(&[hint(&[H::Watching], 4, "i", "probe")]),
+    command(C::Picture, "probe left", &[(Probing, "Left")], |c| c.move_probe(Left, Coarse)).while_watching().hints(&[hint(&[H::Probing], 1, "arrows", "move")]),
+    command(C::Picture, "probe right", &[(Probing, "Right")], |c| c.move_probe(Right, Coarse)).while_watching(),
+    command(C::Picture, "probe up", &[(Probing, "Up")], |c| c.move_probe(Up, Coarse)).while_watching(),
+    command(C::Picture, "probe down", &[(Probing, "Down")], |c| c.move_probe(Down, Coarse)).while_watching(),
+    command(C::Picture, "probe left by one pixel", &[(Probing, "Shift-Left")], |c| c.move_probe(Left, Fine)).while_watching().hints(&[hint(&[H::Probing], 2, "Shift", "one pixel")]),
+    command(C::Picture, "probe right by one pixel", &[(Probing, "Shift-Right")], |c| c.move_probe(Right, Fine)).while_watching(),
+    command(C::Picture, "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe(Up, Fine)).while_watching(),
+    command(C::Picture, "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe(Down, Fine)).while_watching(),
+    command(C::Picture, "pin this picture", &[(Anywhere, "k")], |c| c.pin()).while_watching().hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
+    command(C::Picture, "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(CompareView::Pinned)).while_watching(),
+    command(C::Picture, "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(CompareView::Difference)).while_watching(),
 
     command(C::Render, "pause or resume", &[(Anywhere, "Space")], |c| c.pause()),
     command(C::Render, "restart the picture", &[(Anywhere, "R")], |c| c.restart()),
@@ -308,10 +314,10 @@ pub static COMMANDS: &[Command] = &[
     command(C::Render, "more threads", &[], |c| c.threads(1)),
     command(C::Render, "fewer threads", &[], |c| c.threads(-1)),
     command(C::Render, "low or normal priority", &[], |c| c.priority()),
-    command(C::Render, "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).available(always),
+    command(C::Render, "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).while_watching().available(always),
 
-    command(C::Help, "all keys", &[(Anywhere, "? F1")], |c| c.open_overlay(Overlay::Help { scroll: 0 })).available(always).hints(&[hint(&[H::First, H::Picture], 12, "?", "keys")]),
-    command(C::Help, "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.open_palette()).available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::Picture], 11, ":", "all")]),
+    command(C::Help, "all keys", &[(Anywhere, "? F1")], |c| c.open_overlay(Overlay::Help { scroll: 0 })).while_watching().available(always).hints(&[hint(&[H::First, H::Picture, H::Watching], 12, "?", "keys")]),
+    command(C::Help, "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.open_palette()).while_watching().available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::Picture], 11, ":", "all")]),
     command(C::Help, "what the scene contains", &[], |c| c.open_overlay(Overlay::Inventory { scroll: 0 })),
 ];
 
@@ -353,6 +359,10 @@ impl Command {
         Self { while_typing: true, ..self }
     }
 
+    const fn while_watching(self) -> Self {
+        Self { while_watching: true, ..self }
+    }
+
     const fn over_image(self) -> Self {
         Self { over_image: true, ..self }
     }
@@ -360,11 +370,30 @@ impl Command {
     /// Returns all keys of the command with their contexts, such as `Left in the picture` or
     /// `U Ctrl-r`. `key` formats each key.
     pub fn all_keys(&self, key: impl Fn(&str) -> String) -> String {
+        self.formatted_keys(key, |context| Some(context.place()))
+    }
+
+    /// Returns the keys of the command outside of overlays while files are watched.
+    pub fn watch_keys(&self, key: impl Fn(&str) -> String) -> String {
+        self.formatted_keys(key, |context| match context {
+            Anywhere | Outline => Some(""),
+            Probing => Some(context.place()),
+            _ => None,
+        })
+    }
+
+    /// Formats the keys in the contexts that `place` names.
+    fn formatted_keys(
+        &self,
+        key: impl Fn(&str) -> String,
+        place: impl Fn(KeyContext) -> Option<&'static str>,
+    ) -> String {
         let in_context = |(context, names): &(KeyContext, &'static str)| {
+            let place = place(*context)?;
             let keys: Vec<_> = names.split(' ').map(&key).collect();
-            format!("{} {}", keys.join(" "), context.place()).trim_end().to_string()
+            Some(format!("{} {place}", keys.join(" ")).trim_end().to_string())
         };
-        self.keys.iter().map(in_context).collect::<Vec<_>>().join(", ")
+        self.keys.iter().filter_map(in_context).collect::<Vec<_>>().join(", ")
     }
 }
 

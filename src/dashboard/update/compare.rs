@@ -43,7 +43,11 @@ impl UpdateContext<'_> {
 
     pub(super) fn next_channel(&mut self, by: isize) {
         let current = |channel: &DisplayChannel| *channel == self.model.channel;
-        self.model.channel = *cycled(&DisplayChannel::ALL, current, by);
+        let channels = match self.model.watch {
+            Some(_) => &DisplayChannel::OF_FILM[..],
+            None => &DisplayChannel::ALL,
+        };
+        self.model.channel = *cycled(channels, current, by);
         self.repaint();
         self.say(format!("view: {}", self.model.channel.name()));
     }

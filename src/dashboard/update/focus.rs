@@ -53,8 +53,11 @@ impl UpdateContext<'_> {
             self.move_cursor(by);
             return;
         }
-        let panels = [Focus::Picture, Focus::Outline, Focus::Inspector];
-        self.set_focus(*cycled(&panels, |focus| *focus == self.model.focus, by));
+        let panels = match self.model.watch {
+            Some(_) => &[Focus::Picture, Focus::Outline][..],
+            None => &[Focus::Picture, Focus::Outline, Focus::Inspector],
+        };
+        self.set_focus(*cycled(panels, |focus| *focus == self.model.focus, by));
     }
 
     pub(super) fn set_focus(&mut self, focus: Focus) {

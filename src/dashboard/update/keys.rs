@@ -72,9 +72,12 @@ impl UpdateContext<'_> {
         self.run(command);
     }
 
-    /// Runs a command, or reports that the command needs a scene if there is none.
+    /// Runs a command, or reports that it needs a scene if there is none, or that nothing is edited
+    /// while files are watched.
     pub(super) fn run(&mut self, command: &Command) {
-        if (command.available)(self.model) {
+        if self.model.watch.is_some() && !command.while_watching {
+            self.refuse("Read-only: `zerkalo watch` edits and renders nothing · ? keys");
+        } else if (command.available)(self.model) {
             (command.run)(self);
         } else {
             self.refuse("No scene: fix the errors in its file first");

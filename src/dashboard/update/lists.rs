@@ -1,11 +1,12 @@
 //! Cursor movement and choice in outline, inspector, palette, lists, help and questions.
 
 use crate::dashboard::editor::Editor;
+use crate::dashboard::hints::help;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::overlay::{Answer, Overlay, Palette, PickFor, Question};
 use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
 use crate::dashboard::update::UpdateContext;
-use crate::dashboard::update::commands::{COMMANDS, Chapter};
+use crate::dashboard::update::commands::{COMMANDS, Command};
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
@@ -25,7 +26,7 @@ impl UpdateContext<'_> {
         let inventory = self.model.inventory(width).len();
         match &mut self.model.overlay {
             Some(Overlay::Help { scroll }) => {
-                let lines = COMMANDS.len() + Chapter::ALL.len();
+                let lines = help(self.model.watch.is_some()).len();
                 *scroll = moved(*scroll, steps, lines.saturating_sub(rows) + 1);
             }
             Some(Overlay::Inventory { scroll }) => {
@@ -44,6 +45,7 @@ impl UpdateContext<'_> {
                     }
                 }
             }
+            None if self.model.watch.is_some() => self.move_watch_cursor(steps),
             None if self.model.focus == Focus::Outline => self.move_outline_cursor(steps),
             None => self.move_field_cursor(steps),
         }
@@ -53,6 +55,9 @@ impl UpdateContext<'_> {
     pub(super) fn page(&mut self, pages: isize) {
         let rows = match (self.model.overlay_layout(), self.model.focus) {
             (Some(layout), _) => layout.list.height,
+            (None, _) if self.model.watch.is_some() => {
+                self.model.watch_rows().map_or(1, |(rows, _)| rows.height)
+            }
             (None, Focus::Outline) => self.model.outline_rows().map_or(1, |rows| rows.height),
             (None, _) => self.model.inspector_rows().map_or(1, |(rows, _)| rows.height),
         };
@@ -110,6 +115,7 @@ impl UpdateContext<'_> {
             Some(Overlay::Prompt(_)) => self.answer_prompt(),
             Some(Overlay::Question(question)) => self.answer(question.cursor),
             Some(Overlay::ViewerImage(_)) => {}
+            None if self.model.watch.is_some() => {}
             None if self.model.focus == Focus::Inspector => {
                 if self.model.inspector.editor.is_some() {
                     self.apply_field();
@@ -140,22 +146,27 @@ impl UpdateContext<'_> {
     pub(super) fn open_palette(&mut self) {
         self.model.overlay = Some(Overlay::Palette(Palette {
             editor: Editor::default(),
-            found: (0..COMMANDS.len()).collect(),
+            found: self.offered().map(|(i, _)| i).collect(),
             cursor: 0,
             scroll: 0,
         }));
     }
 
+    /// Returns the commands that the palette offers, with their indices in the table.
+    fn offered(&self) -> impl Iterator<Item = (usize, &'static Command)> + use<> {
+        let watching = self.model.watch.is_some();
+        COMMANDS.iter().enumerate().filter(move |(_, row)| row.while_watching || !watching)
+    }
+
     /// Updates the palette's list to the commands that match its text, best match first.
     pub(super) fn search(&mut self) {
+        let offered = self.offered();
         let Some(Overlay::Palette(palette)) = &mut self.model.overlay else { return };
         let text = palette.editor.text();
         let pattern = Pattern::parse(text, CaseMatching::Ignore, Normalization::Smart);
         let mut matcher = Matcher::new(Config::DEFAULT);
         let mut buffer = Vec::new();
-        let mut found: Vec<(u32, usize)> = COMMANDS
-            .iter()
-            .enumerate()
+        let mut found: Vec<(u32, usize)> = offered
             .filter_map(|(i, row)| {
                 let line = format!("{} {}", row.label, row.chapter.title());
                 let score = pattern.score(Utf32Str::new(&line, &mut buffer), &mut matcher)?;

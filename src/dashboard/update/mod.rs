@@ -19,6 +19,7 @@ mod objects;
 mod prompt;
 mod recovery;
 mod render;
+mod watch;
 
 use crate::dashboard::message::{Effect, Message};
 use crate::dashboard::model::{Inspector, Model, Notice, Tone};
@@ -127,6 +128,10 @@ impl<'a> UpdateContext<'a> {
                 self.model.convergence.add(&snapshot.report);
                 self.model.snapshot = Some(snapshot);
                 self.repaint();
+            }
+            Message::Watched(report) => {
+                self.follow = false;
+                self.watched(*report);
             }
             Message::Pinned(picture, spp) => self.pinned(picture, spp),
             Message::Saved(scene, result) => self.saved(scene, result),
@@ -302,6 +307,10 @@ impl<'a> UpdateContext<'a> {
             self.model.raster = Some(raster);
             self.emit(Effect::Raster(raster));
             self.repaint();
+        }
+        if self.model.watch.is_some() {
+            self.move_watch_cursor(0);
+            return;
         }
         self.normalize_panels();
         self.autosave();

@@ -12,11 +12,11 @@ use crate::terminal::event::{Button, Mouse, MouseKind};
 use glam::DVec3;
 
 /// Lines per tick of the wheel.
-const WHEEL_LINES: i32 = 3;
+pub(super) const WHEEL_LINES: i32 = 3;
 
 /// Returns the index of the list line under the mouse. `rows` is the list's area, `scroll` its
 /// first visible line. Returns `None` if the mouse is outside the area.
-fn line_at(rows: Area, scroll: usize, mouse: Mouse) -> Option<usize> {
+pub(super) fn line_at(rows: Area, scroll: usize, mouse: Mouse) -> Option<usize> {
     let inside = rows.contains(mouse.column, mouse.row);
     inside.then(|| usize::from(mouse.row - rows.y) + scroll)
 }
@@ -24,6 +24,9 @@ fn line_at(rows: Area, scroll: usize, mouse: Mouse) -> Option<usize> {
 impl UpdateContext<'_> {
     pub(super) fn mouse(&mut self, mouse: Mouse) {
         self.model.first_time = false;
+        if self.model.watch.is_some() && self.model.overlay.is_none() {
+            return self.mouse_on_watch(mouse);
+        }
         match mouse.kind {
             MouseKind::Press(button) => self.press(button, mouse),
             MouseKind::Drag(_) => self.dragged(mouse),
@@ -193,7 +196,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    fn probe_at(&mut self, mouse: Mouse) {
+    pub(super) fn probe_at(&mut self, mouse: Mouse) {
         let film = self.scene().film.size;
         let pixel = self.model.layout().and_then(|l| l.film_pixel(film, mouse.column, mouse.row));
         if let Some(pixel) = pixel {

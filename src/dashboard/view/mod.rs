@@ -18,6 +18,7 @@ mod status;
 mod tests;
 mod text;
 mod theme;
+mod watch;
 
 use crate::dashboard::layout::{Focus, Layout, SMALLEST};
 use crate::dashboard::model::Model;
@@ -95,7 +96,10 @@ impl View {
         status::hints_line(model, layout.hints, &theme, buffer);
         // A form replaces the panels.
         let mut cursor = None;
-        if !matches!(model.overlay, Some(Overlay::Form(_))) {
+        if let Some(table) = &model.watch {
+            watch::draw(model, table, &layout, &theme, buffer);
+            plot::draw(model, &layout, &theme, buffer);
+        } else if !matches!(model.overlay, Some(Overlay::Form(_))) {
             outline::draw(model, &layout, &theme, buffer);
             cursor = fields::inspector(model, &layout, &theme, buffer);
             plot::draw(model, &layout, &theme, buffer);

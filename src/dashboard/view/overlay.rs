@@ -19,7 +19,7 @@ use ratatui::style::Style;
 pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
     let mut painter = Painter { place: model.overlay_layout()?, theme, buffer };
     match model.overlay.as_ref()? {
-        Overlay::Help { scroll } => painter.help(*scroll),
+        Overlay::Help { scroll } => painter.help(model.watch.is_some(), *scroll),
         Overlay::Inventory { scroll } => painter.inventory(model, *scroll),
         Overlay::NoiseTargets { cursor } => painter.noise_targets(model, *cursor),
         Overlay::Palette(palette) => return painter.palette(palette),
@@ -80,9 +80,9 @@ impl Painter<'_> {
         (to, styles)
     }
 
-    fn help(&mut self, scroll: usize) {
+    fn help(&mut self, watching: bool, scroll: usize) {
         self.frame("keys");
-        let (lines, theme) = (help(), self.theme);
+        let (lines, theme) = (help(watching), self.theme);
         for (row, i) in self.window(scroll, lines.len()) {
             let mut to = Row::new(self.buffer, self.place.list, row);
             match &lines[i] {

@@ -33,14 +33,15 @@ struct PinnedCache {
     radiance: Vec<[f32; 3]>,
 }
 
-/// Returns `true` if the picture changes only by user input, because rendering has ended or is
-/// paused, or because the pinned picture or an exported image is visible.
+/// Returns `true` if the picture changes only by user input or rarely, because rendering has ended or
+/// is paused, because files are watched, or because the pinned picture or an exported image is visible.
 pub fn is_settled(model: &Model) -> bool {
     if let Some(Overlay::ViewerImage(_)) = model.overlay {
         return true;
     }
     let resting = |s: &Snapshot| matches!(s.report.state, State::Finished(_) | State::Paused);
-    model.snapshot.as_ref().is_some_and(|s| resting(s))
+    model.watch.is_some()
+        || model.snapshot.as_ref().is_some_and(|s| resting(s))
         || model.comparison.shown == CompareView::Pinned
 }
 

@@ -5,8 +5,9 @@ use crate::dashboard::model::{Model, Tone};
 use crate::dashboard::update::commands::Hint;
 use crate::dashboard::view::text::{Row, columns, duration, durations, number};
 use crate::dashboard::view::theme::Theme;
+use crate::dashboard::view::watch;
 use crate::render::schedule::StoppedBy;
-use crate::render::session::{Report, State};
+use crate::render::session::{Report, State, WatchReport};
 use crate::terminal::Area;
 use crate::terminal::Multiplexer;
 use crate::terminal::flow::PacingMode;
@@ -44,6 +45,9 @@ pub fn draw(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
 }
 
 fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
+    if let Some(table) = &model.watch {
+        return watch_parts(model, &table.report, theme);
+    }
     let part = |expendable, text| Part { expendable, text };
     let plain = |text: String| (text, theme.text());
     let dim = |text: &str| (text.to_string(), theme.dim());
@@ -91,6 +95,30 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     };
     let priority = if model.low_priority { ", low priority" } else { "" };
     parts.push(part(5, vec![dim(&threads), dim(priority)]));
+    parts
+}
+
+/// Returns the parts of the status line while files are watched.
+fn watch_parts(model: &Model, watched: &WatchReport, theme: &Theme) -> Vec<Part> {
+    let part = |expendable, text| Part { expendable, text };
+    let mut parts: Vec<Part> = watch::summary(watched, theme)
+        .into_iter()
+        .enumerate()
+        .map(|(i, text)| part(if i == 0 { 0 } else { 1 }, vec![text]))
+        .collect();
+    let Some(snapshot) = &model.snapshot else { return parts };
+    let report = &snapshot.report;
+    parts.push(part(3, spp(model, report, theme)));
+    if let Some(noise) = report.noise {
+        parts.push(part(2, noise_part(model, report, noise.rmse_codes, theme)));
+    }
+    for warning in report.warnings() {
+        parts.push(part(3, vec![(warning, theme.warn())]));
+    }
+    if let Some(link) = &model.link {
+        let rate = (rate(link.rate), theme.text());
+        parts.push(part(6, vec![rate, (format!(" {}", mode(link.mode)), theme.dim())]));
+    }
     parts
 }
 

@@ -17,11 +17,13 @@ mod part;
 mod shard_render;
 #[cfg(test)]
 mod testing;
+mod watched;
 
 pub use file::{PlanError, is_plan_file};
 pub use merge::Merged;
 pub use part::{Part, PartShard};
 pub use shard_render::ShardRender;
+pub use watched::{WatchedFilms, WatchedShards, WatchedState};
 
 use crate::film::{Display, Estimator, Film, TILE};
 use crate::render::schedule::{Schedule, Settings, TilePrediction, TileSamples};

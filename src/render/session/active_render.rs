@@ -296,7 +296,7 @@ impl ActiveRender {
             view: context.view,
             mix: self.state.mix.clone(),
             display: self.state.display(),
-            lighting: Arc::clone(self.state.lighting()),
+            lighting: Some(Arc::clone(self.state.lighting())),
             guide: self.features.clone(),
         }
     }

@@ -21,6 +21,7 @@ mod snapshot;
 mod tests;
 mod threads;
 mod throughput;
+mod watch;
 mod worker;
 
 use crate::film::Display;
@@ -37,6 +38,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
+pub use watch::{WatchReport, WatchSession, WatchedShards, WatchedState};
 use worker::Worker;
 
 /// Function that runs on the rendering thread. Its argument is `None` if there is no film.

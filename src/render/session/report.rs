@@ -98,6 +98,11 @@ impl Report {
 
     /// Creates the report of a complete film, shown with `mix` and `display`.
     pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
+        Self { noise: film.noise(mix, display), ..Self::of_samples(film) }
+    }
+
+    /// Creates the report of a film, without an estimate of its error.
+    pub(super) fn of_samples(film: &Film) -> Self {
         let counts = (0..film.tile_count()).map(|tile| {
             let [a, b] = film.tile(tile).map_or([0; 2], |tile| tile.counts());
             a.saturating_add(b)
@@ -108,7 +113,6 @@ impl Report {
         Self {
             spp: Spp { min, mean: samples as f64 / pixels as f64, max },
             samples,
-            noise: film.noise(mix, display),
             bad_samples: film.bad_samples().count,
             saturated_samples: film.saturated_samples(),
             saturated_pixels: film.saturated_pixels(),

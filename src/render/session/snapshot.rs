@@ -94,7 +94,7 @@ pub(super) struct Frame {
     pub view: View,
     pub mix: LightWeights,
     pub display: Display,
-    pub lighting: Arc<Relighting>,
+    pub lighting: Option<Arc<Relighting>>,
     pub guide: Option<Arc<FeatureBuffer>>,
 }
 
@@ -129,7 +129,7 @@ impl Frame {
             report,
             picture,
             mix: self.mix.clone(),
-            lighting: Some(Arc::clone(&self.lighting)),
+            lighting: self.lighting.clone(),
             guide: self.guide.clone(),
             tiles,
             probe,

@@ -13,9 +13,11 @@ use crate::dashboard::panel_lines::{PanelLine, scrolled};
 use crate::dashboard::testing::report;
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::update::update;
-use crate::film::{LightWeights, Probe};
+use crate::film::{Display, LightWeights, Probe};
 use crate::render::schedule::{Spp, Stop, StoppedBy};
-use crate::render::session::{Report, Snapshot, State, TileMaps};
+use crate::render::session::{
+    Report, Snapshot, State, TileMaps, WatchReport, WatchedShards, WatchedState,
+};
 use crate::scene::edit::{self, Target};
 use crate::scene::{Scene, built_in};
 use std::sync::Arc;
@@ -166,6 +168,53 @@ fn probing(model: &mut Model) {
     });
 }
 
+fn watched(
+    shards: &str,
+    path: Option<&str>,
+    state: WatchedState,
+    [samples, total]: [u64; 2],
+    age: Option<u64>,
+) -> WatchedShards {
+    let (path, age) = (path.map(Into::into), age.map(Duration::from_secs));
+    WatchedShards { shards: shards.to_string(), path, state, samples, total: Some(total), age }
+}
+
+/// Report on a plan of eight shards with a problem of each kind.
+fn watched_plan() -> WatchReport {
+    let reason = "cannot use parts/job-6.zk: it ends in the middle of the part TILE: it was not \
+                  copied as a whole; copy it again, or use an older one";
+    let all = 4_812_345;
+    WatchReport {
+        shards: vec![
+            watched(
+                "",
+                Some("parts/job-6.zk"),
+                WatchedState::Refused(reason.into()),
+                [0; 2],
+                Some(4),
+            ),
+            watched("5", Some("parts/job-5.zk"), WatchedState::Missing, [0; 2], None),
+            watched("7-8", None, WatchedState::Missing, [0; 2], None),
+            watched("2", Some("parts/job-2.zk"), WatchedState::Late, [812_345, all], Some(720)),
+            watched("3", Some("parts/job-3.zk"), WatchedState::Running, [1_912_345, all], Some(12)),
+            watched("4", Some("parts/job-4.zk"), WatchedState::Running, [2_112_345, all], Some(55)),
+            watched("0", Some("parts/job-0.zk"), WatchedState::Complete, [all; 2], Some(7260)),
+            watched("1", Some("parts/job-1.zk"), WatchedState::Complete, [all; 2], Some(180)),
+        ],
+        complete: Some([2, 9]),
+        progress: Some(0.345),
+        target_codes: Some(0.25),
+        size: Some([640, 480]),
+        display: Display::default(),
+        source: "scenes/mirror-room.toml".to_string(),
+    }
+}
+
+fn watching(model: &mut Model, report: &WatchReport) {
+    let report = Box::new(report.clone());
+    update(model, Message::Watched(report), Duration::ZERO);
+}
+
 fn broken(model: &mut Model) {
     let text = "[film]\nsize = [640, 480]\n\n[[object]]\nname = \"queen\"\nmaterial = \"ivroy\"\n\
                 shape.sphere = { center = [0, 0, 0], radius = -1.0 }\n";
@@ -236,6 +285,46 @@ pub const STATES: &[Named] = &[
         );
     }),
     ("notice-of-a-refusal", |m| notice(m, Tone::Bad, "nothing is selected that can be deleted")),
+    ("watching", |m| watching(m, &watched_plan())),
+    ("watching-complete", |m| {
+        let report = watched_plan();
+        let mut shards = report.shards[3..].to_vec();
+        shards.iter_mut().for_each(|row| {
+            row.state = WatchedState::Complete;
+            row.samples = row.total.unwrap_or(0);
+        });
+        let complete = Some([9, 9]);
+        watching(m, &WatchReport { shards, complete, progress: Some(1.0), ..report });
+    }),
+    ("watching-checkpoint", |m| {
+        let row =
+            watched("", Some("mirror-room.zk"), WatchedState::Late, [1_234_567, 0], Some(7200));
+        let shards = vec![WatchedShards { total: None, ..row }];
+        let report = watched_plan();
+        let (complete, progress, target_codes) = (None, None, None);
+        watching(m, &WatchReport { shards, complete, progress, target_codes, ..report });
+    }),
+    ("watching-before-the-first-file", |m| {
+        m.snapshot = None;
+        m.convergence = Default::default();
+        let shards = vec![watched("", Some("job-1.zk"), WatchedState::Missing, [0; 2], None)];
+        let (complete, progress, target_codes) = (None, None, None);
+        let report = watched_plan();
+        let size = None;
+        let source = String::new();
+        watching(
+            m,
+            &WatchReport { shards, complete, progress, target_codes, size, source, ..report },
+        );
+    }),
+    ("watching-help", |m| {
+        watching(m, &watched_plan());
+        m.overlay = Some(Overlay::Help { scroll: 0 });
+    }),
+    ("watching-refusal", |m| {
+        watching(m, &watched_plan());
+        update(m, Message::Key("x".parse().unwrap()), Duration::ZERO);
+    }),
     ("help", |m| m.overlay = Some(Overlay::Help { scroll: 0 })),
     ("help-scrolled", |m| m.overlay = Some(Overlay::Help { scroll: 60 })),
     ("inventory", |m| m.overlay = Some(Overlay::Inventory { scroll: 0 })),

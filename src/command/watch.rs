@@ -1,0 +1,20 @@
+//! `zerkalo watch`: shows films that other processes or machines write.
+
+use crate::command::Failure;
+use crate::command::args::WatchArgs;
+use crate::command::edit::{conclude, terminal_environment};
+use crate::dashboard::run::watch as watch_films;
+use crate::render::plan::WatchedFilms;
+use std::io;
+
+pub fn run(args: &WatchArgs) -> Result<(), Failure> {
+    let environment = terminal_environment().map_err(|reason| {
+        let remedy = "`zerkalo merge --partial FILE.zk.. -o PICTURE.png` writes a picture of parts";
+        Failure::Usage(format!("{reason}; {remedy}"))
+    })?;
+    let films = WatchedFilms::open(&args.files).map_err(Failure::Failed)?;
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let ended = watch_films(films, threads, args.terminal.setup(environment))
+        .map_err(|error| Failure::Failed(error.to_string()))?;
+    conclude(&ended, io::stdout().lock())
+}

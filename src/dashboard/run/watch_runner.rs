@@ -1,0 +1,157 @@
+//! Execution of effects while files are watched: nothing is edited or rendered, the picture is
+//! displayed and exported.
+
+use crate::dashboard::message::{Effect, Exported, Format, Message};
+use crate::dashboard::run::effects::{Effects, Outcome, run_on_terminal};
+use crate::dashboard::run::exporter::stem;
+use crate::dashboard::run::frames::FramePipeline;
+use crate::dashboard::run::paths;
+use crate::film::file::FilmFileHeader;
+use crate::film::{Depth, Film, ImageData, ImageOutput, LinearImage};
+use crate::render::plan::WatchedFilms;
+use crate::render::session::{Report, Snapshot, View, WatchSession};
+use crate::terminal::Capabilities;
+use crossbeam_channel::{Receiver, Sender, unbounded};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Executor of effects that shows watched files.
+pub struct WatchRunner {
+    session: WatchSession,
+    view: View,
+    /// Exports that have not been written yet.
+    exporting: usize,
+    results: Sender<Message>,
+    done: Receiver<Message>,
+}
+
+impl WatchRunner {
+    /// Starts the thread that reads the files.
+    pub fn new(films: WatchedFilms, threads: usize) -> io::Result<Self> {
+        let (results, done) = unbounded();
+        let reports = results.clone();
+        let session = WatchSession::new(films, threads, move |report| {
+            // Sending fails only at the end of the program, when the receiver is gone.
+            let _ = reports.send(Message::Watched(Box::new(report)));
+        })?;
+        Ok(Self { session, view: View::default(), exporting: 0, results, done })
+    }
+
+    fn export(&mut self, format: Format) {
+        self.exporting += 1;
+        let results = self.results.clone();
+        self.session.submit(move |picture| {
+            let written = match picture {
+                Some((film, header, report)) => write(film, header, report, format),
+                None => Err("there is no picture to write".to_string()),
+            };
+            let _ = results.send(Message::Exported(written));
+        });
+    }
+}
+
+/// Writes a picture under the next free name, which begins with that of the scene file.
+fn write(
+    film: &Film,
+    header: &FilmFileHeader,
+    report: &Report,
+    format: Format,
+) -> Result<Exported, String> {
+    let source = header.metadata.iter().find(|(key, _)| key == "Source");
+    let stem = stem(None, source.map_or("", |(_, source)| source));
+    let image = ImageData {
+        film,
+        mix: &header.weights,
+        group_names: &header.group_names,
+        display: header.display,
+        depth: Depth::Eight,
+        metadata: &header.metadata,
+    };
+    let create = |path: &Path| ImageOutput::from_path(path)?.create_new().write(&image);
+    let path = paths::numbered(Path::new(""), &stem, format.extension(), create)
+        .ok_or_else(|| format!("all names for pictures of {stem} are in use"))?
+        .map_err(|error| error.to_string())?;
+    Ok(Exported {
+        scp: paths::scp(&path),
+        path,
+        size: [film.width(), film.height()],
+        spp: report.spp.mean,
+        noise_codes: report.noise.map(|noise| noise.rmse_codes),
+    })
+}
+
+impl Effects for WatchRunner {
+    fn wakeup(&self) -> &Receiver<()> {
+        self.session.wakeup()
+    }
+
+    fn take_snapshot(&self) -> Option<Snapshot> {
+        self.session.take()
+    }
+
+    fn rest(&self, _: bool) {}
+
+    fn done(&self) -> &Receiver<Message> {
+        &self.done
+    }
+
+    fn observe(&mut self, message: &Message) {
+        if let Message::Exported(_) = message {
+            self.exporting = self.exporting.saturating_sub(1);
+        }
+    }
+
+    fn run(
+        &mut self,
+        effect: Effect,
+        frames: &mut FramePipeline,
+        terminal: &Capabilities,
+    ) -> Outcome {
+        match effect {
+            Effect::Raster(raster) => {
+                self.view.raster = Some(raster);
+                self.session.set_view(self.view);
+            }
+            Effect::Probe(pixel) => {
+                self.view.probe = pixel;
+                self.session.set_view(self.view);
+            }
+            Effect::Display(display) => self.session.set_display(display),
+            Effect::Pin => {
+                let results = self.results.clone();
+                self.session.submit(move |picture| {
+                    if let Some((film, header, report)) = picture {
+                        let picture = LinearImage::of_film(film, &header.weights);
+                        let _ = results.send(Message::Pinned(Arc::new(picture), report.spp.mean));
+                    }
+                });
+            }
+            Effect::Export(format) => self.export(format),
+            effect => return run_on_terminal(effect, frames, terminal, &self.results),
+        }
+        Outcome::Done
+    }
+
+    fn flush(&self, _: Duration) {}
+
+    fn finish(
+        mut self: Box<Self>,
+        deadline: Option<Instant>,
+    ) -> (Vec<Message>, Result<Option<PathBuf>, String>) {
+        let mut finished = Vec::new();
+        // Reports may come in between. This runner keeps a sender, so that a session which has
+        // panicked is noticed by its wake-ups.
+        while self.exporting > 0
+            && deadline.is_none_or(|deadline| Instant::now() < deadline)
+            && !self.session.has_ended()
+        {
+            if let Ok(message) = self.done.recv_timeout(Duration::from_millis(50)) {
+                self.observe(&message);
+                finished.push(message);
+            }
+        }
+        (finished, Ok(None))
+    }
+}

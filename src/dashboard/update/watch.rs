@@ -1,0 +1,87 @@
+//! Table of watched files: reports, cursor and mouse.
+
+use crate::dashboard::layout::Focus;
+use crate::dashboard::model::{Drag, Mode, WatchTable, short_name};
+use crate::dashboard::panel_lines::scrolled;
+use crate::dashboard::update::UpdateContext;
+use crate::dashboard::update::mouse::{WHEEL_LINES, line_at};
+use crate::render::schedule::Stop;
+use crate::render::session::{WatchReport, WatchedShards};
+use crate::scene::Scene;
+use crate::terminal::event::{Mouse, MouseKind};
+use crate::value::sanitized;
+use std::path::Path;
+use std::sync::Arc;
+
+impl UpdateContext<'_> {
+    /// Shows a report on the watched files. The cursor stays on its row, whose index may change.
+    pub(super) fn watched(&mut self, report: WatchReport) {
+        let before = self.model.watch.take();
+        if let Some(size) = report.size.filter(|size| *size != self.scene().film.size) {
+            let mut scene = Scene::clone(self.scene());
+            scene.film.size = size;
+            let scene = Arc::new(scene);
+            self.model.file.saved = Arc::clone(&scene);
+            self.model.history.restart(scene);
+            self.repaint();
+        }
+        if before.as_ref().is_none_or(|before| before.report.size.is_none()) {
+            self.model.display = report.display;
+        }
+        self.model.file.name = match report.source.as_str() {
+            "" => "no film yet".to_string(),
+            source => short_name(Path::new(&sanitized(source))),
+        };
+        self.model.stop = Stop { noise_codes: report.target_codes, ..Stop::default() };
+        let key = |row: &WatchedShards| (row.path.clone(), row.shards.clone());
+        let at = before.as_ref().and_then(|table| table.report.shards.get(table.cursor)).map(key);
+        let same = report.shards.iter().position(|row| Some(key(row)) == at);
+        let (cursor, scroll) = before.map_or((0, 0), |table| (table.cursor, table.scroll));
+        // Without movement by the user the most urgent row stays selected.
+        let cursor = if cursor == 0 { 0 } else { same.unwrap_or(cursor) };
+        self.model.watch = Some(WatchTable { report, cursor, scroll });
+        self.move_watch_cursor(0);
+    }
+
+    /// Moves the cursor of the table by `steps` rows, and scrolls to make it visible.
+    pub(super) fn move_watch_cursor(&mut self, steps: isize) {
+        let rows = self.model.watch_rows().map_or(1, |(rows, _)| usize::from(rows.height));
+        let Some(table) = &mut self.model.watch else { return };
+        let len = table.report.shards.len();
+        table.cursor = table.cursor.saturating_add_signed(steps).min(len.saturating_sub(1));
+        table.scroll = scrolled(table.scroll, table.cursor, len, rows);
+    }
+
+    /// Handles the mouse outside of overlays: the table selects and scrolls, the probe follows.
+    pub(super) fn mouse_on_watch(&mut self, mouse: Mouse) {
+        let Some(layout) = self.model.layout() else { return };
+        let in_picture = layout.image.contains(mouse.column, mouse.row);
+        let in_table = layout.outline.is_some_and(|area| area.contains(mouse.column, mouse.row));
+        match mouse.kind {
+            MouseKind::Press(button) => {
+                let last = [mouse.column, mouse.row];
+                let modified = mouse.modified;
+                self.model.drag = Some(Drag { button, modified, last, moved: false, in_picture });
+                if in_table && let Some((rows, _)) = self.model.watch_rows() {
+                    self.model.focus = Focus::Outline;
+                    let table = self.model.watch.as_ref();
+                    let (cursor, scroll) = table.map_or((0, 0), |t| (t.cursor, t.scroll));
+                    if let Some(line) = line_at(rows, scroll, mouse) {
+                        self.move_watch_cursor(line as isize - cursor as isize);
+                    }
+                }
+            }
+            MouseKind::Release(_) => self.model.drag = None,
+            MouseKind::Drag(_) => {}
+            MouseKind::Scroll(ticks) => {
+                if in_table {
+                    self.move_watch_cursor(-(ticks.clamp(-100, 100) * WHEEL_LINES) as isize);
+                }
+            }
+        }
+        let holds = matches!(mouse.kind, MouseKind::Press(_) | MouseKind::Drag(_));
+        if self.model.mode == Mode::Probe && in_picture && holds {
+            self.probe_at(mouse);
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! Files that `zerkalo watch` reads: parts, checkpoints, and files that change, vanish or are damaged.
+
+use crate::command_line::Desk;
+use crate::command_line::shards::{done, merge, plan, trace, traced};
+use std::fs;
+use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
+use zerkalo::film::Film;
+use zerkalo::film::file::FilmReader;
+use zerkalo::render::plan::{WatchedFilms, WatchedShards, WatchedState};
+
+fn open(desk: &Desk, names: &[&str]) -> Result<WatchedFilms, String> {
+    let paths: Vec<PathBuf> = names.iter().map(|name| desk.path(name)).collect();
+    WatchedFilms::open(&paths)
+}
+
+fn film(desk: &Desk, name: &str) -> Film {
+    FilmReader::open(&desk.path(name)).and_then(FilmReader::read).unwrap().1
+}
+
+fn rows(films: &WatchedFilms) -> Vec<WatchedShards> {
+    films.shards(SystemTime::now())
+}
+
+fn states(films: &WatchedFilms) -> Vec<(String, WatchedState)> {
+    rows(films).into_iter().map(|row| (row.shards, row.state)).collect()
+}
+
+/// Replaces a file in one step, as all writers of film files do.
+fn replace(desk: &Desk, name: &str, bytes: &[u8]) {
+    fs::write(desk.path("new"), bytes).unwrap();
+    fs::rename(desk.path("new"), desk.path(name)).unwrap();
+}
+
+fn refusal(films: &WatchedFilms) -> String {
+    let refused = |row: &WatchedShards| match &row.state {
+        WatchedState::Refused(reason) => Some(reason.clone()),
+        _ => None,
+    };
+    rows(films).iter().find_map(refused).unwrap_or_default()
+}
+
+#[test]
+fn parts_are_added_as_they_appear() {
+    let desk = Desk::new();
+    plan(&desk, "job", 3);
+    let mut films = open(&desk, &["job.plan"]).unwrap();
+    let expected = [
+        ("1", WatchedState::Missing),
+        ("2", WatchedState::Missing),
+        ("3", WatchedState::Missing),
+        ("0", WatchedState::Complete),
+    ];
+    assert_eq!(states(&films), expected.map(|(shards, state)| (shards.to_string(), state)));
+    assert!(films.film().unwrap().bytes() == film(&desk, "job-0.zk").bytes());
+    assert_eq!(films.complete_shards(), Some([1, 4]));
+    assert!(!films.poll(), "nothing has changed");
+    for shard in [2, 3, 1] {
+        trace(&desk, "job", shard);
+        assert!(films.poll());
+        let row = rows(&films).into_iter().find(|row| row.shards == shard.to_string()).unwrap();
+        assert_eq!(row.state, WatchedState::Complete);
+        assert!(row.samples > 0 && row.total == Some(row.samples), "{row:?}");
+    }
+    let parts = ["job-0.zk", "job-1.zk", "job-2.zk", "job-3.zk"].map(str::to_string);
+    merge(&desk, &parts, "merged.zk");
+    assert!(films.film().unwrap().bytes() == film(&desk, "merged.zk").bytes());
+    let merged = FilmReader::open(&desk.path("merged.zk")).unwrap();
+    let entry = |header: &zerkalo::film::file::FilmFileHeader| {
+        header.metadata.iter().find(|(key, _)| key == "Shards").cloned()
+    };
+    assert_eq!(entry(films.header().unwrap()), entry(merged.header()));
+    assert!(entry(merged.header()).unwrap().1.starts_with("0-3 of 3, plan "));
+    // A file that vanishes leaves the sum; the names on the command line may come in any order.
+    fs::remove_file(desk.path("job-2.zk")).unwrap();
+    assert!(films.poll());
+    let three = open(&desk, &["job-3.zk", "job-0.zk", "job-1.zk"]).unwrap();
+    assert!(films.film().unwrap().bytes() == three.film().unwrap().bytes());
+    assert_eq!(states(&three)[0], ("2".to_string(), WatchedState::Missing));
+    assert_eq!(states(&films)[0], ("2".to_string(), WatchedState::Missing));
+}
+
+#[test]
+fn unfinished_shards_are_running_and_then_late() {
+    let desk = Desk::new();
+    plan(&desk, "job", 2);
+    trace(&desk, "job", 1);
+    // A part is unfinished if a signal has stopped its command; the format has a word for it.
+    let whole = FilmReader::open(&desk.path("job-1.zk")).unwrap().header().clone();
+    let mut header = whole.clone();
+    let text = String::from_utf8(header.chunks[b"PART"].clone()).unwrap();
+    header.chunks.insert(*b"PART", text.replace("complete", "unfinished").into_bytes());
+    let empty = Film::new(whole.film.clone());
+    let mut pieces = vec![header.encode()];
+    let tiles = 0..zerkalo::film::file::tile_chunks(&empty);
+    pieces.extend(tiles.map(|i| zerkalo::film::file::encode_tiles(&empty, i)));
+    pieces.push(zerkalo::film::file::encode_end(&empty, &pieces));
+    let complete = fs::read(desk.path("job-1.zk")).unwrap();
+    let mut films = open(&desk, &["job.plan"]).unwrap();
+    replace(&desk, "job-1.zk", &pieces.concat());
+    assert!(films.poll());
+    let at = |films: &WatchedFilms, later: u64| {
+        let now = SystemTime::now() + Duration::from_secs(later);
+        films.shards(now).into_iter().find(|row| row.shards == "1").unwrap()
+    };
+    let row = at(&films, 0);
+    assert_eq!((row.state, row.samples), (WatchedState::Running, 0));
+    assert!(row.total.unwrap() > 0);
+    let row = at(&films, 200);
+    assert!(row.state == WatchedState::Late && row.age.unwrap().as_secs() >= 199, "{row:?}");
+    // A clock that is behind that of the writer.
+    let early = films.shards(SystemTime::UNIX_EPOCH);
+    assert!(early.iter().all(|row| row.age.is_none_or(|age| age.is_zero())));
+    assert!(films.film().unwrap().bytes() == film(&desk, "job-0.zk").bytes());
+    // A complete part without its samples is not used.
+    header.chunks.insert(*b"PART", text.into_bytes());
+    pieces[0] = header.encode();
+    pieces.pop();
+    pieces.push(zerkalo::film::file::encode_end(&empty, &pieces));
+    replace(&desk, "job-1.zk", &pieces.concat());
+    assert!(films.poll());
+    assert!(refusal(&films).contains("its 0 samples are not the"), "{}", refusal(&films));
+    replace(&desk, "job-1.zk", &complete);
+    assert!(films.poll());
+    assert_eq!(at(&films, 1000).state, WatchedState::Complete);
+}
+
+#[test]
+fn files_that_do_not_belong_together_are_refused_by_name() {
+    let desk = Desk::new();
+    let parts = traced(&desk, "job", 2);
+    plan(&desk, "other", 3);
+    let run = desk.render("a.png", &["--spp", "2", "--checkpoint", "a.zk"]);
+    assert_eq!(run.status, 0, "{}", run.err);
+    fs::copy(desk.path("job-1.zk"), desk.path("copy.zk")).unwrap();
+    fs::copy(desk.path("a.zk"), desk.path("b.zk")).unwrap();
+    for (names, expected) in [
+        (["job-1.zk", "copy.zk"], "both hold shard 1; name one of them"),
+        (["job-1.zk", "other-0.zk"], "belong to different plans (`shards 2` and `shards 3`)"),
+        (["job-1.zk", "a.zk"], "a.zk to other films: it belongs to no plan"),
+        (["a.zk", "b.zk"], "a.zk to other films: it belongs to no plan"),
+        (["job.plan", "other.plan"], "are two plans; name one of them"),
+        (["other.plan", "job-1.zk"], "belong to different plans"),
+    ] {
+        let error = open(&desk, &names).unwrap_err();
+        assert!(error.contains(expected), "{names:?}: {error}");
+    }
+    let plan = fs::read(desk.path("job.plan")).unwrap();
+    fs::write(desk.path("cut.plan"), &plan[..plan.len() / 2]).unwrap();
+    assert!(open(&desk, &["cut.plan"]).unwrap_err().contains("cut.plan: it is damaged"));
+
+    // A single checkpoint is watched, and keeps its samples.
+    let single = open(&desk, &["a.zk"]).unwrap();
+    assert!(single.film().unwrap().bytes() == film(&desk, "a.zk").bytes());
+    assert_eq!((single.complete_shards(), states(&single).len()), (None, 1));
+    // Later, foreign files are left out.
+    let mut films = open(&desk, &["job.plan"]).unwrap();
+    let whole = films.film().unwrap().bytes();
+    let own = fs::read(desk.path("job-1.zk")).unwrap();
+    for (foreign, expected) in [
+        ("other-0.zk", "belong to different plans"),
+        ("job-2.zk", "both hold shard 2"),
+        ("a.zk", "it belongs to no plan"),
+        ("scene.toml", "it is no film file"),
+    ] {
+        replace(&desk, "job-1.zk", &fs::read(desk.path(foreign)).unwrap());
+        assert!(films.poll());
+        assert!(refusal(&films).contains(expected), "{foreign}: {}", refusal(&films));
+        assert!(films.film().unwrap().bytes() != whole);
+    }
+    replace(&desk, "job-1.zk", &own);
+    assert!(films.poll());
+    assert!(films.film().unwrap().bytes() == whole && refusal(&films).is_empty());
+    assert_eq!(parts.len(), 3);
+}
+
+#[test]
+fn next_round_is_watched_with_the_merged_film_of_the_first() {
+    let desk = Desk::new();
+    let parts = traced(&desk, "job", 2);
+    merge(&desk, &parts, "merged.zk");
+    let args =
+        ["plan", "--from", "merged.zk", "-o", "next.plan", "--noise", "0.2", "--shards", "2"];
+    done(&desk, &args);
+    trace(&desk, "next", 1);
+    let films = open(&desk, &["next.plan", "merged.zk"]).unwrap();
+    assert_eq!(films.complete_shards(), Some([2, 3]));
+    assert_eq!(states(&films)[0], ("2".to_string(), WatchedState::Missing));
+    // Without the base the picture is that of the shard alone.
+    let alone = open(&desk, &["next.plan"]).unwrap();
+    assert!(alone.film().unwrap().bytes() == film(&desk, "next-1.zk").bytes());
+}
+
+/// Whatever a watched file contains, nothing panics, and the film is the sum of whole files.
+#[test]
+fn damaged_files_are_left_out() {
+    let desk = Desk::new();
+    traced(&desk, "job", 2);
+    let mut films = open(&desk, &["job.plan"]).unwrap();
+    let whole = films.film().unwrap().bytes();
+    let part = fs::read(desk.path("job-2.zk")).unwrap();
+    fs::remove_file(desk.path("job-2.zk")).unwrap();
+    assert!(films.poll());
+    let without = films.film().unwrap().bytes();
+    let mut random = 7u64;
+    let mut next = |below: usize| {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (random >> 33) as usize % below
+    };
+    for round in 0..120 {
+        let mut bytes = part.clone();
+        match round % 3 {
+            0 => bytes.truncate(next(part.len())),
+            1 => bytes[next(part.len())] ^= 1 << next(8),
+            _ => bytes.extend(&part[..=next(64)]),
+        }
+        replace(&desk, "job-2.zk", &bytes);
+        assert!(films.poll());
+        assert!(films.film().unwrap().bytes() == without, "round {round}");
+        assert!(refusal(&films).contains("job-2.zk"), "round {round}: {}", refusal(&films));
+        if round % 20 == 0 {
+            replace(&desk, "job-2.zk", &part);
+            assert!(films.poll() && films.film().unwrap().bytes() == whole, "round {round}");
+        }
+    }
+    // A folder in the place of the file.
+    fs::remove_file(desk.path("job-2.zk")).unwrap();
+    fs::create_dir(desk.path("job-2.zk")).unwrap();
+    assert!(films.poll() && !refusal(&films).is_empty());
+    assert!(films.film().unwrap().bytes() == without);
+}
+
+#[test]
+fn watch_needs_a_terminal_and_files() {
+    let desk = Desk::new();
+    let run = desk.run(&["watch", "job-1.zk"]);
+    assert_eq!(run.status, 2, "{}", run.err);
+    assert!(
+        run.err.contains("the dashboard needs a terminal; `zerkalo merge --partial"),
+        "{}",
+        run.err
+    );
+    assert_eq!(desk.run(&["watch"]).status, 2);
+}
