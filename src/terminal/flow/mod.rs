@@ -451,7 +451,9 @@ impl FlowControl {
                     && answers
                     && self.last_frame.is_some_and(|at| at < self.active_since);
                 let extra = if is_first { self.budget() as f64 } else { 0.0 };
-                self.send_queue.bytes < self.max_queue() + extra
+                // While the user is active, less than a frame waits, so that input waits for less.
+                let spare = if now < self.active_until { self.budget() as f64 / 2.0 } else { 0.0 };
+                self.send_queue.bytes < self.max_queue() + extra - spare
             }
             PacingMode::FixedRate => {
                 let lead = if answers { FRAME_SPAN } else { Duration::ZERO };

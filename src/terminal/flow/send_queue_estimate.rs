@@ -23,14 +23,18 @@ pub struct SendQueueEstimate {
     /// Time of the last frame.
     sent_at: Duration,
     busy: Option<Busy>,
+    /// Start of a rate sample that was too short when the queue became empty, and the number of bytes
+    /// that had left the queue by then. The next frames may continue it.
+    short_sample: Option<(Duration, f64)>,
 }
 
 /// Period in which the queue is not empty.
 #[derive(Debug)]
 struct Busy {
     since: Duration,
-    /// Number of bytes that had left the queue before.
-    drained: f64,
+    /// Start of the rate sample that ends with the period: the start of this period or of an earlier
+    /// one, and the number of bytes that had left the queue before.
+    whole: (Duration, f64),
     /// Size in bytes of the only frame of the period; `None` if there are more.
     alone: Option<usize>,
     /// Start of the present rate sample, and the number of bytes that had left the queue by then.
@@ -61,9 +65,12 @@ impl SendQueueEstimate {
         match &mut self.busy {
             Some(busy) => busy.alone = None,
             None => {
+                let continued = self.short_sample.take();
                 self.busy = Some(Busy {
                     since: now,
-                    drained: self.sent,
+                    whole: continued
+                        .filter(|(start, _)| now < *start + SAMPLE)
+                        .unwrap_or((now, self.sent)),
                     alone: Some(bytes),
                     sample: None,
                     is_full: false,
@@ -122,15 +129,19 @@ impl SendQueueEstimate {
         busy.is_full |= self.bytes >= limit;
         if bytes == 0 {
             let elapsed = now - busy.since;
-            let whole = (busy.since, busy.drained);
             let is_long = |(start, _): &(Duration, f64)| now.saturating_sub(*start) >= SAMPLE;
-            let (start, before) = busy.sample.filter(is_long).unwrap_or(whole);
-            let span = now.saturating_sub(start);
+            // The bytes of a short time prove no rate: a relay, or the buffers of the other host,
+            // may have taken them at once.
+            let whole = busy.sample.into_iter().chain([busy.whole]).find(is_long);
+            let rate = whole.map(|(start, before)| {
+                (drained - before) / now.saturating_sub(start).as_secs_f64()
+            });
             let sample = QueueSample {
                 round_trip: busy.alone.map(|bytes| (elapsed, bytes)),
-                rate: Some((drained - before) / span.as_secs_f64()),
+                rate,
                 is_full: false,
             };
+            self.short_sample = whole.is_none().then_some(busy.whole);
             self.busy = None;
             return sample;
         }

@@ -290,6 +290,41 @@ fn rate_stays_true_after_convergence() {
     assert!((0.7..1.2).contains(&(found / 125e3)), "{found:.0}");
 }
 
+/// A relay takes bytes at once, up to its buffer, and sends them at the rate of the connection.
+#[test]
+fn rate_is_true_behind_a_relay_that_buffers() {
+    const RELAYED: f64 = 8e3;
+    for (rate, frames) in [(125e3, 6000), (125e3, 1400), (32e3, 1500)] {
+        let mut flow =
+            FlowControl::new(InitialLink { round_trip: None, ..start(PacingMode::SendQueue) });
+        let mut wire = Wire { rate, round_trip: Duration::ZERO, free_at: Duration::ZERO };
+        let mut pass = |seconds: std::ops::Range<u64>, wants: &dyn Fn(u64, usize) -> usize| {
+            for at in seconds.start * 1000..seconds.end * 1000 {
+                let now = ms(at);
+                if flow.asks_kernel(now) {
+                    let backlog = wire.free_at.saturating_sub(now).as_secs_f64() * rate;
+                    flow.held_back(now, Some((backlog - RELAYED).max(0.0) as usize));
+                }
+                let Some(allowance) = flow.allowance(now, false) else { continue };
+                let bytes = wants(at, allowance.bytes);
+                if bytes > 0 {
+                    flow.sent(now, bytes, allowance.picture, 0);
+                    wire.send(now, bytes);
+                }
+            }
+            flow.reading().unwrap().rate
+        };
+        let busy = pass(0..30, &|_, permitted| permitted);
+        let converged = pass(30..90, &|at, permitted| match at % 240 < 35 {
+            true => permitted.min(frames),
+            false => 0,
+        });
+        let what = format!("{rate}, {frames} bytes a frame: {busy:.0}, then {converged:.0}");
+        assert!((0.7..1.3).contains(&(busy / rate)), "{what}");
+        assert!((0.7..1.3).contains(&(converged / rate)), "{what}");
+    }
+}
+
 #[test]
 fn unknown_round_trip_is_measured_by_a_small_frame() {
     let mut flow =
