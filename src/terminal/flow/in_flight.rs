@@ -19,14 +19,16 @@ pub struct Acked {
     pub bytes: usize,
     /// `true` if no other frame was in flight when this one was sent.
     pub alone: bool,
+    /// Previously acknowledged frame: times at which it was sent and acknowledged.
+    pub previous: Option<[Duration; 2]>,
 }
 
 /// Queue of frames in flight, oldest first.
 #[derive(Debug, Default)]
 pub struct FramesInFlight {
     queue: VecDeque<(InFlight, bool)>,
-    /// Time of the last acknowledgement.
-    acked_at: Option<Duration>,
+    /// Last acknowledged frame: times at which it was sent and acknowledged.
+    last_acked: Option<[Duration; 2]>,
 }
 
 impl FramesInFlight {
@@ -35,11 +37,12 @@ impl FramesInFlight {
         self.queue.push_back((frame, alone));
     }
 
-    /// Records an acknowledgement and removes the oldest frame, to which it belongs. Returns this
-    /// frame and the time of the previous acknowledgement. Returns `None` if no frame is in flight.
-    pub fn on_ack(&mut self, at: Duration) -> Option<(Acked, Option<Duration>)> {
+    /// Records an acknowledgement and removes the oldest frame, to which it belongs. Returns `None`
+    /// if no frame is in flight.
+    pub fn on_ack(&mut self, at: Duration) -> Option<Acked> {
         let (InFlight { sent, bytes, .. }, alone) = self.queue.pop_front()?;
-        Some((Acked { sent, bytes, alone }, self.acked_at.replace(at)))
+        let previous = self.last_acked.replace([sent, at]);
+        Some(Acked { sent, bytes, alone, previous })
     }
 
     pub fn is_empty(&self) -> bool {

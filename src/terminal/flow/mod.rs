@@ -135,10 +135,14 @@ pub struct FlowControl {
     ack_sample: Option<AckSample>,
 }
 
-/// Bytes that were transmitted from `start` until their acknowledgement.
+/// Bytes whose transmission began between two times, until their acknowledgement.
 #[derive(Clone, Copy, Debug)]
 struct AckSample {
-    start: Duration,
+    earliest_start: Duration,
+    latest_start: Duration,
+    /// Time at which the frame before these bytes was sent, if their transmission began after its
+    /// acknowledgement.
+    sent_from: Option<Duration>,
     at: Duration,
     bytes: usize,
 }
@@ -325,7 +329,7 @@ impl FlowControl {
             self.losses = 0;
             return true;
         }
-        let Some((frame, previous_ack)) = self.in_flight.on_ack(at) else { return false };
+        let Some(frame) = self.in_flight.on_ack(at) else { return false };
         self.losses = 0;
         if self.in_flight.is_empty() {
             self.clear_at = self.clear_at.min(at);
@@ -335,24 +339,44 @@ impl FlowControl {
             self.round_trip = Some(elapsed);
             self.round_trip_at = at;
         }
+        let known = self.round_trip.filter(|least| *least <= elapsed);
         self.round_trip = self.round_trip.map(|least| least.min(elapsed));
-        // The transmission time of a frame is the time of its acknowledgement minus `start`, which
-        // is 0.9 round trips after the frame was sent, but not before the previous acknowledgement.
-        let earliest = frame.sent + self.round_trip.unwrap_or_default().mul_f64(0.9);
-        let start = previous_ack.map_or(earliest, |previous| earliest.max(previous));
+        // The transmission of a frame began 0.9 to 1 round trips before a reply to its first byte
+        // would have come, but not before the previous acknowledgement. A reply that comes sooner
+        // than a round trip shows only that the round trip was measured too long.
+        let idle_start =
+            |round_trips: f64| frame.sent + known.unwrap_or_default().mul_f64(round_trips);
+        let previous = frame.previous.filter(|[_, acked_at]| *acked_at > idle_start(0.9));
+        let start = |round_trips: f64| {
+            let start = idle_start(round_trips);
+            previous.map_or(start, |[_, acked_at]| start.max(acked_at))
+        };
         let sample = match self.ack_sample {
             Some(last) if at <= last.at + ACKS_TOGETHER => {
                 AckSample { at, bytes: last.bytes + frame.bytes, ..last }
             }
-            _ => AckSample { start, at, bytes: frame.bytes },
+            _ => AckSample {
+                earliest_start: start(0.9),
+                latest_start: if known.is_some() { start(1.0) } else { at },
+                sent_from: previous.map(|[sent, _]| sent),
+                at,
+                bytes: frame.bytes,
+            },
         };
         self.ack_sample = Some(sample);
-        let span = at.saturating_sub(sample.start).max(Duration::from_millis(10));
-        let rate = sample.bytes as f64 / span.as_secs_f64();
+        // Acknowledgements that were held back come faster than the frames were sent.
+        let sending = sample.sent_from.map(|from| frame.sent.saturating_sub(from));
+        let longest = at.saturating_sub(sample.earliest_start).max(sending.unwrap_or_default());
+        let shortest = at.saturating_sub(sample.latest_start);
+        let rate = |span: Duration| {
+            sample.bytes as f64 / span.max(Duration::from_millis(10)).as_secs_f64()
+        };
+        // A rate between both bounds is confirmed.
+        let rate = self.rate.clamp(rate(longest), rate(shortest.min(longest)));
         // The time of a small frame is mostly latency. It can prove a connection fast, but not
         // slow.
         if sample.bytes >= SMALL || rate > self.rate {
-            let is_full = 2 * sample.bytes >= self.budget() || span > 2 * FRAME_SPAN;
+            let is_full = 2 * sample.bytes >= self.budget() || shortest > 2 * FRAME_SPAN;
             if is_full || rate > self.rate {
                 self.rate = (1.0 - NEW_WEIGHT) * self.rate + NEW_WEIGHT * rate;
             }

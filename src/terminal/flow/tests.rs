@@ -290,6 +290,44 @@ fn rate_stays_true_after_convergence() {
     assert!((0.7..1.2).contains(&(found / 125e3)), "{found:.0}");
 }
 
+/// The terminal is slow at times, when the round trip is measured and when a frame is acknowledged.
+#[test]
+fn late_replies_prove_no_rate() {
+    for (rate, round_trip) in [(125e3, 100), (32e3, 300)] {
+        let link = InitialLink { round_trip: None, ..start(PacingMode::AckClocked(None)) };
+        let mut flow = FlowControl::new(link);
+        let mut wire = Wire { rate, round_trip: ms(round_trip), free_at: Duration::ZERO };
+        saturate(&mut flow, &mut wire, 25, false);
+        flow.in_flight = FramesInFlight::default();
+        let is_true = |flow: &FlowControl| {
+            let found = flow.reading().unwrap().rate;
+            assert!((0.7..1.3).contains(&(found / rate)), "{found:.0} of {rate}");
+        };
+        for i in 10..30 {
+            let at = |after| ms(3000 * i + after);
+            // The measurement of the round trip takes four times the time.
+            flow.round_trip_at = Duration::ZERO;
+            flow.sent(at(0), 500, false, 0);
+            flow.on_ack(at(4 * round_trip));
+            assert_eq!(flow.round_trip, Some(ms(4 * round_trip)));
+            let bytes = (rate * 0.1) as usize;
+            flow.sent(at(1500), bytes, true, 0);
+            flow.on_ack(wire.send(at(1500), bytes));
+            is_true(&flow);
+            flow.sent(at(2000), 300, false, 0);
+            flow.on_ack(wire.send(at(2000), 300));
+            // The acknowledgement of the first of two frames is held back.
+            let [first, second] = [2500, 2560].map(|after| {
+                flow.sent(at(after), bytes / 2, true, 0);
+                wire.send(at(after), bytes / 2)
+            });
+            flow.on_ack(first.max(second - ms(25)));
+            flow.on_ack(second);
+            is_true(&flow);
+        }
+    }
+}
+
 /// A relay takes bytes at once, up to its buffer, and sends them at the rate of the connection.
 #[test]
 fn rate_is_true_behind_a_relay_that_buffers() {
