@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 /// Solid angle, in rounding errors, below which a rectangle is sampled by area. The boundaries of
 /// the spherical rectangle are angles of about 1 with an error of some roundings, so that a
 /// rectangle of this solid angle is sampled at points that are off by 1e-5 of its size.
-const MIN_SOLID_ANGLE: f64 = 2e5;
+pub(super) const MIN_SOLID_ANGLE: f64 = 2e5;
 
 /// Surface of a compiled emitter.
 #[derive(Clone, Copy, Debug)]
@@ -186,7 +186,7 @@ impl<S: Float> Emitter<S> {
             }
             Surface::Rectangle { axes, size } => {
                 let size = size.map(L::splat);
-                let rectangle = SphericalRectangle::new(axes, size, to_center);
+                let rectangle = SphericalRectangle::new(size, local_of(axes, to_center));
                 let [x, y] = rectangle.sample(u, v);
                 let (wi, distance) = towards(axes, [x, y, rectangle.height]);
                 let density = rectangle.density(distance);
@@ -212,7 +212,8 @@ impl<S: Float> Emitter<S> {
         match &self.surface {
             Surface::Sphere { radius } => Cone::new(to_center, L::splat(*radius)).density(),
             Surface::Rectangle { axes, size } => {
-                SphericalRectangle::new(axes, size.map(L::splat), to_center).density(distance)
+                let local = local_of(axes, to_center);
+                SphericalRectangle::new(size.map(L::splat), local).density(distance)
             }
             Surface::Disk { axes, .. } => {
                 let [_, _, height] = local_of(axes, to_center);
@@ -237,13 +238,13 @@ impl<S: Float> Emitter<S> {
 
 /// Returns the components of `v` along the axes.
 #[inline(always)]
-fn local_of<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> [L; 3] {
+pub(super) fn local_of<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> [L; 3] {
     axes.map(|axis| Vec3::splat(axis).dot(v))
 }
 
 /// Returns the unit vector with the given local components, and their length.
 #[inline(always)]
-fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3]) -> (Vec3<L>, L) {
+pub(super) fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3]) -> (Vec3<L>, L) {
     let distance = (x * x + y * y + z * z).sqrt();
     let [across, up, normal] = axes.map(Vec3::splat);
     let inverse = L::one() / distance;
@@ -269,24 +270,24 @@ fn plane_hit<L: SimdFloat>(
 /// `distance`: distance^2 / (area cos). `height` is the coordinate of the surface along its normal;
 /// it is negative in front of the surface.
 #[inline(always)]
-fn density_of_area<L: SimdFloat>(area: L, distance: L, height: L) -> L {
+pub(super) fn density_of_area<L: SimdFloat>(area: L, distance: L, height: L) -> L {
     let density = distance * distance * distance / (area * -height);
     density.min(L::from_f64(L::MAX)).masked(height.lt(L::zero()))
 }
 
 /// Cone of the directions in which a sphere is seen; all directions from its inside.
-struct Cone<L: SimdFloat> {
-    axis: Vec3<L>,
-    one_minus_cos: L,
+pub(super) struct Cone<L: SimdFloat> {
+    pub axis: Vec3<L>,
+    pub one_minus_cos: L,
     /// Squared distance to the centre.
-    distance2: L,
+    pub distance2: L,
     /// Lanes whose origin is inside of the sphere.
-    inside: L::Mask,
+    pub inside: L::Mask,
 }
 
 impl<L: SimdFloat> Cone<L> {
     #[inline(always)]
-    fn new(to_center: Vec3<L>, radius: L) -> Self {
+    pub fn new(to_center: Vec3<L>, radius: L) -> Self {
         let distance2 = to_center.length_squared();
         let sin2 = radius * radius / distance2;
         let inside = sin2.ge(L::one()) | !distance2.gt(L::zero());
@@ -303,7 +304,7 @@ impl<L: SimdFloat> Cone<L> {
 
     /// Density of uniform directions in the cone \[1/sr\].
     #[inline(always)]
-    fn density(&self) -> L {
+    pub fn density(&self) -> L {
         (L::one() / (self.one_minus_cos * L::from_f64(TAU))).min(L::from_f64(L::MAX))
     }
 }
@@ -311,7 +312,7 @@ impl<L: SimdFloat> Cone<L> {
 /// Rectangle seen from a point, sampled by solid angle.
 ///
 /// Ureña, Fajardo, King 2013, *An Area-Preserving Parametrization for Spherical Rectangles*.
-struct SphericalRectangle<L: SimdFloat> {
+pub(super) struct SphericalRectangle<L: SimdFloat> {
     /// Local coordinates of the sides, relative to the point.
     x: [L; 2],
     y: [L; 2],
@@ -324,10 +325,11 @@ struct SphericalRectangle<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> SphericalRectangle<L> {
+    /// Creates the rectangle with the given width and height, whose centre has the given local
+    /// coordinates relative to the point: across, up and along the normal.
     #[inline(always)]
-    fn new(axes: &[[L::Scalar; 3]; 3], [width, height]: [L; 2], to_center: Vec3<L>) -> Self {
+    pub fn new([width, height]: [L; 2], [center_x, center_y, z]: [L; 3]) -> Self {
         let half = L::from_f64(0.5);
-        let [center_x, center_y, z] = local_of(axes, to_center);
         let (a, b) = (width * half, height * half);
         let (x, y) = ([center_x - a, center_x + a], [center_y - b, center_y + b]);
         let area = width * height;
@@ -338,7 +340,7 @@ impl<L: SimdFloat> SphericalRectangle<L> {
 
     /// Samples a point, as local coordinates relative to the origin.
     #[inline(always)]
-    fn sample(&self, u: L, v: L) -> [L; 2] {
+    pub fn sample(&self, u: L, v: L) -> [L; 2] {
         let ([x0, x1], [y0, y1]) = (self.x, self.y);
         let by_area = [u.mul_add(x1 - x0, x0), v.mul_add(y1 - y0, y0)];
         if self.by_angle.none() {
@@ -368,7 +370,7 @@ impl<L: SimdFloat> SphericalRectangle<L> {
 
     /// Density of the direction \[1/sr\] in which the rectangle is at `distance`.
     #[inline(always)]
-    fn density(&self, distance: L) -> L {
+    pub fn density(&self, distance: L) -> L {
         let by_area = density_of_area(self.area, distance, self.height);
         let in_front = self.height.lt(L::zero());
         L::select(self.by_angle, (L::one() / self.solid_angle).masked(in_front), by_area)

@@ -1,14 +1,16 @@
-//! Lights: points, directions, cones, and surfaces with a size.
+//! Lights: points, directions, cones, surfaces with a size, and the emission of objects.
 
 mod area;
 mod delta;
 mod emitter;
 mod environment;
+mod object_emitter;
 
 pub use area::{DiskLight, EmitterSurface, RectangleLight, SphereLight};
 pub use delta::{DeltaLight, LightSample, SpotCone};
 pub use emitter::{Emitter, EmitterSample};
 pub use environment::{Environment, EnvironmentLight, EnvironmentSample};
+pub use object_emitter::{ObjectEmitter, ObjectSurface};
 
 use glam::DVec3;
 

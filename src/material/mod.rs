@@ -69,6 +69,11 @@ description! {
         f0: Option<Color>, or "white", in SHARE;
         /// A metal, for its reflectance. Not together with `f0`.
         metal: Option<Metal>, or "no metal";
+        /// Radiance that the surface emits, the same at every point and in every direction; 0 emits
+        /// nothing. It is added to the light that the surface reflects, and illuminates other objects.
+        emission: f64 = 0.0, in LIGHT "W/(sr m²)";
+        /// Colour of the emitted light; multiplies `emission`.
+        emission_color: Color = [1.0, 1.0, 1.0], in LIGHT;
         /// The back of a surface has the same material as its front; otherwise the back is black: only
         /// `transmission` remains there, and total internal reflection unless `fresnel` is `dielectric`.
         two_sided: bool = true;
@@ -191,6 +196,16 @@ impl Material {
         self.attenuation_color.0.map(|c| coefficient(c).clamp(0.0, 1e30))
     }
 
+    /// Returns the radiance that the surface emits; black if it emits nothing.
+    pub fn emitted(&self) -> [f64; 3] {
+        self.emission_color.scaled(self.emission).0
+    }
+
+    /// Returns `true` if the surface emits light.
+    pub fn emits(&self) -> bool {
+        self.emitted() != [0.0; 3]
+    }
+
     /// Returns `true` if the reflection or the highlight uses a microfacet distribution.
     pub fn has_microfacets(&self) -> bool {
         matches!(self.lobe, Lobe::Beckmann | Lobe::Ggx)
@@ -255,6 +270,8 @@ mod tests {
             roughness: -1e-9,
             alpha: Some(-1.0),
             f0: Some(Color([1.1, 0.0, 0.0])),
+            emission: -1.0,
+            emission_color: Color([0.0, -0.1, 0.0]),
             ..Material::default()
         };
         let keys: Vec<_> = bad.faults().into_iter().map(|f| f.key).collect();
@@ -272,6 +289,8 @@ mod tests {
             "roughness",
             "alpha",
             "f0",
+            "emission",
+            "emission_color",
         ];
         assert_eq!(keys, numbers);
         assert_eq!(FIELDS.len(), numbers.len() + 8, "check the range of the new field here");

@@ -90,6 +90,7 @@ impl Scene {
             && self.lights.is_empty()
             && self.ambient.color == Color::BLACK
             && self.background.color == Color::BLACK
+            && !self.materials.values().any(Material::emits)
     }
 }
 

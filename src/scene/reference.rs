@@ -65,6 +65,18 @@ and every key with a default may be left out. Unknown keys are errors.
 - With `unit = \"radiance\"` the intensity of such a light is its radiance [W/(sr m\u{b2})]: a light of
   intensity 1 is white in the picture. With `unit = \"power\"` it is the emitted power [W], pi x
   radiance x area. The area is that of the side that shines, or of the whole sphere.
+- A material with `emission` makes its objects emit light: the radiance [W/(sr m\u{b2})] is
+  `emission` x `emission_color`, the same at every point and in every direction, without texture, in
+  addition to the light that the surface reflects. Camera and mirrors see it. With `two_sided` both
+  sides of a flat object emit, and the inside of a solid; otherwise the front alone. The materials have
+  light groups as lights have: `emission` and `emission_color` of a scene in progress change without
+  new samples, to 0 and back. Beyond eight lights and emissive materials the last ones share a group.
+- Matt surfaces, highlights and rough mirrors get the light of emissive spheres, rectangles, platforms,
+  boxes, cubes, prisms, pyramids and meshes of up to 65536 triangles from points sampled on them, as
+  that of lights with a size. The emission of other shapes (torus, cylinder, cone, plane, compound,
+  sphere scaled to an ellipsoid, larger mesh) is found only by rays that hit them: the camera's,
+  reflected, transmitted, and those of diffuse bounces. It makes no highlights, and without
+  `max_diffuse_depth` it does not light matt surfaces; `zerkalo check` says so.
 - A texture multiplies the `color` of its material in the ambient and the diffuse part. White leaves
   it unchanged: `color = [1.0, 1.0, 1.0]` with `texture.image = { file = \"wood.png\", scale =
   [2.0, 2.0] }` or `texture.checker = { even = \"#ffffff\", odd = \"#202020\" }`. A bump,

@@ -19,6 +19,7 @@ use crate::world::inventory::{Inventory, InventorySources};
 use crate::world::light_groups::{LightGroupSource, LightGroups};
 use crate::world::lights_on_surfaces::OnSurface;
 use crate::world::radiance_range::SceneDistances;
+use crate::world::surface_emission::SurfaceEmission;
 use crate::world::truncation_bias;
 use crate::world::world::{
     DeltaSource, EmitterSource, EnvironmentSource, LightSource, ShadowRayTarget, World,
@@ -176,6 +177,7 @@ struct CompiledLights<S> {
     sources: Vec<DeltaSource<S>>,
     emitters: Vec<EmitterSource<S>>,
     environments: Vec<EnvironmentSource<S>>,
+    emission: SurfaceEmission<S>,
 }
 
 impl<S: Float> CompiledLights<S> {
@@ -183,6 +185,7 @@ impl<S: Float> CompiledLights<S> {
         scene: &Scene,
         geometry: &RecenteredGeometry,
         materials: &CompiledMaterials<S>,
+        primitives: &[PrimitiveId],
         camera: &PerspectiveCamera,
     ) -> Self {
         let groups = LightGroups::new(scene, materials.has_direct(), materials.has_ambient());
@@ -203,7 +206,8 @@ impl<S: Float> CompiledLights<S> {
         let emitter = |light: &Light| Emitter::new(light, geometry.origin, lift);
         let emitters = light_sources(scene, &emitting, emitter);
         let environments = light_sources(scene, &emitting, EnvironmentLight::new);
-        Self { groups, scales, sources, emitters, environments }
+        let emission = SurfaceEmission::new(scene, &geometry.forms, primitives, &groups, lift);
+        Self { groups, scales, sources, emitters, environments, emission }
     }
 
     /// Target of the shadow rays to each light without a size.
@@ -218,18 +222,19 @@ impl<S: Float> CompiledLights<S> {
         self.sources.iter().map(target_of_source).collect()
     }
 
-    /// Bounding sphere of each emitter.
+    /// Bounding sphere of each emitter and of each object from which light is sampled.
     fn emitter_bounds(&self) -> Vec<BoundingSphere> {
-        let bounds_of = |source: &EmitterSource<S>| {
-            let (center, radius) = (source.light.center(), source.light.radius());
-            BoundingSphere { center, radius }
-        };
-        self.emitters.iter().map(bounds_of).collect()
+        let emitters = self.emitters.iter().map(|source| &source.light);
+        let emitters = emitters.map(|light| (light.center(), light.radius()));
+        let objects = self.emission.emitters().map(|light| (light.center(), light.radius()));
+        let balls = emitters.chain(objects);
+        balls.map(|(center, radius)| BoundingSphere { center, radius }).collect()
     }
 
-    /// Number of lights without a size and of emitters. Environments have no lists of occluders.
+    /// Number of lights without a size, of emitters and of objects from which light is sampled.
+    /// Environments have no lists of occluders.
     fn count(&self) -> usize {
-        self.sources.len() + self.emitters.len()
+        self.sources.len() + self.emitters.len() + self.emission.counts()[0]
     }
 
     /// Largest distance between a light and the end point of its shadow rays.
@@ -327,7 +332,7 @@ impl<L: SimdFloat> World<L> {
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
         let material_of = |id: &PrimitiveId| materials.material(id);
         let textures = SurfaceTextures::new(scene, primitives, recentered.origin, material_of);
-        let lights = CompiledLights::new(scene, recentered, &materials, &camera);
+        let lights = CompiledLights::new(scene, recentered, &materials, primitives, &camera);
         let nested_dielectrics = NestedDielectrics::new(
             recentered,
             primitives,
@@ -348,6 +353,7 @@ impl<L: SimdFloat> World<L> {
                 bsdfs: &materials.bsdfs,
                 groups: &lights.groups.members,
                 lights: lights.count() + lights.environments.len(),
+                emissive: lights.emission.counts(),
                 diffuse_limits: materials.diffuse_limits(scene),
                 precision: if L::EPSILON > 1e-10 { "single" } else { "double" },
             },
@@ -380,6 +386,7 @@ impl<L: SimdFloat> World<L> {
             sources: lights.sources,
             emitters: lights.emitters,
             environments: lights.environments,
+            emission: lights.emission,
             culling: culling.mode,
             all_candidates: culling.all_candidates,
             light_buffers: culling.light_buffers,

@@ -23,6 +23,8 @@ pub(super) struct InventorySources<'a, S> {
     pub groups: &'a [LightGroupSource],
     /// Number of lights that emit.
     pub lights: usize,
+    /// Number of emissive objects from which light is sampled, and of other emissive objects.
+    pub emissive: [usize; 2],
     pub diffuse_limits: Option<DiffuseLimits>,
     /// `single` or `double`.
     pub precision: &'static str,
@@ -37,6 +39,7 @@ impl Inventory {
             bsdfs,
             groups,
             lights,
+            emissive,
             precision,
             diffuse_limits,
         } = sources;
@@ -90,16 +93,18 @@ impl Inventory {
             n => Some(format!("{n} {name}s")),
         };
         let light_count = |kind: &str| {
-            let lights_of = |source: &LightGroupSource| match source {
-                LightGroupSource::Light(i) => vec![*i],
-                LightGroupSource::Shared(list) => list.clone(),
-                _ => Vec::new(),
+            let is_kind = |source: &&LightGroupSource| match source {
+                LightGroupSource::Light(i) => scene.lights[*i].kinds() == [kind],
+                _ => false,
             };
-            let is_kind = |i: &usize| scene.lights[*i].kinds() == [kind];
-            groups.iter().flat_map(lights_of).filter(is_kind).count()
+            groups.iter().flat_map(LightGroupSource::emitting).filter(is_kind).count()
         };
         for kind in ["point", "directional", "spot", "sphere", "rectangle", "disk", "environment"] {
             parts.extend(counted(light_count(kind), &format!("{kind} light")));
+        }
+        parts.extend(counted(emissive[0] + emissive[1], "emissive object"));
+        if emissive[1] > 0 {
+            parts.push(format!("{} of them without sampled points", emissive[1]));
         }
         let mut add_if = |present: bool, name: &str| {
             if present {

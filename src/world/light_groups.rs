@@ -1,16 +1,17 @@
-//! Light groups. A light group is the part of the picture that comes from one light, ambient light
-//! or the background, and is linear in its colour and intensity. The film stores each group
+//! Light groups. A light group is the part of the picture that comes from one light, one emissive
+//! material, ambient light or the background, and is linear in its colour and intensity. The film stores each group
 //! separately, so that colour and intensity can change without new samples.
 
 use crate::lanes::Float;
 use crate::light::{DeltaLight, Emitter, EnvironmentLight, Light};
-use crate::scene::Scene;
+use crate::material::Material;
+use crate::scene::{Object, Scene};
 use crate::value::Color;
 use crate::world::radiance_range::{RadianceRange, SceneDistances};
 use glam::DVec3;
 
-/// Largest number of light groups for lights. If there are more lights, the remaining ones share
-/// the last group.
+/// Largest number of light groups for lights and emissive materials. If there are more, the
+/// remaining ones share the last group.
 const MAX_LIGHT_GROUPS: usize = 8;
 
 /// Largest number of light groups: the groups of lights, one for ambient light and one for the
@@ -32,8 +33,30 @@ pub enum LightGroupSource {
     Background,
     /// One light, by its index in the scene.
     Light(usize),
-    /// Several lights. Their samples already contain the colour and intensity of each light.
-    Shared(Vec<usize>),
+    /// Emission of all objects with one material, by its name.
+    Material(String),
+    /// Several lights and materials. Their samples already contain the colour and intensity of each.
+    Shared(Vec<LightGroupSource>),
+}
+
+impl LightGroupSource {
+    /// Lights and materials of the group.
+    pub fn emitting(&self) -> &[Self] {
+        match self {
+            Self::Ambient | Self::Background => &[],
+            Self::Light(_) | Self::Material(_) => std::slice::from_ref(self),
+            Self::Shared(list) => list,
+        }
+    }
+
+    /// Returns the emission of a light or material in `scene`; black for other sources.
+    pub(super) fn emission(&self, scene: &Scene) -> [f64; 3] {
+        match self {
+            Self::Light(i) => scene.lights.get(*i).map_or([0.0; 3], emission),
+            Self::Material(name) => scene.materials.get(name).map_or([0.0; 3], Material::emitted),
+            Self::Ambient | Self::Background | Self::Shared(_) => [0.0; 3],
+        }
+    }
 }
 
 /// Light groups of a scene. Groups that are certainly black are left out.
@@ -59,8 +82,9 @@ impl LightGroups {
         if scene.background.color != Color::BLACK {
             members.push(LightGroupSource::Background);
         }
-        let emitting: Vec<usize> =
-            (0..scene.lights.len()).filter(|i| contributes(&scene.lights[*i], lit)).collect();
+        let lights = (0..scene.lights.len()).filter(|i| contributes(&scene.lights[*i], lit));
+        let mut emitting: Vec<_> = lights.map(LightGroupSource::Light).collect();
+        emitting.extend(emissive_materials(scene).into_iter().map(LightGroupSource::Material));
         let pixels = scene.film.size.iter().map(|n| u64::from(*n)).product::<u64>().max(1);
         let max_groups = (FILM_BYTES / (pixels * GROUP_BYTES)) as usize;
         let max_light_groups = max_groups.saturating_sub(members.len()).clamp(1, MAX_LIGHT_GROUPS);
@@ -69,7 +93,7 @@ impl LightGroups {
         } else {
             max_light_groups - 1
         });
-        members.extend(single.iter().map(|i| LightGroupSource::Light(*i)));
+        members.extend_from_slice(single);
         if !shared.is_empty() {
             members.push(LightGroupSource::Shared(shared.to_vec()));
         }
@@ -89,14 +113,36 @@ impl LightGroups {
     /// Returns a triple for each light that emits: its index in the scene, its group, and the
     /// emission that the group's samples contain.
     pub fn lights(&self, scene: &Scene) -> Vec<(usize, usize, [f64; 3])> {
+        let light = |source: &LightGroupSource| match source {
+            LightGroupSource::Light(i) => Some(*i),
+            _ => None,
+        };
+        self.emitting(scene, light)
+    }
+
+    /// Returns a triple for each emissive material: its name, its group, and the emission that the
+    /// group's samples contain.
+    pub fn materials(&self, scene: &Scene) -> Vec<(String, usize, [f64; 3])> {
+        let material = |source: &LightGroupSource| match source {
+            LightGroupSource::Material(name) => Some(name.clone()),
+            _ => None,
+        };
+        self.emitting(scene, material)
+    }
+
+    /// Returns a triple for each light or material to which `select` gives a name: the name, the
+    /// group, and the emission that the group's samples contain.
+    fn emitting<T>(
+        &self,
+        scene: &Scene,
+        select: impl Fn(&LightGroupSource) -> Option<T>,
+    ) -> Vec<(T, usize, [f64; 3])> {
         let mut out = Vec::new();
         for (group, member) in self.members.iter().enumerate() {
-            match member {
-                LightGroupSource::Light(i) => out.push((*i, group, [1.0; 3])),
-                LightGroupSource::Shared(list) => {
-                    out.extend(list.iter().map(|i| (*i, group, emission(&scene.lights[*i]))));
-                }
-                LightGroupSource::Ambient | LightGroupSource::Background => {}
+            let is_shared = matches!(member, LightGroupSource::Shared(_));
+            for source in member.emitting() {
+                let emission = if is_shared { source.emission(scene) } else { [1.0; 3] };
+                out.extend(select(source).map(|name| (name, group, emission)));
             }
         }
         out
@@ -104,12 +150,13 @@ impl LightGroups {
 
     /// Returns the factor for red, green and blue by which the sums of each group are multiplied in
     /// the picture of `scene`. Compared with the compiled scene, `scene` may have other colours,
-    /// intensities and on/off switches of lights, ambient light and background.
+    /// intensities and on/off switches of lights, emission of materials, ambient light and
+    /// background.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         let weight = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => scene.ambient.color.0,
             LightGroupSource::Background => scene.background.color.0,
-            LightGroupSource::Light(i) => scene.lights.get(*i).map_or([0.0; 3], emission),
+            LightGroupSource::Light(_) | LightGroupSource::Material(_) => member.emission(scene),
             LightGroupSource::Shared(_) => [1.0; 3],
         };
         self.members.iter().map(weight).collect()
@@ -124,6 +171,7 @@ impl LightGroups {
                 Some(light) if !light.name.is_empty() => light.name.clone(),
                 _ => format!("light {}", i + 1),
             },
+            LightGroupSource::Material(name) => name.clone(),
             LightGroupSource::Shared(list) => format!("{} lights", list.len()),
         };
         self.members.iter().map(name).collect()
@@ -148,18 +196,28 @@ impl LightGroups {
             }
             Some(distances.light(&DeltaLight::<S>::new(light, origin)?))
         };
-        let range_of_emission = |i: &usize| {
-            let channels = emission(&scene.lights[*i]).into_iter().filter(|s| *s > 0.0);
-            let (low, high) = (channels.clone().reduce(f64::min)?, channels.reduce(f64::max)?);
-            Some(range_of_light(*i)?.times(low, high))
+        let range_of_material = |name: &str| {
+            let has_material = |object: &usize| scene.objects[*object].materials().contains(&name);
+            let objects = (0..scene.objects.len()).filter(has_material);
+            objects.map(|object| distances.object(object)).reduce(RadianceRange::or)
         };
-        let range_of = |member: &LightGroupSource| match member {
+        let range_of_one = |source: &LightGroupSource| match source {
             LightGroupSource::Ambient => Some(distances.ambient()),
             LightGroupSource::Background => Some(distances.background()),
             LightGroupSource::Light(i) => range_of_light(*i),
+            LightGroupSource::Material(name) => range_of_material(name),
+            LightGroupSource::Shared(_) => None,
+        };
+        let range_of_emission = |source: &LightGroupSource| {
+            let channels = source.emission(scene).into_iter().filter(|s| *s > 0.0);
+            let (low, high) = (channels.clone().reduce(f64::min)?, channels.reduce(f64::max)?);
+            Some(range_of_one(source)?.times(low, high))
+        };
+        let range_of = |member: &LightGroupSource| match member {
             LightGroupSource::Shared(list) => {
                 list.iter().filter_map(range_of_emission).reduce(RadianceRange::or)
             }
+            member => range_of_one(member),
         };
         // The largest sample and its square have to be finite in the precision of the samples.
         let (min_exponent, max_exponent) =
@@ -170,6 +228,18 @@ impl LightGroups {
         };
         self.members.iter().map(scale).collect()
     }
+}
+
+/// Returns the names of the materials that emit light and are used, in order of first use.
+pub(super) fn emissive_materials(scene: &Scene) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for name in scene.objects.iter().flat_map(Object::materials) {
+        let emits = scene.materials.get(name).is_some_and(Material::emits);
+        if emits && !names.iter().any(|known| known == name) {
+            names.push(name.to_string());
+        }
+    }
+    names
 }
 
 /// Returns the emission of a light: colour times intensity, black if it is off.
@@ -270,6 +340,64 @@ mod tests {
         assert!(!reusable(|s| s.objects.push(s.objects[0].clone())));
     }
 
+    const GLOWING: &str = "
+        [materials.lamp]
+        emission = 4.0
+        [materials.matt]
+        [[object]]
+        material = \"lamp\"
+        shape.sphere = { center = [0.0, 3.0, 0.0], radius = 1.0 }
+        [[object]]
+        material = \"matt\"
+        shape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }
+    ";
+
+    #[test]
+    fn emission_of_a_material_is_a_group_weight() {
+        let scene = scene(GLOWING);
+        let groups = LightGroups::new(&scene, true, false);
+        assert_eq!(groups.members, [LightGroupSource::Material("lamp".to_string())]);
+        assert_eq!(groups.names(&scene), ["lamp"]);
+        assert_eq!(groups.mix(&scene), [[4.0; 3]]);
+        let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
+        fn lamp(scene: &mut Scene) -> &mut Material {
+            scene.materials.get_mut("lamp").unwrap()
+        }
+        assert!(reusable(|_| ()));
+        assert!(reusable(|s| lamp(s).emission = 7.0));
+        assert!(reusable(|s| lamp(s).emission = 0.0));
+        assert!(reusable(|s| lamp(s).emission_color = Color([1.0, 0.5, 0.0])));
+        assert!(!reusable(|s| lamp(s).diffuse = 0.5));
+        assert!(!reusable(|s| s.materials.get_mut("matt").unwrap().emission = 1.0));
+        assert!(!reusable(|s| s.objects[1].material = "lamp".to_string()));
+        // The group belongs to the name.
+        assert!(!reusable(|s| {
+            let lamp = s.materials.remove("lamp").unwrap();
+            s.materials.insert("bulb".to_string(), lamp);
+            s.objects[0].material = "bulb".to_string();
+        }));
+        let mut dark = scene.clone();
+        lamp(&mut dark).emission = 0.0;
+        assert_eq!(groups.mix(&dark), [[0.0; 3]]);
+        assert!(!LightGroups::new(&dark, true, false).can_reuse(&dark, &scene));
+    }
+
+    #[test]
+    fn lights_and_materials_share_the_last_group() {
+        let light = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
+        let scene = scene(&(light.repeat(MAX_LIGHT_GROUPS) + GLOWING));
+        let groups = LightGroups::new(&scene, true, false);
+        let shared = [
+            LightGroupSource::Light(MAX_LIGHT_GROUPS - 1),
+            LightGroupSource::Material("lamp".to_string()),
+        ];
+        assert_eq!(groups.members.last(), Some(&LightGroupSource::Shared(shared.to_vec())));
+        let emission = groups.materials(&scene);
+        assert_eq!(emission, [("lamp".to_string(), MAX_LIGHT_GROUPS - 1, [4.0; 3])]);
+        let change = |s: &mut Scene| s.materials.get_mut("lamp").unwrap().emission = 3.0;
+        assert!(!can_reuse(&groups, &scene, change));
+    }
+
     #[test]
     fn lights_do_not_matter_without_surfaces_that_return_light() {
         let scene = scene(LIGHTS);
@@ -290,7 +418,7 @@ mod tests {
         let single = MAX_LIGHT_GROUPS - 1;
         assert_eq!(
             groups.members[single],
-            LightGroupSource::Shared((single..single + 3).collect())
+            LightGroupSource::Shared((single..single + 3).map(LightGroupSource::Light).collect())
         );
         assert!(can_reuse(&groups, &scene, |s| s.lights[single - 1].intensity = 3.0));
         assert!(!can_reuse(&groups, &scene, |s| s.lights[single].intensity = 3.0));

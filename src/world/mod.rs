@@ -12,6 +12,7 @@ mod pixel_block;
 mod precision;
 mod radiance_range;
 mod reuse;
+mod surface_emission;
 mod tile_tracer;
 mod truncation_bias;
 #[allow(clippy::module_inception, reason = "the file of `World`, in the folder of the same name")]

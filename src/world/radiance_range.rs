@@ -282,11 +282,40 @@ impl<'a> SceneDistances<'a> {
 
     /// Range of an emitter of unit intensity.
     pub fn emitter<S: Float>(&self, emitter: &Emitter<S>, visible: bool) -> RadianceRange {
-        let (center, radius) = (emitter.center(), emitter.radius());
-        let emitted = emitter.radiance().to_f64();
+        let ball = (emitter.center(), emitter.radius());
+        self.emitting_surface(ball, emitter.area(), emitter.radiance().to_f64(), visible)
+    }
+
+    /// Range of the emission of an object of unit radiance. The area of its bounding sphere stands
+    /// for its own.
+    pub fn object(&self, index: usize) -> RadianceRange {
+        match self.forms[index].bounds() {
+            Some((low, high)) => {
+                let (center, radius) = (0.5 * (low + high), 0.5 * low.distance(high));
+                self.emitting_surface((center, radius), 4.0 * PI * radius * radius, 1.0, true)
+            }
+            // The light of an infinite plane is the same everywhere.
+            None => {
+                let all = self.responses.iter().flatten().copied().reduce(Response::or);
+                let Response { least, most, peak } =
+                    all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 });
+                self.range_of(1.0, (least, most.max(1.0), peak.max(1.0)))
+            }
+        }
+    }
+
+    /// Range of the light of a surface with the radiance `emitted` in the ball with the given centre
+    /// and radius.
+    fn emitting_surface(
+        &self,
+        (center, radius): (DVec3, f64),
+        area: f64,
+        emitted: f64,
+        visible: bool,
+    ) -> RadianceRange {
         // Radiance of a white surface that faces the emitter at a distance from its centre.
         let radiance_at = |distance: f64| {
-            emitted * (emitter.area() / (PI * distance * distance).max(f64::MIN_POSITIVE)).min(1.0)
+            emitted * (area / (PI * distance * distance).max(f64::MIN_POSITIVE)).min(1.0)
         };
         let typical = radiance_at(center.length().max(self.radius));
         let (mut dimmest, mut brightest, mut extreme) = (f64::INFINITY, 0.0f64, 0.0f64);

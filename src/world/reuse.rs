@@ -9,14 +9,14 @@ use crate::material::Material;
 use crate::scene::{FilmSettings, Object, Scene};
 use crate::shape::Shape;
 use crate::value::Color;
-use crate::world::light_groups::{LightGroupSource, LightGroups, contributes, emission};
+use crate::world::light_groups::{LightGroupSource, LightGroups, contributes};
 use std::borrow::Cow;
 
 impl LightGroups {
     /// Returns `true` if the samples of the scene `compiled` are valid for `scene` after a change
     /// of the group weights. These groups are those of `compiled`. The scenes may differ in the
-    /// emission of lights, ambient light and background that have groups of their own, in names, in
-    /// unused materials, and in the cap on rays per pixel.
+    /// emission of lights, materials, ambient light and background that have groups of their own, in
+    /// names, in unused materials, and in the cap on rays per pixel.
     pub fn can_reuse(&self, compiled: &Scene, scene: &Scene) -> bool {
         let Scene {
             film,
@@ -42,7 +42,7 @@ impl LightGroups {
                 .objects
                 .iter()
                 .zip(objects)
-                .all(|(a, b)| same_object((compiled, a), (scene, b)))
+                .all(|(a, b)| self.same_object((compiled, a), (scene, b)))
             && self.can_relight(compiled, scene)
     }
 
@@ -52,10 +52,9 @@ impl LightGroups {
         let is_compiled = |i: usize| {
             let contains = |source: &LightGroupSource| match source {
                 LightGroupSource::Light(light) => *light == i,
-                LightGroupSource::Shared(list) => list.contains(&i),
-                LightGroupSource::Ambient | LightGroupSource::Background => false,
+                _ => false,
             };
-            self.members.iter().any(contains)
+            self.members.iter().flat_map(LightGroupSource::emitting).any(contains)
         };
         let same_but_emission = |i: usize, light: &Light| {
             with_unit_emission(&compiled.lights[i]) == with_unit_emission(light)
@@ -63,16 +62,49 @@ impl LightGroups {
         let mut emitting =
             scene.lights.iter().enumerate().filter(|(_, light)| contributes(light, self.lit));
         let same_emission_if_shared = |source: &LightGroupSource| match source {
-            LightGroupSource::Shared(list) => list.iter().all(|i| {
-                scene.lights.get(*i).is_some_and(|l| emission(l) == emission(&compiled.lights[*i]))
-            }),
-            LightGroupSource::Ambient
-            | LightGroupSource::Background
-            | LightGroupSource::Light(_) => true,
+            LightGroupSource::Shared(list) => {
+                list.iter().all(|source| source.emission(scene) == source.emission(compiled))
+            }
+            _ => true,
         };
         emitting.all(|(i, light)| is_compiled(i) && same_but_emission(i, light))
             && self.members.iter().all(same_emission_if_shared)
     }
+
+    /// Returns `true` if two objects of two scenes are equal except for their names, the names of
+    /// their materials, and the emission of materials that have a group.
+    fn same_object(&self, (compiled, a): (&Scene, &Object), (scene, b): (&Scene, &Object)) -> bool {
+        let Object { name: _, material: _, shape, transform } = b;
+        let names = a.materials().into_iter().zip(b.materials());
+        *transform == a.transform
+            && *unnamed(shape) == *unnamed(&a.shape)
+            && a.materials().len() == b.materials().len()
+            && names.into_iter().all(|(a, b)| self.same_material((compiled, a), (scene, b)))
+    }
+
+    /// Returns `true` if two materials are equal except for the emission that a group scales. Such a
+    /// group belongs to the name of the material.
+    fn same_material(
+        &self,
+        (compiled, name_a): (&Scene, &str),
+        (scene, name_b): (&Scene, &str),
+    ) -> bool {
+        let (a, b) = (material(compiled, name_a), material(scene, name_b));
+        let is_a = |source: &LightGroupSource| match source {
+            LightGroupSource::Material(name) => name == name_a,
+            _ => false,
+        };
+        if self.members.iter().flat_map(LightGroupSource::emitting).any(is_a) {
+            name_a == name_b && without_emission(&a) == without_emission(&b)
+        } else {
+            !b.emits() && without_emission(&a) == without_emission(&b)
+        }
+    }
+}
+
+/// Returns a copy of the material that emits nothing.
+fn without_emission(material: &Material) -> Material {
+    Material { emission: 0.0, emission_color: Color::WHITE, ..material.clone() }
 }
 
 /// Returns a copy of the settings with the cap on rays per pixel set to 0.
@@ -86,15 +118,6 @@ fn with_unit_emission(light: &Light) -> Light {
     Light { name: String::new(), color: Color::WHITE, intensity: 1.0, on: true, ..light.clone() }
 }
 
-/// Returns `true` if two objects of two scenes are equal except for their names and the names of
-/// their materials.
-fn same_object((scene_a, a): (&Scene, &Object), (scene_b, b): (&Scene, &Object)) -> bool {
-    let Object { name: _, material: _, shape, transform } = b;
-    *transform == a.transform
-        && *unnamed(shape) == *unnamed(&a.shape)
-        && materials(scene_b, b).eq(materials(scene_a, a))
-}
-
 /// Returns a copy of the shape in which the parts name no materials.
 fn unnamed(shape: &Shape) -> Cow<'_, Shape> {
     if shape.named_materials().is_empty() {
@@ -105,10 +128,10 @@ fn unnamed(shape: &Shape) -> Cow<'_, Shape> {
     Cow::Owned(shape)
 }
 
-/// Returns the material of each part of an object.
-fn materials<'a>(scene: &'a Scene, object: &'a Object) -> impl Iterator<Item = Cow<'a, Material>> {
-    object.materials().into_iter().map(|name| match scene.materials.get(name) {
+/// Returns the material `name` of a scene.
+fn material<'a>(scene: &'a Scene, name: &str) -> Cow<'a, Material> {
+    match scene.materials.get(name) {
         Some(material) => Cow::Borrowed(material),
         None => Cow::Owned(Material::default()),
-    })
+    }
 }

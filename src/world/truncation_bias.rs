@@ -3,6 +3,7 @@
 
 use crate::material::{Fresnel, Material, Texture};
 use crate::scene::{Object, RayTypes, Scene};
+use crate::world::surface_emission::is_sampled;
 use glam::DVec3;
 
 /// Returns the largest share of light that a material reflects and transmits together, over all
@@ -169,6 +170,9 @@ impl Reach {
 /// most this total times the radiance of the brightest surface, light with a size, or background. Nothing is truncated only if no surface reflects or transmits, or if the only one
 /// that does is flat or convex, which a path hits once.
 ///
+/// The emission of some objects is found only by rays that hit them: matt surfaces lack their light if
+/// there are no diffuse bounces.
+///
 /// With diffuse bounces the factor of a surface includes its diffuse albedo. A path is cut off by
 /// `max_depth` after at least as many surfaces, by `max_diffuse_depth` after one surface more than
 /// bounces, and by `caustics = false` after two. Without diffuse bounces, ambient light stands for
@@ -206,6 +210,26 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
         };
         let ended = ended * reach.from(0);
         out.push(format!("min_throughput {least} cuts weaker paths ({})", bound(ended)));
+    }
+    if bounces == 0 {
+        let default = Material::default();
+        let material = |name: &str| scene.materials.get(name).unwrap_or(&default);
+        let is_found_by_rays_alone = |object: &Object| {
+            object.materials().into_iter().any(|name| material(name).emits())
+                && !is_sampled(&object.form())
+        };
+        let albedo = |object: &Object| {
+            let albedo = |name| max_diffuse_albedo(material(name), object);
+            object.materials().into_iter().map(albedo).fold(0.0, f64::max)
+        };
+        let matt = scene.objects.iter().map(albedo).fold(0.0, f64::max);
+        if matt > 0.0 && scene.objects.iter().any(is_found_by_rays_alone) {
+            out.push(format!(
+                "max_diffuse_depth 0 leaves out the light of emissive objects without sampled \
+                 points on matt surfaces ({})",
+                bound(matt * specular.from(0))
+            ));
+        }
     }
     if bounces > 0 {
         let cut = reach.from(bounces + 1);
@@ -333,6 +357,28 @@ mod tests {
         let trace =
             crate::scene::IntegratorSettings { max_diffuse_depth: 1, ..alone.trace.clone() };
         assert_eq!(truncation_bounds(&Scene { trace, ..alone }), [""; 0], "it does not see itself");
+    }
+
+    #[test]
+    fn light_that_only_rays_find_is_left_out_without_diffuse_bounces() {
+        let torus =
+            "torus = { center = [0.0, 1.0, 0.0], axis = [0.0, 1.0, 0.0], ring = 1.0, tube = 0.2 }";
+        let with = |shape: &str| {
+            let mut scene = scene("[0.0, 0.0, 5.0]", &[(0.0, shape), (0.0, FLOOR)]);
+            let lamp = scene.materials.get_mut("m0").unwrap();
+            (lamp.emission, lamp.diffuse) = (3.0, 0.0);
+            scene
+        };
+        assert_eq!(truncation_bounds(&with(BALL)), [""; 0]);
+        // The albedo of the floor is 0.8.
+        let told = truncation_bounds(&with(torus)).concat();
+        assert!(told.contains("emissive objects") && told.contains("at most 8.00e-1 of"), "{told}");
+        let mut bouncing = with(torus);
+        bouncing.trace.max_diffuse_depth = 1;
+        assert!(!truncation_bounds(&bouncing).concat().contains("emissive"));
+        let mut black = with(torus);
+        black.materials.get_mut("m1").unwrap().diffuse = 0.0;
+        assert_eq!(truncation_bounds(&black), [""; 0]);
     }
 
     #[test]

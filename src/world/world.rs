@@ -19,6 +19,7 @@ use crate::world::integrator::transmission::TransmissionIntegrator;
 use crate::world::inventory::Inventory;
 use crate::world::light_groups::LightGroups;
 use crate::world::lights_on_surfaces::OnSurface;
+use crate::world::surface_emission::SurfaceEmission;
 use crate::world::tile_tracer::CameraTracer;
 
 /// A light of the world, with its light group. `T` is the compiled light, `S` the type of numbers.
@@ -41,6 +42,13 @@ impl<T, S: Float> LightSource<T, S> {
             Some(emission) => value.component_mul(Vec3::splat(emission)),
             None => value,
         }
+    }
+
+    /// The same source with `light` in place of its light.
+    #[inline(always)]
+    pub fn with_light<U>(&self, light: U) -> LightSource<U, S> {
+        let Self { group, emission, visible, .. } = *self;
+        LightSource { light, group, emission, visible }
     }
 }
 
@@ -73,6 +81,8 @@ pub struct World<L: SimdFloat> {
     pub(super) emitters: Vec<EmitterSource<L::Scalar>>,
     /// Environment lights.
     pub(super) environments: Vec<EnvironmentSource<L::Scalar>>,
+    /// Emission of objects.
+    pub(super) emission: SurfaceEmission<L::Scalar>,
     /// Light group of ambient light. `None` if no surface reflects ambient light.
     pub(super) ambient: Option<usize>,
     /// Light group of the background. `None` if the background is black.
@@ -157,14 +167,14 @@ impl<L: SimdFloat> World<L> {
         origin: [usize; 2],
         extent: [usize; 2],
     ) -> Option<TileCandidates> {
-        let lights = self.sources.len() + self.emitters.len();
+        let lights = self.sources.len() + self.emitters.len() + self.emission.counts()[0];
         self.culling.candidates(&self.geometry, lights, &self.camera, (origin, extent))
     }
 
-    /// Returns `true` if the world has emitters or environment lights.
+    /// Returns `true` if the world has emitters, environment lights or emissive objects.
     #[inline(always)]
     pub(super) fn has_emitters(&self) -> bool {
-        !self.emitters.is_empty() || !self.environments.is_empty()
+        !self.emitters.is_empty() || !self.environments.is_empty() || !self.emission.is_empty()
     }
 
     /// Returns `true` if the samples of a tile with these candidates are certainly black: no

@@ -70,6 +70,11 @@ impl Leaf {
         Spot { leaf: self, facet, point, normal: self.own_normal(outer) }
     }
 
+    /// Transform from the coordinates of the leaf's description to the scene's.
+    pub fn scene_from_own(&self) -> DAffine3 {
+        self.own_from_scene.inverse()
+    }
+
     /// Converts a normal of the scene to the coordinates of the leaf's description.
     pub fn own_normal(&self, normal: DVec3) -> DVec3 {
         (self.scene_from_own_normals.inverse() * normal).normalize()
@@ -119,6 +124,11 @@ impl Body {
             }
         }
         nearest
+    }
+
+    /// The leaf of a body that is no compound.
+    pub fn simple(&self) -> Option<&Leaf> {
+        matches!(self.tree, Tree::Leaf(_)).then(|| &self.leaves[0])
     }
 
     /// Returns `true` for a mesh, which has no defined inside.

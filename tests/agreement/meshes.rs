@@ -103,6 +103,11 @@ impl Triangles {
         [(b, c), (c, a), (a, b)].map(|(a, b)| area(a, b) / normal.length_squared())
     }
 
+    /// Corners of all triangles.
+    pub fn corners(&self) -> impl Iterator<Item = [DVec3; 3]> {
+        self.corners.iter().copied()
+    }
+
     /// Returns `true` if the file has texture coordinates.
     pub fn has_uv(&self) -> bool {
         !self.uvs.is_empty()

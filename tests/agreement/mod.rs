@@ -5,6 +5,7 @@
 pub(crate) mod answers;
 pub(crate) mod compare;
 pub(crate) mod compounds;
+pub(crate) mod emission;
 pub(crate) mod lamps;
 pub(crate) mod meshes;
 pub(crate) mod paint;
@@ -28,7 +29,7 @@ const REFERENCE_SAMPLES: u32 = 96;
 const SAMPLES: u32 = 512;
 
 /// Scenes that must be compared.
-const GALLERY: [&str; 16] = [
+const GALLERY: [&str; 17] = [
     "mirror-room.toml",
     "gallery-triptych.toml",
     "gallery-metals.toml",
@@ -45,6 +46,7 @@ const GALLERY: [&str; 16] = [
     "rectangle-light.toml",
     "disk-light.toml",
     "environment.toml",
+    "emissive-objects.toml",
 ];
 
 #[test]
@@ -122,6 +124,7 @@ fn deliberate_errors_are_detected() {
         (Mutation::NoLampCosine, "disk-light.toml"),
         (Mutation::LampSeenTwice, "rectangle-light.toml"),
         (Mutation::NoSky, "environment.toml"),
+        (Mutation::NoEmissionCosine, "emissive-objects.toml"),
     ] {
         check_detection(mutation, name, &scene(name), 8 * REFERENCE_SAMPLES);
     }

@@ -2,6 +2,7 @@
 
 use crate::agreement::answers::{highlight, reflect, wide_lobe};
 use crate::agreement::compounds::Body;
+use crate::agreement::emission::Shine;
 use crate::agreement::lamps::Lamp;
 use crate::agreement::meshes;
 use crate::agreement::paint::Pixels;
@@ -54,6 +55,8 @@ pub enum Mutation {
     HalfAbsorption,
     /// The cosine at the surface of a lamp is omitted.
     NoLampCosine,
+    /// The cosine at the surface of an emissive object is omitted.
+    NoEmissionCosine,
     /// Rays that miss all surfaces do not see environments.
     NoSky,
     /// Reflected rays see lamps whose light in the lobe was found at points of the lamp, too, as
@@ -67,6 +70,8 @@ pub struct Tracer<'a> {
     pub bodies: Vec<Body>,
     /// Lamp of each light of the scene; `None` for a light without a size.
     lamps: Vec<Option<Lamp>>,
+    /// Emissive surface of each body; `None` for a body of which no points are sampled.
+    shines: Vec<Option<Shine>>,
     /// Images by file name.
     pub images: HashMap<String, Pixels>,
     plain: Material,
@@ -105,7 +110,8 @@ impl<'a> Tracer<'a> {
         let bodies = scene.objects.iter().map(Body::new).collect::<Result<Vec<_>, _>>()?;
         let (images, plain) = (HashMap::new(), Material::default());
         let lamps = scene.lights.iter().map(Lamp::new).collect();
-        let mut tracer = Self { scene, bodies, lamps, images, plain, mutation };
+        let shines = bodies.iter().map(Shine::new).collect();
+        let mut tracer = Self { scene, bodies, lamps, shines, images, plain, mutation };
         if scene.lights.iter().any(|l| l.environment.as_ref().is_some_and(|e| e.file().is_some())) {
             return Err("an image around the scene".to_string());
         }
@@ -117,6 +123,10 @@ impl<'a> Tracer<'a> {
             if tracer.material(&body.leaves[0].material).transmission > 0.0 {
                 return Err("a mesh that lets light through".to_string());
             }
+        }
+        let no_shadows = scene.trace.ray_types == RayTypes::Primary;
+        if no_shadows && scene.materials.values().any(Material::emits) {
+            return Err("emission without shadows".to_string());
         }
         Ok(tracer)
     }
@@ -173,15 +183,21 @@ impl<'a> Tracer<'a> {
                 radiance += weight * self.glow(origin, direction, end);
             }
             weight *= self.transmittance(origin, hit.as_ref().map(|hit| hit.point), direction);
+            let mut own = DVec3::ZERO;
             let Some(hit) = hit else {
                 let sky = if sees_sky { self.sky(direction) } else { DVec3::ZERO };
                 return radiance + weight * (sky + DVec3::from(self.scene.background.color.0));
             };
+            // After a diffuse bounce: the direct light has the bodies of which points are sampled.
+            if !hit.bare && (sees_sky || self.shines[hit.body].is_none()) {
+                own = DVec3::from(hit.material.emitted());
+            }
             (sees_lamps, sees_sky) = (true, true);
             let through = trace.ray_types == RayTypes::Full && hit.material.transmission > 0.0;
             if through && trace.max_depth > 0 {
                 let way = self.through(&hit, direction, numbers);
                 if matches!(way, Way::On(_)) && !hit.bare {
+                    radiance += weight * own;
                     radiance += weight * self.lit(&hit, -direction, diffuse, numbers);
                 }
                 let next = match way {
@@ -198,6 +214,7 @@ impl<'a> Tracer<'a> {
             if hit.bare {
                 return radiance;
             }
+            radiance += weight * own;
             radiance += weight * self.lit(&hit, -direction, diffuse, numbers);
             let reflects = hit.material.reflection > 0.0 && trace.ray_types == RayTypes::Full;
             if !reflects || bounce == max_depth {
@@ -427,6 +444,29 @@ impl<'a> Tracer<'a> {
             }
             sum += irradiance * (color * (m.diffuse * cos / PI) + shine);
         }
+        for (body, shine) in self.bodies.iter().zip(&self.shines) {
+            let material = self.material(&body.leaves[0].material);
+            let Some(shine) = shine.as_ref().filter(|_| material.emits()) else { continue };
+            let (point, normal, area) = shine.point(numbers);
+            let distance = point.distance(hit.point);
+            let towards = (point - hit.point) / distance;
+            let mut cos_there = -normal.dot(towards);
+            if material.two_sided {
+                cos_there = cos_there.abs();
+            }
+            let cos = hit.seen.dot(towards);
+            let behind = cos <= 0.0 || hit.normal.dot(towards) <= 0.0 || cos_there <= 0.0;
+            if behind || self.in_shadow(hit.point, towards, distance * (1.0 - 1e-9)) {
+                continue;
+            }
+            if self.mutation == Mutation::NoEmissionCosine {
+                cos_there = 1.0;
+            }
+            let irradiance =
+                DVec3::from(material.emitted()) * (area * cos_there / (distance * distance));
+            let highlight = highlight(m, hit.seen, view, towards);
+            sum += irradiance * (color * (m.diffuse * cos / PI) + highlight);
+        }
         sum
     }
 
@@ -489,7 +529,7 @@ fn spot_factor(spot: &Spot, along: DVec3, mutation: Mutation) -> f64 {
 }
 
 /// Material keys that this tracer supports.
-const KNOWN: [&str; 21] = [
+const KNOWN: [&str; 23] = [
     "color",
     "ambient",
     "diffuse",
@@ -508,6 +548,8 @@ const KNOWN: [&str; 21] = [
     "fresnel",
     "f0",
     "metal",
+    "emission",
+    "emission_color",
     "two_sided",
     "texture",
     "bump",

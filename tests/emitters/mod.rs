@@ -3,4 +3,5 @@
 mod forms;
 mod irradiance;
 mod mirrors;
+mod objects;
 mod setup;

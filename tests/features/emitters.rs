@@ -88,3 +88,19 @@ fn d9_environment() {
     bouncing.trace.max_diffuse_depth = 2;
     agrees(&bouncing, &bouncing, 128).unwrap_or_else(|e| panic!("two diffuse bounces: {e}"));
 }
+
+#[test]
+fn d10_emissive_objects() {
+    alike(
+        "emissive-objects.toml",
+        &[
+            ("a dark ball", &|s| material(s, "ball").emission = 0.0),
+            ("a dark box", &|s| material(s, "box").emission = 0.0),
+            ("a dark crystal", &|s| material(s, "crystal").emission = 0.0),
+            ("a dark ring", &|s| material(s, "ring").emission = 0.0),
+            ("a brighter sign", &|s| material(s, "sign").emission *= 1.2),
+            ("a sign with two sides", &|s| material(s, "sign").two_sided = true),
+            ("no bounce that finds the ring", &|s| s.trace.max_diffuse_depth = 0),
+        ],
+    );
+}

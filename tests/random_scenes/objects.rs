@@ -10,7 +10,7 @@ use zerkalo::asset::Assets;
 use zerkalo::material::{self, Material};
 use zerkalo::scene::{AssetResolver, Object, Rotate, Scale, Scene, TransformOp};
 use zerkalo::shape::{CsgOperand, KINDS, Shape};
-use zerkalo::value::{Field, ValueType};
+use zerkalo::value::{Color, Field, ValueType};
 
 /// Mesh files; the empty name is the built-in icosahedron.
 const MESHES: &[&str] = &[
@@ -87,10 +87,12 @@ pub enum Finish {
     Glowing,
 }
 
-/// Random material without validation errors.
+/// Random material without validation errors. It emits nothing: see [`emission`].
 pub fn material(numbers: &mut Numbers, finish: Finish) -> Material {
+    let emits_nothing = |field: &&Field| !field.name.starts_with("emission");
+    let fields: Vec<Field> = material::FIELDS.iter().filter(emits_nothing).copied().collect();
     loop {
-        let mut keys = table(numbers, material::FIELDS, 0.3, &material_key);
+        let mut keys = table(numbers, &fields, 0.3, &material_key);
         let mut set = |key: &str, value| keys.insert(key.to_string(), value);
         match finish {
             Finish::Any => {}
@@ -116,6 +118,12 @@ pub fn material(numbers: &mut Numbers, finish: Finish) -> Material {
             return material;
         }
     }
+}
+
+/// Random emission: of most materials 0.
+pub fn emission(numbers: &mut Numbers) -> (f64, Color) {
+    let color = pick(numbers, &[Color::WHITE, Color([1.0, 0.6, 0.2]), Color([0.0, 0.0, 1.0])]);
+    (if chance(numbers, 1, 6) { log(numbers, 0.1, 30.0) } else { 0.0 }, color)
 }
 
 fn keys_of(kind: &Field) -> &'static [Field] {

@@ -2,7 +2,7 @@
 
 use crate::common::Numbers;
 use crate::random_scenes::layouts::Layout;
-use crate::random_scenes::objects::{Stock, library, material, resolved};
+use crate::random_scenes::objects::{Stock, emission, library, material, resolved};
 use crate::random_scenes::words::{KeyValue, chance, direction, log, pick, table};
 use glam::DVec3;
 use std::collections::BTreeMap;
@@ -113,7 +113,17 @@ fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
         // A shape may lack the texture coordinates of its texture.
         scene.materials.values_mut().for_each(|m| (m.texture, m.bump) = (None, None));
     }
-    scene.faults().is_empty().then_some(scene)
+    if !scene.faults().is_empty() {
+        return None;
+    }
+    // Points alone find the highlights of emissive objects: sharp ones are few bright samples, whose
+    // error is reported too low.
+    if scene.materials.values().all(|material| material.specular == 0.0) {
+        for material in scene.materials.values_mut() {
+            (material.emission, material.emission_color) = emission(numbers);
+        }
+    }
+    Some(scene)
 }
 
 fn film_size(numbers: &mut Numbers, layout: Layout) -> [u32; 2] {

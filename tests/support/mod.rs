@@ -99,7 +99,7 @@ pub fn accelerated(
 }
 
 /// Removes all random choices from a scene: anti-aliasing, the lens, blurred lobes, lights with a size,
-/// diffuse bounces, and the choice between reflection and refraction, which begins behind the second
+/// emission, diffuse bounces, and the choice between reflection and refraction, which begins behind the second
 /// transmitting surface.
 pub fn without_chance(scene: &mut Scene) {
     scene.film.filter = Filter::Point;
@@ -112,7 +112,7 @@ pub fn without_chance(scene: &mut Scene) {
             && light.environment.is_none()
     });
     for material in scene.materials.values_mut() {
-        (material.roughness, material.alpha) = (0.0, None);
+        (material.roughness, material.alpha, material.emission) = (0.0, None, 0.0);
         if material.transmission > 0.0 {
             scene.trace.max_depth = scene.trace.max_depth.min(2);
         }

@@ -4,9 +4,12 @@
 //! Two samples find the light that a glossy lobe reflects: a point of the emitter, and the
 //! direction of the reflected ray. Each is weighted by the power heuristic with exponent 2. Matt
 //! surfaces and highlights of lights use the point alone, mirrors and the camera the ray alone.
+//!
+//! Objects that emit light are emitters, too. Rays find the emission of an object where they hit it,
+//! so that its shape may be any; where no points of the shape can be sampled, the rays find all of it.
 
-use crate::bvh::Ray;
-use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::bvh::{Hit, Ray};
+use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
 use crate::material::ReflectionLobe;
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
@@ -58,6 +61,32 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
     }
 }
 
+/// Adds the radiance that the surfaces themselves emit. `hit` is the hits of `path`.
+#[inline(never)]
+pub(crate) fn surface_emission<L: SimdFloat>(
+    world: &World<L>,
+    path: &Path<L>,
+    hit: &Hit<L>,
+    interaction: &SurfaceInteraction<L>,
+    out: &mut Radiance<L>,
+) {
+    let mut remaining = interaction.has_bsdf;
+    while let Some((item, lanes)) = next_distinct(interaction.item, remaining) {
+        remaining = remaining.and_not(lanes);
+        let Some(source) = world.emission.of_item(item) else { continue };
+        let mut radiance = path.throughput;
+        if let Some(light) = &source.light
+            && path.lobe_density.lt(L::from_f64(L::MAX)).any()
+        {
+            let triangle = world.geometry.is_mesh(item).then_some(hit.triangle);
+            let ray = (path.ray.origin, path.ray.direction);
+            let density = light.density(ray, hit.t, triangle);
+            radiance = radiance * power_heuristic(path.lobe_density, density);
+        }
+        out.groups[source.group] += source.emitted(radiance).masked(lanes);
+    }
+}
+
 /// Reflection lobes in the direction of an emitter.
 pub(crate) struct ReflectingLobes<L: SimdFloat> {
     /// Lanes whose reflected rays the integrator follows.
@@ -97,8 +126,16 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
     let origin = interaction.ray_origin();
     let view = -path.ray.direction;
     let occluders = &candidates.occluders[world.sources.len()..];
-    for (index, (source, occluders)) in world.emitters.iter().zip(occluders).enumerate() {
-        let light = source.light.sample(origin, sampler.light_2d(bounce, index as u32));
+    for (index, occluders) in occluders.iter().enumerate() {
+        let numbers = sampler.light_2d(bounce, index as u32);
+        let source = match world.emitters.get(index) {
+            Some(source) => source.with_light(source.light.sample(origin, numbers)),
+            None => match world.emission.sampled(index - world.emitters.len()) {
+                Some((light, source)) => source.with_light(light.sample(origin, numbers)),
+                None => break,
+            },
+        };
+        let light = &source.light;
         let arrives = light.irradiance.gt(L::zero());
         let arrives = arrives & interaction.geometric.dot(light.wi).gt(L::zero());
         let cos_light = interaction.normal.dot(light.wi);

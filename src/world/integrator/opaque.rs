@@ -8,7 +8,7 @@ use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::direct_lighting::direct_lighting;
 use crate::world::integrator::emitter_lighting::{
-    ReflectingLobes, emitter_lighting, reflected_density, visible_emitters,
+    ReflectingLobes, emitter_lighting, reflected_density, surface_emission, visible_emitters,
 };
 use crate::world::integrator::indirect_diffuse::DiffuseReservoir;
 use crate::world::integrator::interaction::{SurfaceInteraction, interact};
@@ -51,6 +51,9 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
         let Some(interaction) = interact::<_, SIMPLE>(world, &path.ray, &hit, active) else {
             return counts;
         };
+        if EMITTERS && !world.emission.is_empty() {
+            surface_emission(world, &path, &hit, &interaction, out);
+        }
         let mut bouncing = None;
         if EMITTERS && let Some(reservoir) = &mut reservoir {
             let media = (&MediumStack::vacuum(), None);

@@ -9,7 +9,7 @@ use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState, Contacts};
 use crate::world::integrator::direct_lighting::direct_lighting;
 use crate::world::integrator::emitter_lighting::{
-    ReflectingLobes, emitter_lighting, reflected_density, visible_emitters,
+    ReflectingLobes, emitter_lighting, reflected_density, surface_emission, visible_emitters,
 };
 use crate::world::integrator::indirect_diffuse::{DiffuseReservoir, PathStart};
 use crate::world::integrator::interaction::{SurfaceInteraction, interact};
@@ -171,6 +171,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let interface_hit = self.interface_hit(&interaction, lanes, &media);
         if let Some(interface_hit) = &interface_hit {
             interaction.mask_out(interface_hit.suppressed);
+        }
+        if has_emitters && !world.emission.is_empty() {
+            surface_emission(world, &path, &hit, &interaction, out);
         }
         let bouncing = reservoir.map(|reservoir| {
             let coincident = coincident.as_ref().map(CoincidentState::reversed);

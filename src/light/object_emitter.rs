@@ -1,0 +1,542 @@
+//! Emission of objects: points of their surfaces sampled by solid angle or area, and densities. Rays
+//! find the emission where they hit the object itself.
+//!
+//! A sampled point is lifted off the surface to the side of the receiver, so that the object does not
+//! occlude its own points. The lift is along the normal: at any angle the point is above the
+//! rounding errors of the surface.
+
+use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3};
+use crate::light::EmitterSample;
+use crate::light::emitter::{
+    Cone, MIN_SOLID_ANGLE, SphericalRectangle, density_of_area, local_of, towards,
+};
+use crate::sampling::warp;
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// Surface of an object, from which light can be sampled.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ObjectSurface {
+    /// Sphere.
+    Sphere {
+        /// Centre.
+        center: DVec3,
+        /// Radius.
+        radius: f64,
+    },
+    /// Rectangle.
+    Rectangle {
+        /// Centre.
+        center: DVec3,
+        /// Unit vectors across, up, and along the normal of the front.
+        axes: [DVec3; 3],
+        /// Width and height.
+        size: [f64; 2],
+    },
+    /// Triangles, with counter-clockwise corners seen from the front. Each has an area.
+    Triangles(Vec<[DVec3; 3]>),
+}
+
+/// Emission of an object, white and of unit radiance.
+#[derive(Clone, Debug)]
+pub struct ObjectEmitter<S> {
+    surface: CompiledSurface<S>,
+    /// Centre of a ball that contains the surface and the lifted points.
+    center: DVec3,
+    /// Radius of the ball.
+    radius: f64,
+    /// Height of sampled points above the surface.
+    lift: S,
+    /// `true` if the back emits too: of a flat surface the other side, of a solid the inside.
+    two_sided: bool,
+}
+
+#[derive(Clone, Debug)]
+enum CompiledSurface<S> {
+    Sphere {
+        center: [S; 3],
+        radius: S,
+    },
+    Rectangle {
+        center: [S; 3],
+        axes: [[S; 3]; 3],
+        size: [S; 2],
+    },
+    /// Triangles, in the order of their `end`.
+    Triangles(Vec<Triangle<S>>),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Triangle<S> {
+    corner: [S; 3],
+    /// Edges from the corner to the two others.
+    edges: [[S; 3]; 2],
+    /// Unit normal of the front.
+    normal: [S; 3],
+    area: S,
+    /// Range of the random numbers that choose the triangle; its length is the share of the area.
+    start: S,
+    end: S,
+}
+
+impl<S: Float> ObjectEmitter<S> {
+    /// Compiles a surface with coordinates relative to the scene's centre. `lift` is the height of
+    /// sampled points above the surface; at most 1e-4 of the surface's size is used. Returns `None`
+    /// if the surface has no area.
+    pub fn new(surface: &ObjectSurface, two_sided: bool, lift: f64) -> Option<Self> {
+        let vector = |v: DVec3| v.to_array().map(S::from_f64);
+        let (compiled, center, radius, area, size);
+        match surface {
+            ObjectSurface::Sphere { center: middle, radius: r } => {
+                (center, radius, area, size) = (*middle, *r, 4.0 * PI * r * r, *r);
+                compiled =
+                    CompiledSurface::Sphere { center: vector(*middle), radius: S::from_f64(*r) };
+            }
+            ObjectSurface::Rectangle { center: middle, axes, size: [width, height] } => {
+                (center, radius) = (*middle, 0.5 * width.hypot(*height));
+                (area, size) = (width * height, width.min(*height));
+                compiled = CompiledSurface::Rectangle {
+                    center: vector(*middle),
+                    axes: axes.map(vector),
+                    size: [*width, *height].map(S::from_f64),
+                };
+            }
+            ObjectSurface::Triangles(triangles) => {
+                let corners = || triangles.iter().flatten().copied();
+                let low = corners().fold(DVec3::INFINITY, DVec3::min);
+                let high = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
+                center = 0.5 * (low + high);
+                radius = corners().map(|corner| corner.distance(center)).fold(0.0, f64::max);
+                let normal = |[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a);
+                let areas = || triangles.iter().map(|corners| 0.5 * normal(corners).length());
+                area = areas().sum::<f64>();
+                size = area.sqrt();
+                let mut end = 0.0;
+                let compile = |(corners, own_area): (&[DVec3; 3], f64)| {
+                    let start = end;
+                    end += own_area / area;
+                    let [a, b, c] = *corners;
+                    Triangle {
+                        corner: vector(a),
+                        edges: [b - a, c - a].map(vector),
+                        normal: vector(normal(corners).normalize_or(DVec3::Z)),
+                        area: S::from_f64(own_area),
+                        start: S::from_f64(start),
+                        end: S::from_f64(end),
+                    }
+                };
+                let triangles = triangles.iter().zip(areas()).map(compile).collect();
+                compiled = CompiledSurface::Triangles(triangles);
+            }
+        }
+        let lift = lift.min(1e-4 * size);
+        let exists = area > 0.0 && area.is_finite() && radius.is_finite();
+        exists.then(|| Self {
+            surface: compiled,
+            center,
+            radius: radius + lift,
+            lift: S::from_f64(lift),
+            two_sided,
+        })
+    }
+
+    /// Centre, in coordinates relative to the scene's centre.
+    pub fn center(&self) -> DVec3 {
+        self.center
+    }
+
+    /// Radius of a ball around the centre that contains all sampled points.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Samples a point for each of the surface points `origin`. `u` and `v` are uniform in [0, 1).
+    /// A sphere is sampled by the cone that it subtends, a rectangle by solid angle. A triangle is
+    /// chosen by its area and then sampled by solid angle, unless this is tiny.
+    #[inline(never)]
+    pub fn sample<L: SimdFloat<Scalar = S>>(
+        &self,
+        origin: Vec3<L>,
+        (u, v): (L, L),
+    ) -> EmitterSample<L> {
+        let (wi, distance, density) = match &self.surface {
+            CompiledSurface::Sphere { center, radius } => {
+                let to_center = Vec3::splat(*center) - origin;
+                let (lift, radius) = (L::splat(self.lift), L::splat(*radius));
+                let cone = Cone::new(to_center, radius);
+                let local = warp::cone(u, v, cone.one_minus_cos);
+                let wi = Frame::around(cone.axis).to_world(local).renormalize();
+                // The lifted point in front of the sampled one.
+                let sin2 = local.x * local.x + local.y * local.y;
+                let outer = radius + lift;
+                let root2 = outer * outer - cone.distance2 * sin2;
+                let near = cone.distance2.sqrt() * local.z - root2.max(L::zero()).sqrt();
+                let (along, inner) = (to_center.dot(wi), radius - lift);
+                let root2 = along * along + inner * inner - cone.distance2;
+                let far = along + root2.max(L::zero()).sqrt();
+                let distance = L::select(cone.inside, far, near).max(L::zero());
+                (wi, distance, self.cone_density(&cone))
+            }
+            CompiledSurface::Rectangle { center, axes, size } => {
+                let to_center = Vec3::splat(*center) - origin;
+                let ([x, y, height], behind) = self.lifted(local_of(axes, to_center));
+                let rectangle = SphericalRectangle::new(size.map(L::splat), [x, y, height]);
+                let [x, y] = rectangle.sample(u, v);
+                let height = L::select(behind, -height, height);
+                let (wi, distance) = towards(axes, [x, y, height]);
+                (wi, distance, rectangle.density(distance))
+            }
+            CompiledSurface::Triangles(triangles) => {
+                let index_of = |u: S| triangles.partition_point(|triangle| triangle.end <= u);
+                let mut index = [0; MAX_WIDTH];
+                for (lane, index) in index.iter_mut().enumerate().take(L::WIDTH) {
+                    *index = index_of(u.lane(lane));
+                }
+                let triangle = PacketTriangle::gather(triangles, &index, origin);
+                let u = (u - triangle.start) / triangle.share;
+                self.sample_triangle(&triangle, (u.max(L::zero()).min(L::one()), v))
+            }
+        };
+        let arrives = density.gt(L::zero());
+        let irradiance = (L::one() / density).min(L::from_f64(L::MAX)).masked(arrives);
+        EmitterSample { wi, distance, density, irradiance }
+    }
+
+    /// Returns the density \[1/sr\] with which [`ObjectEmitter::sample`] draws the direction in
+    /// which the ray from `origin` hits the object at `distance`. `triangle` is the index of the
+    /// triangle of a mesh, stored as an id; `None` for other objects.
+    #[inline(never)]
+    pub fn density<L: SimdFloat<Scalar = S>>(
+        &self,
+        (origin, direction): (Vec3<L>, Vec3<L>),
+        distance: L,
+        triangle: Option<L>,
+    ) -> L {
+        match &self.surface {
+            CompiledSurface::Sphere { center, radius } => {
+                let to_center = Vec3::splat(*center) - origin;
+                self.cone_density(&Cone::new(to_center, L::splat(*radius)))
+            }
+            CompiledSurface::Rectangle { center, axes, size } => {
+                let to_center = Vec3::splat(*center) - origin;
+                let (local, _) = self.lifted(local_of(axes, to_center));
+                SphericalRectangle::new(size.map(L::splat), local).density(distance)
+            }
+            CompiledSurface::Triangles(triangles) => {
+                let index = match triangle {
+                    Some(tag) => {
+                        let mut index = [0; MAX_WIDTH];
+                        for (lane, index) in index.iter_mut().enumerate().take(L::WIDTH) {
+                            *index = tag.id_lane(lane) as usize;
+                        }
+                        index
+                    }
+                    None => hit_triangles(triangles, direction.mul_add(distance, origin)),
+                };
+                let triangle = PacketTriangle::gather(triangles, &index, origin);
+                let (seen, _, height) = self.seen_triangle(&triangle);
+                triangle.density(&seen, height, distance)
+            }
+        }
+    }
+
+    /// Samples a point of each triangle: its direction, distance and density.
+    #[inline(always)]
+    fn sample_triangle<L: SimdFloat<Scalar = S>>(
+        &self,
+        triangle: &PacketTriangle<L>,
+        (u, v): (L, L),
+    ) -> (Vec3<L>, L, L) {
+        let (seen, lifted, height) = self.seen_triangle(triangle);
+        // Uniform barycentric coordinates.
+        let root = u.sqrt();
+        let [a, b, c] = lifted;
+        let point = a * (L::one() - root) + b * (root * (L::one() - v)) + c * (root * v);
+        let mut distance = point.length_squared().sqrt();
+        let mut wi = point * (L::one() / distance);
+        if seen.by_angle.any() {
+            wi = Vec3::select(seen.by_angle, seen.sample(u, v), wi);
+            let to_plane = height.abs() / triangle.normal.dot(wi).abs();
+            distance = L::select(seen.by_angle, to_plane, distance);
+        }
+        (wi, distance, triangle.density(&seen, height, distance))
+    }
+
+    /// Returns the triangle as the points see it, its corners relative to the points, and the
+    /// height of its plane. The triangle is lifted to the side of the points. The height is not
+    /// negative where no light arrives.
+    #[inline(always)]
+    fn seen_triangle<L: SimdFloat<Scalar = S>>(
+        &self,
+        triangle: &PacketTriangle<L>,
+    ) -> (SphericalTriangle<L>, [Vec3<L>; 3], L) {
+        let height = triangle.normal.dot(triangle.corners[0]);
+        let ([_, _, height], behind) = self.lifted([L::zero(), L::zero(), height]);
+        let lift = L::splat(self.lift);
+        let lift = triangle.normal * L::select(behind, -lift, lift);
+        let corners = triangle.corners.map(|corner| corner + lift);
+        (SphericalTriangle::new(corners, height, triangle.area), corners, height)
+    }
+
+    /// Returns the density of directions to a sphere in the cone that it subtends; zero inside of a
+    /// sphere that emits outwards only.
+    #[inline(always)]
+    fn cone_density<L: SimdFloat<Scalar = S>>(&self, cone: &Cone<L>) -> L {
+        let density = cone.density();
+        if self.two_sided { density } else { density.masked(!cone.inside) }
+    }
+
+    /// Returns the local coordinates of a point of a flat surface as seen from its lifted front, whose
+    /// height is negative; and the lanes that see its back. The height is not negative where no light
+    /// arrives.
+    #[inline(always)]
+    fn lifted<L: SimdFloat<Scalar = S>>(&self, [x, y, height]: [L; 3]) -> ([L; 3], L::Mask) {
+        let behind = if self.two_sided { height.gt(L::zero()) } else { L::mask(false) };
+        let height = L::select(behind, -height, height) + L::splat(self.lift);
+        ([x, y, height], behind)
+    }
+}
+
+/// One triangle per lane.
+struct PacketTriangle<L> {
+    /// Corners relative to the points from which they are seen.
+    corners: [Vec3<L>; 3],
+    /// Unit normal of the front.
+    normal: Vec3<L>,
+    /// Smallest random number that chooses the triangle.
+    start: L,
+    /// Probability with which the triangle is chosen.
+    share: L,
+    area: L,
+}
+
+impl<L: SimdFloat> PacketTriangle<L> {
+    /// Gathers the triangles with the given index in each lane. An index past the end counts as the
+    /// last triangle.
+    #[inline(always)]
+    fn gather(
+        triangles: &[Triangle<L::Scalar>],
+        index: &[usize; MAX_WIDTH],
+        origin: Vec3<L>,
+    ) -> Self {
+        let of_lane = |lane: usize| &triangles[index[lane].min(triangles.len() - 1)];
+        let corner = Vec3::from_fn(|lane| of_lane(lane).corner) - origin;
+        let edge = |k: usize| Vec3::from_fn(|lane| of_lane(lane).edges[k]);
+        let start = L::from_fn(|lane| of_lane(lane).start);
+        Self {
+            corners: [corner, corner + edge(0), corner + edge(1)],
+            normal: Vec3::from_fn(|lane| of_lane(lane).normal),
+            start,
+            share: L::from_fn(|lane| of_lane(lane).end) - start,
+            area: L::from_fn(|lane| of_lane(lane).area),
+        }
+    }
+
+    /// Returns the density \[1/sr\] of the direction in which the triangle is at `distance`: that of
+    /// the choice of the triangle times that of the point. `height` is that of its plane.
+    #[inline(always)]
+    fn density(&self, seen: &SphericalTriangle<L>, height: L, distance: L) -> L {
+        let by_area = density_of_area(self.area / self.share, distance, height);
+        let density = L::select(seen.by_angle, self.share / seen.solid_angle, by_area);
+        density.min(L::from_f64(L::MAX)).masked(height.lt(L::zero()))
+    }
+}
+
+/// Returns for each lane the index of the triangle that `point` is on: the one whose smallest
+/// barycentric coordinate is largest, among those in whose plane the point is.
+#[inline(never)]
+fn hit_triangles<L: SimdFloat>(
+    triangles: &[Triangle<L::Scalar>],
+    point: Vec3<L>,
+) -> [usize; MAX_WIDTH] {
+    let (mut best, mut index) = (L::from_f64(-L::MAX), L::from_id(0));
+    for (i, triangle) in triangles.iter().enumerate() {
+        let [u, v] = triangle.edges.map(Vec3::splat);
+        let to_point = point - Vec3::splat(triangle.corner);
+        let normal = u.cross(v);
+        let inverse = L::one() / normal.length_squared();
+        let b = to_point.cross(v).dot(normal) * inverse;
+        let c = u.cross(to_point).dot(normal) * inverse;
+        // Distance from the plane in units of the triangle's size.
+        let away = to_point.dot(normal) * inverse.sqrt() * inverse.sqrt().sqrt();
+        let inside = b.min(c).min(L::one() - b - c) - away.abs() * L::from_f64(64.0);
+        let better = inside.gt(best);
+        best = L::select(better, inside, best);
+        index = L::select(better, L::from_id(i as u32), index);
+    }
+    let mut out = [0; MAX_WIDTH];
+    for (lane, out) in out.iter_mut().enumerate().take(L::WIDTH) {
+        *out = index.id_lane(lane) as usize;
+    }
+    out
+}
+
+/// Triangle seen from a point, sampled by solid angle.
+///
+/// Arvo 1995, *Stratified Sampling of Spherical Triangles*.
+struct SphericalTriangle<L: SimdFloat> {
+    /// Unit vectors to the corners.
+    corners: [Vec3<L>; 3],
+    /// Volume of the parallelepiped of the unit vectors.
+    volume: L,
+    solid_angle: L,
+    /// Lanes in which the solid angle is large enough for the parametrization.
+    by_angle: L::Mask,
+}
+
+impl<L: SimdFloat> SphericalTriangle<L> {
+    /// Creates the triangle with corners relative to the point, in a plane of the given height.
+    #[inline(always)]
+    fn new(corners: [Vec3<L>; 3], height: L, area: L) -> Self {
+        let inverse = corners.map(|corner| L::one() / corner.length_squared().sqrt());
+        let [a, b, c] = [0, 1, 2].map(|k| corners[k] * inverse[k]);
+        // Without cancellation for small angles (Van Oosterom and Strackee 1983).
+        let inverse = inverse[0] * inverse[1] * inverse[2];
+        let volume = height.abs() * (area + area) * inverse;
+        let below = L::one() + a.dot(b) + b.dot(c) + c.dot(a);
+        let half = volume.atan2(below);
+        let solid_angle = half + half;
+        let by_angle = solid_angle.ge(L::from_f64(MIN_SOLID_ANGLE * L::EPSILON));
+        Self { corners: [a, b, c], volume, solid_angle, by_angle }
+    }
+
+    /// Samples a direction, uniform over the solid angle.
+    #[inline(always)]
+    fn sample(&self, u: L, v: L) -> Vec3<L> {
+        let [a, b, c] = self.corners;
+        let one = L::one();
+        let unit = |v: Vec3<L>| {
+            let tiny = L::from_f64(L::EPSILON * L::EPSILON);
+            v * (one / v.length_squared().max(tiny).sqrt())
+        };
+        // Angle of the triangle at the corner a.
+        let cos_c = a.dot(b);
+        let cross = a.cross(b).dot(a.cross(c));
+        let alpha = self.volume.atan2(cross);
+        let (sin_alpha, cos_alpha) = alpha.sin_cos();
+        // The part of the triangle up to an arc through b has the share `u` of the area.
+        let (s, t) = u.mul_add(self.solid_angle, -alpha).sin_cos();
+        let p = t - cos_alpha;
+        let r = sin_alpha.mul_add(cos_c, s);
+        let above = (r * t - p * s) * cos_alpha - r;
+        let q = (above / ((r * s + p * t) * sin_alpha)).min(one).max(-one);
+        let across = unit(c - a * c.dot(a));
+        let end = a * q + across * (one - q * q).max(L::zero()).sqrt();
+        // A point of the arc from b to `end`.
+        let cos_end = end.dot(b);
+        let z = one - v * (one - cos_end);
+        let along = unit(end - b * cos_end);
+        (b * z + along * (one - z * z).max(L::zero()).sqrt()).renormalize()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIFT: f64 = 1e-10;
+
+    /// Surfaces of every kind, with points in front, behind, beside and inside.
+    fn surfaces() -> Vec<ObjectSurface> {
+        let tetrahedron = [
+            DVec3::new(0.0, 0.0, 0.0),
+            DVec3::new(1.0, 0.1, 0.0),
+            DVec3::new(0.2, 0.9, 0.1),
+            DVec3::new(0.3, 0.2, 1.1),
+        ];
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let [x, y, z] = DVec3::AXES;
+        vec![
+            ObjectSurface::Sphere { center: DVec3::ZERO, radius: 0.6 },
+            ObjectSurface::Rectangle { center: DVec3::ZERO, axes: [x, y, z], size: [1.0, 0.4] },
+            ObjectSurface::Triangles(vec![[x, y, -x - y]]),
+            ObjectSurface::Triangles(faces.map(|face| face.map(|i| tetrahedron[i])).into()),
+        ]
+    }
+
+    /// Points from which the surfaces are seen.
+    fn points() -> Vec<DVec3> {
+        let points = [[0.1, 0.2, 1.5], [0.3, -0.1, -0.8], [2.0, 0.1, 0.2], [0.25, 0.2, 0.05]];
+        [points.map(DVec3::from).into(), vec![DVec3::new(40.0, 30.0, 20.0)]].concat()
+    }
+
+    fn numbers(i: u32) -> (f64, f64) {
+        let unit = |x: f64| x - x.floor();
+        // Roberts' sequence.
+        (
+            unit(0.5 + f64::from(i) * 0.754_877_666_246_69),
+            unit(0.5 + f64::from(i) * 0.569_840_290_998_05),
+        )
+    }
+
+    #[test]
+    fn density_of_a_hit_is_that_of_the_sample() {
+        for surface in surfaces() {
+            let emitter = ObjectEmitter::<f64>::new(&surface, true, LIFT).unwrap();
+            for point in points() {
+                let origin = Vec3::<f64>::of(point.to_array());
+                for i in 0..200 {
+                    let sample = emitter.sample(origin, numbers(i));
+                    let found = emitter.density((origin, sample.wi), sample.distance, None);
+                    assert!(
+                        (found - sample.density).abs() <= 1e-6 * sample.density,
+                        "{surface:?} from {point}, sample {i}: {found}, sampled {}",
+                        sample.density
+                    );
+                    assert!((sample.density * sample.irradiance - 1.0).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
+    /// The mean of 1 / density is the solid angle of all triangles together, front and back.
+    #[test]
+    fn samples_of_triangles_cover_their_solid_angle() {
+        for surface in surfaces() {
+            let ObjectSurface::Triangles(triangles) = &surface else { continue };
+            let emitter = ObjectEmitter::<f64>::new(&surface, true, LIFT).unwrap();
+            for point in points() {
+                let origin = Vec3::<f64>::of(point.to_array());
+                let expected: f64 = triangles
+                    .iter()
+                    .map(|corners| {
+                        let [a, b, c] = corners.map(|corner| (corner - point).normalize());
+                        let below = 1.0 + a.dot(b) + b.dot(c) + c.dot(a);
+                        2.0 * a.cross(b).dot(c).abs().atan2(below)
+                    })
+                    .sum();
+                let count = 20_000;
+                let sum: f64 =
+                    (0..count).map(|i| emitter.sample(origin, numbers(i)).irradiance).sum();
+                let mean = sum / f64::from(count);
+                assert!(
+                    (mean - expected).abs() < 2e-3 * expected,
+                    "{surface:?} from {point}: {mean}, expected {expected}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn one_sided_surfaces_are_dark_from_behind() {
+        let [front, back] = [DVec3::new(0.1, 0.2, 1.5), DVec3::new(0.1, 0.2, -1.5)];
+        for surface in &surfaces()[1..3] {
+            let emitter = ObjectEmitter::<f64>::new(surface, false, LIFT).unwrap();
+            let irradiance = |point: DVec3| {
+                emitter.sample(Vec3::<f64>::of(point.to_array()), (0.3, 0.6)).irradiance
+            };
+            assert!(irradiance(front) > 0.0 && irradiance(back) == 0.0, "{surface:?}");
+        }
+        let ball = ObjectEmitter::<f64>::new(&surfaces()[0], false, LIFT).unwrap();
+        let irradiance =
+            |x: f64| ball.sample(Vec3::<f64>::of([x, 0.0, 0.0]), (0.3, 0.6)).irradiance;
+        assert!(irradiance(0.7) > 0.0 && irradiance(0.5) == 0.0);
+    }
+
+    #[test]
+    fn surfaces_without_area_are_no_emitters() {
+        let point = ObjectSurface::Triangles(vec![[DVec3::X; 3]]);
+        assert!(ObjectEmitter::<f32>::new(&point, true, LIFT).is_none());
+        assert!(ObjectEmitter::<f32>::new(&ObjectSurface::Triangles(vec![]), true, LIFT).is_none());
+    }
+}

@@ -1,0 +1,200 @@
+//! Emission of objects, compiled: the light group of each emissive primitive, and the emitters from
+//! which points of objects are sampled.
+//!
+//! Light is sampled from spheres, flat shapes, convex polyhedra, and meshes of up to
+//! [`MAX_TRIANGLES`] triangles. The emission of other shapes is found only by rays that hit them.
+
+use crate::lanes::Float;
+use crate::light::{ObjectEmitter, ObjectSurface};
+use crate::material::Material;
+use crate::primitive::{
+    CanonicalShape, ConvexPolyhedronForm, Form, MeshForm, ParallelogramForm, PrimitiveId,
+};
+use crate::scene::Scene;
+use crate::world::light_groups::LightGroups;
+use crate::world::world::LightSource;
+use glam::DVec3;
+
+/// Largest number of triangles of a mesh from which light is sampled. A triangle takes 56 bytes in
+/// single precision.
+const MAX_TRIANGLES: usize = 1 << 16;
+
+/// Emission of an object, with its light group. `None`: points of the object cannot be sampled.
+pub(super) type EmissiveSource<S> = LightSource<Option<ObjectEmitter<S>>, S>;
+
+/// Emission of all objects of a world. Empty if no object emits light.
+pub(super) struct SurfaceEmission<S> {
+    /// Emissive objects; those whose points are sampled come first.
+    sources: Vec<EmissiveSource<S>>,
+    /// Number of objects whose points are sampled.
+    sampled: usize,
+    /// Index into `sources` of each primitive; `None` if it emits nothing.
+    source_of: Vec<Option<u32>>,
+}
+
+impl<S: Float> SurfaceEmission<S> {
+    /// Compiles the emission of the objects with the given forms. `lift` is the height of sampled
+    /// points above the surfaces.
+    pub fn new(
+        scene: &Scene,
+        forms: &[Form],
+        primitives: &[PrimitiveId],
+        groups: &LightGroups,
+        lift: f64,
+    ) -> Self {
+        let emitting = groups.materials(scene);
+        if emitting.is_empty() {
+            return Self { sources: Vec::new(), sampled: 0, source_of: Vec::new() };
+        }
+        // The group of each primitive, by object.
+        let entry_of = |id: &PrimitiveId| {
+            let name = scene.objects[id.form].materials()[id.part];
+            let (_, group, emission) = emitting.iter().find(|(known, ..)| *known == name)?;
+            Some((id.form, *group, *emission))
+        };
+        let entries: Vec<_> = primitives.iter().map(entry_of).collect();
+        let mut objects: Vec<(usize, usize, [f64; 3])> = Vec::new();
+        for entry in entries.iter().flatten() {
+            if !objects.contains(entry) {
+                objects.push(*entry);
+            }
+        }
+        let compile = |&(form, group, emission): &(usize, usize, [f64; 3])| {
+            let two_sided = material_of(scene, form).is_none_or(|material| material.two_sided);
+            let surface = surface_of(&forms[form]);
+            let light = surface.and_then(|surface| ObjectEmitter::new(&surface, two_sided, lift));
+            let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
+            LightSource { light, group, emission, visible: true }
+        };
+        let compiled = objects.iter().map(|object| (*object, compile(object)));
+        let (mut all, others): (Vec<_>, Vec<_>) =
+            compiled.partition(|(_, source)| source.light.is_some());
+        let sampled = all.len();
+        all.extend(others);
+        let (objects, sources): (Vec<_>, Vec<_>) = all.into_iter().unzip();
+        let index_of = |entry: &Option<_>| {
+            let index = objects.iter().position(|object| Some(*object) == *entry)?;
+            Some(index as u32)
+        };
+        Self { sources, sampled, source_of: entries.iter().map(index_of).collect() }
+    }
+
+    /// Returns `true` if no object emits light.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.sources.is_empty()
+    }
+
+    /// Number of emissive objects from which light is sampled, and of the other emissive objects.
+    pub fn counts(&self) -> [usize; 2] {
+        [self.sampled, self.sources.len() - self.sampled]
+    }
+
+    /// Emission of primitive `item`. `None` if it emits nothing.
+    #[inline(always)]
+    pub fn of_item(&self, item: u32) -> Option<&EmissiveSource<S>> {
+        let source = *self.source_of.get(item as usize)?;
+        Some(&self.sources[source? as usize])
+    }
+
+    /// The emitter with the given index among those from which light is sampled, with its group.
+    #[inline(always)]
+    pub fn sampled(&self, index: usize) -> Option<(&ObjectEmitter<S>, &EmissiveSource<S>)> {
+        let source = self.sources[..self.sampled].get(index)?;
+        Some((source.light.as_ref()?, source))
+    }
+
+    /// Emitters from which light is sampled.
+    pub fn emitters(&self) -> impl Iterator<Item = &ObjectEmitter<S>> {
+        self.sources.iter().filter_map(|source| source.light.as_ref())
+    }
+}
+
+/// Returns the material of an object that is not a compound.
+fn material_of(scene: &Scene, object: usize) -> Option<&Material> {
+    scene.materials.get(&scene.objects[object].material)
+}
+
+/// Returns `true` if points of `form` can be sampled.
+pub(super) fn is_sampled(form: &Form) -> bool {
+    match form {
+        Form::Sphere(_) | Form::Parallelogram(_) | Form::ConvexPolyhedron(_) => true,
+        Form::Mesh(form) => form.mesh.mesh().triangles.len() <= MAX_TRIANGLES,
+        Form::Ellipsoid(_)
+        | Form::ConicalFrustum(_)
+        | Form::Csg(_)
+        | Form::Plane(_)
+        | Form::Torus(_) => false,
+    }
+}
+
+/// Returns the surface of `form` if points of it can be sampled.
+fn surface_of(form: &Form) -> Option<ObjectSurface> {
+    if !is_sampled(form) {
+        return None;
+    }
+    match form {
+        Form::Sphere(sphere) => {
+            Some(ObjectSurface::Sphere { center: sphere.center, radius: sphere.radius })
+        }
+        Form::Parallelogram(form) => Some(surface_of_parallelogram(form)),
+        Form::ConvexPolyhedron(form) => {
+            Some(ObjectSurface::Triangles(triangles_of_polyhedron(form)))
+        }
+        Form::Mesh(form) => Some(ObjectSurface::Triangles(triangles_of_mesh(form))),
+        _ => None,
+    }
+}
+
+fn surface_of_parallelogram(form: &ParallelogramForm) -> ObjectSurface {
+    let ParallelogramForm { corner, u, v } = *form;
+    let size = [u.length(), v.length()];
+    let far = corner + u + v;
+    if u.dot(v).abs() > 1e-12 * size[0] * size[1] {
+        return ObjectSurface::Triangles(vec![
+            [corner, corner + u, far],
+            [corner, far, corner + v],
+        ]);
+    }
+    let (right, up) = (u / size[0], v / size[1]);
+    ObjectSurface::Rectangle {
+        center: 0.5 * (corner + far),
+        axes: [right, up, right.cross(up)],
+        size,
+    }
+}
+
+/// Returns the triangles of all faces, counter-clockwise as seen from outside.
+fn triangles_of_polyhedron(form: &ConvexPolyhedronForm) -> Vec<[DVec3; 3]> {
+    let slack = 1e-6 * form.thickness();
+    let mut triangles = Vec::new();
+    for face in &form.faces {
+        let is_on_face = |corner: &&DVec3| (face.normal.dot(**corner) - face.offset).abs() <= slack;
+        let mut corners: Vec<DVec3> = form.corners.iter().filter(is_on_face).copied().collect();
+        if corners.len() < 3 {
+            continue;
+        }
+        let middle = corners.iter().sum::<DVec3>() / corners.len() as f64;
+        let (right, up) = face.normal.any_orthonormal_pair();
+        let side = right.cross(up).dot(face.normal).signum();
+        let angle = |corner: &DVec3| {
+            let from_middle = *corner - middle;
+            (side * from_middle.dot(up)).atan2(from_middle.dot(right))
+        };
+        corners.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+        triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
+    }
+    triangles
+}
+
+/// Returns the triangles of the mesh in the scene, counter-clockwise as seen from their front.
+fn triangles_of_mesh(form: &MeshForm) -> Vec<[DVec3; 3]> {
+    let mesh = form.mesh.mesh();
+    let mirrored = form.scene_from_mesh.matrix3.determinant() < 0.0;
+    let corner = |i: u32| {
+        let position = mesh.positions[i as usize].map(f64::from);
+        form.scene_from_mesh.transform_point3(DVec3::from(position))
+    };
+    let triangle = |&[a, b, c]: &[u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] }.map(corner);
+    mesh.triangles.iter().map(triangle).collect()
+}

@@ -1,0 +1,258 @@
+//! Light of emissive objects: closed forms, agreement with lights of the same size, furnaces.
+
+use crate::common::normal::two_sided_z;
+use crate::emitters::forms;
+use crate::emitters::setup::{array, check, radiance, scene};
+use glam::{DMat3, DVec3};
+use std::f64::consts::PI;
+use std::fs;
+use zerkalo::lanes::{Double, Single};
+use zerkalo::scene::Scene;
+
+/// Rounding errors that the comparison allows: sampled points are lifted off the surface, and rays
+/// start above theirs.
+const ROUNDING: [f64; 2] = [1e-4, 1e-9];
+
+/// Scene of a camera that looks at a receiver at the origin, with the material `white`, a black
+/// emissive material `lamp`, and a black material `black`.
+fn receiver(normal: DVec3, white: &str, rest: &str) -> Scene {
+    scene(&format!(
+        "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
+         [camera]\neye = {eye}\ndirection = {direction}\nup = {up}\nview_angle.vertical = 0.1\n\
+         [materials.white]\n{white}\n\
+         [materials.black]\ncolor = [0.0, 0.0, 0.0]\n\
+         [materials.lamp]\ncolor = [0.0, 0.0, 0.0]\nemission = 1.0\n\
+         [materials.front]\ncolor = [0.0, 0.0, 0.0]\nemission = 1.0\ntwo_sided = false\n\
+         [[object]]\nmaterial = \"white\"\n\
+         shape.rectangle = {{ center = [0.0, 0.0, 0.0], size = [0.01, 0.01], normal = {normal}, up = {up} }}\n{rest}",
+        eye = array(normal * 0.01),
+        direction = array(-normal),
+        up = array(normal.any_orthonormal_vector()),
+        normal = array(normal),
+    ))
+}
+
+const MATT: &str = "color = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0";
+
+fn object(material: &str, shape: &str) -> String {
+    format!("[[object]]\nmaterial = \"{material}\"\n{shape}\n")
+}
+
+/// A rectangle across `x` and `z` at `center`, facing down: as a shape or light, and its corners.
+fn rectangle(center: DVec3, [width, depth]: [f64; 2]) -> (String, Vec<DVec3>) {
+    let corner = |x: f64, z: f64| center + DVec3::new(x * width, 0.0, z * depth);
+    let text = format!(
+        "rectangle = {{ center = {}, size = [{width:?}, {depth:?}], normal = [0.0, -1.0, 0.0], \
+         up = [0.0, 0.0, 1.0] }}",
+        array(center)
+    );
+    (text, [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, z)| corner(x, z)).into())
+}
+
+/// Writes the polygons to an OBJ file; returns the shape that names it.
+fn mesh(name: &str, polygons: &[Vec<DVec3>]) -> String {
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("emissive-objects");
+    fs::create_dir_all(&folder).unwrap();
+    let path = folder.join(format!("{name}.obj"));
+    let (mut vertices, mut faces, mut count) = (String::new(), String::new(), 0);
+    for polygon in polygons {
+        faces += "f";
+        for corner in polygon {
+            count += 1;
+            vertices += &format!("v {:?} {:?} {:?}\n", corner.x, corner.y, corner.z);
+            faces += &format!(" {count}");
+        }
+        faces += "\n";
+    }
+    fs::write(&path, vertices + &faces).unwrap();
+    format!("shape.mesh = {{ file = {:?}, normals = \"flat\" }}", path.to_str().unwrap())
+}
+
+#[test]
+fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
+    let mut cases = Vec::new();
+    let mut case = |name: String, normal: DVec3, rest: String, irradiance: f64| {
+        cases.push((name, receiver(normal, MATT, &rest), irradiance / PI));
+    };
+    for (i, (center, size)) in [
+        (DVec3::Y, [1.0, 0.7]),
+        (DVec3::new(1.5, 0.3, 0.2), [1.0, 2.0]),
+        (DVec3::Y * 30.0, [1.0; 2]),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (text, corners) = rectangle(center, size);
+        let expected = forms::polygon(&corners, DVec3::Y);
+        for material in ["lamp", "front"] {
+            let shape = object(material, &format!("shape.{text}"));
+            case(format!("{material} rectangle {i}"), DVec3::Y, shape, expected);
+            let two = mesh(&format!("rectangle-{i}"), std::slice::from_ref(&corners));
+            case(format!("{material} mesh {i}"), DVec3::Y, object(material, &two), expected);
+        }
+        // The same corners in the opposite order face away.
+        let away: Vec<DVec3> = corners.iter().rev().copied().collect();
+        let away = mesh(&format!("away-{i}"), &[away]);
+        case(format!("back of mesh {i}"), DVec3::Y, object("lamp", &away), expected);
+        case(format!("black back of mesh {i}"), DVec3::Y, object("front", &away), 0.0);
+        // A mirrored mesh keeps its front.
+        let image = corners.iter().rev().map(|p| DVec3::new(-p.x, p.y, p.z)).collect();
+        let mirrored = object("front", &mesh(&format!("mirrored-{i}"), &[image]));
+        let mirrored = mirrored + "transform = [{ scale = [-1.0, 1.0, 1.0] }]\n";
+        case(format!("mirrored mesh {i}"), DVec3::Y, mirrored, expected);
+        // A turned and stretched rectangle: a parallelogram.
+        let stretched = DVec3::new(2.0, 1.0, 1.0);
+        let turn = DMat3::from_rotation_y(30f64.to_radians());
+        let sheared: Vec<DVec3> = corners.iter().map(|p| stretched * (turn * *p)).collect();
+        let shape = object("front", &format!("shape.{text}"))
+            + "transform = [{ rotate_y = 30.0 }, { scale = [2.0, 1.0, 1.0] }]\n";
+        let irradiance = forms::polygon(&sheared, DVec3::Y);
+        case(format!("parallelogram {i}"), DVec3::Y, shape, irradiance);
+        let up = DVec3::new(0.48, 0.6, 0.64);
+        let sphere = format!("shape.sphere = {{ center = {}, radius = 0.2 }}", array(center));
+        for material in ["lamp", "front"] {
+            let expected = forms::sphere(center, 0.2, up);
+            case(format!("{material} sphere {i}"), up, object(material, &sphere), expected);
+        }
+    }
+    // A box shows one face, two, or three.
+    for center in [DVec3::Y, DVec3::new(1.5, 1.0, 0.0), DVec3::new(1.5, 0.9, 1.4)] {
+        let half = DVec3::new(0.25, 0.2, 0.3);
+        let mut expected = 0.0;
+        for axis in 0..3 {
+            for sign in [-1.0, 1.0] {
+                let mut normal = DVec3::ZERO;
+                normal[axis] = sign;
+                let middle = center + normal * half;
+                if middle.dot(normal) >= 0.0 {
+                    continue;
+                }
+                let (mut u, mut v) = (DVec3::ZERO, DVec3::ZERO);
+                u[(axis + 1) % 3] = half[(axis + 1) % 3];
+                v[(axis + 2) % 3] = half[(axis + 2) % 3];
+                let corners = [middle - u - v, middle + u - v, middle + u + v, middle - u + v];
+                expected += forms::polygon(&corners, DVec3::Y);
+            }
+        }
+        let shape =
+            format!("shape.box = {{ center = {}, size = {} }}", array(center), array(2.0 * half));
+        for material in ["lamp", "front"] {
+            case(
+                format!("{material} box at {center}"),
+                DVec3::Y,
+                object(material, &shape),
+                expected,
+            );
+        }
+    }
+    check(&cases, 1 << 15, ROUNDING);
+}
+
+/// A flat object with a two-sided material lights both sides, one with a one-sided material its front.
+#[test]
+fn back_of_a_flat_emissive_object_follows_two_sided() {
+    let (text, corners) = rectangle(DVec3::Y, [1.0, 0.7]);
+    let upward = text.replace("normal = [0.0, -1.0, 0.0]", "normal = [0.0, 1.0, 0.0]");
+    let expected = forms::polygon(&corners, DVec3::Y) / PI;
+    let scene =
+        |material: &str| receiver(DVec3::Y, MATT, &object(material, &format!("shape.{upward}")));
+    let cases = [
+        ("two-sided".to_string(), scene("lamp"), expected),
+        ("one-sided".to_string(), scene("front"), 0.0),
+    ];
+    check(&cases, 1 << 14, ROUNDING);
+}
+
+/// Asserts that the means of `a` and `b` differ by no more than chance explains.
+fn agree(name: &str, a: &Scene, b: &Scene, count: u32) {
+    for (precision, rounding) in ["single", "double"].into_iter().zip(ROUNDING) {
+        let mean = |scene: &Scene, seed| match precision {
+            "single" => radiance::<Single>(scene, count, seed),
+            _ => radiance::<Double>(scene, count, seed),
+        };
+        let ((a, a_error), (b, b_error)) = (mean(a, 1), mean(b, 2));
+        let off = (a - b).abs() - rounding * a;
+        assert!(a > 0.0, "{name}: black");
+        assert!(
+            off <= two_sided_z(1e-5) * a_error.hypot(b_error),
+            "{name}, {precision} precision: {a} ± {a_error} and {b} ± {b_error}"
+        );
+    }
+}
+
+/// Rough mirrors combine sampled points with reflected rays: for each lobe the light of an emissive
+/// object is that of a light of its size.
+#[test]
+fn reflection_of_emissive_objects_is_that_of_lights_of_the_same_size() {
+    let center = DVec3::new(0.15, 0.7, 0.0);
+    let (text, corners) = rectangle(center, [0.6, 0.4]);
+    let two = mesh("reflected", &[corners]);
+    let sphere = format!("sphere = {{ center = {}, radius = 0.25 }}", array(center));
+    for lobe in ["cone", "square", "beckmann", "ggx"] {
+        for roughness in [0.05, 0.5] {
+            let mirror = format!(
+                "color = [0.0, 0.0, 0.0]\nreflection = 1.0\nroughness = {roughness:?}\nlobe = \"{lobe}\""
+            );
+            let light = |shape: &str| receiver(DVec3::Y, &mirror, &format!("[[light]]\n{shape}\n"));
+            let lamp = |shape: &str| receiver(DVec3::Y, &mirror, &object("lamp", shape));
+            let name = format!("{lobe} {roughness}");
+            agree(&name, &light(&text), &lamp(&format!("shape.{text}")), 1 << 14);
+            agree(&name, &light(&text), &lamp(&two), 1 << 14);
+            agree(&name, &light(&sphere), &lamp(&format!("shape.{sphere}")), 1 << 14);
+        }
+    }
+}
+
+/// Inside of a closed surface that emits a radiance of 1 everything white shows 1: by sampled points, by
+/// rays, and by both. Surfaces of which no points are sampled need a diffuse bounce.
+#[test]
+fn furnace_of_emissive_walls_shows_white() {
+    let walls = [
+        ("sphere = { center = [0.1, 0.2, 0.0], radius = 2.0 }", true),
+        ("box = { center = [0.1, 0.2, 0.0], size = [2.0, 3.0, 2.5] }", true),
+        (
+            "mesh = { file = \"\", normals = \"flat\" }\ntransform = [{ scale = 4.0 }, { translate = [0.0, -2.0, 0.0] }]",
+            true,
+        ),
+        ("cylinder = { base = [0.0, -1.0, 0.0], top = [0.0, 1.5, 0.0], radius = 1.2 }", false),
+        (
+            "torus = { center = [0.0, 0.0, 2.0], axis = [0.0, 1.0, 0.0], ring = 2.0, tube = 0.8 }",
+            false,
+        ),
+    ];
+    let mut cases = Vec::new();
+    for (shape, sampled) in walls {
+        let mut add = |name: &str, white: &str, bounces: u32| {
+            let rest = object("lamp", &format!("shape.{shape}"));
+            let mut scene = receiver(DVec3::Y, white, &rest);
+            scene.trace.max_diffuse_depth = bounces;
+            cases.push((format!("{name} in {shape}"), scene, 1.0));
+        };
+        if sampled {
+            add("matt", MATT, 0);
+        }
+        add("matt with a bounce", MATT, 1);
+        add("cone lobe", "color = [0.0, 0.0, 0.0]\nreflection = 1.0\nroughness = 0.3", 0);
+        add("mirror", "color = [0.0, 0.0, 0.0]\nreflection = 1.0", 0);
+        add(
+            "glass",
+            "color = [0.0, 0.0, 0.0]\nreflection = 1.0\ntransmission = 1.0\nfresnel = \"dielectric\"",
+            0,
+        );
+    }
+    check(&cases, 1 << 14, [1e-4, 1e-6]);
+}
+
+/// An emissive sphere with an object inside: the back of the wall lights it, but not through it.
+#[test]
+fn inside_of_an_emissive_sphere_has_shadows() {
+    // A black disk-like box between the receiver and half of the wall.
+    let cover =
+        object("black", "shape.platform = { center = [0.0, 0.5, 0.0], size = [100.0, 100.0] }");
+    let wall = object("lamp", "shape.sphere = { center = [0.0, 0.0, 0.0], radius = 2.0 }");
+    let scene = receiver(DVec3::Y, MATT, &(cover + &wall));
+    // The part of the wall below the cover: all directions with an elevation below that of the circle in
+    // which the cover cuts the sphere.
+    let cos2 = 0.25 / 4.0;
+    check(&[("band".to_string(), scene, cos2)], 1 << 15, [1e-3, 1e-6]);
+}
