@@ -1,6 +1,7 @@
 //! Edits written to scene files: only changed values are written, and the text reads back as the
 //! scene.
 
+mod large;
 mod layouts;
 mod navigation;
 mod operations;

@@ -1,0 +1,81 @@
+//! Time in which edits of large scenes are written, by ratios of processor time within one run.
+
+use super::*;
+use std::fmt::Write;
+
+/// Scene of `count` spheres, each with a comment.
+fn spheres(count: usize, has_names: bool) -> String {
+    let mut text = "# Spheres.\nambient.color = [1, 1, 1]\n".to_string();
+    for i in 0..count {
+        let name = if has_names { format!("name = \"ball {i}\"\n") } else { String::new() };
+        // Writing into a string cannot fail.
+        let _ = writeln!(
+            text,
+            "\n[[object]]   # number {i}\n{name}shape.sphere = {{ center = [{i}, 0, 0], radius = 0.3 }}"
+        );
+    }
+    text
+}
+
+/// Seconds of processor time of this thread.
+fn cpu_seconds() -> f64 {
+    let times = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
+    times.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-9
+}
+
+/// Seconds in which the text of a scene of `count` objects is changed after `edit`.
+fn seconds(count: usize, has_names: bool, edit: fn(&mut Scene)) -> f64 {
+    let document = document(&spheres(count, has_names));
+    let times = (0..3).map(|_| {
+        let (mut document, mut scene) = (document.clone(), document.scene().clone());
+        edit(&mut scene);
+        let start = cpu_seconds();
+        document.apply(&scene);
+        let elapsed = cpu_seconds() - start;
+        assert!(document.text().contains(&format!("# number {}", count - 1)));
+        elapsed
+    });
+    times.fold(f64::INFINITY, f64::min)
+}
+
+fn move_object(object: &mut Object) {
+    if let Shape::Sphere(sphere) = &mut object.shape {
+        sphere.center[1] += 0.5;
+    }
+}
+
+/// Twice the objects take at most `limit` times the time.
+fn check_growth(fewest: usize, limit: f64) {
+    let edits: [(&str, fn(&mut Scene)); 3] = [
+        ("one moved", |scene| {
+            let middle = scene.objects.len() / 2;
+            move_object(&mut scene.objects[middle]);
+        }),
+        ("one deleted", |scene| {
+            scene.objects.remove(0);
+        }),
+        ("all moved", |scene| scene.objects.iter_mut().for_each(move_object)),
+    ];
+    for (name, edit) in edits {
+        for has_names in [true, false] {
+            let times = [fewest, 4 * fewest].map(|count| seconds(count, has_names, edit));
+            println!("{name}, with names: {has_names}: {times:.3?} s");
+            assert!(times[1] / times[0] < limit * limit, "{name}, {has_names}: {times:?} s");
+        }
+    }
+}
+
+/// Halfway between linear and quadratic time: few objects fit into the caches.
+#[test]
+#[cfg(target_os = "linux")]
+fn edits_of_many_objects_are_written_in_linear_time() {
+    check_growth(2_000, 8_f64.sqrt());
+}
+
+///     cargo test --test program scene_editing::large -- --ignored --nocapture
+#[test]
+#[ignore = "takes a minute, and needs an idle machine"]
+#[cfg(target_os = "linux")]
+fn edits_of_100_000_objects_are_written_in_linear_time() {
+    check_growth(25_000, 2.3);
+}
