@@ -18,6 +18,107 @@ fn wait_for_file(fixture: &Fixture, name: &str) {
     }
 }
 
+fn kill(terminal: Terminal) {
+    let kill = Command::new("kill").args(["-9", &terminal.process_id().to_string()]).status();
+    assert!(kill.unwrap().success());
+    // A killed program does not restore its terminal, which `end` would demand.
+    drop(terminal);
+}
+
+/// Checkpoints in the folder with their samples. All of them are complete.
+fn checkpoints(fixture: &Fixture) -> Vec<(PathBuf, u64)> {
+    let files = fs::read_dir(fixture.0.path()).unwrap().map(|entry| entry.unwrap().path());
+    let files = files.filter(|path| {
+        let name = path.file_name().unwrap().to_string_lossy();
+        name.ends_with(".zk") && (name.starts_with("room") || name == "latest.zk")
+    });
+    files.map(|path| (path.clone(), film(path).samples())).collect()
+}
+
+/// Kills a dashboard at `moments` random moments, in each life while it renders and writes
+/// checkpoints, continues from the checkpoint with most samples, and compares the film at the end
+/// with that of an uninterrupted render.
+fn kill_at_random_moments(moments: u32, text: &str, seed: u64) {
+    let fixture = Fixture::new();
+    fs::write(fixture.path("room.toml"), text).unwrap();
+    let start = Instant::now();
+    fixture.rendered(&["room.toml", "--noise", "0.5", "--checkpoint", "whole.zk"], "whole.png");
+    // The lives together are about as long as the uninterrupted render.
+    let life = start.elapsed().as_secs_f64() / f64::from(moments);
+    let whole = film(fixture.path("whole.zk"));
+    let mut random = seed;
+    let mut part = move || {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (random >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let (mut latest, mut samples, mut kept) = ("room.toml", 0, 0);
+    for moment in 0..moments {
+        let mut terminal = fixture.open(&[latest], [80, 24]);
+        // Every fourth life may end before its first picture or checkpoint.
+        if moment % 4 != 3 {
+            wait_for_picture(&terminal);
+            terminal.send("K");
+            wait_for_file(&fixture, "room-1.zk");
+        }
+        let end = Instant::now() + Duration::from_secs_f64(life * part());
+        while Instant::now() < end {
+            terminal.send("K");
+            std::thread::sleep(Duration::from_secs_f64(0.06 * part()));
+        }
+        kill(terminal);
+        let written = checkpoints(&fixture);
+        let Some((best, most)) = written.iter().max_by_key(|(_, samples)| *samples) else {
+            continue;
+        };
+        assert!(*most >= samples, "moment {moment}: {most} samples after {samples}, seed {seed}");
+        kept += u32::from(*most > samples);
+        eprintln!("life {moment}: {most} of {} samples", whole.samples());
+        (samples, latest) = (*most, "latest.zk");
+        fs::rename(best, fixture.path("best")).unwrap();
+        written.iter().for_each(|(path, _)| drop(fs::remove_file(path)));
+        fs::rename(fixture.path("best"), fixture.path(latest)).unwrap();
+    }
+    eprintln!("{kept} of {moments} lives added samples");
+    assert!(kept > 0, "no life has added samples");
+    let mut terminal = fixture.open(&[latest], [80, 24]);
+    wait_for_picture(&terminal);
+    await_film(&fixture, &mut terminal, &whole, 1);
+    terminal.send("q");
+    assert_eq!(terminal.end().0, 0);
+}
+
+/// Requests checkpoints `room-FIRST.zk` and so on until one has the samples of `whole`, whose film
+/// it must be.
+fn await_film(fixture: &Fixture, terminal: &mut Terminal, whole: &Film, first: usize) {
+    for number in first.. {
+        terminal.send("K");
+        let name = format!("room-{number}.zk");
+        wait_for_file(fixture, &name);
+        let now = film(fixture.path(&name));
+        if now.samples() == whole.samples() {
+            assert!(now.bytes() == whole.bytes(), "the film differs");
+            break;
+        }
+        assert!(number < 300, "{} samples, {} expected", now.samples(), whole.samples());
+        std::thread::sleep(Duration::from_millis(200));
+    }
+}
+
+#[test]
+fn dashboard_killed_at_random_moments_ends_with_the_same_film() {
+    let text = zerkalo::scene::BUILT_IN.replace("size = [640, 480]", "size = [320, 240]");
+    kill_at_random_moments(4, &text, 1);
+}
+
+/// The long form: `cargo test --test program killed_at_twenty -- --ignored --nocapture`.
+#[test]
+#[ignore = "long"]
+fn dashboard_killed_at_twenty_random_moments_ends_with_the_same_film() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/gallery-glass.toml");
+    let text = fs::read_to_string(path).unwrap().replace("size = [960, 540]", "size = [400, 300]");
+    kill_at_random_moments(20, &text, 2);
+}
+
 /// A dashboard that is killed after a checkpoint, and one that continues it, end with the film of
 /// `zerkalo render`.
 #[test]
@@ -35,10 +136,7 @@ fn killed_dashboard_continues_from_its_checkpoint() {
     wait_for_picture(&terminal);
     terminal.send("K");
     wait_for_file(&fixture, "room-1.zk");
-    let kill = Command::new("kill").args(["-9", &terminal.process_id().to_string()]).status();
-    assert!(kill.unwrap().success());
-    // A killed program does not restore its terminal, which `end` would demand.
-    drop(terminal);
+    kill(terminal);
     let before = film(fixture.path("room-1.zk")).samples();
     assert!(before > 0 && before <= whole.samples());
 
@@ -46,19 +144,11 @@ fn killed_dashboard_continues_from_its_checkpoint() {
     wait_for_picture(&terminal);
     // The scene file is open, not the copy in the checkpoint.
     terminal.wait_for_text("room.toml");
-    for number in 2.. {
-        terminal.send("K");
-        let name = format!("room-{number}.zk");
-        wait_for_file(&fixture, &name);
-        let now = film(fixture.path(&name));
-        assert!(now.samples() >= before, "the samples of the checkpoint are lost");
-        if now.samples() == whole.samples() {
-            assert!(now.bytes() == whole.bytes(), "the film differs");
-            break;
-        }
-        assert!(number < 200, "{} samples, {} expected", now.samples(), whole.samples());
-        std::thread::sleep(Duration::from_millis(200));
-    }
+    terminal.send("K");
+    wait_for_file(&fixture, "room-2.zk");
+    let after = film(fixture.path("room-2.zk")).samples();
+    assert!(after >= before, "the samples of the checkpoint are lost");
+    await_film(&fixture, &mut terminal, &whole, 3);
     // A checkpoint that was requested last is complete when the program has ended.
     terminal.send("Kq");
     let (status, bytes) = terminal.end();
