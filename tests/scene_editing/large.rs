@@ -44,9 +44,12 @@ fn move_object(object: &mut Object) {
     }
 }
 
+/// Name of an edit and its function.
+type NamedEdit = (&'static str, fn(&mut Scene));
+
 /// Twice the objects take at most `limit` times the time.
 fn check_growth(fewest: usize, limit: f64) {
-    let edits: [(&str, fn(&mut Scene)); 3] = [
+    let edits: [NamedEdit; 3] = [
         ("one moved", |scene| {
             let middle = scene.objects.len() / 2;
             move_object(&mut scene.objects[middle]);
