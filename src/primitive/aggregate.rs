@@ -378,11 +378,6 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns `true` if `item` is a mesh, whose hits name a triangle.
-    pub fn is_mesh(&self, item: u32) -> bool {
-        self.meshes().is_some_and(|(_, base)| item >= base)
-    }
-
     /// Returns `true` if any surface has interpolated normals: [`Aggregate::shading_normal`].
     pub fn is_smooth(&self) -> bool {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_smooth())

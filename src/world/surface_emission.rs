@@ -139,7 +139,7 @@ fn surface_of(form: &Form) -> Option<ObjectSurface> {
         }
         Form::Parallelogram(form) => Some(surface_of_parallelogram(form)),
         Form::ConvexPolyhedron(form) => {
-            Some(ObjectSurface::Triangles(triangles_of_polyhedron(form)))
+            Some(ObjectSurface::ConvexTriangles(triangles_of_polyhedron(form)))
         }
         Form::Mesh(form) => Some(ObjectSurface::Triangles(triangles_of_mesh(form))),
         _ => None,

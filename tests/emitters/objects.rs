@@ -49,6 +49,16 @@ fn rectangle(center: DVec3, [width, depth]: [f64; 2]) -> (String, Vec<DVec3>) {
     (text, [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, z)| corner(x, z)).into())
 }
 
+/// Pieces of a rectangle with the given corners, 6 x 6 of them: 72 triangles.
+fn pieces(corners: &[DVec3]) -> Vec<Vec<DVec3>> {
+    let (u, v) = ((corners[1] - corners[0]) / 6.0, (corners[3] - corners[0]) / 6.0);
+    let corner = |i: u32, j: u32| corners[0] + u * f64::from(i) + v * f64::from(j);
+    let squares = (0..6).flat_map(|i| (0..6).map(move |j| (i, j)));
+    let piece =
+        |(i, j)| vec![corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+    squares.map(piece).collect()
+}
+
 /// Writes the polygons to an OBJ file; returns the shape that names it.
 fn mesh(name: &str, polygons: &[Vec<DVec3>]) -> String {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("emissive-objects");
@@ -89,6 +99,8 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
             case(format!("{material} rectangle {i}"), DVec3::Y, shape, expected);
             let two = mesh(&format!("rectangle-{i}"), std::slice::from_ref(&corners));
             case(format!("{material} mesh {i}"), DVec3::Y, object(material, &two), expected);
+            let many = mesh(&format!("pieces-{i}"), &pieces(&corners));
+            case(format!("{material} pieces {i}"), DVec3::Y, object(material, &many), expected);
         }
         // The same corners in the opposite order face away.
         let away: Vec<DVec3> = corners.iter().rev().copied().collect();
@@ -186,7 +198,8 @@ fn agree(name: &str, a: &Scene, b: &Scene, count: u32) {
 fn reflection_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     let center = DVec3::new(0.15, 0.7, 0.0);
     let (text, corners) = rectangle(center, [0.6, 0.4]);
-    let two = mesh("reflected", &[corners]);
+    let two = mesh("reflected", std::slice::from_ref(&corners));
+    let many = mesh("reflected-pieces", &pieces(&corners));
     let sphere = format!("sphere = {{ center = {}, radius = 0.25 }}", array(center));
     for lobe in ["cone", "square", "beckmann", "ggx"] {
         for roughness in [0.05, 0.5] {
@@ -198,6 +211,7 @@ fn reflection_of_emissive_objects_is_that_of_lights_of_the_same_size() {
             let name = format!("{lobe} {roughness}");
             agree(&name, &light(&text), &lamp(&format!("shape.{text}")), 1 << 14);
             agree(&name, &light(&text), &lamp(&two), 1 << 14);
+            agree(&name, &light(&text), &lamp(&many), 1 << 14);
             agree(&name, &light(&sphere), &lamp(&format!("shape.{sphere}")), 1 << 14);
         }
     }

@@ -78,9 +78,7 @@ pub(crate) fn surface_emission<L: SimdFloat>(
         if let Some(light) = &source.light
             && path.lobe_density.lt(L::from_f64(L::MAX)).any()
         {
-            let triangle = world.geometry.is_mesh(item).then_some(hit.triangle);
-            let ray = (path.ray.origin, path.ray.direction);
-            let density = light.density(ray, hit.t, triangle);
+            let density = light.density(path.ray.origin, hit.t, hit.triangle);
             radiance = radiance * power_heuristic(path.lobe_density, density);
         }
         out.groups[source.group] += source.emitted(radiance).masked(lanes);
