@@ -127,18 +127,16 @@ impl SendQueueEstimate {
             busy.most_drained = drained;
         }
         busy.is_full |= self.bytes >= limit;
+        // Rate since the beginning of the period, which stalls lower but do not raise. The bytes of a
+        // short time prove no rate: a relay, or the buffers of the other host, may have taken them at
+        // once.
+        let (start, before) = busy.whole;
+        let span = now.saturating_sub(start);
+        let whole = (span >= SAMPLE).then(|| (drained - before) / span.as_secs_f64());
         if bytes == 0 {
-            let elapsed = now - busy.since;
-            let is_long = |(start, _): &(Duration, f64)| now.saturating_sub(*start) >= SAMPLE;
-            // The bytes of a short time prove no rate: a relay, or the buffers of the other host,
-            // may have taken them at once.
-            let whole = busy.sample.into_iter().chain([busy.whole]).find(is_long);
-            let rate = whole.map(|(start, before)| {
-                (drained - before) / now.saturating_sub(start).as_secs_f64()
-            });
             let sample = QueueSample {
-                round_trip: busy.alone.map(|bytes| (elapsed, bytes)),
-                rate,
+                round_trip: busy.alone.map(|bytes| (now - busy.since, bytes)),
+                rate: whole,
                 is_full: false,
             };
             self.short_sample = whole.is_none().then_some(busy.whole);
@@ -153,8 +151,9 @@ impl SendQueueEstimate {
         if span < SAMPLE {
             return QueueSample::default();
         }
-        let rate = Some((drained - before).max(0.0) / span.as_secs_f64());
         let is_full = std::mem::replace(&mut busy.is_full, self.bytes >= limit);
+        let rate =
+            if is_full { Some((drained - before).max(0.0) / span.as_secs_f64()) } else { whole };
         busy.sample = Some((now, drained));
         QueueSample { round_trip: None, rate, is_full }
     }
