@@ -4,7 +4,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use zerkalo::film::{
     Depth, Display, Estimator, Film, Header, ImageData, ImageOutput, LightWeights, TILE_PIXELS,
-    Thumbnail, Tone,
+    Thumbnail, Tone, WholeFilm,
 };
 
 /// Film of a noisy gradient with `groups` light groups and 64 + 64 samples in every pixel.
@@ -72,14 +72,15 @@ fn pictures(c: &mut Criterion) {
     {
         let target = ImageOutput::from_path(dir.path().join(name)).expect("a known extension");
         let picture = ImageData {
-            film: &one,
+            size: [one.width(), one.height()].map(|n| n as u32),
             mix: &white(1),
             group_names: &["lamp".to_string()],
             display: Display::default(),
             depth,
-            metadata: &[],
         };
-        group.bench_function(name, |b| b.iter(|| target.write(&picture)));
+        group.bench_function(name, |b| {
+            b.iter(|| target.write(&picture, &mut WholeFilm { film: &one, metadata: &[] }));
+        });
         let bytes = std::fs::metadata(target.path()).map_or(0, |m| m.len());
         println!("{name}: {bytes} bytes");
     }

@@ -162,7 +162,7 @@ fn sampler(c: &mut Criterion) {
 
 fn compile(c: &mut Criterion) {
     let scene = physical();
-    let options = Options { precision: Precision::Single };
+    let options = Options { precision: Precision::Single, ..Options::default() };
     c.bench_function("compile the mirror room", |b| b.iter(|| AnyWorld::compile(&scene, &options)));
 }
 
@@ -173,7 +173,7 @@ fn wave(c: &mut Criterion) {
     group.throughput(Throughput::Elements(640 * 480 * 8));
     group.sample_size(10);
     for precision in [Precision::Single, Precision::Double] {
-        let world = AnyWorld::compile(&scene, &Options { precision });
+        let world = AnyWorld::compile(&scene, &Options { precision, ..Options::default() });
         let (scales, mix) = (world.group_scales(), LightWeights { weights: world.mix(&scene) });
         let estimator = Estimator::new(&scales, &mix, &Display::default());
         let header = Header {

@@ -4,6 +4,7 @@
 
 mod acceleration;
 mod agreement;
+mod big_picture;
 mod common;
 mod determinism;
 mod emitters;

@@ -180,7 +180,7 @@ const VIEW: &str = "
 
 fn sights(scene: &Scene, precision: Precision) -> Vec<FirstHit> {
     let [width, height] = scene.film.size.map(|n| n as usize);
-    let world = AnyWorld::compile(scene, &Options { precision });
+    let world = AnyWorld::compile(scene, &Options { precision, ..Options::default() });
     let points: Vec<[f64; 2]> = (0..width * height)
         .map(|i| [(i % width) as f64 + 0.37, (i / width) as f64 + 0.61])
         .collect();

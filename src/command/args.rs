@@ -159,6 +159,10 @@ pub struct RenderArgs {
     /// Trace only this shard of the plan, into a .zk file; 0 is the base
     #[arg(long, value_name = "K", requires = "plan", allow_negative_numbers = true)]
     pub shard: Option<u32>,
+    /// Stay below this much memory, such as 4GB: lights share a light group, then the picture is
+    /// rendered in regions and written row by row
+    #[arg(long, value_name = "SIZE", value_parser = memory, conflicts_with = "plan", allow_negative_numbers = true)]
+    pub memory: Option<u64>,
     /// Bits per channel of a PNG
     #[arg(long, value_name = "8|16", default_value = "8", value_parser = bits)]
     pub bits: u8,
@@ -511,6 +515,29 @@ fn exposure(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "expected a number from -64 to 64".to_string())
 }
 
+/// Units of sizes of memory, with their number of bytes.
+const MEMORY_UNITS: [(&str, f64); 6] = [
+    ("KB", 1e3),
+    ("MB", 1e6),
+    ("GB", 1e9),
+    ("KiB", 1024.0),
+    ("MiB", 1_048_576.0),
+    ("GiB", 1_073_741_824.0),
+];
+
+/// Parses a size of memory such as `4GB`, `1.5GiB` or `800 MB`. Returns bytes.
+fn memory(text: &str) -> Result<u64, String> {
+    let of_unit = |(unit, bytes): &(&str, f64)| {
+        let end = text.len().checked_sub(unit.len())?;
+        let (number, ending) = text.split_at_checked(end)?;
+        let number: f64 =
+            number.trim_end().parse().ok().filter(|_| ending.eq_ignore_ascii_case(unit))?;
+        (number > 0.0 && number * bytes < 1e18).then(|| (number * bytes) as u64)
+    };
+    let bytes = MEMORY_UNITS.iter().find_map(of_unit);
+    bytes.ok_or_else(|| "expected a size with KB, MB, GB, KiB, MiB or GiB, such as 4GB".to_string())
+}
+
 fn bits(text: &str) -> Result<u8, String> {
     match text {
         "8" => Ok(8),
@@ -559,6 +586,23 @@ mod tests {
         assert_eq!(render(&["--size", "640x480"]).unwrap().picture.size, Some([640, 480]));
         for wrong in ["640", "640x", "x480", "640x-1", "640X480", "1x1x1", "5000000000x1", ""] {
             assert!(render(&["--size", wrong]).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn sizes_of_memory_have_units() {
+        let memory = |text: &str| render(&["--memory", text]).map(|args| args.memory.unwrap());
+        for (text, bytes) in [
+            ("4GB", 4_000_000_000),
+            ("1.5gib", 1_610_612_736),
+            ("800 MB", 800_000_000),
+            ("1KB", 1000),
+        ] {
+            assert_eq!(memory(text).unwrap(), bytes, "{text}");
+        }
+        for wrong in ["4", "GB", "-1GB", "0MB", "4TB", "1e99GB", "nanGB", "infKB", "", "é", "4 G B"]
+        {
+            assert_eq!(memory(wrong).unwrap_err().exit_code(), 2, "{wrong}");
         }
     }
 

@@ -56,7 +56,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         state,
         threads: args.compute.threads(),
         options: Options {
-            world: world::Options { precision },
+            world: world::Options { precision, ..world::Options::default() },
             sampling,
             display: Display::default(),
         },

@@ -14,6 +14,7 @@ mod new;
 mod part_file;
 mod plan;
 mod progress;
+mod regions;
 mod render;
 mod shard;
 mod signals;

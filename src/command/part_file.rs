@@ -3,7 +3,7 @@
 use crate::command::{Failure, check_file};
 use crate::disk::WriteError;
 use crate::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
-use crate::film::{Depth, Film, ImageData, ImageOutput};
+use crate::film::{Depth, Film, ImageData, ImageOutput, WholeFilm};
 use crate::render::RenderState;
 use crate::render::export::{Provenance, metadata};
 use crate::render::plan::{Part, Plan};
@@ -36,14 +36,16 @@ impl FilmOutput {
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), Failure> {
         let written = match self {
             Self::Film(path) => write_film(path, film, header),
-            Self::Picture(output, depth) => output.write(&ImageData {
-                film,
-                mix: &header.weights,
-                group_names: &header.group_names,
-                display: header.display,
-                depth: *depth,
-                metadata: &header.metadata,
-            }),
+            Self::Picture(output, depth) => {
+                let picture = ImageData {
+                    size: [film.width(), film.height()].map(|n| n as u32),
+                    mix: &header.weights,
+                    group_names: &header.group_names,
+                    display: header.display,
+                    depth: *depth,
+                };
+                output.write(&picture, &mut WholeFilm { film, metadata: &header.metadata })
+            }
         };
         written.map_err(|error| Failure::Failed(error.to_string()))
     }

@@ -72,7 +72,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     let options = Options {
-        world: world::Options { precision: args.precision.get() },
+        world: world::Options { precision: args.precision.get(), ..world::Options::default() },
         sampling: SampleSettings { seed: args.compute.seed, kind: args.sampler.kind() },
         display: args.picture.display(),
     };

@@ -4,8 +4,9 @@ use crate::command::args::RenderArgs;
 use crate::command::checkpoints::CheckpointWriter;
 use crate::command::load_progress::LoadReporter;
 use crate::command::progress::Progress;
+use crate::command::regions::{self, Division};
 use crate::command::signals::Signals;
-use crate::command::stats::{Stats, peak_rss_bytes};
+use crate::command::stats::Stats;
 use crate::command::{Failure, check_file, print_line, shard, warn, write_file};
 use crate::disk::WriteError;
 use crate::film::{Depth, ImageOutput};
@@ -15,8 +16,9 @@ use crate::render::session::{Report, Session, State};
 use crate::render::{Checkpoint, Options};
 use crate::sampling::SampleSettings;
 use crate::scene::{Document, Scene};
+use crate::value::resident_memory;
 use crate::world;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -51,14 +53,8 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         warn(&format!("warning: {warning}"));
     }
     let signals = Signals::watch().map_err(|e| Failure::Failed(format!("no signals: {e}")))?;
+    let division = args.memory.map(|cap| Division::new(&scene, args, cap)).transpose()?;
 
-    let threads = args.compute.threads();
-    let mut session =
-        Session::new(threads, options(args), schedule_settings(args)).map_err(|error| {
-            Failure::Failed(format!(
-                "cannot start {threads} threads: {error}; try fewer by --threads"
-            ))
-        })?;
     let size = scene.film.size;
     let provenance = Provenance {
         source: args.scene.display().to_string(),
@@ -66,24 +62,14 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         sampler: args.sampler.kind(),
         adaptive: !args.uniform,
     };
-    match checkpoint {
-        Some(checkpoint) => resume(&mut session, Arc::new(scene), checkpoint),
-        None => drop(session.set_scene(Arc::new(scene))),
-    }
-    let scene_set_after = started.elapsed();
-    let mut checkpoints = args.checkpoint.as_ref().map(|path| {
-        let interval = Duration::from_secs_f64(args.checkpoint_interval.min(1e9));
-        CheckpointWriter::new(path, interval, provenance.clone())
-    });
-    let end = watch(&session, &signals, checkpoints.as_mut())?;
-    // The picture is written even if the checkpoint cannot be.
-    let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
-
-    let writing = Instant::now();
-    let (report, precision, biased, written) = write(&session, args, &output, provenance)
-        .ok_or_else(|| Failure::Failed("the renderer has no picture".to_string()))?;
-    written.map_err(failed_write)?;
-    let write_seconds = writing.elapsed().as_secs_f64();
+    let mut options = options(args);
+    options.world.merge_lights = division.is_some_and(|division| division.merge_lights);
+    let job = Job { args, scene, options, output: &output, provenance, signals, started };
+    let rendered = match division.filter(|division| division.regions.count > 1) {
+        Some(division) => in_regions(job, division.regions.rows)?,
+        None => as_a_whole(job, checkpoint)?,
+    };
+    let Rendered { report, end, precision, biased, set_after, write_seconds, kept } = rendered;
     let printed = print_line(&summary(output.path(), size, &report, end));
 
     if let Some(path) = &args.stats {
@@ -97,7 +83,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
             sampler: args.sampler.kind().name(),
             precision,
             lanes: report.lanes,
-            threads,
+            threads: args.compute.threads(),
             adaptive: !args.uniform,
             samples: report.samples,
             spp_min: report.spp.min,
@@ -111,7 +97,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
             samples_per_second: report.samples_per_second(),
             first_picture_seconds: report
                 .first_picture_seconds
-                .map(|s| s + scene_set_after.as_secs_f64()),
+                .map(|s| s + set_after.as_secs_f64()),
             noise_codes: report.noise.map(|n| n.rmse_codes),
             noise_codes_p95: report.noise.map(|n| n.p95_codes),
             rmse_linear: report.noise.map(|n| n.rmse_linear),
@@ -119,7 +105,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
             saturated_samples: report.saturated_samples,
             saturated_pixels: report.saturated_pixels,
             biased,
-            peak_rss_bytes: peak_rss_bytes(),
+            peak_rss_bytes: resident_memory().map(|resident| resident.peak),
             stopped_by: match end {
                 End::Done(reason) => reason.name(),
                 End::Signal(_) => "signal",
@@ -135,6 +121,77 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
         End::Done(_) => Ok(()),
         End::Signal(status) => Err(Failure::Signalled(status)),
     }
+}
+
+/// A render to a picture file.
+struct Job<'a> {
+    args: &'a RenderArgs,
+    scene: Scene,
+    options: Options,
+    output: &'a ImageOutput,
+    provenance: Provenance,
+    signals: Signals,
+    /// Start of the program.
+    started: Instant,
+}
+
+/// A render whose picture is written.
+struct Rendered {
+    report: Report,
+    end: End,
+    precision: &'static str,
+    /// Sentences about truncated paths.
+    biased: Vec<String>,
+    /// Time from the start of the program to that of the compilation.
+    set_after: Duration,
+    write_seconds: f64,
+    /// Result of writing the last checkpoint; `None` without checkpoints.
+    kept: Option<Result<PathBuf, WriteError>>,
+}
+
+/// Renders a picture whose film fits into memory.
+fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Failure> {
+    let Job { args, scene, options, output, provenance, signals, started } = job;
+    let threads = args.compute.threads();
+    let mut session = Session::new(threads, options, schedule_settings(args)).map_err(|error| {
+        Failure::Failed(format!("cannot start {threads} threads: {error}; try fewer by --threads"))
+    })?;
+    match checkpoint {
+        Some(checkpoint) => resume(&mut session, Arc::new(scene), checkpoint),
+        None => drop(session.set_scene(Arc::new(scene))),
+    }
+    let set_after = started.elapsed();
+    let mut checkpoints = args.checkpoint.as_ref().map(|path| {
+        let interval = Duration::from_secs_f64(args.checkpoint_interval.min(1e9));
+        CheckpointWriter::new(path, interval, provenance.clone())
+    });
+    let end = watch(&session, &signals, checkpoints.as_mut())?;
+    // The picture is written even if the checkpoint cannot be.
+    let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
+    let writing = Instant::now();
+    let (report, precision, biased, written) = write(&session, args, output, provenance)
+        .ok_or_else(|| Failure::Failed("the renderer has no picture".to_string()))?;
+    written.map_err(failed_write)?;
+    let write_seconds = writing.elapsed().as_secs_f64();
+    Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept })
+}
+
+/// Renders a picture in regions of `rows` rows.
+fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
+    let Job { args, scene, options, output, provenance, signals, started } = job;
+    let set_after = started.elapsed();
+    let how = (&options, schedule_settings(args));
+    let file = (output, depth(args));
+    let rendered = regions::render(args, scene, how, rows, file, provenance, &signals)?;
+    let regions::Rendered { report, stopped_by, precision, biased } = rendered;
+    let traced = report.seconds + report.compile_seconds;
+    let write_seconds = (started.elapsed() - set_after).as_secs_f64() - traced;
+    let end = End::Done(stopped_by);
+    Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept: None })
+}
+
+fn depth(args: &RenderArgs) -> Depth {
+    if args.bits == 16 { Depth::Sixteen } else { Depth::Eight }
 }
 
 /// Reason for the end of a render.
@@ -181,8 +238,7 @@ fn write(
     output: &ImageOutput,
     provenance: Provenance,
 ) -> Option<Written> {
-    let depth = if args.bits == 16 { Depth::Sixteen } else { Depth::Eight };
-    let (display, output) = (args.picture.display(), output.clone());
+    let (display, depth, output) = (args.picture.display(), depth(args), output.clone());
     session.with(move |state, report| {
         let written = state.write(report, &provenance, display, depth, &output);
         (report.clone(), state.world.precision(), state.world.biases(), written)
@@ -244,7 +300,7 @@ fn check_stats_path(path: &Path, output: &Path) -> Result<(), Failure> {
 
 fn options(args: &RenderArgs) -> Options {
     Options {
-        world: world::Options { precision: args.precision.get() },
+        world: world::Options { precision: args.precision.get(), ..world::Options::default() },
         sampling: SampleSettings { seed: args.compute.seed, kind: args.sampler.kind() },
         display: args.picture.display(),
     }

@@ -174,7 +174,7 @@ fn start(
     let precision =
         if settings.precision == "double" { Precision::Double } else { Precision::Single };
     let options = Options {
-        world: world::Options { precision },
+        world: world::Options { precision, ..world::Options::default() },
         sampling: SampleSettings { seed: settings.seed, kind: settings.sampler },
         display: settings.display,
     };

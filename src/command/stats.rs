@@ -1,7 +1,6 @@
 //! Statistics of a render as JSON, written for `--stats`.
 
 use serde::Serialize;
-use std::fs;
 
 /// Contents of the JSON file. The keys must not change, because scripts rely on them.
 #[derive(Debug, Serialize)]
@@ -66,24 +65,5 @@ impl Stats {
     /// Returns the statistics as JSON.
     pub fn json(&self) -> String {
         serde_json::to_string_pretty(self).expect("plain numbers and strings") + "\n"
-    }
-}
-
-/// Returns the peak resident memory of the process in bytes. Returns `None` on systems without
-/// Linux's `/proc/self/status`.
-pub fn peak_rss_bytes() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kibibytes * 1024)
-}
-
-#[cfg(all(test, target_os = "linux"))]
-mod tests {
-    #[test]
-    fn peak_memory_includes_a_large_block() {
-        let before = super::peak_rss_bytes().unwrap();
-        let block = std::hint::black_box(vec![1u8; 64 << 20]);
-        assert!(super::peak_rss_bytes().unwrap() >= before.max(block.len() as u64));
     }
 }

@@ -5,10 +5,15 @@
 //! `A.R ..` and `B.R ..` are the two replicates; half of their difference is an estimate of the
 //! picture's error. `light_NAME.R ..` are the contributions of the light groups; their sum is the
 //! picture. `count` is the number of samples of a pixel.
+//!
+//! Rows are written as soon as they are complete, as chunks in increasing order. The header is
+//! written again at the end if metadata have changed.
 
+use crate::film::bands::Bands;
 use crate::film::exr_header::Ordered;
 use crate::film::image_data::{ImageData, WriteSeek};
 use crate::film::light_weights::{Replicates, Sums};
+use crate::film::metadata::padded;
 use exr::block::UncompressedBlock;
 use exr::block::writer::ChunksWriter;
 use exr::compression::Compression;
@@ -19,10 +24,15 @@ use exr::meta::attribute::{
 };
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::meta::{BlockDescription, Headers};
-use std::io;
+use std::io::{self, Cursor, SeekFrom};
 
-pub(super) fn encode(picture: &ImageData, sink: &mut dyn WriteSeek) -> io::Result<()> {
-    encode_to(picture, sink).map_err(|error| match error {
+/// Encodes a picture row by row.
+pub(super) fn encode(
+    picture: &ImageData,
+    bands: &mut dyn Bands,
+    sink: &mut dyn WriteSeek,
+) -> io::Result<()> {
+    encode_to(picture, bands, sink).map_err(|error| match error {
         Error::Io(error) => error,
         other => io::Error::other(other.to_string()),
     })
@@ -39,10 +49,63 @@ enum Source {
     Count,
 }
 
-fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), Error> {
-    let film = picture.film;
-    let channels = channels(&layer_names(picture.group_names, film.groups()));
-    let size = Vec2(film.width(), film.height());
+fn encode_to(
+    picture: &ImageData,
+    bands: &mut dyn Bands,
+    sink: &mut dyn WriteSeek,
+) -> Result<(), Error> {
+    let channels = channels(&layer_names(picture.group_names, picture.mix.weights.len()));
+    let metadata = bands.metadata();
+    let headers = headers(picture, &channels, &metadata);
+    exr::block::write(Ordered::new(&mut *sink), headers, true, |meta, writer| {
+        let mut rows = Rows::new(picture, channels.iter().map(|(_, source)| *source).collect());
+        let mut compressor = writer.sequential_blocks_compressor(&meta);
+        for (index, block) in exr::block::enumerate_ordered_header_block_indices(&meta.headers) {
+            // Blocks of RLE have one row.
+            rows.load(block.pixel_position.y(), bands)?;
+            let channels = &meta.headers[0].channels;
+            let block = UncompressedBlock::from_lines(channels, block, |line| {
+                line.value.copy_from_slice(&rows.bytes[line.location.channel]);
+            });
+            compressor.compress_block(index, block)?;
+        }
+        Ok(())
+    })?;
+    let last = bands.metadata();
+    if last != metadata {
+        let [before, after] = [&metadata, &last].map(|m| header(picture, &channels, m));
+        let (before, after) = (before?, after?);
+        if before.len() != after.len() {
+            return Err(io::Error::other("metadata of another length").into());
+        }
+        sink.seek(SeekFrom::Start(0))?;
+        sink.write_all(&after)?;
+        sink.seek(SeekFrom::End(0))?;
+    }
+    Ok(())
+}
+
+/// Returns the bytes of a file before the table of chunks.
+fn header(
+    picture: &ImageData,
+    channels: &[(String, Source)],
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, Error> {
+    let mut file = Ordered::new(Cursor::new(Vec::new()));
+    let headers = headers(picture, channels, metadata);
+    match exr::block::write(&mut file, headers, true, |_, _| Err(Error::Aborted)) {
+        Ok(()) | Err(Error::Aborted) => Ok(file.into_header()),
+        Err(error) => Err(error),
+    }
+}
+
+/// Describes the only part of the file.
+fn headers(
+    picture: &ImageData,
+    channels: &[(String, Source)],
+    metadata: &[(String, String)],
+) -> Headers {
+    let size = Vec2(picture.size[0] as usize, picture.size[1] as usize);
     let mut image = ImageAttributes::with_size(size);
     image.chromaticities = Some(Chromaticities {
         red: Vec2(0.64, 0.33),
@@ -51,8 +114,8 @@ fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), Error>
         white: Vec2(0.3127, 0.329),
     });
     let mut layer = LayerAttributes::default();
-    for (key, value) in picture.metadata {
-        layer.other.insert(text(key), AttributeValue::Text(text(value)));
+    for (key, value) in metadata {
+        layer.other.insert(text(key), AttributeValue::Text(text(&padded(value))));
     }
     let descriptions = channels
         .iter()
@@ -67,21 +130,7 @@ fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), Error>
         .with_encoding(Compression::RLE, BlockDescription::ScanLines, LineOrder::Increasing)
         .with_shared_attributes(image)
         .with_attributes(layer);
-    let headers = Headers::from_elem(header, 1);
-    exr::block::write(Ordered::new(sink), headers, true, |meta, writer| {
-        let mut rows = Rows::new(picture, channels.iter().map(|(_, source)| *source).collect());
-        let mut compressor = writer.sequential_blocks_compressor(&meta);
-        for (index, block) in exr::block::enumerate_ordered_header_block_indices(&meta.headers) {
-            let channels = &meta.headers[0].channels;
-            let block = UncompressedBlock::from_lines(channels, block, |line| {
-                let location = line.location;
-                let row = rows.load(location.position.y());
-                line.value.copy_from_slice(&row[location.channel]);
-            });
-            compressor.compress_block(index, block)?;
-        }
-        Ok(())
-    })
+    Headers::from_elem(header, 1)
 }
 
 fn text(text: &str) -> Text {
@@ -121,37 +170,29 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     layers
 }
 
-/// Reader of film rows. It returns a row as the bytes of each channel.
+/// Reader of film rows.
 struct Rows<'a> {
     picture: &'a ImageData<'a>,
     sources: Vec<Source>,
-    mixed: Vec<f64>,
-    loaded: Option<usize>,
+    /// Latest row, as the bytes of each channel.
     bytes: Vec<Vec<u8>>,
 }
 
 impl<'a> Rows<'a> {
     fn new(picture: &'a ImageData<'a>, sources: Vec<Source>) -> Self {
-        Self {
-            picture,
-            mixed: picture.mix.radiance_per_step(picture.film.scales()),
-            loaded: None,
-            bytes: sources.iter().map(|_| Vec::new()).collect(),
-            sources,
-        }
+        Self { picture, bytes: sources.iter().map(|_| Vec::new()).collect(), sources }
     }
 
-    fn load(&mut self, y: usize) -> &[Vec<u8>] {
-        if self.loaded == Some(y) {
-            return &self.bytes;
-        }
-        self.loaded = Some(y);
-        let Self { picture, sources, mixed, bytes, .. } = self;
+    /// Replaces the bytes by those of row `y`.
+    fn load(&mut self, y: usize, bands: &mut dyn Bands) -> io::Result<()> {
+        let Self { picture, sources, bytes } = self;
+        let film = bands.film_with_row(y)?;
+        let mixed = &picture.mix.radiance_per_step(film.scales());
         for bytes in bytes.iter_mut() {
             bytes.clear();
-            bytes.resize(picture.film.width() * 4, 0);
+            bytes.resize(film.width() * 4, 0);
         }
-        picture.film.visit_row(y, |x, sums| {
+        film.visit_row(y - film.first_row(), |x, sums| {
             let means = [Replicates::Both, Replicates::A, Replicates::B]
                 .map(|replicates| sums.mean(replicates, mixed));
             for (source, bytes) in sources.iter().zip(bytes.iter_mut()) {
@@ -167,7 +208,7 @@ impl<'a> Rows<'a> {
                 bytes[x * 4..][..4].copy_from_slice(&value);
             }
         });
-        &self.bytes
+        Ok(())
     }
 }
 

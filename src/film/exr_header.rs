@@ -5,7 +5,7 @@
 //! a zero byte. An attribute consists of a name and a type (each ends with a zero byte), a size
 //! (i32, little-endian), and `size` bytes of data.
 
-use std::io::{self, Seek, SeekFrom, Write};
+use std::io::{self, Cursor, Seek, SeekFrom, Write};
 
 /// Number of bytes before the first attribute: magic number and version.
 const PREAMBLE: usize = 8;
@@ -16,12 +16,23 @@ pub(super) struct Ordered<W: Write + Seek> {
     sink: W,
     /// Buffered bytes. `None` after the header has been written.
     buffer: Option<Vec<u8>>,
+    /// Number of bytes of the header, with its last byte; 0 until it is complete.
+    header_len: usize,
 }
 
 impl<W: Write + Seek> Ordered<W> {
     /// Creates a writer for a file that starts at the current position of `sink`.
     pub fn new(sink: W) -> Self {
-        Self { sink, buffer: Some(Vec::new()) }
+        Self { sink, buffer: Some(Vec::new()), header_len: 0 }
+    }
+}
+
+impl Ordered<Cursor<Vec<u8>>> {
+    /// Returns the bytes of the header. They are empty if it is not complete.
+    pub fn into_header(self) -> Vec<u8> {
+        let mut bytes = self.sink.into_inner();
+        bytes.truncate(self.header_len);
+        bytes
     }
 }
 
@@ -32,6 +43,7 @@ impl<W: Write + Seek> Write for Ordered<W> {
         if let Some((mut attributes, rest)) = buffer.get(PREAMBLE..).and_then(attributes) {
             attributes.sort_unstable();
             self.sink.write_all(&[&buffer[..PREAMBLE], &attributes.concat(), rest].concat())?;
+            self.header_len = buffer.len() - rest.len() + 1;
             self.buffer = None;
         }
         Ok(bytes.len())
@@ -70,7 +82,6 @@ fn attributes(mut bytes: &[u8]) -> Option<(Vec<&[u8]>, &[u8])> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::io::Cursor;
 
     const HEAD: &[u8] = b"magicver\
         b\0int\0\x04\0\0\0abcd\

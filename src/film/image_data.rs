@@ -1,15 +1,14 @@
-//! Input of the picture encoders (PNG and OpenEXR).
+//! Input of the picture encoders (PNG and OpenEXR), apart from the samples.
 
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
-use crate::film::store::Film;
 use std::io::{Seek, Write};
 
-/// Contents of a picture file.
+/// Size and settings of a picture file. [`Bands`](crate::film::Bands) hold its samples.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageData<'a> {
-    /// Film that holds the samples.
-    pub film: &'a Film,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
     /// Weight of each light group: colour times intensity.
     pub mix: &'a LightWeights,
     /// Name of each light group, used by formats with layers.
@@ -18,10 +17,6 @@ pub struct ImageData<'a> {
     pub display: Display,
     /// Bits per channel, used by formats that hold display values.
     pub depth: Depth,
-    /// Metadata keys and values. A key has 1 to 79 printable ASCII characters, without leading,
-    /// trailing or double spaces. It starts with a capital letter, because OpenEXR's own keys start
-    /// with a small one.
-    pub metadata: &'a [(String, String)],
 }
 
 /// Bits per channel of a picture file with display values.

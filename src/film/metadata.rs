@@ -1,4 +1,4 @@
-//! Reader of the metadata of picture files and film files.
+//! Metadata of picture files and film files: reader, and padding of values.
 
 use crate::disk::open_regular;
 use crate::film::file::{FilmFileHeader, FilmReader, is_film_file};
@@ -7,6 +7,21 @@ use exr::meta::attribute::AttributeValue;
 use png::Decoder;
 use std::io::BufReader;
 use std::path::Path;
+
+/// Multiple of bytes to which the values in picture files are padded.
+const PADDED: usize = 128;
+
+/// Pads a value with spaces. Noise and sample counts of a picture that is written while it is
+/// rendered are known at the end, and replace placeholders of the same length.
+pub(super) fn padded(value: &str) -> String {
+    let len = value.len().next_multiple_of(PADDED).max(PADDED);
+    format!("{value}{}", " ".repeat(len - value.len()))
+}
+
+/// Removes the padding of a value.
+fn unpadded((key, value): (String, String)) -> (String, String) {
+    (key, value.trim_end_matches(' ').to_string())
+}
 
 /// Metadata of a picture or of a film file.
 #[derive(Clone, Debug)]
@@ -53,7 +68,7 @@ impl FileMetadata {
             return Ok(Self {
                 format: "PNG",
                 size: [width as usize, height as usize],
-                entries: latin.chain(utf8).collect(),
+                entries: latin.chain(utf8).map(unpadded).collect(),
                 film: None,
             });
         }
@@ -65,8 +80,9 @@ impl FileMetadata {
             _ => None,
         };
         let all = header.own_attributes.other.iter();
-        let mut entries: Vec<_> =
-            all.filter_map(|(key, value)| Some((key.to_string(), text(value)?))).collect();
+        let mut entries: Vec<_> = all
+            .filter_map(|(key, value)| Some(unpadded((key.to_string(), text(value)?))))
+            .collect();
         entries.sort();
         let size = [header.layer_size.width(), header.layer_size.height()];
         Ok(Self { format: "OpenEXR", size, entries, film: None })

@@ -5,6 +5,7 @@
 //! addition changes no bit. Each light group has its own sums, for white light of unit intensity.
 //! [`LightWeights`] multiply each group by colour and intensity afterwards.
 
+mod bands;
 mod box_filter;
 mod canonical_bytes;
 mod display;
@@ -33,6 +34,7 @@ mod test_random;
 pub mod testing;
 mod tile;
 
+pub use bands::{Bands, WholeFilm};
 pub use box_filter::box_means;
 pub use display::{Display, Tone, quantised_16};
 pub use downsample::{DirtyTile, IncrementalDownsample, Thumbnail};

@@ -1,6 +1,7 @@
 //! Picture files: chooses the format by extension.
 
 use crate::disk::{Existing, Replacement, WriteError};
+use crate::film::bands::Bands;
 use crate::film::image_data::{ImageData, WriteSeek};
 use crate::film::{exr, png};
 use std::ffi::OsStr;
@@ -10,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// A picture file format.
 struct Format {
     extension: &'static str,
-    encode: fn(&ImageData, &mut dyn WriteSeek) -> io::Result<()>,
+    encode: fn(&ImageData, &mut dyn Bands, &mut dyn WriteSeek) -> io::Result<()>,
 }
 
 /// All formats that can be written.
@@ -76,13 +77,13 @@ impl ImageOutput {
         Replacement::begin(&self.path, self.existing).map(drop)
     }
 
-    /// Writes the picture to a temporary file in the same directory. Renames the file when it is
-    /// complete and stored on the disk.
+    /// Writes the picture to a temporary file in the same directory, row by row. Renames the file
+    /// when it is complete and stored on the disk.
     ///
     /// # Errors
-    /// Fails if the file cannot be written; an existing file is then unchanged.
-    pub fn write(&self, picture: &ImageData) -> Result<(), WriteError> {
-        self.replace(|sink| (FORMATS[self.format].encode)(picture, sink))
+    /// Fails if the file cannot be written or `bands` fail; an existing file is then unchanged.
+    pub fn write(&self, picture: &ImageData, bands: &mut dyn Bands) -> Result<(), WriteError> {
+        self.replace(|sink| (FORMATS[self.format].encode)(picture, bands, sink))
     }
 
     fn replace(
@@ -101,6 +102,8 @@ impl ImageOutput {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::testing::{fill, film, white};
+    use crate::film::{Depth, Display, FileMetadata, Film, WholeFilm};
     use std::fs;
 
     #[test]
@@ -144,5 +147,82 @@ mod tests {
         assert!(error.contains("such a file already"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"new");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    /// Bands whose metadata change after the last row.
+    struct Late<'a> {
+        film: &'a Film,
+        rows: usize,
+    }
+
+    fn entries(noise: &str) -> Vec<(String, String)> {
+        [("Noise", noise), ("Source", "окно.toml")].map(|(k, v)| (k.into(), v.into())).to_vec()
+    }
+
+    impl Bands for Late<'_> {
+        fn film_with_row(&mut self, y: usize) -> io::Result<&Film> {
+            self.rows += 1;
+            assert_eq!(y + 1, self.rows, "rows in increasing order");
+            Ok(self.film)
+        }
+
+        fn metadata(&self) -> Vec<(String, String)> {
+            entries(if self.rows < self.film.height() { "unknown" } else { "0.5 codes" })
+        }
+    }
+
+    #[test]
+    fn metadata_that_are_known_last_replace_placeholders() {
+        let mut film = film(40, 20, &[1.0]);
+        fill(&mut film, 2, |x, y, _| vec![x as f64, y as f64, 1.0]);
+        let folder = tempfile::tempdir().unwrap();
+        let picture = ImageData {
+            size: [40, 20],
+            mix: &white(1),
+            group_names: &[],
+            display: Display::default(),
+            depth: Depth::Eight,
+        };
+        for name in ["a.png", "a.exr"] {
+            let write = |bands: &mut dyn Bands| {
+                let path = folder.path().join(name);
+                ImageOutput::from_path(&path).unwrap().write(&picture, bands).unwrap();
+                assert_eq!(FileMetadata::read(&path).unwrap().get("Noise"), Some("0.5 codes"));
+                fs::read(path).unwrap()
+            };
+            let late = write(&mut Late { film: &film, rows: 0 });
+            let known = write(&mut WholeFilm { film: &film, metadata: &entries("0.5 codes") });
+            assert!(late == known, "{name}");
+        }
+    }
+
+    /// Bands that cannot be rendered, as after a signal.
+    struct Failing(Film);
+
+    impl Bands for Failing {
+        fn film_with_row(&mut self, y: usize) -> io::Result<&Film> {
+            if y < 10 { Ok(&self.0) } else { Err(io::Error::other("stopped by a signal")) }
+        }
+
+        fn metadata(&self) -> Vec<(String, String)> {
+            entries("unknown")
+        }
+    }
+
+    #[test]
+    fn failed_bands_leave_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let mix = &white(1);
+        let (display, depth) = (Display::default(), Depth::Sixteen);
+        let picture = ImageData { size: [40, 20], mix, group_names: &[], display, depth };
+        for name in ["a.png", "a.exr"] {
+            let path = folder.path().join(name);
+            fs::write(&path, "old").unwrap();
+            let output = ImageOutput::from_path(&path).unwrap();
+            let error = output.write(&picture, &mut Failing(film(40, 20, &[1.0]))).unwrap_err();
+            assert!(error.to_string().contains("stopped by a signal, and the old file"), "{error}");
+            assert_eq!(fs::read(&path).unwrap(), b"old");
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 }

@@ -1,26 +1,77 @@
 //! PNG writer: displayed pictures in 8 or 16 bits per channel, sRGB, with text metadata.
 
+use crate::film::bands::Bands;
 use crate::film::display::quantised_16;
 use crate::film::image_data::{Depth, ImageData, WriteSeek};
 use crate::film::light_weights::Replicates;
+use crate::film::metadata::padded;
 use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SourceChromaticities,
-    SrgbRenderingIntent,
+    SrgbRenderingIntent, Writer,
 };
-use std::io;
+use std::io::{self, SeekFrom, Write};
 
-pub(super) fn encode(picture: &ImageData, sink: &mut dyn WriteSeek) -> io::Result<()> {
-    encode_to(picture, sink).map_err(|error| match error {
+/// Size of the chunks of image data \[bytes\].
+const CHUNK_BYTES: usize = 1 << 18;
+/// Size of the last chunk, which has no data \[bytes\].
+const END_CHUNK_BYTES: usize = 12;
+
+/// Encodes a picture row by row.
+pub(super) fn encode(
+    picture: &ImageData,
+    bands: &mut dyn Bands,
+    sink: &mut dyn WriteSeek,
+) -> io::Result<()> {
+    encode_to(picture, bands, sink).map_err(|error| match error {
         EncodingError::IoError(error) => error,
         other => io::Error::other(other),
     })
 }
 
-fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), EncodingError> {
-    let film = picture.film;
-    let too_large = |_| io::Error::new(io::ErrorKind::InvalidInput, "too large for a PNG file");
-    let width = u32::try_from(film.width()).map_err(too_large)?;
-    let height = u32::try_from(film.height()).map_err(too_large)?;
+fn encode_to(
+    picture: &ImageData,
+    bands: &mut dyn Bands,
+    sink: &mut dyn WriteSeek,
+) -> Result<(), EncodingError> {
+    let metadata = bands.metadata();
+    let mut writer = start(picture, &metadata, &mut *sink)?;
+    let mut stream = writer.stream_writer_with_size(CHUNK_BYTES)?;
+    let mut row = Vec::new();
+    for y in 0..picture.size[1] as usize {
+        encode_row(picture, bands, y, &mut row)?;
+        stream.write_all(&row)?;
+    }
+    stream.finish()?;
+    writer.finish()?;
+    let last = bands.metadata();
+    if last != metadata {
+        let [before, after] = [preamble(picture, &metadata)?, preamble(picture, &last)?];
+        if before.len() != after.len() {
+            return Err(io::Error::other("metadata of another length").into());
+        }
+        sink.seek(SeekFrom::Start(0))?;
+        sink.write_all(&after)?;
+        sink.seek(SeekFrom::End(0))?;
+    }
+    Ok(())
+}
+
+/// Returns the bytes of a file before its image data.
+fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8>, EncodingError> {
+    let mut bytes = Vec::new();
+    // The writer adds the last chunk when it is dropped.
+    drop(start(picture, metadata, &mut bytes)?);
+    bytes.truncate(bytes.len() - END_CHUNK_BYTES);
+    Ok(bytes)
+}
+
+/// Writes everything that precedes the image data.
+fn start<W: Write>(
+    picture: &ImageData,
+    metadata: &[(String, String)],
+    sink: W,
+) -> Result<Writer<W>, EncodingError> {
+    let [width, height] = picture.size;
     let mut encoder = Encoder::new(sink, width, height);
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(match picture.depth {
@@ -39,17 +90,15 @@ fn encode_to(picture: &ImageData, sink: &mut dyn WriteSeek) -> Result<(), Encodi
         green: xy(30_000, 60_000),
         blue: xy(15_000, 6_000),
     });
-    for (key, value) in picture.metadata {
+    for (key, value) in metadata {
         // More programs read the older text chunk, but it can hold only Latin-1.
         if value.is_ascii() {
-            encoder.add_text_chunk(key.clone(), value.clone())?;
+            encoder.add_text_chunk(key.clone(), padded(value))?;
         } else {
-            encoder.add_itxt_chunk(key.clone(), value.clone())?;
+            encoder.add_itxt_chunk(key.clone(), padded(value))?;
         }
     }
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(&pixels(picture))?;
-    writer.finish()
+    encoder.write_header()
 }
 
 /// Encodes rows of red, green, blue, 8 bits each, sRGB, as PNG.
@@ -68,26 +117,28 @@ pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> 
     Ok(bytes)
 }
 
-/// Returns the bytes of the picture: rows of red, green, blue. 16-bit values are big-endian, as PNG
-/// requires.
-fn pixels(picture: &ImageData) -> Vec<u8> {
-    let (film, mut row) = (picture.film, Vec::new());
-    let bytes_per_channel = match picture.depth {
-        Depth::Eight => 1,
-        Depth::Sixteen => 2,
-    };
-    let mut bytes = Vec::with_capacity(film.width() * film.height() * 3 * bytes_per_channel);
-    let to_8 = picture.display.to_8();
-    for y in 0..film.height() {
-        film.row(y, Replicates::Both, picture.mix, &mut row);
-        match picture.depth {
-            Depth::Eight => row.iter().for_each(|rgb| bytes.extend(to_8(*rgb))),
-            Depth::Sixteen => bytes.extend(
-                row.iter()
-                    .flat_map(|rgb| picture.display.codes(*rgb))
-                    .flat_map(|value| quantised_16(value).to_be_bytes()),
-            ),
+/// Replaces `bytes` by those of row `y`: red, green, blue of each pixel. 16-bit values are
+/// big-endian, as PNG requires.
+fn encode_row(
+    picture: &ImageData,
+    bands: &mut dyn Bands,
+    y: usize,
+    bytes: &mut Vec<u8>,
+) -> io::Result<()> {
+    let film = bands.film_with_row(y)?;
+    let mut row = Vec::new();
+    film.row(y - film.first_row(), Replicates::Both, picture.mix, &mut row);
+    bytes.clear();
+    match picture.depth {
+        Depth::Eight => {
+            let to_8 = picture.display.to_8();
+            row.iter().for_each(|rgb| bytes.extend(to_8(*rgb)));
         }
+        Depth::Sixteen => bytes.extend(
+            row.iter()
+                .flat_map(|rgb| picture.display.codes(*rgb))
+                .flat_map(|value| quantised_16(value).to_be_bytes()),
+        ),
     }
-    bytes
+    Ok(())
 }

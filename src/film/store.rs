@@ -42,6 +42,8 @@ impl Header {
 #[derive(Debug)]
 pub struct Film {
     header: Header,
+    /// Row of the picture in which the film begins, a multiple of [`TILE`].
+    first_row: usize,
     epoch: u64,
     tiles: Vec<Tile>,
 }
@@ -51,7 +53,7 @@ pub struct Film {
 pub struct TileHandle<'a> {
     /// Number of the tile; tiles are numbered row by row.
     pub index: usize,
-    /// Column and row of the tile's upper left pixel.
+    /// Column and row of the tile's upper left pixel in the picture.
     pub origin: [usize; 2],
     tile: &'a mut Tile,
     epoch: u64,
@@ -156,7 +158,7 @@ impl Film {
                 .map(|t| [inside(*width, t % columns), inside(*height, t / columns)])
                 .map(|extent| Tile::cleared(scales.len(), extent)),
         );
-        Ok(Self { epoch: 1, tiles, header })
+        Ok(Self { epoch: 1, tiles, header, first_row: 0 })
     }
 
     /// Creates a film without samples. It uses the memory of this film, which may have another
@@ -170,6 +172,7 @@ impl Film {
     pub fn reuse_for(mut self, header: Header) -> Result<Self, TryReserveError> {
         if header == self.header {
             self.restart();
+            self.first_row = 0;
             return Ok(self);
         }
         let mut film = Self::without_memory(header)?;
@@ -184,6 +187,21 @@ impl Film {
             .collect();
         film.reserve()?;
         Ok(film)
+    }
+
+    /// Returns this film as that of a band of rows: its first row is row `first_row` of the picture.
+    /// All columns and rows of other functions are counted from the band's upper left pixel.
+    ///
+    /// # Panics
+    /// Panics if `first_row` is not a multiple of [`TILE`].
+    pub fn starting_at(self, first_row: usize) -> Self {
+        assert!(first_row.is_multiple_of(TILE), "a band from row {first_row}");
+        Self { first_row, ..self }
+    }
+
+    /// Row of the picture in which the film begins; 0 for the film of a whole picture.
+    pub fn first_row(&self) -> usize {
+        self.first_row
     }
 
     /// Width in pixels.
@@ -256,7 +274,7 @@ impl Film {
     pub fn slots(&mut self, indices: &[usize]) -> Vec<TileHandle<'_>> {
         let mut order: Vec<usize> = (0..indices.len()).collect();
         order.sort_unstable_by_key(|i| indices[*i]);
-        let (columns, epoch) = (self.tile_columns(), self.epoch);
+        let (columns, epoch, first_row) = (self.tile_columns(), self.epoch, self.first_row);
         let mut handles: Vec<Option<TileHandle>> = indices.iter().map(|_| None).collect();
         let mut remaining = self.tiles.as_mut_slice();
         let mut first = 0;
@@ -265,7 +283,7 @@ impl Film {
             assert!(index >= first, "tile {index} is named twice");
             let (tile, after) =
                 remaining[index - first..].split_first_mut().expect("tile in range");
-            let origin = [index % columns * TILE, index / columns * TILE];
+            let origin = [index % columns * TILE, first_row + index / columns * TILE];
             handles[i] = Some(TileHandle { index, origin, tile, epoch });
             (remaining, first) = (after, index + 1);
         }

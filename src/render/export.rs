@@ -2,7 +2,7 @@
 //! therefore holds no dates, times or numbers of threads.
 
 use crate::disk::WriteError;
-use crate::film::{Depth, Display, ImageData, ImageOutput, Tone};
+use crate::film::{Depth, Display, ImageData, ImageOutput, Tone, WholeFilm};
 use crate::render::render_state::RenderState;
 use crate::render::session::Report;
 use crate::sampling::SamplerKind;
@@ -35,14 +35,11 @@ impl RenderState {
         depth: Depth,
         output: &ImageOutput,
     ) -> Result<(), WriteError> {
-        output.write(&ImageData {
-            film: &self.film,
-            mix: &self.mix,
-            group_names: &self.group_names(),
-            display,
-            depth,
-            metadata: &metadata(self, report, provenance, &display),
-        })
+        let metadata = &metadata(self, report, provenance, &display);
+        let group_names = &self.group_names();
+        let picture =
+            ImageData { size: self.scene().film.size, mix: &self.mix, group_names, display, depth };
+        output.write(&picture, &mut WholeFilm { film: &self.film, metadata })
     }
 }
 

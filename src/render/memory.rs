@@ -3,8 +3,8 @@
 //! An allocation that fails ends the program without a picture, and with the edits of the dashboard
 //! lost. The sum is therefore compared with every known limit before a film is created.
 
-use crate::film::{Film, TILE};
-use crate::value::{Available, available_memory, megabytes};
+use crate::film::{Film, TILE, TileNoise};
+use crate::value::{Available, ResidentMemory, available_memory, megabytes, resident_memory};
 
 /// Memory for each pixel beside the film: a linear copy of the picture \[bytes\].
 const COPY_BYTES: u64 = 16;
@@ -47,7 +47,8 @@ fn compare(size: [u32; 2], groups: usize, available: Available) -> Result<(), St
     };
     Err(format!(
         "film: {width} x {height} pixels with {lights} need {} of memory, and {} are available \
-         ({}). Expected a smaller picture, such as size = [{fit_width}, {fit_height}]",
+         ({}). Expected a smaller picture, such as size = [{fit_width}, {fit_height}], or \
+         `zerkalo render --memory SIZE`, which renders it in regions",
         megabytes(needed),
         megabytes(available.bytes),
         available.limit,
@@ -62,6 +63,69 @@ pub fn refused(size: [u32; 2], groups: usize) -> String {
          picture, or less memory in use by other programs",
         megabytes(needed(size, groups)),
     )
+}
+
+/// Memory for each tile of a region beside its sums: tile, schedule with the latest estimates, jobs
+/// and their reports \[bytes\].
+const REGION_TILE_BYTES: u64 = 1024;
+/// Memory for each tile of a picture in regions: its error, and a number for the percentiles
+/// \[bytes\].
+const PICTURE_TILE_BYTES: u64 = (size_of::<Option<TileNoise>>() + size_of::<f64>()) as u64;
+/// Memory for each pixel of a row and light group while the row is encoded \[bytes\].
+const ROW_BYTES: u64 = 160;
+/// Memory of the program beside scene and film: buffers, allocator \[bytes\].
+const PROGRAM_BYTES: u64 = 3 << 20;
+/// Memory of a tracing thread: stack and paths \[bytes\].
+const THREAD_BYTES: u64 = 1 << 20;
+/// Assumed memory of program and scene on systems that do not report it \[bytes\].
+const UNKNOWN_RESIDENT: ResidentMemory = ResidentMemory { now: 64 << 20, peak: 64 << 20 };
+
+/// Regions of a picture: bands of rows that are rendered one after another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Regions {
+    /// Number of rows of each region but the last; a multiple of [`TILE`].
+    pub rows: u32,
+    /// Number of regions.
+    pub count: u32,
+    /// Expected peak of the memory of this process \[bytes\].
+    pub bytes: u64,
+}
+
+/// Divides a picture of `size` pixels with `groups` light groups into the fewest regions whose
+/// memory, with that of the program and of the compiled scene, which exists now, is at most `cap`
+/// bytes.
+///
+/// # Errors
+/// Returns the least memory in bytes if not even regions of one row of tiles fit.
+pub fn divide(size: [u32; 2], groups: usize, threads: usize, cap: u64) -> Result<Regions, u64> {
+    divide_from(resident_memory().unwrap_or(UNKNOWN_RESIDENT), size, groups, threads, cap)
+}
+
+fn divide_from(
+    resident: ResidentMemory,
+    size: [u32; 2],
+    groups: usize,
+    threads: usize,
+    cap: u64,
+) -> Result<Regions, u64> {
+    let [columns, tile_rows] = size.map(|n| u64::from(n.div_ceil(TILE as u32)));
+    let fixed = resident.now
+        + PROGRAM_BYTES
+        + THREAD_BYTES * threads as u64
+        + PICTURE_TILE_BYTES * columns * tile_rows
+        + ROW_BYTES * u64::from(size[0]) * (groups as u64 + 3);
+    let band = Film::memory_bytes([size[0], 1], groups) + REGION_TILE_BYTES * columns;
+    let fitting = cap.saturating_sub(fixed) / band;
+    if fitting == 0 || resident.peak > cap {
+        return Err(resident.peak.max(fixed + band));
+    }
+    let count = tile_rows.div_ceil(fitting);
+    let rows_each = tile_rows.div_ceil(count);
+    Ok(Regions {
+        rows: rows_each as u32 * TILE as u32,
+        count: tile_rows.div_ceil(rows_each) as u32,
+        bytes: resident.peak.max(fixed + rows_each * band),
+    })
 }
 
 /// Rounds down to a size that people would write.
@@ -93,10 +157,48 @@ mod tests {
             error,
             "film: 16384 x 4096 pixels with 2 light groups need 7.7 GB of memory, and 1.0 GB are \
              available (the limit of the control group). Expected a smaller picture, such as size = \
-             [5888, 1408]"
+             [5888, 1408], or `zerkalo render --memory SIZE`, which renders it in regions"
         );
         // The suggestion fits.
         assert_eq!(compare([5888, 1408], 2, available(1_000_000_000)), Ok(()));
         assert!(compare([65536, 65536], 16, available(0)).unwrap_err().contains("[1, 1]"));
+    }
+
+    #[test]
+    fn picture_is_divided_into_the_fewest_regions_that_fit() {
+        let resident = ResidentMemory { now: 20_000_000, peak: 25_000_000 };
+        let divide = |size, cap| divide_from(resident, size, 1, 4, cap);
+        let whole = divide([16384, 16384], 1 << 40).unwrap();
+        assert_eq!((whole.rows, whole.count), (16384, 1));
+        assert!(whole.bytes > 48 << 28, "{whole:?}");
+        for cap in [200_000_000, 1_000_000_000, 4_000_000_000, whole.bytes - 1, whole.bytes] {
+            let regions = divide([16384, 16384], cap).unwrap();
+            assert!(regions.bytes <= cap, "{cap}: {regions:?}");
+            assert!(regions.rows.is_multiple_of(16), "{regions:?}");
+            assert_eq!(16384u32.div_ceil(regions.rows), regions.count, "{regions:?}");
+            // Fewer regions do not fit.
+            let rows = 16384u32.div_ceil(regions.count.max(2) - 1).next_multiple_of(16);
+            let band = Film::memory_bytes([16384, rows], 1) + 1024 * 1024 * u64::from(rows / 16);
+            assert!(regions.count == 1 || resident.now + band > cap - 200_000_000, "{regions:?}");
+        }
+        // The last region may be smaller, and no region is empty.
+        for height in [1, 16, 17, 100, 1000] {
+            for cap in (32_000_000..200_000_000).step_by(1_000_000) {
+                let Ok(regions) = divide([4096, height], cap) else { continue };
+                assert_eq!(height.div_ceil(regions.rows), regions.count, "{height} {cap}");
+            }
+        }
+    }
+
+    #[test]
+    fn least_memory_suffices_and_less_does_not() {
+        let resident = ResidentMemory { now: 20_000_000, peak: 25_000_000 };
+        let divide = |cap| divide_from(resident, [640, 480], 2, 4, cap);
+        let least = divide(1000).unwrap_err();
+        assert_eq!(divide(least).unwrap().rows, 16);
+        assert_eq!(divide(least - 1), Err(least));
+        let peak = ResidentMemory { peak: 90_000_000, ..resident };
+        assert_eq!(divide_from(peak, [640, 480], 2, 4, 89_999_999), Err(90_000_000));
+        assert_eq!(divide_from(peak, [640, 480], 2, 4, 90_000_000).unwrap().count, 1);
     }
 }

@@ -8,6 +8,7 @@ mod first_pass;
 pub mod memory;
 pub mod pass;
 pub mod plan;
+mod region_render;
 mod relighting;
 mod render_state;
 pub mod schedule;
@@ -17,6 +18,7 @@ pub mod wave;
 
 pub use checkpoint::{Checkpoint, EncodedCheckpoint, SampleInputs};
 pub use feature_buffer::FeatureBuffer;
+pub use region_render::RegionRender;
 pub use relighting::Relighting;
 pub use render_state::{Options, RenderState};
 pub use sync_render::SyncRender;

@@ -9,6 +9,7 @@ use crate::render::{first_pass, memory, pass};
 use crate::sampling::SampleSettings;
 use crate::scene::Scene;
 use crate::world::{self, AnyWorld};
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -64,19 +65,58 @@ impl RenderState {
         }
     }
 
+    /// Compiles `scene`, which has no faults, with a film of the rows `rows` of the picture. The
+    /// first row is a multiple of [`TILE`].
+    ///
+    /// # Errors
+    /// Returns that there is not enough memory for the film.
+    pub(super) fn of_band(
+        scene: &Arc<Scene>,
+        options: &Options,
+        rows: Range<u32>,
+    ) -> Result<Self, String> {
+        Self::compile_rows(Arc::clone(scene), options, None, rows)
+    }
+
+    /// Replaces the film by an empty one of the rows `rows`, which uses its memory.
+    ///
+    /// # Errors
+    /// Returns that there is not enough memory for the film. The state has no film then.
+    pub(super) fn into_band(self, rows: Range<u32>) -> Result<Self, String> {
+        let size = [self.film.width() as u32, rows.len() as u32];
+        let header = Header { height: rows.len(), ..self.film.header().clone() };
+        let film = self.film.reuse_for(header);
+        let film = film.map_err(|_| memory::refused(size, self.mix.weights.len()))?;
+        Ok(Self { film: film.starting_at(rows.start as usize), ..self })
+    }
+
     fn compile(
         scene: Arc<Scene>,
         options: &Options,
         previous: Option<Self>,
     ) -> Result<Self, String> {
+        let rows = 0..scene.film.size[1];
+        Self::compile_rows(scene, options, previous, rows)
+    }
+
+    fn compile_rows(
+        scene: Arc<Scene>,
+        options: &Options,
+        previous: Option<Self>,
+        rows: Range<u32>,
+    ) -> Result<Self, String> {
         let world = AnyWorld::compile(&scene, &options.world);
-        let (size, groups) = (scene.film.size, world.light_groups().members.len());
+        let (size, groups) =
+            ([scene.film.size[0], rows.len() as u32], world.light_groups().members.len());
         let film_of = |previous: &Self| {
             let size = [previous.film.width(), previous.film.height()].map(|n| n as u32);
             Film::memory_bytes(size, previous.film.groups())
         };
-        memory::check(size, groups, previous.as_ref().map_or(0, film_of))?;
-        let [width, height] = scene.film.size.map(|n| n as usize);
+        // Bands are part of a division for which the memory has been compared.
+        if size == scene.film.size {
+            memory::check(size, groups, previous.as_ref().map_or(0, film_of))?;
+        }
+        let [width, height] = size.map(|n| n as usize);
         let header = Header {
             width,
             height,
@@ -91,6 +131,7 @@ impl RenderState {
             None => Film::try_new(header),
         };
         let film = film.map_err(|_| memory::refused(size, groups))?;
+        let film = film.starting_at(rows.start as usize);
         let lighting = Relighting::new(Arc::clone(&scene), world.light_groups().clone());
         Ok(Self {
             world,

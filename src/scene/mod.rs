@@ -34,7 +34,7 @@ pub use recovery::{Orphan, Recovery, RecoveryFile, kept_in, remove_stale, state_
 pub use reference::reference;
 pub use settings::{
     AMBIENT_FIELDS, Ambient, BACKGROUND_FIELDS, Background, BelowHorizon, FILM_FIELDS,
-    FilmSettings, Filter, IntegratorSettings, MAX_PIXELS, RayTypes, TRACE_FIELDS,
+    FilmSettings, Filter, IntegratorSettings, RayTypes, TRACE_FIELDS,
 };
 pub use validate::Problem;
 

@@ -7,7 +7,7 @@ use crate::value::{choices, description};
 description! {
     /// Film settings: size, pixel filter, sample limit of glossy pixels.
     pub struct FilmSettings: Default {
-        /// Width and height of the picture; together at most 67108864 pixels.
+        /// Width and height of the picture.
         size: [u32; 2] = [640, 480], in closed(1.0, 16384.0) "pixels";
         /// Distribution of samples over a pixel.
         filter: Filter = "box";
@@ -99,9 +99,6 @@ impl FieldValue for Acceleration {
     }
 }
 
-/// Largest number of pixels of a picture: that of 8192 x 8192.
-pub const MAX_PIXELS: u64 = 1 << 26;
-
 /// Keys of `[film]`.
 pub const FILM_FIELDS: &[Field] = FilmSettings::FIELDS;
 /// Keys of `[trace]`.
@@ -114,18 +111,7 @@ pub const AMBIENT_FIELDS: &[Field] = Ambient::FIELDS;
 impl FilmSettings {
     /// Returns the validation errors of the film settings.
     pub fn faults(&self) -> Vec<ValidationError> {
-        let [width, height] = self.size;
-        let errors = self.validator().errors();
-        let pixels = u64::from(width) * u64::from(height);
-        let too_many = (errors.iter().all(|error| error.key != "size") && pixels > MAX_PIXELS)
-            .then(|| {
-                ValidationError::new(
-                    "size",
-                    format!("size is [{width}, {height}], {pixels} pixels"),
-                    format!("at most {MAX_PIXELS} pixels, such as [8192, 8192]"),
-                )
-            });
-        errors.into_iter().chain(too_many).collect()
+        self.validator().errors()
     }
 }
 

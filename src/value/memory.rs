@@ -24,6 +24,23 @@ pub fn available_memory() -> Option<Available> {
     known.min_by_key(|available| available.bytes)
 }
 
+/// Physical memory of this process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ResidentMemory {
+    /// Bytes at present.
+    pub now: u64,
+    /// Largest number of bytes so far.
+    pub peak: u64,
+}
+
+/// Returns the physical memory of this process. Returns `None` on systems without Linux's
+/// `/proc/self/status`.
+pub fn resident_memory() -> Option<ResidentMemory> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let bytes = |name| Some(1024 * value_of(&status, name)?);
+    Some(ResidentMemory { now: bytes("VmRSS:")?, peak: bytes("VmHWM:")? })
+}
+
 /// Formats a number of bytes: `17 MB`, `3.2 GB`.
 pub fn megabytes(bytes: u64) -> String {
     match bytes as f64 * 1e-6 {
@@ -136,6 +153,17 @@ mod tests {
         let available = available_memory().unwrap();
         assert!(available.bytes > 1 << 20, "{available:?}");
         assert!(free_in_machine().unwrap() >= available.bytes);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn resident_memory_includes_a_large_block() {
+        let before = resident_memory().unwrap();
+        let block = std::hint::black_box(vec![1u8; 64 << 20]);
+        let with_block = resident_memory().unwrap();
+        assert!(with_block.now > block.len() as u64 && with_block.peak >= with_block.now);
+        drop(block);
+        assert!(resident_memory().unwrap().peak >= before.peak);
     }
 
     #[test]

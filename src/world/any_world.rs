@@ -26,6 +26,9 @@ pub enum Precision {
 pub struct Options {
     /// Precision in which the world is compiled.
     pub precision: Precision,
+    /// `true` if all lights share one light group, which makes the film smaller. Colours and
+    /// intensities of lights are then part of the samples.
+    pub merge_lights: bool,
 }
 
 /// A world in the precision that the scene requires or that the user has chosen.
@@ -60,9 +63,9 @@ impl AnyWorld {
             }
         };
         if single {
-            Self::Single(World::compile(scene, &geometry))
+            Self::Single(World::compile(scene, &geometry, options.merge_lights))
         } else {
-            Self::Double(World::compile(scene, &geometry))
+            Self::Double(World::compile(scene, &geometry, options.merge_lights))
         }
     }
 

@@ -187,8 +187,10 @@ impl<S: Float> CompiledLights<S> {
         materials: &CompiledMaterials<S>,
         primitives: &[PrimitiveId],
         camera: &PerspectiveCamera,
+        merge_lights: bool,
     ) -> Self {
-        let groups = LightGroups::new(scene, materials.has_direct(), materials.has_ambient());
+        let reflected = (materials.has_direct(), materials.has_ambient());
+        let groups = LightGroups::new(scene, reflected, merge_lights);
         let lift = emitter_lift::<S>(geometry);
         let materials_of = |object: usize| materials.of_parts(object);
         let distances = SceneDistances::new(scene, geometry, materials_of, camera, S::EPSILON);
@@ -319,10 +321,14 @@ fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
 impl<L: SimdFloat> World<L> {
     /// Compiles `scene`, which has no validation errors.
     pub fn new(scene: &Scene) -> Self {
-        Self::compile(scene, &RecenteredGeometry::new(scene))
+        Self::compile(scene, &RecenteredGeometry::new(scene), false)
     }
 
-    pub(super) fn compile(scene: &Scene, recentered: &RecenteredGeometry) -> Self {
+    pub(super) fn compile(
+        scene: &Scene,
+        recentered: &RecenteredGeometry,
+        merge_lights: bool,
+    ) -> Self {
         let level = scene.trace.ray_types;
         let default_material = Material::default();
         let camera = PerspectiveCamera::new(&scene.camera, scene.film.size, recentered.origin);
@@ -332,7 +338,8 @@ impl<L: SimdFloat> World<L> {
         let bsdf_of: Vec<u32> = primitives.iter().map(|id| materials.index(id)).collect();
         let material_of = |id: &PrimitiveId| materials.material(id);
         let textures = SurfaceTextures::new(scene, primitives, recentered.origin, material_of);
-        let lights = CompiledLights::new(scene, recentered, &materials, primitives, &camera);
+        let lights =
+            CompiledLights::new(scene, recentered, &materials, primitives, &camera, merge_lights);
         let nested_dielectrics = NestedDielectrics::new(
             recentered,
             primitives,

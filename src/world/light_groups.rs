@@ -73,8 +73,8 @@ pub struct LightGroups {
 impl LightGroups {
     /// Creates the light groups of `scene`. `lit` is `true` if some surface reflects direct light,
     /// `ambient` if some surface reflects ambient light. A light that no surface reflects still has
-    /// a group if it is visible itself.
-    pub fn new(scene: &Scene, lit: bool, ambient: bool) -> Self {
+    /// a group if it is visible itself. If `merge_lights` is `true`, all lights share one group.
+    pub fn new(scene: &Scene, (lit, ambient): (bool, bool), merge_lights: bool) -> Self {
         let mut members = Vec::new();
         if ambient && scene.ambient.color != Color::BLACK {
             members.push(LightGroupSource::Ambient);
@@ -87,7 +87,10 @@ impl LightGroups {
         emitting.extend(emissive_materials(scene).into_iter().map(LightGroupSource::Material));
         let pixels = scene.film.size.iter().map(|n| u64::from(*n)).product::<u64>().max(1);
         let max_groups = (FILM_BYTES / (pixels * GROUP_BYTES)) as usize;
-        let max_light_groups = max_groups.saturating_sub(members.len()).clamp(1, MAX_LIGHT_GROUPS);
+        let max_light_groups = match merge_lights {
+            true => 1,
+            false => max_groups.saturating_sub(members.len()).clamp(1, MAX_LIGHT_GROUPS),
+        };
         let (single, shared) = emitting.split_at(if emitting.len() <= max_light_groups {
             emitting.len()
         } else {
@@ -102,6 +105,12 @@ impl LightGroups {
             members.push(LightGroupSource::Background);
         }
         Self { members, lit, ambient }
+    }
+
+    /// Returns the number of groups if all lights and emissive materials share one.
+    pub fn merged_count(&self) -> usize {
+        let lights = self.members.iter().filter(|member| !member.emitting().is_empty()).count();
+        self.members.len() - lights.saturating_sub(1)
     }
 
     /// Returns the index of the group whose source is `wanted`. Returns `None` if there is no such
@@ -293,7 +302,7 @@ mod tests {
     #[test]
     fn samples_are_reused_for_scenes_that_differ_in_group_weights_only() {
         let scene = scene(LIGHTS);
-        let groups = LightGroups::new(&scene, true, true);
+        let groups = LightGroups::new(&scene, (true, true), false);
         let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
         assert!(reusable(|_| ()));
         assert!(reusable(|s| s.lights[0].intensity = 7.0));
@@ -325,7 +334,7 @@ mod tests {
     #[test]
     fn samples_are_not_reused_for_other_scenes() {
         let scene = scene(LIGHTS);
-        let groups = LightGroups::new(&scene, true, true);
+        let groups = LightGroups::new(&scene, (true, true), false);
         let reusable = |change: fn(&mut Scene)| can_reuse(&groups, &scene, change);
         assert!(!reusable(|s| s.lights[1].on = true));
         assert!(!reusable(|s| s.background.color = Color::WHITE));
@@ -355,7 +364,7 @@ mod tests {
     #[test]
     fn emission_of_a_material_is_a_group_weight() {
         let scene = scene(GLOWING);
-        let groups = LightGroups::new(&scene, true, false);
+        let groups = LightGroups::new(&scene, (true, false), false);
         assert_eq!(groups.members, [LightGroupSource::Material("lamp".to_string())]);
         assert_eq!(groups.names(&scene), ["lamp"]);
         assert_eq!(groups.mix(&scene), [[4.0; 3]]);
@@ -379,14 +388,14 @@ mod tests {
         let mut dark = scene.clone();
         lamp(&mut dark).emission = 0.0;
         assert_eq!(groups.mix(&dark), [[0.0; 3]]);
-        assert!(!LightGroups::new(&dark, true, false).can_reuse(&dark, &scene));
+        assert!(!LightGroups::new(&dark, (true, false), false).can_reuse(&dark, &scene));
     }
 
     #[test]
     fn lights_and_materials_share_the_last_group() {
         let light = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
         let scene = scene(&(light.repeat(MAX_LIGHT_GROUPS) + GLOWING));
-        let groups = LightGroups::new(&scene, true, false);
+        let groups = LightGroups::new(&scene, (true, false), false);
         let shared = [
             LightGroupSource::Light(MAX_LIGHT_GROUPS - 1),
             LightGroupSource::Material("lamp".to_string()),
@@ -401,7 +410,7 @@ mod tests {
     #[test]
     fn lights_do_not_matter_without_surfaces_that_return_light() {
         let scene = scene(LIGHTS);
-        let groups = LightGroups::new(&scene, false, false);
+        let groups = LightGroups::new(&scene, (false, false), false);
         assert!(can_reuse(&groups, &scene, |s| s.lights[1].on = true));
         assert!(can_reuse(&groups, &scene, |s| s.lights.push(s.lights[0].clone())));
         assert!(can_reuse(&groups, &scene, |s| s.ambient.color = Color::WHITE));
@@ -414,7 +423,7 @@ mod tests {
     fn samples_are_not_reused_when_a_light_of_a_shared_group_changes() {
         let light = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
         let scene = scene(&light.repeat(MAX_LIGHT_GROUPS + 2));
-        let groups = LightGroups::new(&scene, true, false);
+        let groups = LightGroups::new(&scene, (true, false), false);
         let single = MAX_LIGHT_GROUPS - 1;
         assert_eq!(
             groups.members[single],

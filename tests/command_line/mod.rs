@@ -2,6 +2,7 @@
 
 mod checkpoints;
 mod hostile;
+mod memory;
 #[cfg(unix)]
 mod outputs;
 mod refusals;

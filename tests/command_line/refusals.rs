@@ -114,6 +114,7 @@ fn film_that_does_not_fit_is_refused_with_sums_and_remedy() {
             "film: 16384 x 4096 pixels with 1 light group need 4.4 GB of memory, and ",
             "are available (the limit on address space, `ulimit -v`)",
             "Expected a smaller picture, such as size = [",
+            "], or `zerkalo render --memory SIZE`, which renders it in regions",
         ] {
             assert!(run.err.contains(part), "no {part:?} in {:?}", run.err);
         }

@@ -32,7 +32,7 @@ fn wait_for_signals(id: u32, set: &str, condition: impl Fn(u64) -> bool) {
 
 /// Starts the program and waits until it handles SIGTERM, and SIGINT, whose handlers are installed
 /// before.
-fn spawn(desk: &Desk, args: &[&str]) -> Child {
+pub fn spawn(desk: &Desk, args: &[&str]) -> Child {
     let mut command = desk.command(args);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_for_signals(child.id(), "SigCgt:", |caught| caught >> 14 & 1 == 1);

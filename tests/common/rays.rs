@@ -118,7 +118,7 @@ pub struct Traced {
 
 impl Traced {
     pub fn new(scene: &Scene, precision: Precision) -> Self {
-        let world = AnyWorld::compile(scene, &Options { precision });
+        let world = AnyWorld::compile(scene, &Options { precision, ..Options::default() });
         let eye = match &world {
             AnyWorld::Single(w) => w.camera().eye(),
             AnyWorld::Double(w) => w.camera().eye(),

@@ -50,7 +50,8 @@ pub fn pixel_ray(camera: &Camera, [width, height]: [u32; 2], [x, y]: [f64; 2]) -
 pub fn first_hits(scene: &Scene) -> Vec<FirstHit> {
     let centers = centers(scene.film.size);
     let mut hits = vec![FirstHit::MISS; centers.len()];
-    let world = AnyWorld::compile(scene, &Options { precision: Precision::Double });
+    let world =
+        AnyWorld::compile(scene, &Options { precision: Precision::Double, ..Options::default() });
     world.first_hit(&centers, &mut hits);
     hits
 }

@@ -7,6 +7,7 @@
 mod analytic_shapes;
 mod first_hits;
 mod plain_tracer;
+mod regions;
 mod row;
 
 mod camera;

@@ -95,7 +95,7 @@ fn extreme_26_parallel_mirrors() {
     let mut worst = [0f64; 2];
     for depth in [16, 10_000] {
         let scene = parallel_mirrors(depth);
-        let options = |precision| Options { precision };
+        let options = |precision| Options { precision, ..Options::default() };
         let double = AnyWorld::compile(&scene, &options(Precision::Double));
         let first = rho.powi(depth as i32 + 1);
         let cut = first / (1.0 - rho);

@@ -48,7 +48,7 @@ pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> RenderState {
 
 /// A rendering without samples, with the given sampler settings.
 pub fn begin_with(scene: &Scene, sampling: SampleSettings, precision: Precision) -> RenderState {
-    let world = world::Options { precision };
+    let world = world::Options { precision, ..world::Options::default() };
     RenderState::new(scene, &Options { world, sampling, display: Display::default() }, None)
 }
 

@@ -7,7 +7,7 @@ use crate::dashboard::run::exporter::stem;
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::paths;
 use crate::film::file::FilmFileHeader;
-use crate::film::{Depth, Film, ImageData, ImageOutput, LinearImage};
+use crate::film::{Depth, Film, ImageData, ImageOutput, LinearImage, WholeFilm};
 use crate::render::plan::WatchedFilms;
 use crate::render::session::{Report, Snapshot, View, WatchSession};
 use crate::terminal::Capabilities;
@@ -62,14 +62,16 @@ fn write(
     let source = header.metadata.iter().find(|(key, _)| key == "Source");
     let stem = stem(None, source.map_or("", |(_, source)| source));
     let image = ImageData {
-        film,
+        size: [film.width(), film.height()].map(|n| n as u32),
         mix: &header.weights,
         group_names: &header.group_names,
         display: header.display,
         depth: Depth::Eight,
-        metadata: &header.metadata,
     };
-    let create = |path: &Path| ImageOutput::from_path(path)?.create_new().write(&image);
+    let create = |path: &Path| {
+        let mut bands = WholeFilm { film, metadata: &header.metadata };
+        ImageOutput::from_path(path)?.create_new().write(&image, &mut bands)
+    };
     let path = paths::numbered(Path::new(""), &stem, format.extension(), create)
         .ok_or_else(|| format!("all names for pictures of {stem} are in use"))?
         .map_err(|error| error.to_string())?;

@@ -18,7 +18,7 @@ mod stop;
 mod tests;
 mod tile;
 
-use crate::film::Noise;
+use crate::film::{Noise, TileNoise};
 use crate::render::wave::{Job, Wave, WaveReport};
 use convergence_fit::ConvergenceFit;
 pub use prediction::{Prediction, TilePrediction, TileSamples, USUAL_SLOPE};
@@ -185,6 +185,11 @@ impl Schedule {
     pub fn tile_noise_codes(&self) -> Vec<f32> {
         let codes = |t: &Tile| t.error.map_or(0.0, |(_, e)| e.of_all().codes.sqrt() as f32);
         self.tiles.iter().map(codes).collect()
+    }
+
+    /// Latest estimate of each tile's error, in row order; `None` before the first estimate.
+    pub(super) fn tile_estimates(&self) -> impl Iterator<Item = Option<TileNoise>> {
+        self.tiles.iter().map(|tile| tile.error.map(|(_, error)| error))
     }
 
     /// Number of samples traced so far, over all pixels.

@@ -405,7 +405,5 @@ fn resized(sides: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     };
     let factor = next / width;
     let scaled: Vec<_> = sides.iter().map(|s| (s * factor).round()).collect();
-    let pixels: f64 = scaled.iter().product();
-    let fits = scaled.iter().all(|s| range.holds(*s)) && pixels <= crate::scene::MAX_PIXELS as f64;
-    if fits { scaled } else { sides.to_vec() }
+    if scaled.iter().all(|s| range.holds(*s)) { scaled } else { sides.to_vec() }
 }

@@ -1,0 +1,177 @@
+//! `zerkalo render --memory`: decides how a render fits into the given memory, and renders the
+//! pictures that do not fit as a whole.
+
+use crate::command::args::RenderArgs;
+use crate::command::progress::Progress;
+use crate::command::signals::Signals;
+use crate::command::{Failure, warn};
+use crate::film::{Depth, ImageOutput};
+use crate::render::export::Provenance;
+use crate::render::memory::{Regions, check, divide};
+use crate::render::schedule::{Settings, StoppedBy};
+use crate::render::session::Report;
+use crate::render::{Options, RegionRender};
+use crate::scene::Scene;
+use crate::value::{available_memory, megabytes, resident_memory};
+use crate::world::{self, AnyWorld};
+use std::io;
+use std::sync::Arc;
+
+/// Limit that the user gives.
+const OPTION: &str = "--memory";
+
+/// Division of a picture for a given amount of memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Division {
+    /// `true` if all lights share one light group.
+    pub merge_lights: bool,
+    /// Regions; a picture that fits as a whole is one region.
+    pub regions: Regions,
+}
+
+impl Division {
+    /// Divides the picture of `scene` so that the process stays below `cap` bytes, and prints the
+    /// expected memory. Lights share a light group first.
+    ///
+    /// # Errors
+    /// Fails with the least memory if nothing fits, and if a checkpoint is to be kept of a film
+    /// that does not fit as it is.
+    pub fn new(scene: &Scene, args: &RenderArgs, cap: u64) -> Result<Self, Failure> {
+        let options =
+            world::Options { precision: args.precision.get(), ..world::Options::default() };
+        // The memory of the compiled scene is measured.
+        let world = AnyWorld::compile(scene, &options);
+        let groups = world.light_groups().members.len();
+        let merged = world.light_groups().merged_count();
+        let (size, threads) = (scene.film.size, args.compute.threads());
+        let (cap, limit) = usable(cap);
+        // The render of a whole picture compares a larger sum with the available memory.
+        let refused = |groups| check(size, groups, 0).is_err();
+        let divided = |groups| match divide(size, groups, threads, cap) {
+            Ok(whole) if whole.count == 1 && refused(groups) => {
+                divide(size, groups, threads, whole.bytes - 1)
+            }
+            divided => divided,
+        };
+        let separate = divided(groups).ok().filter(|regions| regions.count == 1);
+        drop(world);
+        let division = match separate {
+            Some(regions) => Self { merge_lights: false, regions },
+            None => Self {
+                merge_lights: merged < groups,
+                regions: divided(merged).map_err(too_little(cap, limit))?,
+            },
+        };
+        if separate.is_none() && (args.checkpoint.is_some() || args.resume.is_some()) {
+            let needed = divide(size, groups, threads, u64::MAX).map_or(0, |whole| whole.bytes);
+            return Err(Failure::Failed(format!(
+                "a checkpoint has the whole film, which needs {} of memory, and {limit} allows {}; \
+                 expected more memory, a smaller picture, or no --checkpoint and --resume",
+                megabytes(needed),
+                megabytes(cap),
+            )));
+        }
+        division.announce(groups, merged, cap);
+        Ok(division)
+    }
+
+    fn announce(&self, groups: usize, merged: usize, cap: u64) {
+        let Regions { rows, count, bytes } = self.regions;
+        let regions = match count {
+            1 => "the picture as a whole".to_string(),
+            n => format!("{n} regions of {rows} rows"),
+        };
+        let merging = match self.merge_lights {
+            true => format!(", {groups} light groups merged into {merged}"),
+            false => String::new(),
+        };
+        warn(&format!(
+            "memory: {} expected, at most {}: {regions}{merging}",
+            megabytes(bytes),
+            megabytes(cap)
+        ));
+    }
+}
+
+/// Returns the bytes that the process may use, and the limit: `cap`, or less if less is available.
+fn usable(cap: u64) -> (u64, &'static str) {
+    let now = resident_memory().map_or(0, |resident| resident.now);
+    match available_memory() {
+        Some(available) if available.bytes.saturating_add(now) < cap => {
+            (available.bytes + now, available.limit)
+        }
+        _ => (cap, OPTION),
+    }
+}
+
+/// Returns the message for a picture that needs at least `least` bytes.
+fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
+    move |least| {
+        // Rounded up, so that the advice suffices.
+        let least = least.div_ceil(1_000_000);
+        let expected = match limit {
+            OPTION => format!("expected at least {OPTION} {least}MB"),
+            _ => "expected that much memory, or a smaller scene".to_string(),
+        };
+        Failure::Failed(format!(
+            "{limit} allows {}, but the scene and a region of the least size need {least} MB; {expected}",
+            small(cap),
+        ))
+    }
+}
+
+/// Formats a number of bytes that may be small.
+fn small(bytes: u64) -> String {
+    if bytes < 1_000_000 { format!("{} KB", bytes / 1000) } else { megabytes(bytes) }
+}
+
+/// Result of a render in regions.
+pub struct Rendered {
+    pub report: Report,
+    pub stopped_by: StoppedBy,
+    pub precision: &'static str,
+    /// Sentences about truncated paths.
+    pub biased: Vec<String>,
+}
+
+/// Renders `scene` in regions and writes the picture meanwhile.
+pub fn render(
+    args: &RenderArgs,
+    scene: Scene,
+    (options, settings): (&Options, Settings),
+    rows: u32,
+    (output, depth): (&ImageOutput, Depth),
+    provenance: Provenance,
+    signals: &Signals,
+) -> Result<Rendered, Failure> {
+    let mut progress = Progress::on_stderr();
+    let mut signal = None;
+    let mut observe = |report: &Report| {
+        progress.show(report);
+        signal = signals.caught();
+        signal.map_or(Ok(()), |_| Err(io::Error::other("stopped by a signal")))
+    };
+    let threads = args.compute.threads();
+    let scene = Arc::new(scene);
+    let (rows, observer) = ((rows, threads), &mut observe);
+    let mut render = RegionRender::new(&scene, options, settings, rows, provenance, observer)
+        .map_err(Failure::Failed)?;
+    let written = render.write(depth, output);
+    let (precision, biased) = match &written {
+        Ok(_) => (render.state().world.precision(), render.state().world.biases()),
+        Err(_) => ("", Vec::new()),
+    };
+    drop(render);
+    progress.finish();
+    match (written, signal) {
+        (Ok((report, stopped_by)), _) => Ok(Rendered { report, stopped_by, precision, biased }),
+        (Err(_), Some(status)) => {
+            warn(&format!(
+                "stopped by a signal: {} is not written, because regions are missing",
+                output.path().display()
+            ));
+            Err(Failure::Signalled(status))
+        }
+        (Err(error), None) => Err(Failure::Failed(error.to_string())),
+    }
+}

@@ -1,0 +1,40 @@
+//! Source of the samples of a picture file: one film, or films of bands of rows.
+
+use crate::film::store::Film;
+use std::io;
+
+/// Source of a picture's samples. A picture that does not fit into memory consists of bands of rows,
+/// which are rendered one after another while the file is written.
+pub trait Bands {
+    /// Returns the film that holds row `y` of the picture; its first row is [`Film::first_row`].
+    /// Encoders ask for all rows, in increasing order.
+    ///
+    /// # Errors
+    /// Fails if the rows cannot be rendered.
+    fn film_with_row(&mut self, y: usize) -> io::Result<&Film>;
+
+    /// Metadata keys and values. Values that are known only after the last row may differ from those
+    /// before it, in up to 128 bytes. A key has 1 to 79 printable ASCII characters, without leading,
+    /// trailing or double spaces. It starts with a capital letter, because OpenEXR's own keys start
+    /// with a small one.
+    fn metadata(&self) -> Vec<(String, String)>;
+}
+
+/// A whole film as a single band.
+#[derive(Clone, Copy, Debug)]
+pub struct WholeFilm<'a> {
+    /// Film of the whole picture.
+    pub film: &'a Film,
+    /// Metadata keys and values, see [`Bands::metadata`].
+    pub metadata: &'a [(String, String)],
+}
+
+impl Bands for WholeFilm<'_> {
+    fn film_with_row(&mut self, _: usize) -> io::Result<&Film> {
+        Ok(self.film)
+    }
+
+    fn metadata(&self) -> Vec<(String, String)> {
+        self.metadata.to_vec()
+    }
+}

@@ -1,0 +1,80 @@
+//! Check of a big picture: single pixels, traced without regions and tiles.
+
+use crate::support::{shipped, sized};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::PathBuf;
+use zerkalo::film::{Display, Film, Header, LightWeights, TILE_PIXELS};
+use zerkalo::lanes::{SimdFloat, Single};
+use zerkalo::sampling::{SampleSettings, SamplerKind};
+use zerkalo::world::{AnyWorld, Options, World};
+
+/// Side of the picture in pixels.
+const SIDE: u32 = 16384;
+/// Samples of each replicate: half of `--spp`.
+const SAMPLES: u32 = 4;
+/// Columns in which every row is checked.
+const COLUMNS: [u32; 16] =
+    [0, 1, 15, 16, 1000, 2047, 2048, 5003, 6001, 8191, 8192, 9001, 11003, 13007, 16382, 16383];
+
+/// Displayed pixels of the columns of `COLUMNS` in row `y`, traced without tiles.
+fn column_pixels(world: &World<Single>, mix: &LightWeights, y: u32) -> Vec<[u8; 3]> {
+    let sampling = SampleSettings { seed: 0, kind: SamplerKind::Sobol };
+    let tracer = world.camera_tracer(&sampling);
+    let scales = world.scales().to_vec();
+    let precision = "single".to_string();
+    let mut film = Film::new(Header { width: 16, height: 1, scales, seed: 0, precision });
+    let tile = film.slots(&[0]).remove(0).prepare();
+    for replicate in [0, 1] {
+        let pixels = COLUMNS.iter().map(|x| (*x, y));
+        let mut tracer = tracer.scattered(replicate, pixels);
+        tracer.radiance_shared::<{ SAMPLES as usize }>(0, |packet, radiance| {
+            for (lane, pixel) in packet.pixels.clone().enumerate() {
+                assert!(pixel < TILE_PIXELS);
+                for (group, scale) in world.scales().iter().enumerate() {
+                    let value = radiance.groups[group];
+                    let sums = [value.x, value.y, value.z].map(|channel| {
+                        let lanes = channel.fixed(*scale);
+                        let first = lane * SAMPLES as usize;
+                        lanes[first..first + SAMPLES as usize].iter().sum()
+                    });
+                    tile.add_group(replicate, pixel, group, sums);
+                }
+            }
+        });
+        tile.advance(replicate, SAMPLES);
+    }
+    let display = Display::default();
+    (0..COLUMNS.len()).map(|x| display.codes_8(film.pixel(x, 0, mix))).collect()
+}
+
+/// Compares 16 columns of the picture at `ZERKALO_PICTURE`, 262,144 pixels, which
+/// `zerkalo render scenes/mirror-room-physical.toml --size 16384x16384 --spp 8 --uniform` has
+/// written.
+#[test]
+#[ignore = "needs the picture at ZERKALO_PICTURE, see docs/big-pictures.md"]
+fn big_picture_has_the_pixels_of_single_rays() {
+    let path = std::env::var_os("ZERKALO_PICTURE").map(PathBuf::from).expect("a picture");
+    let scene = sized(shipped("mirror-room-physical.toml"), [SIDE; 2]);
+    let world = AnyWorld::compile(&scene, &Options::default());
+    let mix = LightWeights { weights: world.mix(&scene) };
+    let AnyWorld::Single(world) = &world else { panic!("single precision is expected") };
+    let decoder = png::Decoder::new(BufReader::new(File::open(path).unwrap()));
+    let mut reader = decoder.read_info().unwrap();
+    assert_eq!(reader.info().size(), (SIDE, SIDE));
+    let mut different = BTreeMap::new();
+    let mut lit = 0;
+    for y in 0..SIDE {
+        let row = reader.next_row().unwrap().expect("all rows");
+        for (x, expected) in COLUMNS.iter().zip(column_pixels(world, &mix, y)) {
+            let found = &row.data()[3 * *x as usize..][..3];
+            lit += u32::from(expected != [0; 3]);
+            if found != expected {
+                different.insert((y, *x), (found.to_vec(), expected));
+            }
+        }
+    }
+    assert!(different.is_empty(), "{} pixels differ: {different:?}", different.len());
+    println!("{} pixels are equal, {lit} of them are not black", SIDE as usize * COLUMNS.len());
+}

@@ -1,0 +1,67 @@
+//! Feature of big pictures: rendering in regions.
+
+use crate::features::row::{Verdict, ensure, material, row};
+use crate::support::{begin, follow, pool, settings, shipped, sized};
+use std::sync::Arc;
+use zerkalo::film::{Bands, Display, Film, Replicates};
+use zerkalo::render::export::Provenance;
+use zerkalo::render::schedule::Stop;
+use zerkalo::render::{Options, RegionRender};
+use zerkalo::sampling::{SampleSettings, SamplerKind};
+use zerkalo::scene::{Filter, Scene};
+use zerkalo::world::{self, Precision};
+
+const SIZE: [u32; 2] = [100, 70];
+const SEED: u64 = 5;
+
+/// Renders `scene` in regions of `rows` rows and compares each row with `whole`, a uniform render.
+fn regions_equal(whole: &Film, scene: &Scene, rows: u32) -> Verdict {
+    let scene = Arc::new(sized(scene.clone(), SIZE));
+    let options = Options {
+        world: world::Options::default(),
+        sampling: SampleSettings { seed: SEED, kind: SamplerKind::Sobol },
+        display: Display::default(),
+    };
+    let stop = Stop { spp: Some(8), ..Stop::default() };
+    let provenance = Provenance {
+        source: String::new(),
+        scene_hash: String::new(),
+        sampler: SamplerKind::Sobol,
+        adaptive: false,
+    };
+    let mut observe = |_: &_| Ok(());
+    let how = settings(false, 0, stop);
+    let mut render = RegionRender::new(&scene, &options, how, (rows, 2), provenance, &mut observe)?;
+    let mix = begin(&scene, SEED, Precision::Auto).mix;
+    let mut films = 0;
+    for y in 0..SIZE[1] as usize {
+        let film = render.film_with_row(y).map_err(|e| e.to_string())?;
+        films += u32::from(y == film.first_row());
+        let [mut region, mut expected] = [Vec::new(), Vec::new()];
+        for replicates in [Replicates::A, Replicates::B] {
+            film.row(y - film.first_row(), replicates, &mix, &mut region);
+            whole.row(y, replicates, &mix, &mut expected);
+            ensure(region == expected, || format!("row {y} of regions of {rows} rows differs"))?;
+        }
+    }
+    ensure(films == SIZE[1].div_ceil(rows), || format!("{films} regions of {rows} rows"))
+}
+
+#[test]
+fn e3_regions() {
+    let mut state = begin(&sized(shipped("mirror-room.toml"), SIZE), SEED, Precision::Auto);
+    follow(&mut state, settings(false, 0, Stop { spp: Some(8), ..Stop::default() }), &pool(2));
+    let whole = state.film;
+    let check = |scene: &Scene| {
+        [16, 32, 48, 80].iter().try_for_each(|rows| regions_equal(&whole, scene, *rows))
+    };
+    row(
+        "mirror-room.toml",
+        check,
+        &[
+            ("another mirror", &|s| material(s, "mirror").roughness = 0.3),
+            ("another camera", &|s| s.camera.eye[0] += 0.1),
+            ("no anti-aliasing", &|s| s.film.filter = Filter::Point),
+        ],
+    );
+}
