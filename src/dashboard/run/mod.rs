@@ -185,6 +185,9 @@ fn run_on_terminal(
         suspend: false,
         quit: false,
     };
+    while let Ok(message) = dashboard.effects.done().try_recv() {
+        dashboard.take_done(message);
+    }
     // The resize passes the raster size on to the renderer.
     dashboard.dispatch(Message::Resize(dashboard.model.screen));
     let input = input::read(keyboard)?;

@@ -17,6 +17,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// Longest wait for the first report on the files.
+const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
+
 /// Executor of effects that shows watched files.
 pub struct WatchRunner {
     session: WatchSession,
@@ -36,6 +39,10 @@ impl WatchRunner {
             // Sending fails only at the end of the program, when the receiver is gone.
             let _ = reports.send(Message::Watched(Box::new(report)));
         })?;
+        // The first frame shows the table.
+        if let Ok(report) = done.recv_timeout(FIRST_REPORT_WITHIN) {
+            let _ = results.send(report);
+        }
         Ok(Self { session, view: View::default(), exporting: 0, results, done })
     }
 

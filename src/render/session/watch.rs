@@ -150,8 +150,8 @@ struct Shown {
 
 impl Worker {
     fn run(mut self, inbox: &Receiver<Command>, on_report: &dyn Fn(WatchReport)) {
-        self.estimate();
         self.report(on_report);
+        self.estimate();
         let mut due = Instant::now() + POLL;
         loop {
             match inbox.recv_deadline(due) {
