@@ -6,9 +6,9 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::PathBuf;
 use zerkalo::film::{Display, Film, Header, LightWeights, TILE_PIXELS};
-use zerkalo::lanes::{SimdFloat, Single};
+use zerkalo::lanes::{Double, SimdFloat};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
-use zerkalo::world::{AnyWorld, Options, World};
+use zerkalo::world::{AnyWorld, Options, Radiance, TracedPacket, World};
 
 /// Side of the picture in pixels.
 const SIDE: u32 = 16384;
@@ -19,30 +19,30 @@ const COLUMNS: [u32; 16] =
     [0, 1, 15, 16, 1000, 2047, 2048, 5003, 6001, 8191, 8192, 9001, 11003, 13007, 16382, 16383];
 
 /// Displayed pixels of the columns of `COLUMNS` in row `y`, traced without tiles.
-fn column_pixels(world: &World<Single>, mix: &LightWeights, y: u32) -> Vec<[u8; 3]> {
+fn column_pixels(world: &World<Double>, mix: &LightWeights, y: u32) -> Vec<[u8; 3]> {
     let sampling = SampleSettings { seed: 0, kind: SamplerKind::Sobol };
     let tracer = world.camera_tracer(&sampling);
     let scales = world.scales().to_vec();
-    let precision = "single".to_string();
+    let precision = "double".to_string();
     let mut film = Film::new(Header { width: 16, height: 1, scales, seed: 0, precision });
     let tile = film.slots(&[0]).remove(0).prepare();
     for replicate in [0, 1] {
         let pixels = COLUMNS.iter().map(|x| (*x, y));
         let mut tracer = tracer.scattered(replicate, pixels);
-        tracer.radiance_shared::<{ SAMPLES as usize }>(0, |packet, radiance| {
+        let mut add = |packet: TracedPacket<f64>, radiance: &mut Radiance<Double>| {
             for (lane, pixel) in packet.pixels.clone().enumerate() {
                 assert!(pixel < TILE_PIXELS);
                 for (group, scale) in world.scales().iter().enumerate() {
                     let value = radiance.groups[group];
                     let sums = [value.x, value.y, value.z].map(|channel| {
                         let lanes = channel.fixed(*scale);
-                        let first = lane * SAMPLES as usize;
-                        lanes[first..first + SAMPLES as usize].iter().sum()
+                        lanes[2 * lane] + lanes[2 * lane + 1]
                     });
                     tile.add_group(replicate, pixel, group, sums);
                 }
             }
-        });
+        };
+        (0..SAMPLES).step_by(2).for_each(|first| tracer.radiance_shared::<2>(first, &mut add));
         tile.advance(replicate, SAMPLES);
     }
     let display = Display::default();
@@ -59,7 +59,7 @@ fn big_picture_has_the_pixels_of_single_rays() {
     let scene = sized(shipped("mirror-room-physical.toml"), [SIDE; 2]);
     let world = AnyWorld::compile(&scene, &Options::default());
     let mix = LightWeights { weights: world.mix(&scene) };
-    let AnyWorld::Single(world) = &world else { panic!("single precision is expected") };
+    let AnyWorld::Double(world) = &world else { panic!("double precision is expected") };
     let decoder = png::Decoder::new(BufReader::new(File::open(path).unwrap()));
     let mut reader = decoder.read_info().unwrap();
     assert_eq!(reader.info().size(), (SIDE, SIDE));
