@@ -137,11 +137,24 @@ impl<S: Float> DeltaLight<S> {
                 distance: L::from_f64(L::MAX),
                 irradiance: L::from_f64(PI),
             },
-            Self::InverseSquare { position } => sample_point(position, true, point),
-            Self::Constant { position } => sample_point(position, false, point),
-            Self::Spot { position, cone, inverse_square } => {
-                let sample = sample_point(position, *inverse_square, point);
-                LightSample { irradiance: sample.irradiance * cone.factor(sample.wi), ..sample }
+            Self::InverseSquare { position }
+            | Self::Constant { position }
+            | Self::Spot { position, .. } => {
+                let to_light = Vec3::splat(*position) - point;
+                let distance = to_light.length_squared().sqrt();
+                let inverse = L::one() / distance;
+                let wi = to_light * inverse;
+                let mut irradiance = match self {
+                    Self::InverseSquare { .. } | Self::Spot { inverse_square: true, .. } => {
+                        // The irradiance is kept finite, because infinity times black would be NaN.
+                        (inverse * inverse).min(L::from_f64(L::MAX))
+                    }
+                    _ => L::from_f64(PI),
+                };
+                if let Self::Spot { cone, .. } = self {
+                    irradiance = irradiance * cone.factor(wi);
+                }
+                LightSample { wi, distance, irradiance }
             }
         }
     }
@@ -157,26 +170,6 @@ impl<S: Float> DeltaLight<S> {
             None => PI,
         }
     }
-}
-
-/// Returns the light incident at `point` from a point light at `position`. The irradiance is 1 / d^2
-/// or pi.
-#[inline(always)]
-fn sample_point<L: SimdFloat>(
-    position: &[L::Scalar; 3],
-    inverse_square: bool,
-    point: Vec3<L>,
-) -> LightSample<L> {
-    let to_light = Vec3::splat(*position) - point;
-    let distance = to_light.length_squared().sqrt();
-    let inverse = L::one() / distance;
-    let irradiance = if inverse_square {
-        // The irradiance is kept finite, because infinity times black would be NaN.
-        (inverse * inverse).min(L::from_f64(L::MAX))
-    } else {
-        L::from_f64(PI)
-    };
-    LightSample { wi: to_light * inverse, distance, irradiance }
 }
 
 #[cfg(test)]

@@ -129,12 +129,22 @@ pub fn beckmann_visible<L: SimdFloat>(
     view: Vec3<L>,
     v_cavity: bool,
 ) -> Vec3<L> {
-    let (ax, ay, sin) = azimuth(view);
     let (sx, sy) = (erf_inverse(u), erf_inverse(v));
-    let away = -sx.mul_add(ax, sy * ay);
-    let r = (alpha * sin / view.z.max(L::from_f64(1e-30))).min(L::from_f64(1e6));
-    let shift = away - visible_slope(away, r, v_cavity);
-    Vec3::new(alpha * ax.mul_add(shift, sx), alpha * ay.mul_add(shift, sy), L::one()).normalize()
+    // The tangent of the view in the stretched space where alpha is 1, as a vector of length r.
+    let scale = alpha / view.z.max(L::from_f64(1e-30));
+    let (rx, ry) = (view.x * scale, view.y * scale);
+    let r2 = rx.mul_add(rx, ry * ry);
+    let factor = small_r_shift(-sx.mul_add(rx, sy * ry), r2);
+    let (mut slope_x, mut slope_y) = (rx.mul_add(factor, sx), ry.mul_add(factor, sy));
+    let oblique = r2.gt(L::from_f64(SMALL_R * SMALL_R));
+    if oblique.any() {
+        let (ax, ay, sin) = azimuth(view);
+        let away = -sx.mul_add(ax, sy * ay);
+        let shift = away - visible_slope(away, (scale * sin).min(L::from_f64(1e6)), v_cavity);
+        slope_x = L::select(oblique, ax.mul_add(shift, sx), slope_x);
+        slope_y = L::select(oblique, ay.mul_add(shift, sy), slope_y);
+    }
+    Vec3::new(alpha * slope_x, alpha * slope_y, L::one()).normalize()
 }
 
 /// Returns exp(x^2) erfc(x) for x >= 0, with a relative error of 5e-8.
@@ -159,6 +169,22 @@ fn scaled_erfc<L: SimdFloat>(x: L) -> L {
     polynomial(&K, at) / x.mul_add(L::from_f64(1.5), L::one())
 }
 
+/// Largest r for which [`small_r_shift`] is used.
+const SMALL_R: f64 = 0.25;
+
+/// Returns (t - x) / r of the slopes in [`visible_slope`], given r t and r^2, for r <= [`SMALL_R`].
+///
+/// The polynomial is a fit for the smallest error of the quantile, which is 3e-6. The masked microfacets,
+/// 1e-9 of all, are neglected.
+#[inline(always)]
+fn small_r_shift<L: SimdFloat>(rt: L, r2: L) -> L {
+    let constant = polynomial(&[0.499_993, -0.083_186_5, 0.034_474], r2);
+    let linear = polynomial(&[0.250_05, -0.155_808], r2);
+    let square = polynomial(&[0.166_945, -0.231_177], r2);
+    let higher = rt.mul_add(L::from_f64(0.104_431), L::from_f64(0.122_301));
+    rt.mul_add(rt.mul_add(rt.mul_add(higher, square), linear), constant)
+}
+
 /// Value of 1 / r in [`visible_slope`] from which no microfacet counts as masked: twice Lambda is
 /// below 1e-9 there.
 const UNMASKED: f64 = 4.0;
@@ -175,7 +201,8 @@ const UNMASKED: f64 = 4.0;
 /// The distribution function is erfc(-x) + r exp(-x^2) / sqrt(pi), up to constants. Newton's method is
 /// applied to its logarithm below the median. Above, where its derivative falls to 0 at x = 1 / r, it is
 /// applied to the square root of the complement. It starts at a value that is exact to first order in r.
-/// It takes one step for r <= 0.2, two for r <= 2, else three.
+/// It takes one step for r <= 0.2, two for r <= 2, else three. For r <= [`SMALL_R`], [`small_r_shift`] takes
+/// less time.
 #[inline(always)]
 fn visible_slope<L: SimdFloat>(t: L, r: L, v_cavity: bool) -> L {
     let (one, two) = (L::one(), L::from_f64(2.0));
@@ -446,7 +473,8 @@ mod tests {
     fn check_visible_slope<L: SimdFloat>(max_error: f64) {
         let full_erfc = |x: f64| if x < 0.0 { 2.0 - erfc(-x) } else { erfc(x) };
         let mut worst = 0f64;
-        for r in [0.0, 1e-6, 1e-3, 0.05, 0.2, 0.21, 0.5, 1.0, 2.0, 2.1, 10.0, 23.0, 25.0, 1e3, 1e6]
+        for r in
+            [0.0, 1e-6, 1e-3, 0.05, 0.2, 0.21, 0.25, 0.5, 1.0, 2.0, 2.1, 10.0, 23.0, 25.0, 1e3, 1e6]
         {
             let end = 1.0 / f64::max(r, 1e-6);
             let smith = |x: f64| full_erfc(-x) + r * (-x * x).exp() / PI.sqrt();
@@ -464,7 +492,16 @@ mod tests {
                 let slope = |v_cavity| visible_slope(t, r, v_cavity).lane(0).to_f64();
                 let (a, b) = (slope(false), slope(true));
                 assert!(a <= end * (1.0 + 1e-6) && b <= end * (1.0 + 1e-6), "{a} {b} {end}");
-                for (found, name) in [(smith(a) / smith(end), "Smith"), (v_cavity(b), "V-cavity")] {
+                let mut quantiles =
+                    vec![(smith(a) / smith(end), "Smith"), (v_cavity(b), "V-cavity")];
+                let r_scalar = r.lane(0).to_f64();
+                if r_scalar <= SMALL_R {
+                    let shift = r * small_r_shift(r * t, r * r);
+                    let small = (t - shift).lane(0).to_f64();
+                    quantiles.push((smith(small) / smith(end), "Smith, small r"));
+                    quantiles.push((v_cavity(small), "V-cavity, small r"));
+                }
+                for (found, name) in quantiles {
                     let error = (found - quantile).abs();
                     worst = worst.max(error);
                     let at = t.lane(0).to_f64();

@@ -218,7 +218,7 @@ impl<L: SimdFloat> World<L> {
                 (false, true) => trace_opaque::<_, false, false>,
                 (_, false) => trace_opaque::<_, false, true>,
             };
-            trace(self, (Path::new(ray), active, self.depth), candidates, sampler, None, out)
+            trace(self, (&Path::new(ray), active, self.depth), candidates, sampler, None, out)
         }
     }
 

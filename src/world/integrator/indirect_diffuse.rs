@@ -187,7 +187,7 @@ pub(crate) fn trace_generations<L: SimdFloat>(
             }
             None => {
                 let reservoir = reservoir.as_mut();
-                let paths = (start.path, start.lanes, start.depth);
+                let paths = (&start.path, start.lanes, start.depth);
                 trace_opaque::<_, false, true>(world, paths, candidates, &sampler, reservoir, out)
             }
         };

@@ -25,13 +25,14 @@ use crate::world::world::World;
 #[inline(never)]
 pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS: bool>(
     world: &'a World<L>,
-    (mut path, mut active, depth): (Path<L>, L::Mask, u32),
+    (start, mut active, depth): (&Path<L>, L::Mask, u32),
     mut candidates: &'a TileCandidates,
     sampler: &PacketSampler<'_, L>,
     mut reservoir: Option<&mut DiffuseReservoir<L>>,
     out: &mut Radiance<L>,
 ) -> Counts {
     let mut counts = Counts::default();
+    let mut path = *start;
     let mut bounce = 0;
     loop {
         counts.rays += u64::from(active.bits().count_ones());
