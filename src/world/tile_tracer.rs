@@ -126,14 +126,12 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         let center = L::from_f64(0.5);
         let offset = if world.jitter() { sampler.pixel() } else { (center, center) };
         let camera = world.camera();
-        let rays = match camera.lens() {
-            None => camera.rays(corner_directions, offset),
-            Some(lens) => {
-                let (u, v) = sampler.lens();
-                let (x, y, _) = disk(u, v);
-                camera.lens_rays(lens, corner_directions, offset, (x, y))
-            }
-        };
+        let mut rays = camera.rays(corner_directions, offset);
+        if let Some(lens) = camera.lens() {
+            let (u, v) = sampler.lens();
+            let (x, y, _) = disk(u, v);
+            rays = camera.lens_rays(lens, corner_directions, offset, (x, y));
+        }
         let candidates = self.candidates.as_ref();
         let counts = world.trace(rays, candidates, sampler, active, &mut self.radiance);
         self.counts.rays += counts.rays;
