@@ -1,6 +1,6 @@
-//! zerkalo, part 2 of 3: compiled worlds, films and rendering. All kernels are compiled here.
+//! zerkalo, part 3 of 4: compiled worlds, films and rendering. All kernels are compiled here.
 //!
-//! The source is in `src`, one folder per module. The modules of part 1 are re-exported, so that
+//! The source is in `src`, one folder per module. The modules of parts 1 and 2 are re-exported, so that
 //! paths are the same in every part.
 
 pub use zerkalo_scene::{

@@ -1,11 +1,11 @@
 //! Eight-wide bounding volume hierarchies: build, packet traversal, single-ray traversal.
 
-pub(crate) mod build;
+pub mod build;
 mod clustering;
-pub(crate) mod packet;
+pub mod packet;
 mod ray;
 mod reinsertion;
-pub(crate) mod single;
+pub mod single;
 
 pub use build::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, Bvh8Node, LEAF_FLAG};
 pub use ray::{Hit, Ray};

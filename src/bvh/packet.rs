@@ -13,11 +13,12 @@ use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn};
 /// Ray packet in the form that slab tests need.
 #[derive(Clone, Copy)]
 pub struct SlabPacket<L> {
-    /// Ray origins plus the padding of the boxes (`above`), and minus the padding (`below`).
-    pub(crate) above: Vec3<L>,
-    pub(crate) below: Vec3<L>,
+    /// Ray origins plus the padding of the boxes.
+    pub above: Vec3<L>,
+    /// Ray origins minus the padding of the boxes.
+    pub below: Vec3<L>,
     /// Reciprocals of the directions. They are finite also for axis-parallel rays.
-    pub(crate) inverse: Vec3<L>,
+    pub inverse: Vec3<L>,
 }
 
 impl<L: SimdFloat> SlabPacket<L> {
@@ -57,14 +58,16 @@ impl<L: SimdFloat> SlabPacket<L> {
 /// axis.
 #[derive(Clone, Copy, Default)]
 pub struct PacketBounds<S> {
-    /// Indices into [`Bvh8Node::bounds`] of the near and of the far side of a box, for each axis.
-    pub(crate) near: [usize; 3],
-    pub(crate) far: [usize; 3],
-    /// Padded origins that are subtracted from the near and from the far sides.
-    pub(crate) near_origin: [S; 3],
-    pub(crate) far_origin: [S; 3],
+    /// Indices into [`Bvh8Node::bounds`] of the near side of a box, for each axis.
+    pub near: [usize; 3],
+    /// Indices into [`Bvh8Node::bounds`] of the far side of a box, for each axis.
+    pub far: [usize; 3],
+    /// Padded origin that is subtracted from the near sides.
+    pub near_origin: [S; 3],
+    /// Padded origin that is subtracted from the far sides.
+    pub far_origin: [S; 3],
     /// Smallest and largest reciprocals of the directions, for each axis.
-    pub(crate) inverse: [[S; 3]; 2],
+    pub inverse: [[S; 3]; 2],
 }
 
 impl<S: Float> PacketBounds<S> {

@@ -22,7 +22,7 @@ impl<L: SimdFloat> Ray<L> {
     /// by at most `max_turn` (length of the difference of unit vectors), and each coordinate of
     /// their origins by at most `max_shift`.
     #[inline(always)]
-    pub(crate) fn is_coherent(&self, lanes: u32, max_turn: f64, max_shift: f64) -> bool {
+    pub fn is_coherent(&self, lanes: u32, max_turn: f64, max_shift: f64) -> bool {
         let lane = lanes.trailing_zeros() as usize;
         let turn = self.direction - Vec3::splat(self.direction.lane(lane));
         let shift = self.origin - Vec3::splat(self.origin.lane(lane));
@@ -54,7 +54,7 @@ impl<L: SimdFloat> Hit<L> {
     /// Returns misses that later accept only hits at distances below `t`. Inactive lanes have a
     /// negative `t`.
     #[inline(always)]
-    pub(crate) fn with_t_max(t: L) -> Self {
+    pub fn with_t_max(t: L) -> Self {
         Self { t, item: L::from_id(0), triangle: L::from_id(0) }
     }
 
@@ -69,7 +69,7 @@ impl<L: SimdFloat> Hit<L> {
     /// Accepts a hit on `item` at distance `t` in the lanes of `mask` where `t` is positive and
     /// smaller than the current distance.
     #[inline(always)]
-    pub(crate) fn keep_closer(&mut self, mask: L::Mask, t: L, item: u32) {
+    pub fn keep_closer(&mut self, mask: L::Mask, t: L, item: u32) {
         let nearer = mask & t.gt(L::zero()) & t.lt(self.t);
         self.t = L::select(nearer, t, self.t);
         self.item = L::select(nearer, L::from_id(item), self.item);
@@ -77,7 +77,7 @@ impl<L: SimdFloat> Hit<L> {
 
     /// Accepts the hits of `other` that are closer, or equally close with a smaller primitive id.
     #[inline(always)]
-    pub(crate) fn merge(&mut self, other: &Self) {
+    pub fn merge(&mut self, other: &Self) {
         let mut nearer = other.t.lt(self.t);
         let tie = (other.t.le(self.t) & other.t.lt(L::from_f64(L::MAX))).and_not(nearer);
         // This is rare. Ids are subnormal numbers if read as floats, and some processors compare

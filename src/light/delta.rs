@@ -152,7 +152,7 @@ impl<S: Float> DeltaLight<S> {
                     _ => L::from_f64(PI),
                 };
                 if let Self::Spot { cone, .. } = self {
-                    irradiance = irradiance * cone.factor(wi);
+                    irradiance *= cone.factor(wi);
                 }
                 LightSample { wi, distance, irradiance }
             }
