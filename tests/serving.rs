@@ -116,8 +116,10 @@ fn rendered(scene: &Scene, pool: &rayon::ThreadPool) -> RenderState {
 
 /// Returns another value for `key` of `scene`, which may be invalid.
 fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value> {
+    // An earlier edit may have removed the table.
+    let materials = scene.get("materials").and_then(Value::as_table).into_iter();
     let names: Vec<String> =
-        scene["materials"].as_table().unwrap().keys().cloned().chain([String::new()]).collect();
+        materials.flat_map(Table::keys).cloned().chain([String::new()]).collect();
     let old = value_at(scene, &key.path).cloned();
     let other = |x: f64, numbers: &mut Numbers| match numbers.below(5) {
         0 => 0.0,

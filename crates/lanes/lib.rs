@@ -1,4 +1,4 @@
-//! zerkalo, part 1 of 4: SIMD lanes and what needs nothing else, which are sampling and BVHs.
+//! zerkalo, part 1 of 5: SIMD lanes and what needs nothing else, which are sampling and BVHs.
 //!
 //! The source is in `src`, one folder per module. The crate is separate so that it is optimised for
 //! speed and part 2, which reads scenes, for size.

@@ -1,4 +1,4 @@
-//! zerkalo, part 2 of 4: descriptions of scenes, their files, and the kernels that intersect and shade.
+//! zerkalo, part 2 of 5: descriptions of scenes, their files, and the kernels that intersect and shade.
 //!
 //! The source is in `src`, one folder per module. The modules of part 1 are re-exported, so that paths
 //! are the same in every part.

@@ -211,7 +211,7 @@ impl<L: SimdFloat> World<L> {
         if let Some(nested_dielectrics) = &self.nested_dielectrics {
             let start = PathStart::camera(ray, active, self.depth);
             TransmissionIntegrator { world: self, nested_dielectrics, sampler }
-                .trace(start, candidates, None, out)
+                .trace(&start, candidates, None, out)
         } else {
             let trace = match (self.simple, !self.has_emitters()) {
                 (true, true) => trace_opaque::<_, true, false>,

@@ -22,11 +22,12 @@ fn takes_single(scene: &Scene) -> bool {
     matches!(AnyWorld::compile(scene, &Options::default()), AnyWorld::Single(_))
 }
 
-/// Returns the RMSE of single precision against double precision [8-bit levels].
-fn error(scene: &Scene) -> f64 {
+/// Returns the RMSE of single precision against double precision with so many samples per pixel and
+/// replicate [8-bit levels].
+fn error(scene: &Scene, samples: u32) -> f64 {
     let display = Display::default();
     let levels_of_picture = |precision| -> Vec<f64> {
-        let rendering = rendered(scene, 3, precision, SAMPLES);
+        let rendering = rendered(scene, 3, precision, samples);
         assert_eq!(rendering.film.bad_samples().count, 0);
         picture(&rendering, Replicates::Both).iter().flat_map(|p| display.codes(*p)).collect()
     };
@@ -207,7 +208,7 @@ fn auto_takes_double_where_single_would_show() {
         while p >= least {
             let scene = parsed(&text(p));
             let single = takes_single(&scene);
-            last = error(&scene);
+            last = error(&scene, SAMPLES);
             println!(
                 "{name} {p:.1e}: {}, single precision is {last:.4} levels off",
                 if single { "single" } else { "double" }
@@ -379,11 +380,16 @@ fn eye_inside_a_box_of_a_round_solid_decides_by_its_distance_from_the_surface() 
 fn shipped_scenes_stay_in_single_precision() {
     // Rounding makes some paths in glass and between mirrors end elsewhere. That is noise, not
     // error: in gallery-glass.toml single and double precision differ by 0.24, 0.13, 0.066 and
-    // 0.035 levels at 16, 64, 256 and 1024 samples a pixel (96x54).
+    // 0.035 levels at 16, 64, 256 and 1024 samples a pixel (96x54), in emissive-objects.toml by 0.41,
+    // 0.16 and 0.08 at 64, 256 and 1024.
     let mut wrong = Vec::new();
     let mut worst = (0.0, String::new());
     for (name, scene) in all_shipped() {
-        let levels = error(&sized(scene.clone(), SIZE));
+        let mut levels = error(&sized(scene.clone(), SIZE), SAMPLES);
+        if levels > INVISIBLE {
+            // Noise falls to less than a quarter, an error stays.
+            levels = error(&sized(scene.clone(), SIZE), 16 * SAMPLES);
+        }
         if !takes_single(&scene) {
             wrong.push(format!("{name}: double, {levels} levels"));
         } else if levels > INVISIBLE {

@@ -70,7 +70,8 @@ fn arrow_steps_of_each_number_kind() {
         (&Target::Film, "rays_per_pixel", "1", -1.0, "0"),
         (&Target::Film, "size", "640 480", 1.0, "1280, 960"),
         (&Target::Film, "size", "640 480", -0.1, "624, 468"),
-        (&Target::Film, "size", "8192 8192", 1.0, "8192, 8192"),
+        (&Target::Film, "size", "8192 8192", 1.0, "16384, 16384"),
+        (&Target::Film, "size", "16384 16384", 1.0, "16384, 16384"),
     ] {
         let scene = with(subject, key, from);
         assert_eq!(after(&scene, subject, key, steps), to, "{key} {from} {steps:+}");

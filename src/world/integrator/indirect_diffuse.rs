@@ -179,7 +179,7 @@ pub(crate) fn trace_generations<L: SimdFloat>(
         let traced = match &world.nested_dielectrics {
             Some(nested_dielectrics) => {
                 TransmissionIntegrator { world, nested_dielectrics, sampler: &sampler }.trace(
-                    start,
+                    &start,
                     candidates,
                     reservoir.as_mut(),
                     out,

@@ -90,20 +90,28 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     #[inline(never)]
     pub fn trace(
         &self,
-        start: PathStart<L>,
+        start: &PathStart<L>,
         candidates: &TileCandidates,
         mut reservoir: Option<&mut DiffuseReservoir<L>>,
         out: &mut Radiance<L>,
     ) -> Counts {
         let mut counts = Counts::default();
-        let PathStart { path, lanes, media, coincident, depth } = start;
-        let media = media.unwrap_or_else(|| self.nested_dielectrics.at_start(&path.ray));
-        let mut waiting = BranchStack { branches: [None; SPLIT_DEPTH] };
-        let mut branch = Branch { path, lanes, media, bounce: 0, coincident };
+        // Copied in place: branches are large.
+        let mut branch = Branch {
+            path: start.path,
+            lanes: start.lanes,
+            media: match &start.media {
+                Some(media) => *media,
+                None => self.nested_dielectrics.at_start(&start.path.ray),
+            },
+            bounce: 0,
+            coincident: start.coincident,
+        };
+        let mut waiting = BranchStack { branches: [const { None }; SPLIT_DEPTH] };
         loop {
             let candidates =
                 if branch.bounce == 0 { candidates } else { &self.world.all_candidates };
-            let limits = (depth, reservoir.as_deref_mut());
+            let limits = (start.depth, reservoir.as_deref_mut());
             let results = (&mut *out, &mut counts);
             let continues = self.advance(&mut branch, candidates, &mut waiting, limits, results);
             if !continues && !waiting.pop_into(&mut branch) {

@@ -5,11 +5,13 @@ mod changes;
 mod prediction;
 mod stops;
 
-use crate::film::testing::Rng;
 use crate::film::{Mse, TileNoise};
 use crate::render::schedule::*;
+use crate::render::test_random::Rng;
 use crate::render::wave::JobReport;
 
+/// [`TileNoise::squares`] of an error that is spread over many pixels.
+const SPREAD_OUT: Mse = Mse { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
 /// Number of pixels of a whole tile.
 const PIXELS: u32 = 256;
 
@@ -81,7 +83,7 @@ impl Model {
         if self.hidden.contains(&tile) {
             (allocation, reported) = (mse(0.0), mse(2.0 * reported.codes));
         }
-        TileNoise { reported, allocation, squares: Mse::SPREAD, pixels: PIXELS }
+        TileNoise { reported, allocation, squares: SPREAD_OUT, pixels: PIXELS }
     }
 
     /// True squared error of the picture (A + B) / 2.
