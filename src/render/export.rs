@@ -88,7 +88,7 @@ pub fn metadata(
     entries.into_iter().map(|(key, value)| (key.to_string(), value)).collect()
 }
 
-/// Formats the metadata entry [`SETTINGS`].
+/// Formats the metadata entry `Settings`.
 pub fn settings_text(sampler: &str, precision: &str, adaptive: bool, display: &Display) -> String {
     let allocation = if adaptive { "adaptive" } else { "uniform" };
     let display = display_text(display);

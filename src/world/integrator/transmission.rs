@@ -132,7 +132,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         (out, counts): (&mut Radiance<L>, &mut Counts),
     ) -> bool {
         let world = self.world;
-        let Branch { mut path, media, bounce, .. } = *branch;
+        // References: media and interfaces are large.
+        let (mut path, media, bounce) = (branch.path, &branch.media, branch.bounce);
         counts.rays += u64::from(branch.lanes.bits().count_ones());
         let mut hit = world.geometry.closest_masked(&path.ray, &candidates.primary, branch.lanes);
         let mut behind = None;
@@ -142,13 +143,13 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         {
             let coincident =
                 CoincidentState { lanes: coincident.lanes & branch.lanes, ..*coincident };
-            let next = contacts.next(&world.geometry, &coincident, &media);
+            let next = contacts.next(&world.geometry, &coincident, media);
             let origin = Vec3::select(next.lanes, coincident.point, path.ray.origin);
             path.ray.origin = origin;
             hit.take_in(next.lanes, L::zero(), (next.item, next.triangle));
             behind = Some(next);
         }
-        let transmittance = |distance| self.nested_dielectrics.transmittance(&media, distance);
+        let transmittance = |distance| self.nested_dielectrics.transmittance(media, distance);
         let has_emitters = world.has_emitters();
         if has_emitters {
             visible_emitters(world, &path, hit.t, branch.lanes, transmittance, out);
@@ -173,10 +174,10 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             if behind.is_some() || contact_lanes.any() {
                 let lanes = (lanes, contact_lanes);
                 let hits = (&mut hit, &mut interaction);
-                coincident = self.coincident(contacts, &path, hits, lanes, behind.as_ref(), &media);
+                coincident = self.coincident(contacts, &path, hits, lanes, behind.as_ref(), media);
             }
         }
-        let interface_hit = self.interface_hit(&interaction, lanes, &media);
+        let interface_hit = self.interface_hit(&interaction, lanes, media);
         if let Some(interface_hit) = &interface_hit {
             interaction.mask_out(interface_hit.suppressed);
         }
@@ -186,8 +187,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let bouncing = reservoir.map(|reservoir| {
             let coincident = coincident.as_ref().map(CoincidentState::reversed);
             let media = match &interface_hit {
-                Some(hit) => MediumStack::select(hit.lanes, &hit.medium_reflected, &media),
-                None => media,
+                Some(hit) => MediumStack::select(hit.lanes, &hit.medium_reflected, media),
+                None => *media,
             };
             reservoir.offer(&path, &interaction, (&media, coincident.as_ref()), self.sampler)
         });
@@ -220,7 +221,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             return false;
         }
         let bounce = bounce + 1;
-        let Some(interface_hit) = interface_hit else {
+        let Some(interface_hit) = &interface_hit else {
             let path = &mut branch.path;
             let sampler = self.sampler;
             let random = (sampler, bounce - 1);
@@ -236,7 +237,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             branch.coincident = coincident.as_ref().map(CoincidentState::reversed);
             return branch.lanes.any();
         };
-        let split = self.split_directions(&path, &interaction, &interface_hit, bounce - 1, counts);
+        let split = self.split_directions(&path, &interaction, interface_hit, bounce - 1, counts);
         let reaches_min_weight = |throughput: Vec3<L>| {
             let max_throughput = throughput.max_element();
             max_throughput.gt(L::zero()) & max_throughput.ge(L::from_f64(world.min_weight))
@@ -252,11 +253,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 lobe_density: split.reflected_density,
             },
             lanes: both,
-            media: MediumStack::select(
-                interface_hit.lanes,
-                &interface_hit.medium_reflected,
-                &media,
-            ),
+            media: MediumStack::select(interface_hit.lanes, &interface_hit.medium_reflected, media),
             bounce,
             coincident: coincident.as_ref().map(CoincidentState::reversed),
         };
@@ -292,8 +289,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         };
         let media =
             MediumStack::select(transmitted, &interface_hit.medium_transmitted, &reflected.media);
-        let coincident = coincident.map(|coincident| {
-            CoincidentState::select(transmitted, &coincident, &coincident.reversed())
+        let coincident = coincident.as_ref().map(|coincident| {
+            CoincidentState::select(transmitted, coincident, &coincident.reversed())
         });
         *branch = Branch { path, lanes, media, bounce, coincident };
         lanes.any()
