@@ -1,7 +1,7 @@
-//! zerkalo, part 3 of 5: films, and the pictures and film files that are written from them.
+//! zerkalo, part 2 of 4: films, and the pictures and film files that are written from them.
 //!
 //! The source is in `src`, one folder per module. The crate is separate so that it compiles beside
-//! part 4, which contains the kernels.
+//! part 3, which contains the kernels.
 
 use zerkalo_scene::{disk, lanes, value};
 

@@ -1,6 +1,6 @@
-//! zerkalo, part 4 of 5: compiled worlds and rendering. All kernels are compiled here.
+//! zerkalo, part 3 of 4: compiled worlds and rendering. All kernels are compiled here.
 //!
-//! The source is in `src`, one folder per module. The modules of parts 1 to 3 are re-exported, so that
+//! The source is in `src`, one folder per module. The modules of parts 1 and 2 are re-exported, so that
 //! paths are the same in every part.
 
 pub use zerkalo_film::film;

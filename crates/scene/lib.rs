@@ -1,7 +1,7 @@
-//! zerkalo, part 2 of 5: descriptions of scenes, their files, and the kernels that intersect and shade.
+//! zerkalo, part 1 of 4: descriptions of scenes, their files, and the kernels that intersect and shade.
 //!
-//! The source is in `src`, one folder per module. The modules of part 1 are re-exported, so that paths
-//! are the same in every part.
+//! The source is in `src`, one folder per module. The crate is separate so that it compiles beside
+//! the others.
 
 // The modules are left out elsewhere, so that this is the only error.
 #[cfg(not(unix))]
@@ -9,17 +9,21 @@ compile_error!(
     "zerkalo needs a Unix system (Linux, macOS, BSD): it uses POSIX terminals, signals and file locks."
 );
 
-pub use zerkalo_lanes::{bvh, lanes, sampling};
-
 #[cfg(unix)]
 #[path = "../../src/asset/mod.rs"]
 pub mod asset;
+#[cfg(unix)]
+#[path = "../../src/bvh/mod.rs"]
+pub mod bvh;
 #[cfg(unix)]
 #[path = "../../src/camera/mod.rs"]
 pub mod camera;
 #[cfg(unix)]
 #[path = "../../src/disk/mod.rs"]
 pub mod disk;
+#[cfg(unix)]
+#[path = "../../src/lanes/mod.rs"]
+pub mod lanes;
 #[cfg(unix)]
 #[path = "../../src/light/mod.rs"]
 pub mod light;
@@ -29,6 +33,9 @@ pub mod material;
 #[cfg(unix)]
 #[path = "../../src/primitive/mod.rs"]
 pub mod primitive;
+#[cfg(unix)]
+#[path = "../../src/sampling/mod.rs"]
+pub mod sampling;
 #[cfg(unix)]
 #[path = "../../src/scene/mod.rs"]
 pub mod scene;

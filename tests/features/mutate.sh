@@ -38,15 +38,14 @@ for name in $(ls "$mutations"); do
         }' "$file" > mutated
     cp mutated "$file"
 done
-for crate in crates/lanes crates/scene crates/film crates/render src; do
+for crate in crates/scene crates/film crates/render src; do
     { echo '#![allow(unused_parens)]'; cat $crate/lib.rs; } > mutated
     cp mutated $crate/lib.rs
 done
-echo 'pub use zerkalo_lanes::mutant;' >> crates/scene/lib.rs
 echo 'use zerkalo_scene::mutant;' >> crates/film/lib.rs
 echo 'pub use zerkalo_scene::mutant;' >> crates/render/lib.rs
 echo 'pub use zerkalo_render::mutant;' >> src/lib.rs
-cat >> crates/lanes/lib.rs <<'RUST'
+cat >> crates/scene/lib.rs <<'RUST'
 
 /// Returns `true` if the mutation `name` is enabled.
 pub fn mutant(name: &str) -> bool {
