@@ -14,9 +14,6 @@ mod render_state;
 pub mod schedule;
 pub mod session;
 mod sync_render;
-#[cfg(test)]
-#[path = "../film/test_random.rs"]
-mod test_random;
 pub mod wave;
 
 pub use checkpoint::{Checkpoint, EncodedCheckpoint, SampleInputs};

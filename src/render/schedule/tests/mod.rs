@@ -5,9 +5,9 @@ mod changes;
 mod prediction;
 mod stops;
 
+use crate::film::testing::Rng;
 use crate::film::{Mse, TileNoise};
 use crate::render::schedule::*;
-use crate::render::test_random::Rng;
 use crate::render::wave::JobReport;
 
 /// [`TileNoise::squares`] of an error that is spread over many pixels.
