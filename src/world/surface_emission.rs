@@ -14,6 +14,7 @@ use crate::scene::Scene;
 use crate::world::light_groups::LightGroups;
 use crate::world::world::LightSource;
 use glam::DVec3;
+use std::collections::{HashMap, HashSet};
 
 /// Largest number of triangles of a mesh from which light is sampled. A triangle takes 56 bytes in
 /// single precision.
@@ -53,12 +54,12 @@ impl<S: Float> SurfaceEmission<S> {
             Some((id.form, *group, *emission))
         };
         let entries: Vec<_> = primitives.iter().map(entry_of).collect();
-        let mut objects: Vec<(usize, usize, [f64; 3])> = Vec::new();
-        for entry in entries.iter().flatten() {
-            if !objects.contains(entry) {
-                objects.push(*entry);
-            }
-        }
+        let key = |&(form, group, emission): &(usize, usize, [f64; 3])| {
+            (form, group, emission.map(f64::to_bits))
+        };
+        let mut known = HashSet::new();
+        let distinct = entries.iter().flatten().filter(|entry| known.insert(key(entry)));
+        let objects: Vec<_> = distinct.copied().collect();
         let compile = |&(form, group, emission): &(usize, usize, [f64; 3])| {
             let two_sided = material_of(scene, form).is_none_or(|material| material.two_sided);
             let surface = surface_of(&forms[form]);
@@ -72,10 +73,8 @@ impl<S: Float> SurfaceEmission<S> {
         let sampled = all.len();
         all.extend(others);
         let (objects, sources): (Vec<_>, Vec<_>) = all.into_iter().unzip();
-        let index_of = |entry: &Option<_>| {
-            let index = objects.iter().position(|object| Some(*object) == *entry)?;
-            Some(index as u32)
-        };
+        let indices: HashMap<_, u32> = objects.iter().map(key).zip(0..).collect();
+        let index_of = |entry: &Option<_>| indices.get(&key(entry.as_ref()?)).copied();
         Self { sources, sampled, source_of: entries.iter().map(index_of).collect() }
     }
 

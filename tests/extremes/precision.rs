@@ -22,8 +22,8 @@ fn takes_single(scene: &Scene) -> bool {
     matches!(AnyWorld::compile(scene, &Options::default()), AnyWorld::Single(_))
 }
 
-/// Returns the RMSE of single precision against double precision with so many samples per pixel and
-/// replicate [8-bit levels].
+/// Returns the RMSE of single precision against double precision [8-bit levels]. Each replicate has
+/// `samples` samples per pixel.
 fn error(scene: &Scene, samples: u32) -> f64 {
     let display = Display::default();
     let levels_of_picture = |precision| -> Vec<f64> {

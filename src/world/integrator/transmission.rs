@@ -132,7 +132,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         (out, counts): (&mut Radiance<L>, &mut Counts),
     ) -> bool {
         let world = self.world;
-        // References: media and interfaces are large.
+        // Media are large, so that they are borrowed.
         let (mut path, media, bounce) = (branch.path, &branch.media, branch.bounce);
         counts.rays += u64::from(branch.lanes.bits().count_ones());
         let mut hit = world.geometry.closest_masked(&path.ray, &candidates.primary, branch.lanes);
