@@ -6,8 +6,9 @@
 //! picture's error. `light_NAME.R ..` are the contributions of the light groups; their sum is the
 //! picture. `count` is the number of samples of a pixel.
 //!
-//! Rows are written as soon as they are complete, as chunks in increasing order. The header is
-//! written again at the end if metadata have changed.
+//! The file consists of tiles, so that programs can read a part of a large picture. A row of tiles
+//! is written as soon as it is complete. The header is written again at the end if metadata have
+//! changed.
 
 use crate::film::bands::Bands;
 use crate::film::exr_header::Ordered;
@@ -18,15 +19,20 @@ use exr::block::UncompressedBlock;
 use exr::block::writer::ChunksWriter;
 use exr::compression::Compression;
 use exr::error::Error;
-use exr::math::Vec2;
+use exr::math::{RoundingMode, Vec2};
 use exr::meta::attribute::{
-    AttributeValue, ChannelDescription, Chromaticities, LineOrder, SampleType, Text,
+    AttributeValue, ChannelDescription, Chromaticities, LevelMode, LineOrder, SampleType, Text,
+    TileDescription,
 };
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::meta::{BlockDescription, Headers};
 use std::io::{self, Cursor, SeekFrom};
+use std::ops::Range;
 
-/// Encodes a picture row by row.
+/// Width and height of a tile in pixels. A row of tiles is held in memory while it is encoded.
+const TILE: [usize; 2] = [64, 16];
+
+/// Encodes a picture, one row of tiles after another.
 pub(super) fn encode(
     picture: &ImageData,
     bands: &mut dyn Bands,
@@ -58,14 +64,19 @@ fn encode_to(
     let metadata = bands.metadata();
     let headers = headers(picture, &channels, &metadata);
     exr::block::write(Ordered::new(&mut *sink), headers, true, |meta, writer| {
-        let mut rows = Rows::new(picture, channels.iter().map(|(_, source)| *source).collect());
+        let mut rows = TileRow::new(picture, channels.iter().map(|(_, source)| *source).collect());
         let mut compressor = writer.sequential_blocks_compressor(&meta);
         for (index, block) in exr::block::enumerate_ordered_header_block_indices(&meta.headers) {
-            // Blocks of RLE have one row.
-            rows.load(block.pixel_position.y(), bands)?;
+            let Vec2(left, top) = block.pixel_position;
+            if left == 0 {
+                rows.load(top..top + block.pixel_size.height(), bands)?;
+            }
             let channels = &meta.headers[0].channels;
             let block = UncompressedBlock::from_lines(channels, block, |line| {
-                line.value.copy_from_slice(&rows.bytes[line.location.channel]);
+                let Vec2(x, y) = line.location.position;
+                let bytes = &rows.bytes[line.location.channel];
+                let start = ((y - top) * picture.size[0] as usize + x) * 4;
+                line.value.copy_from_slice(&bytes[start..start + line.value.len()]);
             });
             compressor.compress_block(index, block)?;
         }
@@ -124,10 +135,15 @@ fn headers(
             ChannelDescription::named(text(name), kind)
         })
         .collect();
+    let tiles = TileDescription {
+        tile_size: Vec2(TILE[0], TILE[1]),
+        level_mode: LevelMode::Singular,
+        rounding_mode: RoundingMode::Down,
+    };
     let header = Header::new(text("picture"), size, descriptions)
         // Noise hardly compresses. A file of 108 MB at 1920x1080 becomes 100 MB in 0.55 s with RLE,
         // and 71 MB in 3.4 s with ZIP.
-        .with_encoding(Compression::RLE, BlockDescription::ScanLines, LineOrder::Increasing)
+        .with_encoding(Compression::RLE, BlockDescription::Tiles(tiles), LineOrder::Increasing)
         .with_shared_attributes(image)
         .with_attributes(layer);
     Headers::from_elem(header, 1)
@@ -170,44 +186,47 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     layers
 }
 
-/// Reader of film rows.
-struct Rows<'a> {
+/// Values of a row of tiles.
+struct TileRow<'a> {
     picture: &'a ImageData<'a>,
     sources: Vec<Source>,
-    /// Latest row, as the bytes of each channel.
+    /// Bytes of each channel, in `[row][column]` order.
     bytes: Vec<Vec<u8>>,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> TileRow<'a> {
     fn new(picture: &'a ImageData<'a>, sources: Vec<Source>) -> Self {
         Self { picture, bytes: sources.iter().map(|_| Vec::new()).collect(), sources }
     }
 
-    /// Replaces the bytes by those of row `y`.
-    fn load(&mut self, y: usize, bands: &mut dyn Bands) -> io::Result<()> {
+    /// Replaces the bytes by those of the given rows of the picture.
+    fn load(&mut self, rows: Range<usize>, bands: &mut dyn Bands) -> io::Result<()> {
         let Self { picture, sources, bytes } = self;
-        let film = bands.film_with_row(y)?;
-        let mixed = &picture.mix.radiance_per_step(film.scales());
-        for bytes in bytes.iter_mut() {
-            bytes.clear();
-            bytes.resize(film.width() * 4, 0);
-        }
-        film.visit_row(y - film.first_row(), |x, sums| {
-            let means = [Replicates::Both, Replicates::A, Replicates::B]
-                .map(|replicates| sums.mean(replicates, mixed));
-            for (source, bytes) in sources.iter().zip(bytes.iter_mut()) {
-                let value = match *source {
-                    Source::Mixed(Replicates::Both, c) => (means[0][c] as f32).to_ne_bytes(),
-                    Source::Mixed(Replicates::A, c) => (means[1][c] as f32).to_ne_bytes(),
-                    Source::Mixed(Replicates::B, c) => (means[2][c] as f32).to_ne_bytes(),
-                    Source::Group(group, c) => {
-                        group_mean(&sums, mixed, 3 * group + c).to_ne_bytes()
-                    }
-                    Source::Count => sums.count(Replicates::Both).to_ne_bytes(),
-                };
-                bytes[x * 4..][..4].copy_from_slice(&value);
+        bytes.iter_mut().for_each(Vec::clear);
+        for y in rows {
+            let film = bands.film_with_row(y)?;
+            let mixed = &picture.mix.radiance_per_step(film.scales());
+            let start = bytes.first().map_or(0, Vec::len);
+            for bytes in bytes.iter_mut() {
+                bytes.resize(start + film.width() * 4, 0);
             }
-        });
+            film.visit_row(y - film.first_row(), |x, sums| {
+                let means = [Replicates::Both, Replicates::A, Replicates::B]
+                    .map(|replicates| sums.mean(replicates, mixed));
+                for (source, bytes) in sources.iter().zip(bytes.iter_mut()) {
+                    let value = match *source {
+                        Source::Mixed(Replicates::Both, c) => (means[0][c] as f32).to_ne_bytes(),
+                        Source::Mixed(Replicates::A, c) => (means[1][c] as f32).to_ne_bytes(),
+                        Source::Mixed(Replicates::B, c) => (means[2][c] as f32).to_ne_bytes(),
+                        Source::Group(group, c) => {
+                            group_mean(&sums, mixed, 3 * group + c).to_ne_bytes()
+                        }
+                        Source::Count => sums.count(Replicates::Both).to_ne_bytes(),
+                    };
+                    bytes[start + x * 4..][..4].copy_from_slice(&value);
+                }
+            });
+        }
         Ok(())
     }
 }
@@ -218,5 +237,42 @@ fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
     match sums.count(Replicates::Both) {
         0 => 0.0,
         count => (sums.value(Replicates::Both, i) * per_unit[i] / f64::from(count)) as f32,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::testing::{fill, film, white};
+    use crate::film::{Depth, Display, ImageOutput, WholeFilm, read_exr};
+    use exr::meta::MetaData;
+
+    #[test]
+    fn tiles_hold_the_pixels_of_their_place() {
+        let size = [2 * TILE[0] + 2, 2 * TILE[1] + 5];
+        let mut film = film(size[0], size[1], &[1.0]);
+        let value = |x: usize, y: usize| (1000 * y + x) as f64;
+        fill(&mut film, 2, |x, y, _| vec![2.0 * value(x, y); 3]);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let picture = ImageData {
+            size: size.map(|side| side as u32),
+            mix: &white(1),
+            group_names: &[],
+            display: Display::default(),
+            depth: Depth::Eight,
+        };
+        let output = ImageOutput::from_path(&path).unwrap();
+        output.write(&picture, &mut WholeFilm { film: &film, metadata: &[] }).unwrap();
+        let meta = MetaData::read_from_file(&path, true).unwrap();
+        let BlockDescription::Tiles(tiles) = meta.headers[0].blocks else { panic!("{meta:?}") };
+        assert_eq!(tiles.tile_size, Vec2(TILE[0], TILE[1]));
+        assert_eq!(meta.headers[0].chunk_count, 9);
+        let read = read_exr(&path).unwrap();
+        assert_eq!(read.size, size);
+        for (i, pixel) in read.pixels.iter().enumerate() {
+            let (x, y) = (i % size[0], i / size[0]);
+            assert_eq!(*pixel, [value(x, y); 3], "{x} {y}");
+        }
     }
 }

@@ -71,8 +71,8 @@ const REGION_TILE_BYTES: u64 = 1024;
 /// Memory for each tile of a picture in regions: its error, and a number for the percentiles
 /// \[bytes\].
 const PICTURE_TILE_BYTES: u64 = (size_of::<Option<TileNoise>>() + size_of::<f64>()) as u64;
-/// Memory for each pixel of a row and light group while the row is encoded \[bytes\].
-const ROW_BYTES: u64 = 160;
+/// Memory for each column and light group while a row of OpenEXR tiles is encoded \[bytes\].
+const ROW_BYTES: u64 = 256;
 /// Memory of the program beside scene and film: buffers, allocator \[bytes\].
 const PROGRAM_BYTES: u64 = 3 << 20;
 /// Memory of a tracing thread: stack and paths \[bytes\].
