@@ -37,7 +37,7 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 pub use watch::{WatchReport, WatchSession, WatchedShards, WatchedState};
 use worker::Worker;
 
@@ -204,16 +204,24 @@ impl Session {
         &self.wakeup
     }
 
-    /// Waits for the next wake-up, for at most `limit`, and takes the snapshot. Returns `None`
-    /// after `limit`.
+    /// Waits for a snapshot that has not been taken, for at most `limit`. Returns `None` after
+    /// `limit`.
     ///
     /// # Panics
     /// If the rendering thread has panicked.
     pub fn wait(&self, limit: Duration) -> Option<Snapshot> {
-        match self.wakeup.recv_timeout(limit) {
-            Ok(()) => self.take(),
-            Err(RecvTimeoutError::Timeout) => None,
-            Err(RecvTimeoutError::Disconnected) => panic!("the rendering thread has ended"),
+        let deadline = Instant::now() + limit;
+        loop {
+            match self.wakeup.recv_deadline(deadline) {
+                // A snapshot that replaces another between its message and `take` leaves a message
+                // without a snapshot.
+                Ok(()) => match self.take() {
+                    Some(snapshot) => return Some(snapshot),
+                    None => continue,
+                },
+                Err(RecvTimeoutError::Timeout) => return None,
+                Err(RecvTimeoutError::Disconnected) => panic!("the rendering thread has ended"),
+            }
         }
     }
 

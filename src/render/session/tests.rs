@@ -103,6 +103,27 @@ fn newest_scene_is_never_lost() {
     }
 }
 
+/// The message of a snapshot that was taken without waiting must not end the next wait.
+#[test]
+fn wait_ignores_messages_of_snapshots_already_taken() {
+    let mut session = session(Stop { spp: Some(8), ..Stop::default() });
+    for _ in 0..20 {
+        session.set_scene(scene(64));
+        let end = Instant::now() + PATIENCE;
+        loop {
+            if let Some(State::Finished(_)) = session.take().map(|s| s.report.state) {
+                break;
+            }
+            assert!(Instant::now() < end, "the render ends");
+            std::thread::yield_now();
+        }
+        let generation = session.set_scene(scene(128));
+        let snapshot = session.wait(PATIENCE).expect("a snapshot in time");
+        assert_eq!(snapshot.report.generation, generation);
+        wait_for(&session, |s| matches!(s.report.state, State::Finished(_)));
+    }
+}
+
 #[test]
 fn new_scene_cancels_the_first_pass() {
     let mut session = session(endless());
