@@ -10,12 +10,12 @@ use crate::sampling::{CameraDimensions, PacketSampler, SampleSettings};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::tile::{CullingMode, TileCandidates};
 use crate::world::integrator::first_hit::{self, FirstHit};
-use crate::world::integrator::indirect_diffuse::{DiffuseLimits, PathStart, trace_generations};
+use crate::world::integrator::indirect_diffuse::{DiffuseLimits, trace_generations};
 use crate::world::integrator::nested_dielectrics::NestedDielectrics;
 use crate::world::integrator::opaque::trace_opaque;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::integrator::surface_textures::SurfaceTextures;
-use crate::world::integrator::transmission::TransmissionIntegrator;
+use crate::world::integrator::transmission::{Branch, TransmissionIntegrator};
 use crate::world::inventory::Inventory;
 use crate::world::light_groups::LightGroups;
 use crate::world::lights_on_surfaces::OnSurface;
@@ -209,16 +209,18 @@ impl<L: SimdFloat> World<L> {
             return trace_generations(self, limits, ray, candidates, sampler, active, out);
         }
         if let Some(nested_dielectrics) = &self.nested_dielectrics {
-            let start = PathStart::camera(ray, active, self.depth);
+            let mut start = Branch::camera(ray, active);
+            start.media = nested_dielectrics.at_start(&ray);
             TransmissionIntegrator { world: self, nested_dielectrics, sampler }
-                .trace(&start, candidates, None, out)
+                .trace(&mut start, self.depth, candidates, None, out)
         } else {
             let trace = match (self.simple, !self.has_emitters()) {
                 (true, true) => trace_opaque::<_, true, false>,
                 (false, true) => trace_opaque::<_, false, false>,
                 (_, false) => trace_opaque::<_, false, true>,
             };
-            trace(self, (&Path::new(ray), active, self.depth), candidates, sampler, None, out)
+            let paths = (&mut Path::new(ray), active, self.depth);
+            trace(self, paths, candidates, sampler, None, out)
         }
     }
 

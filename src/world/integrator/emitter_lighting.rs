@@ -151,7 +151,8 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
         }
         if source.visible {
             for (index, lanes) in interaction.bsdfs(glossy & arrives) {
-                let (lobe, density) = lobe_value(world, path, interaction, index, light.wi);
+                let incident = &path.ray.direction;
+                let (lobe, density) = lobe_value(world, incident, interaction, index, light.wi);
                 let weight = power_heuristic(light.density, density) * lobes.share;
                 value += (lobe * weight).masked(lanes);
             }
@@ -179,11 +180,12 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
 }
 
 /// Returns the value of the reflection lobe of BSDF `index` in the given direction, with the cosine
-/// of the light, and the density \[1/sr\] of the reflected ray in this direction.
+/// of the light, and the density \[1/sr\] of the reflected ray in this direction. `incident` are the
+/// directions of the incoming rays.
 #[inline(never)]
 pub(crate) fn lobe_value<L: SimdFloat>(
     world: &World<L>,
-    path: &Path<L>,
+    incident: &Vec3<L>,
     interaction: &SurfaceInteraction<L>,
     index: usize,
     direction: Vec3<L>,
@@ -193,9 +195,8 @@ pub(crate) fn lobe_value<L: SimdFloat>(
         return (Vec3::zero(), L::zero());
     };
     let evaluate = |direction: Vec3<L>| {
-        let incident = path.ray.direction;
         let normal = interaction.normal;
-        bsdf.evaluate_lobe(*strength, lobe, incident, normal, direction, world.fold)
+        bsdf.evaluate_lobe(*strength, lobe, *incident, normal, direction, world.fold)
     };
     let (value, density) = evaluate(direction);
     if !world.smooth {
@@ -209,17 +210,17 @@ pub(crate) fn lobe_value<L: SimdFloat>(
 }
 
 /// Returns the density \[1/sr\] of reflected rays of BSDF `index` in their directions; the largest
-/// finite number for a mirror.
+/// finite number for a mirror. `incident` are the directions of the incoming rays.
 #[inline(always)]
 pub(crate) fn reflected_density<L: SimdFloat>(
     world: &World<L>,
-    path: &Path<L>,
+    incident: &Vec3<L>,
     interaction: &SurfaceInteraction<L>,
     index: usize,
     direction: Vec3<L>,
 ) -> L {
     match &world.bsdfs[index].reflection {
         None | Some((_, ReflectionLobe::Mirror)) => L::from_f64(L::MAX),
-        Some(_) => lobe_value(world, path, interaction, index, direction).1,
+        Some(_) => lobe_value(world, incident, interaction, index, direction).1,
     }
 }

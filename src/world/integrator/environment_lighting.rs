@@ -78,7 +78,8 @@ pub(crate) fn environment_lighting<L: SimdFloat>(
         }
         if source.visible {
             for (index, lanes) in interaction.bsdfs(glossy & arrives) {
-                let (lobe, density) = lobe_value(world, path, interaction, index, light.wi);
+                let incident = &path.ray.direction;
+                let (lobe, density) = lobe_value(world, incident, interaction, index, light.wi);
                 let weight = power_heuristic(light.density, density) * lobes.share;
                 value += (lobe * weight).masked(lanes);
             }

@@ -20,7 +20,7 @@ use crate::world::integrator::interaction::SurfaceInteraction;
 use crate::world::integrator::nested_dielectrics::MediumStack;
 use crate::world::integrator::opaque::trace_opaque;
 use crate::world::integrator::path::{Counts, Path, Radiance};
-use crate::world::integrator::transmission::TransmissionIntegrator;
+use crate::world::integrator::transmission::{Branch, TransmissionIntegrator};
 use crate::world::world::World;
 
 /// Density of diffuse bounces for the weight of emitters that they reach: so small that the points
@@ -34,27 +34,6 @@ pub(crate) struct DiffuseLimits {
     pub depth: u32,
     /// `true` if mirrors reflect and glass transmits after a diffuse bounce.
     pub caustics: bool,
-}
-
-/// Rays of a generation.
-#[derive(Clone, Copy)]
-pub(crate) struct PathStart<L: SimdFloat> {
-    pub path: Path<L>,
-    pub lanes: L::Mask,
-    /// Media that the rays are inside of. `None` for camera rays.
-    pub media: Option<MediumStack<L>>,
-    /// State of rays that start on one of several coincident surfaces. `None` if no ray does.
-    pub coincident: Option<CoincidentState<L>>,
-    /// Largest number of surfaces after the first that reflect or transmit.
-    pub depth: u32,
-}
-
-impl<L: SimdFloat> PathStart<L> {
-    /// Camera rays.
-    #[inline(always)]
-    pub fn camera(ray: Ray<L>, lanes: L::Mask, depth: u32) -> Self {
-        Self { path: Path::new(ray), lanes, media: None, coincident: None, depth }
-    }
 }
 
 /// The hit that is chosen for the diffuse bounce, in each lane, among those of a generation.
@@ -143,7 +122,7 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
     }
 
     /// Returns the rays of the next generation, whose direction comes from the numbers `u` and `v`.
-    fn start(&self, world: &World<L>, (u, v): (L, L), depth: u32) -> PathStart<L> {
+    fn start(&self, world: &World<L>, (u, v): (L, L)) -> Branch<L> {
         let direction = Frame::around(self.normal).to_world(cosine_hemisphere(u, v));
         // The largest channel of the throughput becomes the sum of all weights.
         let scale = self.sum / L::select(self.lanes, self.weight, L::one());
@@ -155,7 +134,7 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         let lanes = self.lanes
             & direction.dot(self.geometric).gt(L::zero())
             & path.throughput.max_element().ge(L::from_f64(world.min_weight));
-        PathStart { path, lanes, media: Some(self.media), coincident: self.coincident, depth }
+        Branch { path, lanes, media: self.media, bounce: 0, coincident: self.coincident }
     }
 }
 
@@ -171,7 +150,12 @@ pub(crate) fn trace_generations<L: SimdFloat>(
     out: &mut Radiance<L>,
 ) -> Counts {
     let mut counts = Counts::default();
-    let mut start = PathStart::camera(ray, active, world.depth);
+    let mut start = Branch::camera(ray, active);
+    if let Some(nested_dielectrics) = &world.nested_dielectrics {
+        start.media = nested_dielectrics.at_start(&ray);
+    }
+    // Largest number of surfaces after the first that reflect or transmit.
+    let mut depth = world.depth;
     for generation in 0..=limits.depth {
         let sampler = sampler.generation(generation);
         let candidates = if generation == 0 { candidates } else { &world.all_candidates };
@@ -179,7 +163,8 @@ pub(crate) fn trace_generations<L: SimdFloat>(
         let traced = match &world.nested_dielectrics {
             Some(nested_dielectrics) => {
                 TransmissionIntegrator { world, nested_dielectrics, sampler: &sampler }.trace(
-                    &start,
+                    &mut start,
+                    depth,
                     candidates,
                     reservoir.as_mut(),
                     out,
@@ -187,15 +172,15 @@ pub(crate) fn trace_generations<L: SimdFloat>(
             }
             None => {
                 let reservoir = reservoir.as_mut();
-                let paths = (&start.path, start.lanes, start.depth);
+                let paths = (&mut start.path, start.lanes, depth);
                 trace_opaque::<_, false, true>(world, paths, candidates, &sampler, reservoir, out)
             }
         };
         counts.rays += traced.rays;
         counts.glossy |= traced.glossy;
         let Some(reservoir) = reservoir else { break };
-        let depth = if limits.caustics { world.depth } else { 0 };
-        start = reservoir.start(world, sampler.diffuse_2d(generation), depth);
+        depth = if limits.caustics { world.depth } else { 0 };
+        start = reservoir.start(world, sampler.diffuse_2d(generation));
         if start.lanes.none() {
             break;
         }

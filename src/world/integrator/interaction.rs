@@ -106,21 +106,23 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
     }
 }
 
-/// Creates the interactions of the active rays. Returns `None` if no ray is active.
+/// Creates the interactions of the active rays. `first` is the first result of [`next_distinct`] for
+/// the primitives that they hit.
 #[inline(always)]
 pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
     ray: &Ray<L>,
     hit: &Hit<L>,
+    first: (u32, L::Mask),
     active: L::Mask,
-) -> Option<SurfaceInteraction<L>> {
-    let (item, lanes) = next_distinct(hit.item, active)?;
+) -> SurfaceInteraction<L> {
+    let (item, lanes) = first;
     let remaining = active.and_not(lanes);
-    Some(if remaining.none() {
+    if remaining.none() {
         interact_one::<_, SIMPLE>(world, ray, hit, item, lanes)
     } else {
-        interact_mixed::<_, SIMPLE>(world, ray, hit, (item, lanes), remaining)
-    })
+        interact_mixed::<_, SIMPLE>(world, ray, hit, first, remaining)
+    }
 }
 
 /// Creates the interactions of a packet whose rays hit several primitives. `first` holds the

@@ -1,8 +1,7 @@
 //! Integrator of worlds without transmission (Whitted 1980). At each hit it computes direct
 //! lighting and continues the path with one reflected ray, sampled from the reflection lobe.
 
-use crate::bvh::Ray;
-use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
 use crate::material::ReflectionLobe;
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
@@ -16,8 +15,8 @@ use crate::world::integrator::nested_dielectrics::MediumStack;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
-/// Traces paths in a world without transmissive surfaces. The paths start in the given lanes and
-/// end after `depth` reflections.
+/// Traces paths in a world without transmissive surfaces, and overwrites them. The paths start in
+/// the given lanes and end after `depth` reflections.
 ///
 /// `EMITTERS` is `true` if the world has emitters or indirect diffuse light; `reservoir` takes the
 /// hits from which the latter may bounce. `SIMPLE` is `true` if the world has neither and
@@ -25,14 +24,13 @@ use crate::world::world::World;
 #[inline(never)]
 pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS: bool>(
     world: &'a World<L>,
-    (start, mut active, depth): (&Path<L>, L::Mask, u32),
+    (path, mut active, depth): (&mut Path<L>, L::Mask, u32),
     mut candidates: &'a TileCandidates,
     sampler: &PacketSampler<'_, L>,
     mut reservoir: Option<&mut DiffuseReservoir<L>>,
     out: &mut Radiance<L>,
 ) -> Counts {
     let mut counts = Counts::default();
-    let mut path = *start;
     let mut bounce = 0;
     loop {
         counts.rays += u64::from(active.bits().count_ones());
@@ -46,23 +44,22 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
             out.groups[group] += path.throughput.masked(active.and_not(is_hit));
         }
         if EMITTERS {
-            visible_emitters(world, &path, hit.t, active, |_| None, out);
+            visible_emitters(world, path, hit.t, active, |_| None, out);
         }
         active = active & is_hit;
-        let Some(interaction) = interact::<_, SIMPLE>(world, &path.ray, &hit, active) else {
-            return counts;
-        };
+        let Some(first) = next_distinct(hit.item, active) else { return counts };
+        let interaction = interact::<_, SIMPLE>(world, &path.ray, &hit, first, active);
         if EMITTERS && !world.emission.is_empty() {
-            surface_emission(world, &path, &hit, &interaction, out);
+            surface_emission(world, path, &hit, &interaction, out);
         }
         let mut bouncing = None;
         if EMITTERS && let Some(reservoir) = &mut reservoir {
             let media = (&MediumStack::vacuum(), None);
-            bouncing = Some(reservoir.offer(&path, &interaction, media, sampler));
+            bouncing = Some(reservoir.offer(path, &interaction, media, sampler));
         }
         direct_lighting::<_, SIMPLE>(
             world,
-            &path,
+            path,
             &interaction,
             candidates,
             bouncing,
@@ -74,7 +71,7 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
             let lanes = if is_last { L::mask(false) } else { interaction.reflecting };
             emitter_lighting(
                 world,
-                &path,
+                path,
                 &interaction,
                 candidates,
                 (sampler, bounce),
@@ -87,7 +84,7 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
         }
         active = sample_reflection::<_, SIMPLE>(
             world,
-            &mut path,
+            path,
             &interaction,
             (sampler, bounce),
             EMITTERS,
@@ -115,8 +112,7 @@ pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool>(
     counts: &mut Counts,
 ) -> L::Mask {
     let mut lobe_sample = None;
-    let incoming = *path;
-    let Path { ray: Ray { direction: incident, .. }, throughput, .. } = incoming;
+    let (incident, throughput) = (path.ray.direction, path.throughput);
     for (index, lanes) in interaction.bsdfs(interaction.reflecting) {
         let bsdf = &world.bsdfs[index];
         let Some((strength, lobe)) = &bsdf.reflection else { continue };
@@ -132,7 +128,7 @@ pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool>(
             direction = interaction.reflect_into_hemisphere(direction);
         }
         if emitters {
-            let density = reflected_density(world, &incoming, interaction, index, direction);
+            let density = reflected_density(world, &incident, interaction, index, direction);
             path.lobe_density = L::select(lanes, density, path.lobe_density);
         }
         path.ray.direction = Vec3::select(lanes, direction, path.ray.direction);

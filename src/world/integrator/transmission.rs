@@ -2,7 +2,7 @@
 //! transmitted ray.
 
 use crate::bvh::{Hit, Ray};
-use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
 use crate::material::{Bsdf, Interface, InterfaceMedia, ReflectionLobe, Transmission};
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
@@ -11,7 +11,7 @@ use crate::world::integrator::direct_lighting::direct_lighting;
 use crate::world::integrator::emitter_lighting::{
     ReflectingLobes, emitter_lighting, reflected_density, surface_emission, visible_emitters,
 };
-use crate::world::integrator::indirect_diffuse::{DiffuseReservoir, PathStart};
+use crate::world::integrator::indirect_diffuse::DiffuseReservoir;
 use crate::world::integrator::interaction::{SurfaceInteraction, interact};
 use crate::world::integrator::nested_dielectrics::{InterfaceHit, MediumStack, NestedDielectrics};
 use crate::world::integrator::opaque::sample_reflection;
@@ -23,41 +23,23 @@ use crate::world::world::World;
 const SPLIT_DEPTH: usize = 2;
 
 /// Branches of the paths of a packet, all at the same depth.
-#[derive(Clone, Copy)]
-struct Branch<L: SimdFloat> {
-    path: Path<L>,
-    lanes: L::Mask,
+pub(crate) struct Branch<L: SimdFloat> {
+    pub path: Path<L>,
+    pub lanes: L::Mask,
     /// Media that the rays are inside of.
-    media: MediumStack<L>,
-    /// Number of surfaces that the path has hit before this ray.
-    bounce: u32,
+    pub media: MediumStack<L>,
+    /// Number of surfaces that the path has hit before this ray, since its generation started.
+    pub bounce: u32,
     /// State of rays that start on one of several coincident surfaces. `None` if no ray does.
-    coincident: Option<CoincidentState<L>>,
+    pub coincident: Option<CoincidentState<L>>,
 }
 
-/// Reflected branches that are traced after the transmitted branches of the same interface. The
-/// stack holds at most one branch for each depth.
-struct BranchStack<L: SimdFloat> {
-    branches: [Option<Branch<L>>; SPLIT_DEPTH],
-}
-
-impl<L: SimdFloat> BranchStack<L> {
-    /// Pushes a branch whose `bounce` is between 1 and `SPLIT_DEPTH`.
-    fn push(&mut self, branch: Branch<L>) {
-        self.branches[branch.bounce as usize - 1] = Some(branch);
-    }
-
-    /// Moves the branch of the largest depth to `branch`. Returns `false` if the stack is empty.
-    fn pop_into(&mut self, branch: &mut Branch<L>) -> bool {
-        for slot in self.branches.iter_mut().rev() {
-            // Copied in place: branches are large.
-            if let Some(next) = slot {
-                *branch = *next;
-                *slot = None;
-                return true;
-            }
-        }
-        false
+impl<L: SimdFloat> Branch<L> {
+    /// Creates the paths of camera rays, which start in vacuum.
+    #[inline(always)]
+    pub fn camera(ray: Ray<L>, lanes: L::Mask) -> Self {
+        let media = MediumStack::vacuum();
+        Self { path: Path::new(ray), lanes, media, bounce: 0, coincident: None }
     }
 }
 
@@ -84,65 +66,73 @@ pub(crate) struct TransmissionIntegrator<'a, L: SimdFloat> {
 }
 
 impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
-    /// Traces the rays of `start`. In every lane, the transmitted branch of an interface is traced
-    /// before the reflected one, whatever the other lanes do. `reservoir` takes the hits from which
-    /// indirect diffuse light may bounce.
+    /// Traces the rays of `start`, over at most `depth` surfaces after the first, and overwrites
+    /// `start`. In every lane, the transmitted branch of an interface is traced before the reflected
+    /// one, whatever the other lanes do. `reservoir` takes the hits from which indirect diffuse
+    /// light may bounce.
     #[inline(never)]
     pub fn trace(
         &self,
-        start: &PathStart<L>,
+        start: &mut Branch<L>,
+        depth: u32,
         candidates: &TileCandidates,
         mut reservoir: Option<&mut DiffuseReservoir<L>>,
         out: &mut Radiance<L>,
     ) -> Counts {
         let mut counts = Counts::default();
-        // Copied in place: branches are large.
-        let mut branch = Branch {
-            path: start.path,
-            lanes: start.lanes,
-            media: match &start.media {
-                Some(media) => *media,
-                None => self.nested_dielectrics.at_start(&start.path.ray),
-            },
-            bounce: 0,
-            coincident: start.coincident,
-        };
-        let mut waiting = BranchStack { branches: [const { None }; SPLIT_DEPTH] };
+        // Reflected branches, traced after the transmitted branches of the same interface: entry i
+        // starts at interface i + 1. Branches are large: they are traced where they are stored. The
+        // literal leaves the unused bytes uninitialised.
+        let mut waiting: [Option<Branch<L>>; SPLIT_DEPTH] = [None, None];
+        // Number of entries up to the branch that is traced; 0 for `start`.
+        let mut current = 0;
         loop {
+            let (traced, deeper) = waiting.split_at_mut(current);
+            let branch = match traced.last_mut() {
+                None => &mut *start,
+                Some(Some(branch)) => branch,
+                Some(None) => return counts,
+            };
             let candidates =
                 if branch.bounce == 0 { candidates } else { &self.world.all_candidates };
-            let limits = (start.depth, reservoir.as_deref_mut());
-            let results = (&mut *out, &mut counts);
-            let continues = self.advance(&mut branch, candidates, &mut waiting, limits, results);
-            if !continues && !waiting.pop_into(&mut branch) {
-                return counts;
+            let limits = (depth, reservoir.as_deref_mut());
+            if self.advance(branch, candidates, deeper, limits, (&mut *out, &mut counts)) {
+                continue;
+            }
+            if let Some(finished) = traced.last_mut() {
+                *finished = None;
+            }
+            match waiting.iter().rposition(Option::is_some) {
+                Some(deepest) => current = deepest + 1,
+                None => return counts,
             }
         }
     }
 
     /// Traces the rays of `branch` and adds the radiance of their hit points to `out`. Replaces
     /// `branch` by its continuation, of at most `depth` surfaces after the first. Returns `false` if
-    /// no path continues.
+    /// no path continues. `waiting` takes the reflected branches of the next interfaces, up to
+    /// interface [`SPLIT_DEPTH`].
     fn advance(
         &self,
         branch: &mut Branch<L>,
         candidates: &TileCandidates,
-        waiting: &mut BranchStack<L>,
+        waiting: &mut [Option<Branch<L>>],
         (depth, reservoir): (u32, Option<&mut DiffuseReservoir<L>>),
         (out, counts): (&mut Radiance<L>, &mut Counts),
     ) -> bool {
         let world = self.world;
-        // Media are large, so that they are borrowed.
-        let (mut path, media, bounce) = (branch.path, &branch.media, branch.bounce);
-        counts.rays += u64::from(branch.lanes.bits().count_ones());
-        let mut hit = world.geometry.closest_masked(&path.ray, &candidates.primary, branch.lanes);
+        // Paths and media are large: they are not copied.
+        let (path, media, active, bounce) =
+            (&mut branch.path, &branch.media, branch.lanes, branch.bounce);
+        counts.rays += u64::from(active.bits().count_ones());
+        let mut hit = world.geometry.closest_masked(&path.ray, &candidates.primary, active);
         let mut behind = None;
         if let (Some(contacts), Some(coincident)) =
             (&self.nested_dielectrics.contacts, &branch.coincident)
-            && (coincident.lanes & branch.lanes).any()
+            && (coincident.lanes & active).any()
         {
-            let coincident =
-                CoincidentState { lanes: coincident.lanes & branch.lanes, ..*coincident };
+            let coincident = CoincidentState { lanes: coincident.lanes & active, ..*coincident };
             let next = contacts.next(&world.geometry, &coincident, media);
             let origin = Vec3::select(next.lanes, coincident.point, path.ray.origin);
             path.ray.origin = origin;
@@ -152,20 +142,18 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let transmittance = |distance| self.nested_dielectrics.transmittance(media, distance);
         let has_emitters = world.has_emitters();
         if has_emitters {
-            visible_emitters(world, &path, hit.t, branch.lanes, transmittance, out);
+            visible_emitters(world, path, hit.t, active, transmittance, out);
         }
         if let Some(left) = transmittance(hit.t) {
             path.throughput = path.throughput.component_mul(left);
-            branch.path.throughput = path.throughput;
         }
         let is_hit = hit.t.lt(L::from_f64(L::MAX));
         if let Some(group) = world.background {
-            out.groups[group] += path.throughput.masked(branch.lanes.and_not(is_hit));
+            out.groups[group] += path.throughput.masked(active.and_not(is_hit));
         }
-        let lanes = branch.lanes & is_hit;
-        let Some(mut interaction) = interact::<_, false>(world, &path.ray, &hit, lanes) else {
-            return false;
-        };
+        let lanes = active & is_hit;
+        let Some(first) = next_distinct(hit.item, lanes) else { return false };
+        let mut interaction = interact::<_, false>(world, &path.ray, &hit, first, lanes);
         let mut coincident = None;
         if let Some(contacts) = &self.nested_dielectrics.contacts {
             let behind_lanes = behind.as_ref().map_or(L::mask(false), |next| next.lanes);
@@ -174,7 +162,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             if behind.is_some() || contact_lanes.any() {
                 let lanes = (lanes, contact_lanes);
                 let hits = (&mut hit, &mut interaction);
-                coincident = self.coincident(contacts, &path, hits, lanes, behind.as_ref(), media);
+                coincident = self.coincident(contacts, path, hits, lanes, behind.as_ref(), media);
             }
         }
         let interface_hit = self.interface_hit(&interaction, lanes, media);
@@ -182,7 +170,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             interaction.mask_out(interface_hit.suppressed);
         }
         if has_emitters && !world.emission.is_empty() {
-            surface_emission(world, &path, &hit, &interaction, out);
+            surface_emission(world, path, &hit, &interaction, out);
         }
         let bouncing = reservoir.map(|reservoir| {
             let coincident = coincident.as_ref().map(CoincidentState::reversed);
@@ -190,11 +178,11 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 Some(hit) => MediumStack::select(hit.lanes, &hit.medium_reflected, media),
                 None => *media,
             };
-            reservoir.offer(&path, &interaction, (&media, coincident.as_ref()), self.sampler)
+            reservoir.offer(path, &interaction, (&media, coincident.as_ref()), self.sampler)
         });
         direct_lighting::<_, false>(
             world,
-            &path,
+            path,
             &interaction,
             candidates,
             bouncing,
@@ -205,11 +193,11 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             let lobes = if bounce == depth {
                 ReflectingLobes { lanes: L::mask(false), share: L::one() }
             } else {
-                self.reflecting_lobes(&path, &interaction, interface_hit.as_ref())
+                self.reflecting_lobes(path, &interaction, interface_hit.as_ref())
             };
             emitter_lighting(
                 world,
-                &path,
+                path,
                 &interaction,
                 candidates,
                 (self.sampler, bounce),
@@ -222,9 +210,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         }
         let bounce = bounce + 1;
         let Some(interface_hit) = &interface_hit else {
-            let path = &mut branch.path;
-            let sampler = self.sampler;
-            let random = (sampler, bounce - 1);
+            let random = (self.sampler, bounce - 1);
             branch.lanes = sample_reflection::<_, false>(
                 world,
                 path,
@@ -237,7 +223,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             branch.coincident = coincident.as_ref().map(CoincidentState::reversed);
             return branch.lanes.any();
         };
-        let split = self.split_directions(&path, &interaction, interface_hit, bounce - 1, counts);
+        let split = self.split_directions(path, &interaction, interface_hit, bounce - 1, counts);
         let reaches_min_weight = |throughput: Vec3<L>| {
             let max_throughput = throughput.max_element();
             max_throughput.gt(L::zero()) & max_throughput.ge(L::from_f64(world.min_weight))
@@ -246,23 +232,27 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             & reaches_min_weight(split.reflected_weight);
         let transmits = interface_hit.lanes & reaches_min_weight(split.transmitted_weight);
         let both = reflects & transmits;
-        let reflected = Branch {
-            path: Path {
-                ray: Ray { origin: interaction.ray_origin(), direction: split.reflected },
-                throughput: split.reflected_weight,
-                lobe_density: split.reflected_density,
-            },
-            lanes: both,
-            media: MediumStack::select(interface_hit.lanes, &interface_hit.medium_reflected, media),
-            bounce,
-            coincident: coincident.as_ref().map(CoincidentState::reversed),
-        };
+        let origin = interaction.ray_origin();
+        let medium_reflected =
+            MediumStack::select(interface_hit.lanes, &interface_hit.medium_reflected, media);
+        let coincident_reflected = coincident.as_ref().map(CoincidentState::reversed);
         // Lanes that continue with the transmitted ray; the others continue with the reflected one.
         let (mut transmitted, mut reflected_weight, mut transmitted_weight) =
             (transmits, split.reflected_weight, split.transmitted_weight);
         if both.any() {
             if bounce as usize <= SPLIT_DEPTH {
-                waiting.push(reflected);
+                let entry = waiting.len() + bounce as usize - 1 - SPLIT_DEPTH;
+                waiting[entry] = Some(Branch {
+                    path: Path {
+                        ray: Ray { origin, direction: split.reflected },
+                        throughput: split.reflected_weight,
+                        lobe_density: split.reflected_density,
+                    },
+                    lanes: both,
+                    media: medium_reflected,
+                    bounce,
+                    coincident: coincident_reflected,
+                });
             } else {
                 counts.glossy = true;
                 let (r, t) = (reflected_weight.max_element(), transmitted_weight.max_element());
@@ -274,26 +264,20 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 transmitted_weight = scaled(transmitted_weight, t);
             }
         }
-        let lanes = reflects | transmits;
-        let path = Path {
-            ray: Ray {
-                origin: Vec3::select(
-                    transmitted,
-                    interaction.ray_origin_behind(),
-                    interaction.ray_origin(),
-                ),
-                direction: Vec3::select(transmitted, split.transmitted, split.reflected),
+        path.ray.origin = Vec3::select(transmitted, interaction.ray_origin_behind(), origin);
+        path.ray.direction = Vec3::select(transmitted, split.transmitted, split.reflected);
+        path.throughput = Vec3::select(transmitted, transmitted_weight, reflected_weight);
+        path.lobe_density = L::select(transmitted, L::from_f64(L::MAX), split.reflected_density);
+        branch.lanes = reflects | transmits;
+        branch.media =
+            MediumStack::select(transmitted, &interface_hit.medium_transmitted, &medium_reflected);
+        branch.bounce = bounce;
+        branch.coincident = coincident.as_ref().zip(coincident_reflected.as_ref()).map(
+            |(transmitted_state, reflected_state)| {
+                CoincidentState::select(transmitted, transmitted_state, reflected_state)
             },
-            throughput: Vec3::select(transmitted, transmitted_weight, reflected_weight),
-            lobe_density: L::select(transmitted, L::from_f64(L::MAX), split.reflected_density),
-        };
-        let media =
-            MediumStack::select(transmitted, &interface_hit.medium_transmitted, &reflected.media);
-        let coincident = coincident.as_ref().map(|coincident| {
-            CoincidentState::select(transmitted, coincident, &coincident.reversed())
-        });
-        *branch = Branch { path, lanes, media, bounce, coincident };
-        lanes.any()
+        );
+        branch.lanes.any()
     }
 
     /// Resolves hits of `lanes` on coincident surfaces. It replaces `hit` and `interaction` by
@@ -329,8 +313,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 contacts.first(&self.world.geometry, &coincident, !interaction.front, media);
             if first.lanes.any() {
                 hit.take_in(first.lanes, hit.t, (first.item, first.triangle));
-                if let Some(other) = interact::<_, false>(self.world, &path.ray, hit, lanes) {
-                    *interaction = other;
+                if let Some(distinct) = next_distinct(hit.item, lanes) {
+                    *interaction =
+                        interact::<_, false>(self.world, &path.ray, hit, distinct, lanes);
                     offset = offset.max(interaction.offset);
                     if let (Some(next), true) = (behind, self.world.shadows) {
                         interaction.shade(next.lanes);
@@ -368,9 +353,10 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 index = L::select(bsdf_lanes, L::splat(transmission.index), index);
             }
         }
-        transmissive
-            .any()
-            .then(|| self.nested_dielectrics.cross(interaction, transmissive, media, index))
+        if transmissive.none() {
+            return None;
+        }
+        Some(self.nested_dielectrics.cross(interaction, transmissive, media, index))
     }
 
     /// Returns the lanes whose reflected rays are followed, with the fraction of the light that the
@@ -464,7 +450,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 if self.world.smooth {
                     direction = interaction.reflect_into_hemisphere(direction);
                 }
-                let density = reflected_density(self.world, path, interaction, index, direction);
+                let density =
+                    reflected_density(self.world, &incident, interaction, index, direction);
                 directions.reflected_density =
                     L::select(lanes, density, directions.reflected_density);
             }
