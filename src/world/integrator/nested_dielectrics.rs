@@ -228,15 +228,19 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         L::from_fn(|lane| index_of(priority.lane(lane)))
     }
 
-    /// Returns the transmissive surfaces among the hits of `lanes`. `media` are the media of the
-    /// rays. `thin_index` is the index of refraction of thin surfaces.
+    /// Returns the hits of `lanes` on transmissive surfaces; `None` if there are no lanes. `media`
+    /// are the media of the rays. `thin_index` is the index of refraction of thin surfaces.
+    #[inline(never)]
     pub fn cross(
         &self,
         interaction: &SurfaceInteraction<L>,
         lanes: L::Mask,
         media: &MediumStack<L>,
         thin_index: L,
-    ) -> InterfaceHit<L> {
+    ) -> Option<InterfaceHit<L>> {
+        if lanes.none() {
+            return None;
+        }
         let outer = lanes & interaction.front;
         let mut priority = L::zero();
         let mut remaining = lanes;
@@ -254,7 +258,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         let medium_reflected = select(&outside, &within);
         let medium_transmitted = select(&within, &outside);
         let n_i = self.index(medium_reflected.top());
-        InterfaceHit {
+        Some(InterfaceHit {
             lanes,
             outer,
             thin: lanes.and_not(solid),
@@ -263,7 +267,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
             n_t: L::select(solid, self.index(medium_transmitted.top()), thin_index),
             medium_reflected,
             medium_transmitted,
-        }
+        })
     }
 }
 

@@ -353,10 +353,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 index = L::select(bsdf_lanes, L::splat(transmission.index), index);
             }
         }
-        if transmissive.none() {
-            return None;
-        }
-        Some(self.nested_dielectrics.cross(interaction, transmissive, media, index))
+        self.nested_dielectrics.cross(interaction, transmissive, media, index)
     }
 
     /// Returns the lanes whose reflected rays are followed, with the fraction of the light that the
