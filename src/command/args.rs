@@ -362,11 +362,11 @@ pub enum SamplerArg {
     Random,
 }
 
-/// Largest number of tracing threads for each processor. More threads only wait: with 4,096 on two
-/// processors, a picture of 64 x 48 pixels takes half a minute.
+/// Largest number of tracing threads for each processor. More threads only wait for each other:
+/// with 4,096 on two processors, a picture of 64 x 48 pixels takes half a minute.
 const THREADS_PER_PROCESSOR: usize = 4;
 
-/// Number of tracing threads that are allowed on every machine.
+/// Number of tracing threads that is allowed on every machine, however few processors it has.
 const THREADS_ANYWHERE: usize = 16;
 
 /// Returns the number of processors that this process may use.
@@ -380,7 +380,7 @@ fn max_threads() -> usize {
 }
 
 impl TerminalArgs {
-    /// Returns the settings of a terminal with this environment.
+    /// Returns the terminal settings for these options in the environment `surroundings`.
     pub fn setup(&self, surroundings: Environment) -> TerminalSetup {
         let colors = match self.color {
             ColorArg::True => Some(Colors::True),
@@ -417,7 +417,7 @@ impl ComputeArgs {
 }
 
 impl Cli {
-    /// Returns a warning about options that are legal but not followed.
+    /// Returns a warning about options that are valid but have no effect.
     pub fn warning(&self) -> Option<String> {
         match &self.command {
             Some(Command::Render(args)) => args.compute.warning(),
@@ -437,7 +437,7 @@ impl Cli {
 }
 
 impl PrecisionArgs {
-    /// Returns the precision for the options of scene compilation.
+    /// Returns the precision as an option of scene compilation.
     pub fn get(&self) -> Precision {
         match self.precision {
             PrecisionArg::Single => Precision::Single,
@@ -453,7 +453,8 @@ impl PictureArgs {
         Display { exposure_ev: self.exposure, tone: self.tone }
     }
 
-    /// Sets the size of `scene` to that of `--size`, if this option is given.
+    /// Sets the size of `scene` to that of `--size`, if this option is given. Returns the first
+    /// validation error of the scene with the new size.
     ///
     /// # Errors
     /// Returns the first fault of the scene with the new size.
@@ -468,7 +469,7 @@ impl PictureArgs {
 }
 
 impl SamplerArg {
-    /// Returns the kind of sampler for the render options.
+    /// Returns the kind of sampler as a render option.
     pub fn kind(self) -> SamplerKind {
         match self {
             Self::Sobol => SamplerKind::Sobol,
@@ -477,7 +478,7 @@ impl SamplerArg {
     }
 }
 
-/// Parses the name of a tone curve.
+/// Creates the parser for the name of a tone curve.
 fn tone() -> impl TypedValueParser<Value = Tone> {
     let names = PossibleValuesParser::new(Tone::NAMED.map(|(name, _)| name));
     names.map(|given| {
@@ -486,7 +487,7 @@ fn tone() -> impl TypedValueParser<Value = Tone> {
     })
 }
 
-/// Parses the name of an acceleration structure.
+/// Creates the parser for the name of an acceleration structure.
 fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
     let names = Acceleration::ALL
         .map(|structure| PossibleValue::new(structure.name()).aliases(structure.former_name()));
@@ -494,7 +495,7 @@ fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
         .map(|given| Acceleration::from_name(&given).unwrap_or_default())
 }
 
-/// Parses a size such as `640x480`. Its range is checked later, by the scene.
+/// Parses a size such as `640x480` into width and height. The scene checks their range later.
 fn size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_string())
@@ -515,7 +516,7 @@ fn exposure(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "expected a number from -64 to 64".to_string())
 }
 
-/// Units of sizes of memory, with their number of bytes.
+/// Units of memory sizes, each with its number of bytes.
 const MEMORY_UNITS: [(&str, f64); 6] = [
     ("KB", 1e3),
     ("MB", 1e6),
@@ -525,7 +526,7 @@ const MEMORY_UNITS: [(&str, f64); 6] = [
     ("GiB", 1_073_741_824.0),
 ];
 
-/// Parses a size of memory such as `4GB`, `1.5GiB` or `800 MB`. Returns bytes.
+/// Parses a memory size such as `4GB`, `1.5GiB` or `800 MB` into bytes.
 fn memory(text: &str) -> Result<u64, String> {
     let of_unit = |(unit, bytes): &(&str, f64)| {
         let end = text.len().checked_sub(unit.len())?;

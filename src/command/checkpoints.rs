@@ -43,8 +43,8 @@ impl CheckpointWriter {
         Self { path, interval, provenance, due, busy: false, encoded, results, thread }
     }
 
-    /// Checks that a render may write checkpoints to `path`. `resume` is the checkpoint that it
-    /// continues.
+    /// Checks that a render may write checkpoints to `path`. `resume` is the checkpoint that the
+    /// render continues.
     pub fn check(path: &Path, resume: Option<&Path>) -> Result<(), Failure> {
         crate::disk::check_writable(path).map_err(|error| Failure::Failed(error.to_string()))?;
         if resume == Some(path) || !path.exists() {
@@ -61,7 +61,7 @@ impl CheckpointWriter {
         }))
     }
 
-    /// Requests a checkpoint if one is due. Never waits.
+    /// Requests a checkpoint if one is due. The call does not block.
     pub fn poll(&mut self, session: &Session) {
         match self.results.try_recv() {
             Ok(written) => {
@@ -86,7 +86,7 @@ impl CheckpointWriter {
         });
     }
 
-    /// Writes the last checkpoint and waits for it. Returns the path.
+    /// Writes the last checkpoint, waits until it is complete, and returns its path.
     pub fn finish(self, session: &Session) -> Result<PathBuf, WriteError> {
         self.request(session);
         // The task is dropped with its sender when it has run, so that the thread ends.

@@ -10,8 +10,8 @@
 //! compiles the standard library for this processor, including code that runs before `main`, and
 //! that code may already contain the illegal instruction.
 
-/// Ends the program if the build assumes a listed feature whose CPUID bit is 0. Each item is the
-/// name of the feature, the register and the bit.
+/// Ends the program if the processor lacks a feature that the build assumes. Each listed item has
+/// the name of the feature, and the register and bit of CPUID.
 #[cfg(target_arch = "x86_64")]
 macro_rules! need {
     ($($name:literal $register:ident $bit:literal)*) => {
@@ -54,7 +54,7 @@ pub fn require() {
     }
 }
 
-/// Does nothing: for other architectures the program is compiled for their baseline.
+/// Does nothing: on other architectures the program is compiled for the baseline processor.
 #[cfg(not(target_arch = "x86_64"))]
 pub fn require() {}
 

@@ -1,5 +1,5 @@
-//! `zerkalo doctor`: reports the abilities of the terminal and the connection and how the dashboard
-//! uses them, and gives hints for improvements.
+//! `zerkalo doctor`: reports the abilities of the terminal and of the connection, how the dashboard
+//! uses them, and how to improve them.
 
 use crate::command::args::DoctorArgs;
 use crate::command::{Failure, print_line};
@@ -50,16 +50,16 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Contents of the report.
+/// Results of all tests, from which the report is formatted.
 struct DoctorReport {
     environment: Environment,
-    /// Replies of the terminal, or the reason why it was not queried.
+    /// Replies of the terminal, or the reason for which it was not queried.
     diagnosis: Result<TerminalReport, &'static str>,
     rate_requested: bool,
     /// Environment variable that names the character encoding, and its value.
     locale: Option<(&'static str, String)>,
     state: Option<PathBuf>,
-    /// Files with unsaved edits in the folder `state`.
+    /// Paths of files with unsaved edits in the state folder.
     unsaved_files: Vec<PathBuf>,
 }
 
@@ -99,7 +99,7 @@ impl DoctorReport {
         self.diagnosis.as_ref().ok().map(|diagnosis| &diagnosis.terminal)
     }
 
-    /// Returns the colours that the dashboard uses.
+    /// Returns the number of colours that the dashboard uses.
     fn level(&self) -> Colors {
         self.capabilities().map_or(self.environment.colors(), |terminal| terminal.colors)
     }
@@ -140,8 +140,8 @@ impl DoctorReport {
         }
     }
 
-    /// Describes the number of colours and its source: NO_COLOR, COLORTERM, TERM or the terminal's
-    /// reply.
+    /// Describes the number of colours and where it comes from: NO_COLOR, COLORTERM, TERM or the
+    /// terminal's reply.
     fn colors(&self) -> String {
         let Environment { term, color_term, no_color, .. } = &self.environment;
         let level = self.level();
@@ -237,8 +237,8 @@ impl DoctorReport {
     }
 }
 
-/// Returns `name` followed by `value`. `value` is wrapped, with hanging indent, so that no line is
-/// longer than `COLUMNS`.
+/// Returns a line of `name` and `value`. `value` is wrapped with a hanging indent, so that no line
+/// is longer than `COLUMNS`.
 fn indented(name: &str, value: &str) -> String {
     let lines = wrapped(value, (COLUMNS - name.len()) as u16);
     name.to_string() + &lines.join(&format!("\n{:1$}", "", name.len()))

@@ -74,9 +74,9 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     conclude(&ended, io::stdout().lock())
 }
 
-/// Prints the results of a dashboard that has ended: files that were written on `out`, everything
-/// else on stderr. A signal determines the exit status even if `out` cannot be written, as after
-/// the loss of the terminal.
+/// Prints the results of a dashboard that has ended: names of written files on `out`, everything
+/// else on stderr. If a signal ended it, the exit status is that of the signal, even if `out`
+/// cannot be written, as after the loss of the terminal.
 pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     let mut lines = Vec::new();
     for exported in &ended.exported {
@@ -107,8 +107,8 @@ pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     }
 }
 
-/// Returns the environment of a terminal that can show the dashboard, or the reason why there is
-/// none.
+/// Returns the environment if stdin and stdout are a terminal that can show the dashboard,
+/// otherwise the reason why they are not.
 pub fn terminal_environment() -> Result<Environment, &'static str> {
     let environment = Environment::of(|name| env::var(name).ok());
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
@@ -124,8 +124,9 @@ fn read_checkpoint(path: &Path) -> Result<Checkpoint, Failure> {
     Checkpoint::read(path).map_err(|error| Failure::Failed(error.to_string()))
 }
 
-/// Opens the scene of a checkpoint: the scene file that it was rendered from, if its samples are
-/// valid for that file, otherwise the scene that the checkpoint contains, without a file.
+/// Opens the scene of a checkpoint. It is the scene file from which the checkpoint was rendered, if
+/// the samples are valid for this file; otherwise it is the scene in the checkpoint, without a
+/// file.
 ///
 /// # Errors
 /// Fails if the scene in the checkpoint is not valid.
@@ -142,8 +143,8 @@ fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, F
         .map_err(|errors| Failure::Failed(errors.to_string()))
 }
 
-/// Opens the scene file. The inner error means that the file is readable but not a valid scene: the
-/// dashboard shows its errors, and the user may correct the file meanwhile.
+/// Opens the scene file. The inner error means that the file is readable but not a valid scene. The
+/// dashboard then shows the errors while the user corrects the file.
 ///
 /// # Errors
 /// Fails if the file cannot be read.
@@ -166,8 +167,8 @@ fn open(
     }
 }
 
-/// Returns a hint at unsaved edits of a scene whose file is gone, and at those of other users.
-/// Returns an empty string if there are none.
+/// Returns a note about unsaved edits of a scene file that no longer exists, and about those of
+/// other users. Returns an empty string if there are none.
 fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     let found = Recovery::new(Some(path), "", state).find();
     let hint = |path: &Path, of: String| {
@@ -181,8 +182,8 @@ fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     }
 }
 
-/// Formats a line about an exported picture:
-/// `mirror-room-1.png  640x480  212 spp  noise 0.50 8-bit levels`.
+/// Formats the line about an exported picture, such as `mirror-room-1.png  640x480  212 spp  noise
+/// 0.50 8-bit levels`.
 fn summary(exported: &Exported) -> String {
     let [width, height] = exported.size;
     let noise = match exported.noise_codes {
@@ -197,7 +198,7 @@ fn summary(exported: &Exported) -> String {
 mod tests {
     use super::*;
 
-    /// Writer to a terminal that is gone.
+    /// Writer to a closed terminal: every write fails.
     struct Gone;
 
     impl Write for Gone {
@@ -227,7 +228,8 @@ mod tests {
         }
     }
 
-    /// A picture may be complete only after the connection is lost.
+    /// Checks that the exit status of a signal is returned even if stdout fails, as when a picture
+    /// is complete only after the connection is lost.
     #[test]
     fn status_of_a_signal_does_not_depend_on_stdout() {
         let status = |signalled, out: &mut dyn Write| match conclude(&ended(signalled), out) {

@@ -28,17 +28,18 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
 }
 
-/// Origin of a picture, of a film, or of the films that a plan describes.
+/// Origin of a picture or film, or of the films that a plan describes: metadata about scene,
+/// samples and noise.
 struct Origin {
     /// Format of the file.
     format: &'static str,
     /// Width and height in pixels.
     size: [usize; 2],
-    /// Keys and values.
+    /// Metadata keys and values.
     entries: Vec<(String, String)>,
     /// Hash of the scene. `None` if another program wrote the file.
     scene_hash: Option<String>,
-    /// Inputs of the samples of a checkpoint.
+    /// Inputs of the samples; `None` except for checkpoints.
     inputs: Option<SampleInputs>,
 }
 
@@ -98,7 +99,7 @@ impl Origin {
     }
 }
 
-/// Formats number of shards, samples and noise of a plan.
+/// Formats the number of shards, the samples and the noise target of a plan.
 fn target(plan: &Plan) -> String {
     let settings = &plan.settings;
     format!(
@@ -110,7 +111,7 @@ fn target(plan: &Plan) -> String {
     )
 }
 
-/// Compares the file with the scene at `path`.
+/// Compares the file's origin with the scene at `path`, and prints the differences.
 fn compare(origin: &Origin, path: &Path, args: &InfoArgs) -> Result<(), Failure> {
     let document = Document::read_with(path, LoadReporter::new().assets)
         .map_err(|e| Failure::Failed(e.to_string()))?;

@@ -6,8 +6,8 @@ use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Thresholds of a message: size of a file that is read, in bytes (8 MiB), and number of triangles
-/// of a BVH that is built. Smaller files and BVHs are not reported.
+/// Smallest loads that are reported: size of a file that is read, in bytes (8 MiB), and number of
+/// triangles of a BVH that is built.
 const LARGE: (u64, usize) = (8 << 20, 200_000);
 
 /// Asset cache with progress messages for large files on stderr, if stderr is a terminal.

@@ -35,7 +35,8 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Formats the noise of a picture without some shards, relative to that of the whole picture.
+/// Formats the noise of a merged picture without some shards, with its ratio to the predicted noise
+/// of the complete picture.
 fn cost(report: &Report, predicted_codes: f64) -> String {
     match report.noise {
         Some(noise) => format!(

@@ -34,7 +34,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Exit status for a wrong command line. clap uses the same status.
+/// Exit status for an invalid command line. clap uses the same status.
 const WRONG_USAGE: u8 = 2;
 
 /// Reason for an exit status other than 0.
@@ -78,7 +78,7 @@ pub fn main() -> ExitCode {
     ExitCode::from(status)
 }
 
-/// Parses the command line. Ends the program with exit status 2 if the command line is wrong.
+/// Parses the command line. Ends the program with exit status 2 if the command line is not valid.
 fn parse_command_line() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
         // In `zerkalo rendr a.toml` clap takes `rendr` for a scene and reports `a.toml` as the
@@ -96,7 +96,7 @@ fn parse_command_line() -> Cli {
     })
 }
 
-/// Prints a usage error, the help or the version, and ends the program.
+/// Prints a usage error, the help text or the version, and ends the program.
 fn end(error: &clap::Error) -> ! {
     // Control characters in arguments, such as file names matched by a shell pattern, must not
     // reach the terminal.
@@ -113,18 +113,18 @@ fn end(error: &clap::Error) -> ! {
     std::process::exit(if failed { 1 } else { error.exit_code() })
 }
 
-/// Prints a line on stderr. Errors are ignored, so that a closed stderr is no failure.
+/// Prints a line on stderr. A closed stderr is ignored.
 fn warn(message: &str) {
     let _ = writeln!(std::io::stderr(), "{}", sanitized_lines(message));
 }
 
-/// Prints a line on stdout.
+/// Prints `message` and a line break on stdout.
 fn print_line(message: &str) -> Result<(), Failure> {
     write_line(std::io::stdout().lock(), message)
 }
 
-/// Writes a line to `out`, which is stdout. A reader that has closed the pipe, such as `head`, is no
-/// failure.
+/// Writes `message` and a line break to `out`, which is stdout. A closed pipe, such as that of
+/// `head`, is ignored.
 fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
     let printed = writeln!(out, "{}", sanitized_lines(message)).and_then(|()| out.flush());
     match printed {
@@ -135,17 +135,18 @@ fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
     }
 }
 
-/// Writes a file of results. An existing file is replaced in one step.
+/// Writes a file of results, such as statistics. An existing file is replaced in one step.
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     disk::write(path, bytes).map_err(|error| Failure::Failed(error.to_string()))
 }
 
-/// Checks before the work that the file of results at `path` can be written.
+/// Checks that a file of results can be written to `path`. Commands call it before they start to
+/// render.
 fn check_file(path: &Path) -> Result<(), Failure> {
     disk::check_writable(path).map_err(|error| Failure::Failed(error.to_string()))
 }
 
-/// Escapes control characters in the lines of `message`, which may contain file names.
+/// Escapes the control characters in each line of `message`, because file names may contain some.
 fn sanitized_lines(message: &str) -> String {
     message.split('\n').map(sanitized).collect::<Vec<_>>().join("\n")
 }

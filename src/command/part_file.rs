@@ -1,4 +1,4 @@
-//! Output of films of a plan: part files, and pictures of complete films.
+//! Output of films that belong to a plan: film files of shards, and pictures of complete films.
 
 use crate::command::{Failure, check_file};
 use crate::disk::WriteError;
@@ -10,7 +10,7 @@ use crate::render::plan::{Part, Plan};
 use crate::render::session::Report;
 use std::path::{Path, PathBuf};
 
-/// Destination of a film.
+/// File to which a film is written.
 pub enum FilmOutput {
     /// Film file.
     Film(PathBuf),
@@ -20,6 +20,7 @@ pub enum FilmOutput {
 
 impl FilmOutput {
     /// Chooses the format by the extension of `path`, and checks that the file can be written.
+    /// `bits` is the number of bits per channel of a PNG.
     pub fn new(path: &Path, bits: u8) -> Result<Self, Failure> {
         let failed = |error: WriteError| Failure::Failed(error.to_string());
         if is_film(path) {
@@ -32,7 +33,8 @@ impl FilmOutput {
         Ok(Self::Picture(output, if bits == 16 { Depth::Sixteen } else { Depth::Eight }))
     }
 
-    /// Writes `film`. Pictures are made with the light weights, display and metadata of `header`.
+    /// Writes `film`. A picture has the light weights, the display transform and the metadata of
+    /// `header`.
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), Failure> {
         let written = match self {
             Self::Film(path) => write_film(path, film, header),
@@ -56,8 +58,8 @@ pub fn is_film(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zk"))
 }
 
-/// Returns the header of the film of `state`, which holds the shards of `part`. `report` is the
-/// report on this film.
+/// Creates the header for the film of `state`, which holds the shards listed in `part`. `report` is
+/// the report on this film.
 pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHeader {
     let settings = &part.plan.settings;
     let provenance = Provenance {

@@ -17,8 +17,9 @@ use crate::world;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 
-/// Noise of the pilot relative to the target, without `--pilot`. A pilot to twice the target takes
-/// a third to a half of the rays of the whole picture, and predicts the noise within 10 %.
+/// Noise of the pilot relative to the noise target, if `--pilot` is not given. A pilot at twice the
+/// target noise takes a third to a half of the rays of the whole picture, and predicts the noise
+/// within 10 %.
 const PILOT: f64 = 2.0;
 
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {
@@ -48,12 +49,12 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Hash of the scene of `document` and of the files that it names.
+/// Returns the hash of the scene of `document` and of the files that it names.
 pub fn hash(document: &Document) -> String {
     scene_hash(document.text(), document.scene())
 }
 
-/// Renders the pilot, writes its film, and plans the rest.
+/// Renders the pilot, writes its film, and plans the remaining samples.
 fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let pilot_noise = args.pilot.unwrap_or(PILOT * args.noise);
     if pilot_noise < args.noise {
@@ -126,7 +127,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     Ok(part.plan)
 }
 
-/// Plans the samples that follow those of the merged film at `path`.
+/// Plans the samples that follow those of the merged film at `path`, until the new noise target.
 fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let failed =
         |reason: &str| Failure::Failed(format!("cannot plan from {}: {reason}", path.display()));
@@ -159,7 +160,7 @@ fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         .ok_or_else(|| failed("it has no estimate of its noise"))
 }
 
-/// Returns the file of the pilot's film: `job-0.zk` for `job.plan`.
+/// Returns the default path of the pilot's film: `job-0.zk` for the plan `job.plan`.
 fn default_base(plan: &Path) -> PathBuf {
     let mut name = plan.file_stem().unwrap_or_default().to_os_string();
     name.push("-0.zk");

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 /// Seconds before the first output. Shorter renders show no progress.
 const QUIET_SECONDS: f64 = 0.25;
-/// Seconds before the first line in a log. Each following interval is twice the previous one, up to
-/// [`LONGEST_INTERVAL_SECONDS`].
+/// Seconds before the first line in a log. Each following interval is twice as long as the previous
+/// one, up to [`LONGEST_INTERVAL_SECONDS`].
 const FIRST_LINE_SECONDS: f64 = 1.0;
 /// Longest interval between lines in a log, in seconds.
 const LONGEST_INTERVAL_SECONDS: f64 = 60.0;
@@ -16,12 +16,12 @@ const LONGEST_INTERVAL_SECONDS: f64 = 60.0;
 /// Number of steps of the bar.
 const STEPS: u64 = 1000;
 
-/// Progress display.
+/// Display of the progress: a bar or lines of a log.
 pub enum Progress {
     /// A bar in a terminal, created at the first output.
     Bar(Option<ProgressBar>),
-    /// Lines in a log. The value is the time at which the next line is due, in seconds of
-    /// rendering.
+    /// Lines in a log. The value is the time of rendering at which the next line is due, in
+    /// seconds.
     Lines(f64),
 }
 
@@ -35,7 +35,7 @@ impl Progress {
         }
     }
 
-    /// Shows `report` if a new output is due.
+    /// Shows `report` if the next output is due.
     pub fn show(&mut self, report: &Report) {
         if report.seconds < QUIET_SECONDS {
             return;
@@ -58,7 +58,7 @@ impl Progress {
         }
     }
 
-    /// Clears the bar.
+    /// Removes the bar from the terminal.
     pub fn finish(self) {
         if let Self::Bar(Some(bar)) = self {
             bar.finish_and_clear();
@@ -74,8 +74,8 @@ fn new_bar() -> ProgressBar {
     bar.with_style(style)
 }
 
-/// Formats a report: `33 spp (32-210)  41.2 Msamples/s  noise 0.81  3-5 s left`. Noise is in 8-bit
-/// levels.
+/// Formats a report, such as `33 spp (32-210)  41.2 Msamples/s  noise 0.81  3-5 s left`. The noise
+/// is in 8-bit levels.
 fn status(report: &Report) -> String {
     let spp = &report.spp;
     let mut text = if spp.min == spp.max {
@@ -93,7 +93,7 @@ fn status(report: &Report) -> String {
     text
 }
 
-/// Formats a range of times in seconds.
+/// Formats a range of seconds, such as `3-5 s`.
 fn span(low: f64, high: f64) -> String {
     let [low_text, high_text] = [low, high].map(duration);
     if low_text == high_text {
@@ -106,7 +106,7 @@ fn span(low: f64, high: f64) -> String {
     }
 }
 
-/// Formats a time, such as `0.4 s`, `12 s`, `5 min`, `3.4 h` or `2.1 d`.
+/// Formats seconds with a suitable unit, such as `0.4 s`, `12 s`, `5 min`, `3.4 h` or `2.1 d`.
 fn duration(seconds: f64) -> String {
     const MINUTE: f64 = 60.0;
     const HOUR: f64 = 60.0 * MINUTE;

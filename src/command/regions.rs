@@ -1,5 +1,5 @@
-//! `zerkalo render --memory`: decides how a render fits into the given memory, and renders the
-//! pictures that do not fit as a whole.
+//! `zerkalo render --memory`: finds a way to render within the given memory, and renders pictures
+//! in regions if they do not fit as a whole.
 
 use crate::command::args::RenderArgs;
 use crate::command::progress::Progress;
@@ -17,25 +17,26 @@ use crate::world::{self, AnyWorld};
 use std::io;
 use std::sync::Arc;
 
-/// Limit that the user gives.
+/// Name of the limit in messages, if `--memory` is lower than the available memory.
 const OPTION: &str = "--memory";
 
-/// Division of a picture for a given amount of memory.
+/// Division of a picture into regions that fit into the given memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Division {
-    /// `true` if all lights share one light group.
+    /// `true` if all lights share one light group, to save memory.
     pub merge_lights: bool,
-    /// Regions; a picture that fits as a whole is one region.
+    /// The regions. A picture that fits as a whole is one region.
     pub regions: Regions,
 }
 
 impl Division {
     /// Divides the picture of `scene` so that the process stays below `cap` bytes, and prints the
-    /// expected memory. Lights share a light group first.
+    /// expected memory. If separate light groups do not fit, lights share one group; if that does
+    /// not fit, the picture is divided.
     ///
     /// # Errors
-    /// Fails with the least memory if nothing fits, and if a checkpoint is to be kept of a film
-    /// that does not fit as it is.
+    /// Fails if not even the smallest regions fit, and if a checkpoint is requested for a picture
+    /// that does not fit as a whole.
     pub fn new(scene: &Scene, args: &RenderArgs, cap: u64) -> Result<Self, Failure> {
         let options =
             world::Options { precision: args.precision.get(), ..world::Options::default() };
@@ -93,7 +94,8 @@ impl Division {
     }
 }
 
-/// Returns the bytes that the process may use, and the limit: `cap`, or less if less is available.
+/// Returns the number of bytes that the process may use: `cap`, or less if less is available. The
+/// second value names the limit for messages.
 fn usable(cap: u64) -> (u64, &'static str) {
     let now = resident_memory().map_or(0, |resident| resident.now);
     match available_memory() {
@@ -104,7 +106,8 @@ fn usable(cap: u64) -> (u64, &'static str) {
     }
 }
 
-/// Returns the message for a picture that needs at least `least` bytes.
+/// Returns a function that creates the error for a picture whose least memory in bytes is its
+/// argument.
 fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
     move |least| {
         // The resident memory of the program differs by some hundred kilobytes from run to run.
@@ -120,21 +123,21 @@ fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
     }
 }
 
-/// Formats a number of bytes that may be small.
+/// Formats a number of bytes in a unit that suits small numbers.
 fn small(bytes: u64) -> String {
     if bytes < 1_000_000 { format!("{} KB", bytes / 1000) } else { megabytes(bytes) }
 }
 
-/// Result of a render in regions.
+/// Result of a render in regions, for the summary and the statistics.
 pub struct Rendered {
     pub report: Report,
     pub stopped_by: StoppedBy,
     pub precision: &'static str,
-    /// Sentences about truncated paths.
+    /// One sentence for each limit that ends paths early.
     pub biased: Vec<String>,
 }
 
-/// Renders `scene` in regions and writes the picture meanwhile.
+/// Renders `scene` in regions of `rows` rows, and writes the rows of the picture as they finish.
 pub fn render(
     args: &RenderArgs,
     scene: Scene,

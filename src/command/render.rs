@@ -26,7 +26,7 @@ use std::time::{Duration, Instant};
 /// 8-bit file.
 const DEFAULT_NOISE_CODES: f64 = 0.5;
 
-/// Interval at which signals are polled.
+/// Interval at which signals and progress are polled.
 const POLL: Duration = Duration::from_millis(50);
 
 pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
@@ -123,7 +123,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
 }
 
-/// A render to a picture file.
+/// Inputs of a render to a picture file.
 struct Job<'a> {
     args: &'a RenderArgs,
     scene: Scene,
@@ -135,17 +135,17 @@ struct Job<'a> {
     started: Instant,
 }
 
-/// A render whose picture is written.
+/// Result of a render whose picture has been written.
 struct Rendered {
     report: Report,
     end: End,
     precision: &'static str,
-    /// Sentences about truncated paths.
+    /// One sentence for each limit that ends paths early.
     biased: Vec<String>,
-    /// Time from the start of the program to that of the compilation.
+    /// Time from the start of the program to the start of the scene's compilation.
     set_after: Duration,
     write_seconds: f64,
-    /// Result of writing the last checkpoint; `None` without checkpoints.
+    /// Result of writing the last checkpoint; `None` if no checkpoints are written.
     kept: Option<Result<PathBuf, WriteError>>,
 }
 
@@ -203,7 +203,7 @@ enum End {
     Signal(u8),
 }
 
-/// Shows progress until the render is done or a signal ends it.
+/// Shows the progress until the render ends or a signal arrives.
 fn watch(
     session: &Session,
     signals: &Signals,
@@ -228,7 +228,8 @@ fn watch(
     end
 }
 
-/// Report, precision, sentences about truncated paths, and the result of writing.
+/// Report, name of the precision, sentences about limits that end paths early, and result of
+/// writing the picture.
 type Written = (Report, &'static str, Vec<String>, Result<(), WriteError>);
 
 /// Writes the picture on the rendering thread. Returns `None` if there is no film yet.
@@ -254,7 +255,8 @@ fn read_checkpoint(args: &RenderArgs) -> Result<Option<Checkpoint>, Failure> {
     Checkpoint::read(path).map(Some).map_err(|error| Failure::Failed(error.to_string()))
 }
 
-/// Continues `checkpoint`, and prints a note if the lights of `scene` are others.
+/// Continues `checkpoint`. Prints a note if the lights of `scene` differ from those of the
+/// checkpoint.
 fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
     let weights = checkpoint.weights().clone();
     session.continue_from(scene, checkpoint);
@@ -281,7 +283,8 @@ fn failed_write(error: WriteError) -> Failure {
     Failure::Failed(error.to_string())
 }
 
-/// Returns `scene` with the acceleration structure and the size that are given on the command line.
+/// Returns `scene` with the acceleration structure and the size of the command line, if these are
+/// given.
 fn sized(mut scene: Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     if let Some(acceleration) = args.acceleration {
         scene.trace.acceleration = acceleration;
@@ -321,8 +324,8 @@ fn schedule_settings(args: &RenderArgs) -> Settings {
     }
 }
 
-/// Formats the result of a render:
-/// `room.png  640x480  212 spp (32-900)  noise 0.500 8-bit levels  1.31 s`.
+/// Formats the result of a render, such as `room.png  640x480  212 spp (32-900)  noise 0.500 8-bit
+/// levels  1.31 s`.
 fn summary(path: &Path, size: [u32; 2], report: &Report, end: End) -> String {
     let spp = &report.spp;
     let counts = if spp.min == spp.max {

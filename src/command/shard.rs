@@ -1,7 +1,8 @@
-//! `zerkalo render --plan`: traces one shard of a plan into a part file, or the whole plan.
+//! `zerkalo render --plan`: traces one shard of a plan into a film file, or the whole plan.
 //!
-//! The part file is also the checkpoint of its shard. The same command again continues an
-//! unfinished part and keeps a complete one, so that engines can repeat any failed command.
+//! The film file is also the checkpoint of its shard: the same command continues an unfinished
+//! file, and changes nothing if the file is complete. Workflow engines can therefore repeat any
+//! failed command.
 
 use crate::command::args::RenderArgs;
 use crate::command::load_progress::LoadReporter;
@@ -25,10 +26,10 @@ use std::time::{Duration, Instant};
 const FIRST_CHECKPOINT: Duration = Duration::from_secs(5);
 /// Longest interval between checkpoints.
 const LONGEST_INTERVAL: Duration = Duration::from_secs(60);
-/// Smallest interval between checkpoints, relative to the time to write one.
+/// Smallest interval between two checkpoints, as a multiple of the time to write one.
 const WRITES_PER_INTERVAL: u32 = 50;
 
-/// Renders `plan_path`, or a shard of it.
+/// Traces the plan at `plan_path`, or the shard of it that `--shard` names.
 pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     let plan = part_file::read_plan(plan_path)?;
     let numbers = match args.shard {
@@ -116,8 +117,8 @@ fn check_shard(args: &RenderArgs, plan: &Plan, path: &Path, shard: u32) -> Resul
     Ok(())
 }
 
-/// Reads the part file of an earlier run of the same shard: film, number of rays, and `true` if it
-/// is complete. Returns `None` without such a file, or if it is damaged.
+/// Reads the film file of an earlier run of the same shard. Returns film, number of rays, and
+/// `true` if the shard is complete. Returns `None` if there is no such file, or if it is damaged.
 fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure> {
     if !path.exists() {
         return Ok(None);
@@ -153,8 +154,8 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
     }
 }
 
-/// Compiles the scene for the samples of the shards `numbers`. `saved` is the film of an earlier
-/// run, with its number of rays.
+/// Compiles the scene and creates the render of the shards `numbers`. `saved` is the film of an
+/// earlier run, with its number of rays.
 fn start(
     args: &RenderArgs,
     document: &Document,
@@ -197,8 +198,8 @@ fn start(
     ShardRender::new(state, &ranges, rays, threads).map_err(Failure::Failed)
 }
 
-/// Traces all samples, or until a signal arrives, whose exit status is returned. Writes checkpoints
-/// of a shard.
+/// Traces all samples of `render`. Stops at a signal and returns its exit status. Writes
+/// checkpoints if a single shard is traced.
 fn trace(
     mut render: ShardRender,
     part: &mut Part,

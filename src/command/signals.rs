@@ -10,11 +10,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// Number that is added to the number of a signal to form the exit status, as in shells.
 const SIGNALLED: i32 = 128;
 
-/// Number of the last signal caught, 0 before the first one.
+/// Number of the last signal that was received; 0 before the first one.
 pub struct Signals(Arc<AtomicUsize>);
 
 impl Signals {
-    /// Installs the handlers.
+    /// Installs the signal handlers.
     pub fn watch() -> io::Result<Self> {
         let caught = Arc::new(AtomicUsize::new(0));
         let armed = Arc::new(AtomicBool::new(false));
@@ -29,8 +29,8 @@ impl Signals {
         Ok(Self(caught))
     }
 
-    /// Returns the exit status for the last signal caught: 130 or 143. Returns `None` if no signal
-    /// was caught.
+    /// Returns the exit status for the last signal: 130 (SIGINT) or 143 (SIGTERM). Returns `None`
+    /// if no signal was received.
     pub fn caught(&self) -> Option<u8> {
         let signal = self.0.load(Ordering::Relaxed);
         (signal != 0).then(|| (SIGNALLED as usize + signal) as u8)

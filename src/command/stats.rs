@@ -48,16 +48,18 @@ pub struct Stats {
     pub rmse_linear: Option<f64>,
     /// Number of samples left out because they were NaN or negative.
     pub bad_samples: u64,
-    /// Number of samples brighter than the largest value of the film, as which they were stored.
+    /// Number of samples above the largest value that the film can hold; they are stored as that
+    /// value.
     pub saturated_samples: u64,
     /// Number of pixels with a sum that reached the largest value of the film.
     pub saturated_pixels: u64,
-    /// Sentences of the picture's metadata about limits that truncate paths. Empty: no path is
-    /// truncated, so that the picture is unbiased.
+    /// One sentence for each limit that ends paths early, as in the picture's metadata. Empty if no
+    /// path ends early, so that the picture is unbiased.
     pub biased: Vec<String>,
     /// Peak resident memory in bytes. Null on systems that do not report it.
     pub peak_rss_bytes: Option<u64>,
-    /// Reason for the end: `spp`, `noise`, `rmse`, `time`, `rays_per_pixel`, `full` or `signal`.
+    /// Stop criterion that ended the render: `spp`, `noise`, `rmse`, `time`, `rays_per_pixel`,
+    /// `full` or `signal`.
     pub stopped_by: &'static str,
 }
 

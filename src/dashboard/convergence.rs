@@ -2,7 +2,7 @@
 
 use crate::render::session::Report;
 
-/// A report about the render at one time.
+/// Noise of the picture at one time, from a report.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// Seconds of tracing until the report.
@@ -30,9 +30,9 @@ impl Convergence {
         &self.points
     }
 
-    /// Returns the seconds of tracing at which the noise fell to `codes` 8-bit levels. The time is
-    /// interpolated between two reports by a power law. Returns `None` if the noise has not fallen
-    /// to `codes`, or if it was that low in the first report already.
+    /// Returns the seconds of tracing after which the noise fell to `codes` 8-bit levels,
+    /// interpolated between two reports by a power law. Returns `None` if the noise is still
+    /// higher, or if it was lower in the first report already.
     pub fn seconds_at(&self, codes: f64) -> Option<f64> {
         // The last crossing counts: lights may have been switched on since an earlier one.
         let after = self.points.iter().rposition(|p| p.noise_codes > codes)? + 1;

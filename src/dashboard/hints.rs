@@ -14,8 +14,8 @@ pub enum HelpLine {
     Keys(String, &'static str),
 }
 
-/// Returns the state that selects the hints. Returns `None` while an exported image covers the
-/// screen.
+/// Returns the state of the dashboard that determines the hints. Returns `None` while an exported
+/// image covers the screen.
 fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
         Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => HintLine::Reading,
@@ -45,7 +45,7 @@ fn hint_line(model: &Model) -> Option<HintLine> {
     })
 }
 
-/// Returns the hints for a state, sorted by position.
+/// Returns the hints for the state `line`, sorted by position.
 fn hints_of(line: HintLine) -> Vec<&'static Hint> {
     let mut hints: Vec<_> = COMMANDS
         .iter()
@@ -61,8 +61,8 @@ pub fn hints(model: &Model) -> Vec<&'static Hint> {
     hint_line(model).map_or_else(Vec::new, hints_of)
 }
 
-/// Returns the lines of the help, with every command of the table, or with those that run while
-/// files are watched.
+/// Returns the lines of the help: all commands, or those that run while files are watched if
+/// `watching` is `true`.
 pub fn help(watching: bool) -> Vec<HelpLine> {
     let line = |command: &Command| {
         let keys = match watching {

@@ -22,9 +22,9 @@ pub struct Request {
     pub film: [u32; 2],
     /// Panel with the focus.
     pub focus: Focus,
-    /// Only the picture is visible.
+    /// `true` if only the picture is visible.
     pub fullscreen: bool,
-    /// The table of watched files takes the place of outline and inspector.
+    /// `true` if the table of watched files takes the place of outline and inspector.
     pub watching: bool,
 }
 
@@ -56,8 +56,8 @@ pub const SMALLEST: [u16; 2] = [40, 12];
 
 /// Minimum height of the plot in rows.
 const PLOT_ROWS: u16 = 8;
-/// Terminal width in columns from which the side panels are visible even if the picture has the
-/// focus.
+/// Smallest width of the terminal, in columns, at which the side panels stay visible while the
+/// picture has the focus.
 const SIDE_FROM: u16 = 72;
 
 /// Returns the layout of the screen. Returns `None` if the terminal is smaller than [`SMALLEST`].

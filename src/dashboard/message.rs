@@ -50,7 +50,8 @@ pub enum Message {
     ImageSent(f64),
     /// Status of the connection to a remote terminal; `None` for a local terminal.
     LinkStatus(Option<LinkStatus>),
-    /// The time of [`Model::next_timeout`](crate::dashboard::model::Model::next_timeout) has come.
+    /// A timeout has expired: the time of
+    /// [`Model::next_timeout`](crate::dashboard::model::Model::next_timeout) has come.
     Tick,
 }
 
@@ -61,7 +62,7 @@ pub struct OrphanedEdits {
     pub scene: Arc<Scene>,
     /// Time since the edits were last written to the recovery file.
     pub age: Duration,
-    /// The scene file has changed since the edits were written.
+    /// `true` if the scene file has changed since the edits were written.
     pub changed: bool,
 }
 
@@ -138,7 +139,7 @@ impl DisplayChannel {
 }
 
 /// A request from `update` to the event loop. If several effects of one kind are pending, only the
-/// last one matters, except for saves and exports.
+/// last one is executed, except for saves and exports.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     /// Render this scene. Existing samples are kept if only lighting has changed: intensity or
@@ -158,8 +159,8 @@ pub enum Effect {
     Threads(usize),
     /// Give the tracing threads low (`true`) or normal (`false`) priority.
     LowPriority(bool),
-    /// Report the values of this film pixel (column, row) in snapshots; `None` if no pixel is
-    /// probed.
+    /// Include the values of this film pixel (column, row) in snapshots; with `None`, those of no
+    /// pixel.
     Probe(Option<[usize; 2]>),
     /// Return the current picture as [`Message::Pinned`], for comparison.
     Pin,
@@ -169,7 +170,7 @@ pub enum Effect {
         scene: Arc<Scene>,
         /// Path other than the scene's own, relative to the working directory.
         path: Option<PathBuf>,
-        /// Overwrite changes by other programs, or an existing file at `path`.
+        /// Permission to overwrite changes by other programs, or an existing file at `path`.
         overwrite: bool,
     },
     /// Read the scene file.

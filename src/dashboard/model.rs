@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Meaning of the arrow keys and of drags while the picture has the focus.
+/// Mode of the picture's panel: determines the effect of arrow keys and drags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mode {
     /// Default mode: orbit the camera.
@@ -46,7 +46,8 @@ pub struct File {
     pub saved: Arc<Scene>,
     /// Errors in the current contents of the file; `None` if they are valid.
     pub broken: Option<SceneErrors>,
-    /// The file has never been readable, so there is no scene and only `broken` can be shown.
+    /// `true` if the file has never been readable. There is no scene then, and only `broken` can be
+    /// shown.
     pub unreadable: bool,
 }
 
@@ -158,7 +159,7 @@ pub struct Model {
     pub focus: Focus,
     /// Meaning of the arrow keys while the picture has the focus.
     pub mode: Mode,
-    /// Only the picture is visible.
+    /// `true` if only the picture is visible.
     pub fullscreen: bool,
     /// First visible line of the outline.
     pub outline_scroll: usize,
@@ -180,13 +181,13 @@ pub struct Model {
     pub convergence: Convergence,
     /// Stop criteria of the render.
     pub stop: Stop,
-    /// The user has paused the render.
+    /// `true` if the user has paused the render.
     pub paused: bool,
     /// Number of tracing threads.
     pub threads: usize,
     /// Maximum number of tracing threads.
     pub max_threads: usize,
-    /// The tracing threads have low priority.
+    /// `true` if the tracing threads have low priority.
     pub low_priority: bool,
     /// Status of the connection to a remote terminal; `None` for a local terminal.
     pub link: Option<LinkStatus>,
@@ -196,13 +197,13 @@ pub struct Model {
     pub export: Option<RunningExport>,
     /// Path of the last exported image.
     pub last_export: Option<PathBuf>,
-    /// No key has been pressed yet, so the hint line shows the hints for beginners.
+    /// `true` until the first key is pressed. The hint line then shows the hints for beginners.
     pub first_time: bool,
     /// A mouse button that is held down.
     pub drag: Option<Drag>,
     /// Time of the last edit, if the next one may be merged with it into one undo step.
     pub last_edit: Option<Duration>,
-    /// The program quits after the pending save.
+    /// `true` if the program quits after the pending save.
     pub quit_when_saved: bool,
     /// Unsaved edits of a crashed session that the user has neither recovered nor discarded.
     pub orphaned_edits: Option<OrphanedEdits>,
@@ -213,8 +214,8 @@ pub struct Model {
     pub raster: Option<[usize; 2]>,
     /// Counter that increases whenever the picture's cells may have changed.
     pub picture_version: u64,
-    /// Files that are watched instead of a scene being rendered. Commands that edit or render are
-    /// then refused.
+    /// Table of watched files, in `zerkalo watch`. Commands that edit or render are then refused.
+    /// `None` in the editing dashboard.
     pub watch: Option<WatchTable>,
 }
 

@@ -4,7 +4,7 @@ use crate::dashboard::convergence::Convergence;
 use crate::dashboard::model::Model;
 use crate::render::session::{QUALITIES, Report};
 
-/// Visual quality at each noise target.
+/// Description of the picture's look at each noise target.
 const LOOKS: [&str; QUALITIES.len()] = [
     "a draft: grain is plain to see",
     "grain in dark and even parts",
@@ -20,8 +20,8 @@ pub const ABOUT: &str = "Halving the noise takes two to four times as long. Ente
 /// Time to reach a noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cost {
-    /// The target has been reached after this number of seconds of tracing. `None` if the noise was
-    /// that low in the first report already.
+    /// The target was reached after this number of seconds of tracing. `None` if the noise was that
+    /// low in the first report already.
     Reached(Option<f64>),
     /// The target has not been reached. The numbers are the lower and upper estimate of the
     /// remaining seconds of tracing.
@@ -39,7 +39,7 @@ pub struct NoiseTarget {
     pub looks: &'static str,
     /// Time to reach the target.
     pub cost: Cost,
-    /// The target is the current stop criterion.
+    /// `true` if this target is the current stop criterion.
     pub is_target: bool,
 }
 

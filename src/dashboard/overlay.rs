@@ -44,8 +44,8 @@ pub enum Overlay {
 }
 
 impl Overlay {
-    /// Returns the cursor, the first visible line and the length of a list. A list that never
-    /// scrolls has no first visible line. Returns `None` for overlays without cursor.
+    /// Returns the parts of an overlay with a cursor: cursor, first visible line (`None` if it
+    /// never scrolls) and number of entries. Returns `None` for overlays without a cursor.
     pub fn list(&mut self) -> Option<(&mut usize, Option<&mut usize>, usize)> {
         match self {
             Self::NoiseTargets { cursor } => Some((cursor, None, QUALITIES.len())),
@@ -100,7 +100,7 @@ pub struct Pick {
     pub scroll: usize,
 }
 
-/// Purpose of a choice from a list.
+/// Purpose of a list from which the user chooses.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PickFor {
     /// Kind of a new object.
@@ -130,7 +130,7 @@ pub struct Form {
     pub scroll: usize,
     /// Text editor of the field under the cursor, if one is open.
     pub editor: Option<Editor>,
-    /// Reason why the last change of a field was refused.
+    /// Reason for which the last change of a field was refused.
     pub problem: Option<String>,
 }
 

@@ -131,13 +131,13 @@ impl Model {
     }
 }
 
-/// Returns the layout of an overlay whose list fills the whole frame.
+/// Returns the layout of an overlay that consists of a list only.
 fn whole(frame: Area) -> OverlayLayout {
     OverlayLayout { frame, list: frame.inner(), ..OverlayLayout::default() }
 }
 
-/// Splits the inside of a panel into an area for lines and an area for help below. The help area is
-/// larger if it shows a problem.
+/// Splits the inside of a panel into an area for lines and an area for help below. If `problem` is
+/// `true`, the help area is larger.
 fn split(inner: Area, problem: bool) -> (Area, Area) {
     let rows = match (inner.height, problem) {
         (0..4, _) => 0,

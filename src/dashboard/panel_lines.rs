@@ -51,11 +51,11 @@ pub struct FieldLine {
     /// Value in the syntax of the text editor, with control characters escaped; empty if the scene
     /// does not have the key.
     pub value: String,
-    /// Linear colour to show a sample of, in the first line of a colour.
+    /// Linear colour of the sample beside the value. `None` except in the first line of a colour.
     pub swatch: Option<[f64; 3]>,
     /// Unit of the value; may be empty.
     pub unit: &'static str,
-    /// The value equals the default.
+    /// `true` if the value equals the default.
     pub is_default: bool,
     /// Default value; `None` for a required key.
     pub default: Option<String>,
@@ -142,7 +142,7 @@ fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
         .collect()
 }
 
-/// Returns the lines of a property: one for each number of a list, otherwise a single line.
+/// Returns the lines of a property: one for each number if it is a list of numbers, otherwise one.
 fn lines_of(subject: &Target, row: &Property) -> Vec<FieldLine> {
     let line = |component: Option<usize>, label: String, value: String| FieldLine {
         subject: subject.clone(),
@@ -194,8 +194,8 @@ pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
         .unwrap_or(0)
 }
 
-/// Returns the index of the line that is `steps` fields below the field at `cursor`, clamped to the
-/// ends. Negative steps go upwards. Headings do not count.
+/// Returns the index of the field that is `steps` fields below the field at `cursor`, or the last
+/// field if there are fewer. Negative steps go upwards. Headings are not counted.
 pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].field().is_some()).collect();
     let position =

@@ -4,7 +4,7 @@ use crate::film::{Mse, Noise};
 use crate::render::schedule::Spp;
 use crate::render::session::{QUALITIES, Report, State};
 
-/// Creates a report about the scene with number `generation`, after `spp` samples in each of ten
+/// Creates the report on generation `generation` of a scene, after `spp` samples in each of ten
 /// thousand pixels.
 pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
     Report {

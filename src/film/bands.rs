@@ -6,17 +6,18 @@ use std::io;
 /// Source of a picture's samples. A picture that does not fit into memory consists of bands of rows,
 /// which are rendered one after another while the file is written.
 pub trait Bands {
-    /// Returns the film that holds row `y` of the picture; its first row is [`Film::first_row`].
-    /// Encoders ask for all rows, in increasing order.
+    /// Returns the film that holds row `y` of the picture. Its first row is the row
+    /// [`Film::first_row`] of the picture. Encoders request all rows, in increasing order.
     ///
     /// # Errors
     /// Fails if the rows cannot be rendered.
     fn film_with_row(&mut self, y: usize) -> io::Result<&Film>;
 
-    /// Metadata keys and values. Values that are known only after the last row may differ from those
-    /// before it, in up to 128 bytes. A key has 1 to 79 printable ASCII characters, without leading,
-    /// trailing or double spaces. It starts with a capital letter, because OpenEXR's own keys start
-    /// with a small one.
+    /// Returns metadata as keys and values.
+    ///
+    /// Values that are known only after the last row may change until then, in up to 128 bytes. A
+    /// key has 1 to 79 printable ASCII characters, without leading, trailing or double spaces. It
+    /// starts with a capital letter, because OpenEXR's own keys start with a small one.
     fn metadata(&self) -> Vec<(String, String)>;
 }
 

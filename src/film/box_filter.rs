@@ -1,15 +1,16 @@
-//! Box filter: means of pixels over larger or smaller cells, weighted by covered area. Also fills
-//! cells without samples.
+//! Box filter: means of pixels over cells of any size, weighted by covered area. Cells without
+//! samples get the value of a neighbour.
 
-/// Pixels that a cell covers, fully or in part, along one axis.
+/// Pixels that a cell covers along one axis, fully or in part.
 pub(super) struct Coverage {
     /// Index of the first covered pixel.
     pub first: usize,
-    /// Covered part of each pixel from `first` on; 0..=1.
+    /// Covered fraction of each pixel from `first` on, 0..=1.
     pub parts: Vec<f64>,
 }
 
-/// Divides `pixels` pixels into `cells` cells of equal width.
+/// Divides a row of `pixels` pixels into `cells` cells of equal width, and returns the pixels that
+/// each cell covers.
 pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     let edge = |cell: usize| cell as f64 * pixels as f64 / cells as f64;
     let cover = |cell: usize| {
@@ -56,9 +57,9 @@ pub fn box_means(
     means
 }
 
-/// Fills cells without samples. Such a cell gets the means of the nearest known cell of its row. A
-/// row without samples gets the means of the nearest row with samples. `stride` is the number of
-/// means of a cell.
+/// Fills cells without samples: each gets the means of the nearest known cell of its row, and a row
+/// without known cells gets those of the nearest row with some. `stride` is the number of means in
+/// a cell.
 pub(super) fn fill_gaps(
     means: &mut [f32],
     known: &mut [bool],
@@ -81,8 +82,8 @@ pub(super) fn fill_gaps(
     }
 }
 
-/// Returns, for each element, the index of the nearest known element; the lower one if two are
-/// equally near. Without any known element it is the element's own index.
+/// Returns, for each element, the index of the nearest known element; of two equally near ones the
+/// lower. If no element is known, returns each element's own index.
 fn nearest(known: &[bool]) -> Vec<usize> {
     let mut below: Vec<Option<usize>> = Vec::with_capacity(known.len());
     for (i, k) in known.iter().enumerate() {

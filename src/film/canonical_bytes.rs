@@ -15,7 +15,7 @@ use crate::film::tile::Tile;
 use std::io::{self, Write};
 
 impl Film {
-    /// Returns the film as bytes, which are equal for equal samples.
+    /// Returns the film as bytes. Films with equal samples have equal bytes.
     pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         self.write_bytes(&mut bytes).expect("writing to memory does not fail");

@@ -5,7 +5,7 @@ use crate::value::srgb_from_linear;
 use std::fmt;
 use std::str::FromStr;
 
-/// Tone curve: maps radiance to the range of the display, whose white is 1.
+/// Tone curve: maps radiance to linear light of a display, whose white is 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tone {
     /// Clips each channel at 1.
@@ -56,13 +56,14 @@ impl Display {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Converts radiance to 8-bit sRGB. The result equals rounding of [`Display::codes`], but is
-    /// several times as fast.
+    /// Converts radiance to 8-bit sRGB. The result equals [`Display::codes`] after rounding, and is
+    /// computed several times as fast.
     pub fn codes_8(&self, radiance: [f64; 3]) -> [u8; 3] {
         self.to_8()(radiance)
     }
 
-    /// Returns [`Display::codes_8`] as a function, which is faster for many pixels.
+    /// Returns [`Display::codes_8`] as a closure that has the constants precomputed, for many
+    /// pixels.
     pub fn to_8(&self) -> impl Fn([f64; 3]) -> [u8; 3] + use<> {
         let (tone, factor, curve) = (self.tone, self.exposure_factor(), SrgbTable::shared());
         move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.code_8(c))
@@ -79,7 +80,7 @@ impl Display {
     }
 }
 
-/// Applies a tone curve. The result is in 0..=1.
+/// Applies the tone curve `tone`. The result is in 0..=1.
 #[inline(always)]
 pub(super) fn toned(tone: Tone, color: [f64; 3]) -> [f64; 3] {
     match tone {
@@ -88,7 +89,7 @@ pub(super) fn toned(tone: Tone, color: [f64; 3]) -> [f64; 3] {
     }
 }
 
-/// Applies the Khronos PBR Neutral tone mapper, in the form of its publication.
+/// Applies the Khronos PBR Neutral tone mapper, with the formulas of its publication.
 #[inline(always)]
 fn neutral(color: [f64; 3]) -> [f64; 3] {
     const F90: f64 = 0.04;
@@ -107,7 +108,7 @@ fn neutral(color: [f64; 3]) -> [f64; 3] {
     color.map(|c| c * (new_peak / peak)).map(|c| c + (new_peak - c) * to_white)
 }
 
-/// Rounds a value from 0 to 255 to 16 bits; 255 becomes 65535.
+/// Converts a value from 0 to 255 to 16 bits and rounds it; 255 becomes 65535.
 pub fn quantised_16(code: f64) -> u16 {
     (code * (65535.0 / 255.0)).round() as u16
 }
@@ -150,7 +151,8 @@ mod tests {
         assert_eq!(bright.codes([0.01, 0.1, 2.0]), plain.codes([0.08, 0.8, 1.0]));
     }
 
-    /// The expected values come from the published shader, evaluated by hand in double precision.
+    /// Checks the tone mapper against values of the published shader, evaluated by hand in double
+    /// precision.
     #[test]
     fn neutral_follows_its_publication() {
         let neutral = Display { exposure_ev: 0.0, tone: Tone::Neutral };

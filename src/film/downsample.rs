@@ -7,23 +7,24 @@ use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::store::Film;
 use crate::film::tile::Tile;
 
-/// Mean of each light group over the cells of a raster. The light weights are applied later, so
-/// that they can change without the film.
+/// Mean of each light group over the cells of a raster. Light weights are applied when the
+/// thumbnail is displayed, so that a change of weights needs no access to the film.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Thumbnail {
     /// Number of cells in a row.
     pub cols: usize,
     /// Number of rows.
     pub rows: usize,
-    /// Mean radiance of unit light: `[row][column][group][channel]`.
+    /// Mean radiance for light weights of 1, `[row][column][group][channel]`.
     means: Vec<f32>,
     groups: usize,
 }
 
 impl Thumbnail {
     /// Averages `film` over `cols` x `rows` cells of equal size that together cover the film. Each
-    /// cell holds the mean of its sampled pixels, weighted by their areas inside of the cell. A
-    /// cell without samples gets the means of the nearest cell of its row that has samples. A row
+    /// cell holds the mean of its sampled pixels, weighted by their areas inside of the cell.
+    ///
+    /// A cell without samples gets the means of the nearest cell of its row that has samples. A row
     /// without samples gets the means of the nearest row with samples. A film without samples is
     /// black.
     pub fn of_film(film: &Film, cols: usize, rows: usize) -> Self {
@@ -60,7 +61,7 @@ pub struct IncrementalDownsample {
     parts: Vec<TilePart>,
 }
 
-/// Positions of a raster's cells relative to the film's tiles.
+/// Cells of a raster that overlap each column and row of the film's tiles.
 struct Layout {
     cols: usize,
     rows: usize,
@@ -78,23 +79,24 @@ struct Span {
     first: usize,
     /// Number of cells.
     len: usize,
-    /// Cells that overlap each pixel: the index of each, counted from `first`, and the part of the
-    /// pixel that it covers, 0..=1.
+    /// For each pixel of the tiles along the axis, the cells that overlap it: index of the cell,
+    /// counted from `first`, and the fraction of the pixel that the cell covers, 0..=1.
     pixels: Vec<Vec<(usize, f64)>>,
 }
 
 /// Contribution of a tile to the cells that overlap it.
 #[derive(Default)]
 struct TilePart {
-    /// Epoch, counts and lattice of the tile at its latest refresh. If they are unchanged, so are
-    /// the contents.
+    /// Epoch, sample counts and lattice of the tile at its latest refresh. If the tile still has
+    /// these values, its samples are unchanged.
     version: Option<(u64, [u32; 2], usize)>,
     /// Sums of area, and of area times mean: `[row][column][area, group 0 red, ...]`. Empty without
     /// samples.
     sums: Vec<f64>,
 }
 
-/// A tile that has changed. [`DirtyTile::refresh`] reads it, on any thread.
+/// A tile that has changed since the previous picture. [`DirtyTile::refresh`] reads it, on any
+/// thread.
 pub struct DirtyTile<'a> {
     layout: &'a Layout,
     part: &'a mut TilePart,
@@ -103,8 +105,8 @@ pub struct DirtyTile<'a> {
 }
 
 impl IncrementalDownsample {
-    /// Creates the contributions of a film without samples to `cols` x `rows` cells. `film` gives
-    /// the size and the number of groups.
+    /// Creates the cache for `cols` x `rows` cells over a film with the size and the number of
+    /// groups of `film`. Its contributions are those of a film without samples.
     pub fn new(film: &Film, cols: usize, rows: usize) -> Self {
         let size = [film.width(), film.height()];
         let spans = |pixels: usize, cells: usize| {
@@ -123,8 +125,8 @@ impl IncrementalDownsample {
         Self { layout, parts }
     }
 
-    /// Returns `true` if the raster has `cols` x `rows` cells and `film` has the size and the
-    /// number of groups for which it was created.
+    /// Returns `true` if this cache was created for `cols` x `rows` cells and for a film with the
+    /// size and the number of groups of `film`.
     pub fn is_for(&self, film: &Film, cols: usize, rows: usize) -> bool {
         let Layout { size, groups, .. } = self.layout;
         [self.layout.cols, self.layout.rows] == [cols, rows]
@@ -132,8 +134,8 @@ impl IncrementalDownsample {
             && groups == film.groups()
     }
 
-    /// Returns the tiles that have changed since their latest refresh. Every call must have the
-    /// same `film`; it may have been restarted in between.
+    /// Returns the tiles that have changed since their latest refresh. Every call must pass the
+    /// same film, which may have been restarted in between.
     pub fn stale<'a>(&'a mut self, film: &'a Film) -> Vec<DirtyTile<'a>> {
         let layout = &self.layout;
         let stale = |(index, part): (usize, &'a mut TilePart)| {
@@ -175,7 +177,8 @@ impl IncrementalDownsample {
 }
 
 impl Span {
-    /// Finds the cells that overlap the tile that starts at pixel `start` of `pixels` pixels.
+    /// Finds the cells that overlap a tile, along one axis. The tile begins at pixel `start` and
+    /// has `pixels` pixels.
     fn new(start: usize, pixels: usize, coverage: &[Coverage]) -> Self {
         let end = (start + TILE).min(pixels);
         let touched =
@@ -220,7 +223,8 @@ impl DirtyTile<'_> {
     }
 }
 
-/// Adds every `step`-th pixel of row `y` of a tile to one row of cells, as if the cells had height
+/// Adds every `step`-th pixel of row `y` of a tile to `line`, one row of cells. The height of the
+/// cells is ignored.
 /// 1.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
@@ -282,7 +286,7 @@ mod tests {
         assert_eq!(raster.thumbnail().mixed(&white(2)).len(), 63);
     }
 
-    /// Brute-force reference: computes the overlap of every pixel with every cell.
+    /// Computes the means of the cells by brute force: the overlap of every pixel with every cell.
     fn brute_force(film: &Film, cols: usize, rows: usize, mix: &LightWeights) -> Vec<[f64; 3]> {
         let overlap = |cell: usize, cells: usize, pixel: usize, pixels: usize| {
             let edge = |c: usize| c as f64 * pixels as f64 / cells as f64;
@@ -329,7 +333,8 @@ mod tests {
         }
     }
 
-    /// Adds one sample of value x + 100 y to every pixel of a lattice.
+    /// Adds one sample of value x + 100 y to each pixel of the lattice with step `step_px` that is
+    /// not in the lattice with step `before_px`.
     fn first_samples(film: &mut Film, before_px: usize, step_px: usize) {
         each_tile(film, |tile, [x0, y0]| {
             let [width, height] = tile.extent();

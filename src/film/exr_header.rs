@@ -1,9 +1,9 @@
-//! Sorts the attributes of an OpenEXR header, so that equal pictures have equal files.
+//! Sorting of the attributes of an OpenEXR header, so that equal pictures have equal files.
 //!
-//! The format allows any order of attributes. The library writes them in the order of a hash map,
-//! which differs between runs. OpenEXR File Layout: a header is a list of attributes that ends with
-//! a zero byte. An attribute consists of a name and a type (each ends with a zero byte), a size
-//! (i32, little-endian), and `size` bytes of data.
+//! The format allows any order of attributes, and the library's order differs between runs, because
+//! it comes from a hash map. OpenEXR File Layout: a header is a list of attributes that ends with a
+//! zero byte. An attribute consists of a name and a type (each ends with a zero byte), a size (i32,
+//! little-endian), and `size` bytes of data.
 
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 
@@ -16,7 +16,7 @@ pub(super) struct Ordered<W: Write + Seek> {
     sink: W,
     /// Buffered bytes. `None` after the header has been written.
     buffer: Option<Vec<u8>>,
-    /// Number of bytes of the header, with its last byte; 0 until it is complete.
+    /// Number of bytes of the header, including its last byte; 0 until the header is complete.
     header_len: usize,
 }
 
@@ -28,7 +28,7 @@ impl<W: Write + Seek> Ordered<W> {
 }
 
 impl Ordered<Cursor<Vec<u8>>> {
-    /// Returns the bytes of the header. They are empty if it is not complete.
+    /// Returns the bytes of the header; none if the header is not complete.
     pub fn into_header(self) -> Vec<u8> {
         let mut bytes = self.sink.into_inner();
         bytes.truncate(self.header_len);

@@ -1,21 +1,21 @@
-//! Input of the picture encoders (PNG and OpenEXR), apart from the samples.
+//! Input of the picture encoders (PNG and OpenEXR) except for the samples.
 
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
 use std::io::{Seek, Write};
 
-/// Size and settings of a picture file. [`Bands`](crate::film::Bands) hold its samples.
+/// Size and settings of a picture file. Its samples come from [`Bands`](crate::film::Bands).
 #[derive(Clone, Copy, Debug)]
 pub struct ImageData<'a> {
     /// Width and height in pixels.
     pub size: [u32; 2],
     /// Weight of each light group: colour times intensity.
     pub mix: &'a LightWeights,
-    /// Name of each light group, used by formats with layers.
+    /// Name of each light group, for formats with layers.
     pub group_names: &'a [String],
-    /// Exposure and tone curve, used by formats that hold display values.
+    /// Exposure and tone curve, for formats that hold display values.
     pub display: Display,
-    /// Bits per channel, used by formats that hold display values.
+    /// Bits per channel, for formats that hold display values.
     pub depth: Depth,
 }
 

@@ -2,7 +2,8 @@
 
 use crate::film::tile::Tile;
 
-/// Weight of each light group: colour times intensity. The film's sums are for unit light.
+/// Weight of each light group in a picture: colour times intensity. The film's sums are for weights
+/// of 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightWeights {
     /// Red, green and blue weight of each light group; at least 0.
@@ -10,20 +11,21 @@ pub struct LightWeights {
 }
 
 impl LightWeights {
-    /// Creates weights that show only one light group, in unit light. The film has `groups` groups.
+    /// Creates weights that show light group `group` alone, with weight 1. The film has `groups`
+    /// groups.
     pub fn only(group: usize, groups: usize) -> Self {
         Self { weights: (0..groups).map(|g| [f64::from(u8::from(g == group)); 3]).collect() }
     }
 
-    /// Returns the factors that convert sums to radiance times sample count, `[group][channel]`.
-    /// `scales` are the scales of the film.
+    /// Returns the factors, `[group][channel]`, that convert sums of a film with the given `scales`
+    /// to radiance times sample count.
     pub(super) fn radiance_per_step(&self, scales: &[f64]) -> Vec<f64> {
         assert_eq!(self.weights.len(), scales.len(), "weights for the groups of the film");
         self.weights.iter().zip(scales).flat_map(|(w, scale)| w.map(|w| w / scale)).collect()
     }
 }
 
-/// Replicates that a mean is taken over.
+/// Choice of the replicates over which a mean is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Replicates {
     /// Both replicates: the picture.
@@ -44,7 +46,7 @@ pub(super) struct Sums<'a> {
 }
 
 impl Sums<'_> {
-    /// Returns the number of samples in `replicates`.
+    /// Returns the number of samples in the chosen replicates.
     pub fn count(&self, replicates: Replicates) -> u32 {
         match replicates {
             Replicates::Both => self.counts[0].saturating_add(self.counts[1]),
@@ -53,7 +55,7 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns sum `i`, in `[group][channel]` order, over `replicates`.
+    /// Returns the sum with the index `i`, in `[group][channel]` order, over the chosen replicates.
     #[inline(always)]
     pub fn value(&self, replicates: Replicates, i: usize) -> f64 {
         match replicates {
@@ -63,8 +65,8 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns the radiance of the pixel, or black without samples. `per_unit` is the result of
-    /// [`LightWeights::radiance_per_step`].
+    /// Returns the radiance of the pixel: its mean over the chosen replicates, or black without
+    /// samples. `per_unit` is the result of [`LightWeights::radiance_per_step`].
     #[inline(always)]
     pub fn mean(&self, replicates: Replicates, per_unit: &[f64]) -> [f64; 3] {
         let count = self.count(replicates);

@@ -1,4 +1,4 @@
-//! Linear float image of the film's size. It does not change when the film does.
+//! Linear float image: a copy of a film's pixels that later samples do not change.
 
 use crate::film::box_filter::{box_means, fill_gaps};
 use crate::film::light_weights::{LightWeights, Replicates};

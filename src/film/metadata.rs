@@ -11,8 +11,8 @@ use std::path::Path;
 /// Multiple of bytes to which the values in picture files are padded.
 const PADDED: usize = 128;
 
-/// Pads a value with spaces. Noise and sample counts of a picture that is written while it is
-/// rendered are known at the end, and replace placeholders of the same length.
+/// Pads a value with spaces. A picture may be written while it is rendered; its noise and sample
+/// counts are known at the end, and replace placeholders of the same length.
 pub(super) fn padded(value: &str) -> String {
     let len = value.len().next_multiple_of(PADDED).max(PADDED);
     format!("{value}{}", " ".repeat(len - value.len()))
@@ -23,7 +23,7 @@ fn unpadded((key, value): (String, String)) -> (String, String) {
     (key, value.trim_end_matches(' ').to_string())
 }
 
-/// Metadata of a picture or of a film file.
+/// Metadata of a picture file or film file.
 #[derive(Clone, Debug)]
 pub struct FileMetadata {
     /// Format: `PNG`, `OpenEXR` or `film`.
@@ -32,7 +32,7 @@ pub struct FileMetadata {
     pub size: [usize; 2],
     /// Keys and values, in the order of the file; sorted by key in OpenEXR files.
     pub entries: Vec<(String, String)>,
-    /// Header of a film file.
+    /// Header of a film file; `None` for a picture file.
     pub film: Option<FilmFileHeader>,
 }
 
@@ -88,7 +88,7 @@ impl FileMetadata {
         Ok(Self { format: "OpenEXR", size, entries, film: None })
     }
 
-    /// Value of an entry.
+    /// Returns the value of the entry `key`.
     pub fn get(&self, key: &str) -> Option<&str> {
         self.entries.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str())
     }

@@ -5,8 +5,8 @@ use crate::film::testing::{Rng, each_tile, fill, film, white};
 use crate::film::*;
 use crate::film::{Replicates, quantised_8};
 
-/// Pixel of known mean. Its samples are `dark + LIGHT` with probability `chance` and `dark`
-/// otherwise. If `normal` is set, they are normally distributed around the mean.
+/// Pixel of known mean. A sample is `dark + LIGHT` with probability `chance`, otherwise `dark`. If
+/// `normal` is `true`, samples are normally distributed around the mean instead.
 #[derive(Clone, Copy)]
 struct Pixel {
     chance: f64,
@@ -22,8 +22,8 @@ impl Pixel {
         [0, 1, 2].map(|c| self.dark[c] + self.chance * LIGHT[c])
     }
 
-    /// Returns the sum of `n` samples. Stratified samples use one random number in each n-th of the
-    /// unit interval.
+    /// Returns the sum of `n` samples. Stratified samples use one random number in each n-th part
+    /// of the unit interval.
     fn sum(self, n: u32, stratified: bool, rng: &mut Rng) -> [f64; 3] {
         let count = f64::from(n);
         let hits = if self.normal {
@@ -39,7 +39,7 @@ impl Pixel {
     }
 }
 
-/// Returns the pixels of a picture of 64x48. The light is visible from them with probabilities from
+/// Returns the pixels of a picture of 64x48. The probability `chance` of a sample with light covers
 /// 0 to 1.
 fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
     (0..64 * 48).map(|_| Pixel { chance: rng.unit(), normal, dark }).collect()
@@ -48,7 +48,8 @@ fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
 struct Outcome {
     linear: Vec<f64>,
     codes: Vec<f64>,
-    /// Relative standard deviation of a tile's estimated RMSE over the seeds; mean over all tiles.
+    /// Relative standard deviation of the estimated RMSE of a tile over the seeds, averaged over
+    /// all tiles.
     tile_spread: f64,
 }
 
@@ -119,8 +120,8 @@ fn estimates_equal_true_errors_in_the_mean() {
     }
 }
 
-/// Compares the estimate with the two simpler ones for dark pixels that few samples find lit. There
-/// the tone curve is steep and bent.
+/// Compares the estimate with two simpler ones, for dark pixels whose samples are rarely lit. The
+/// tone curve is steep and bent at their values.
 #[test]
 fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
     let (n, mut rng) = (16u32, Rng(5));
@@ -220,7 +221,8 @@ fn unequal_counts_have_no_noise() {
     assert_eq!(noise(&film), None);
 }
 
-/// The mean over many tiles of the estimate between two waves equals the variance of the picture.
+/// Checks the estimate between two waves: its mean over many tiles equals the variance of the
+/// picture.
 #[test]
 fn replicate_with_fewer_samples_still_has_an_estimate() {
     let display = Display { exposure_ev: -2.0, tone: Tone::Clip };

@@ -8,7 +8,7 @@ use std::ffi::OsStr;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// A picture file format.
+/// A picture file format with its encoder.
 struct Format {
     extension: &'static str,
     encode: fn(&ImageData, &mut dyn Bands, &mut dyn WriteSeek) -> io::Result<()>,
@@ -58,8 +58,8 @@ impl ImageOutput {
         }
     }
 
-    /// Returns an output that fails to write if the file exists, or if another program creates it
-    /// in the meantime.
+    /// Returns an output whose write fails if the file exists at the start or when the write is
+    /// complete.
     pub fn create_new(self) -> Self {
         Self { existing: Existing::Refuse, ..self }
     }
@@ -69,7 +69,8 @@ impl ImageOutput {
         &self.path
     }
 
-    /// Checks that the file can be written, without changing it. Called before a long render.
+    /// Checks that the file can be written, without changing it. Long renders call it at their
+    /// start.
     ///
     /// # Errors
     /// Returns the error that writing would return now.
@@ -149,7 +150,8 @@ mod tests {
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
-    /// Bands whose metadata change after the last row.
+    /// Bands whose metadata change after the last row, as those of a render that runs while the
+    /// file is written.
     struct Late<'a> {
         film: &'a Film,
         rows: usize,
@@ -196,7 +198,7 @@ mod tests {
         }
     }
 
-    /// Bands that cannot be rendered, as after a signal.
+    /// Bands whose rows cannot be rendered, as after a signal.
     struct Failing(Film);
 
     impl Bands for Failing {

@@ -56,7 +56,7 @@ fn encode_to(
     Ok(())
 }
 
-/// Returns the bytes of a file before its image data.
+/// Returns all bytes of a file up to its image data.
 fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
     // The writer adds the last chunk when it is dropped.
@@ -65,7 +65,7 @@ fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8
     Ok(bytes)
 }
 
-/// Writes everything that precedes the image data.
+/// Writes the part of the file before the image data.
 fn start<W: Write>(
     picture: &ImageData,
     metadata: &[(String, String)],
@@ -101,7 +101,7 @@ fn start<W: Write>(
     encoder.write_header()
 }
 
-/// Encodes rows of red, green, blue, 8 bits each, sRGB, as PNG.
+/// Encodes an 8-bit sRGB picture as PNG. `rgb` holds red, green and blue of each pixel, row by row.
 ///
 /// # Errors
 /// Fails if `rgb` has not 3 bytes for each pixel.

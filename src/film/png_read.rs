@@ -5,8 +5,8 @@ use png::{ColorType, Decoder, Transformations};
 use std::io::BufReader;
 use std::path::Path;
 
-/// Largest number of pixels that is read, because the picture is held in memory as a whole: that of
-/// 8192 x 8192.
+/// Largest number of pixels that is read, that of 8192 x 8192. The limit bounds memory, because the
+/// whole picture is held in memory.
 const MAX_PIXELS: u64 = 1 << 26;
 
 /// Reads a PNG file. Returns width and height, and the pixels in 8-bit sRGB, `[row][column]`,

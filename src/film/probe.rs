@@ -17,8 +17,9 @@ pub struct Probe {
     pub radiance: [f64; 3],
     /// Value of the pixel on the display in 8-bit levels, 0..=255, not rounded.
     pub codes: [f64; 3],
-    /// Half the difference of A and B, in radiance. It is an estimate of the pixel's error with one
-    /// degree of freedom, correct within a factor of two or three. `None` if A or B has no samples.
+    /// Half the difference of A and B in radiance, an estimate of the pixel's error. A single
+    /// pixel's estimate is correct only within a factor of two or three. `None` if A or B has no
+    /// samples.
     pub difference: Option<[f64; 3]>,
     /// Estimated RMSE of the tile that contains the pixel, in linear radiance. `None` if A or B has
     /// no samples.

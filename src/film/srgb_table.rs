@@ -5,21 +5,23 @@ use std::sync::LazyLock;
 
 /// Base-2 logarithm of the number of table entries per octave (factor 2 of linear light).
 const SEGMENTS_LOG2: u32 = 7;
-/// Exponent of the power of two below which a single entry is exact: the encoding is linear up to
+/// Exponent of the power of two below which one table entry is exact, because the encoding is
+/// linear up to 0.0031308.
 /// 0.0031308.
 const FIRST_OCTAVE: i32 = -9;
 const SHIFT: u32 = 52 - SEGMENTS_LOG2;
-/// Upper bits of 2^FIRST_OCTAVE as a double, minus one. Entry 0 holds the linear part.
+/// Upper bits of the double 2^FIRST_OCTAVE, minus one, so that table entry 0 is the linear part of
+/// the encoding.
 const BASE: u64 = (((1023 + FIRST_OCTAVE) as u64) << SEGMENTS_LOG2) - 1;
 const ENTRIES: usize = ((-FIRST_OCTAVE as usize) << SEGMENTS_LOG2) + 2;
 
-/// Largest difference from the exact encoding in 8-bit levels.
+/// Largest difference between the table and the exact encoding, in 8-bit levels.
 const MAX_ERROR_CODES: f64 = 5.5e-4;
 
 /// Piecewise linear approximation of the sRGB encoding, exact at 128 points per octave of linear
 /// light.
 pub(super) struct SrgbTable {
-    /// Value at 0 and slope of each linear piece, in 8-bit levels.
+    /// Two numbers for each linear piece: its value at 0 and its slope, in 8-bit levels.
     chords: [[f64; 2]; ENTRIES],
 }
 
@@ -43,8 +45,8 @@ impl SrgbTable {
         Self { chords }
     }
 
-    /// Encodes linear light 0..=1 as an sRGB value 0..=255, not rounded; within 5.5e-4 of the exact
-    /// value.
+    /// Encodes linear light 0..=1 as an sRGB value 0..=255, not rounded. It differs from the exact
+    /// value by less than 5.5e-4.
     #[inline(always)]
     pub fn code(&self, linear: f64) -> f64 {
         let entry = (linear.to_bits() >> SHIFT).saturating_sub(BASE) as usize;
@@ -52,7 +54,7 @@ impl SrgbTable {
         at_zero + slope * linear
     }
 
-    /// Encodes linear light 0..=1 as an 8-bit sRGB value. It equals the rounded exact encoding.
+    /// Encodes linear light 0..=1 as an 8-bit sRGB value, equal to the rounded exact encoding.
     #[inline]
     pub fn code_8(&self, linear: f64) -> u8 {
         let above = self.code(linear) + 0.5;

@@ -1,5 +1,5 @@
-//! Film: tiles of integer sums. Tiles are cleared when they are next written, and added without
-//! rounding.
+//! Film store: tiles of integer sums. A restart clears each tile when it is next written. Films are
+//! added without rounding.
 
 use crate::film::TILE;
 use crate::film::display::Display;
@@ -10,7 +10,7 @@ use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::collections::TryReserveError;
 use std::fmt;
 
-/// Memory from which on a film is allocated as a whole before the first sample \[bytes\].
+/// Smallest memory of a film \[bytes\] that is allocated as a whole before the first sample.
 const RESERVED_FROM: u64 = 64 << 20;
 
 /// Properties of a film. Two films can be added only if their headers are equal.
@@ -37,8 +37,8 @@ impl Header {
     }
 }
 
-/// Integer sums of samples for every pixel, light group, channel and replicate. The order of
-/// addition changes no bit. Radiance is the sum of a pixel divided by `scale * count`.
+/// Integer sums of samples for every pixel, light group, channel and replicate. Integer addition
+/// gives the same sums in any order. The radiance of a pixel is its sum divided by `scale * count`.
 #[derive(Debug)]
 pub struct Film {
     header: Header,
@@ -60,7 +60,7 @@ pub struct TileHandle<'a> {
 }
 
 impl<'a> TileHandle<'a> {
-    /// Returns the tile. Before that it is allocated or cleared if necessary.
+    /// Allocates or clears the tile if necessary, and returns it.
     pub fn prepare(self) -> &'a mut Tile {
         self.tile.clear_if_stale(self.epoch);
         self.tile
@@ -73,7 +73,7 @@ pub enum Mismatch {
     /// The headers of the two films differ. The fields are the name of the property, its value in
     /// the first film, and its value in the second film.
     Header(&'static str, String, String),
-    /// Both films hold parts of the first sample of the tile with this number.
+    /// Both films hold a part of the first sample of the tile with this number.
     Overlap(usize),
 }
 
@@ -128,8 +128,8 @@ impl Film {
         columns * rows * (Tile::sums_len(groups) * size_of::<i64>()) as u64
     }
 
-    /// Allocates the memory of all tiles if the film is large. The tiles of a small film are
-    /// allocated by the threads that first write them, and the first picture appears sooner.
+    /// Allocates the memory of all tiles of a large film. The tiles of a small film are allocated
+    /// when threads first write them, so that the first picture appears sooner.
     fn reserve(&mut self) -> Result<(), TryReserveError> {
         let size = [self.width(), self.height()].map(|n| n as u32);
         if Self::memory_bytes(size, self.groups()) < RESERVED_FROM {
@@ -161,8 +161,7 @@ impl Film {
         Ok(Self { epoch: 1, tiles, header, first_row: 0 })
     }
 
-    /// Creates a film without samples. It uses the memory of this film, which may have another
-    /// header.
+    /// Creates a film without samples with the header `header`, which uses the memory of this film.
     ///
     /// # Errors
     /// Fails if the memory cannot be allocated.
@@ -189,8 +188,8 @@ impl Film {
         Ok(film)
     }
 
-    /// Returns this film as that of a band of rows: its first row is row `first_row` of the picture.
-    /// All columns and rows of other functions are counted from the band's upper left pixel.
+    /// Returns this film as a band of rows of a picture: its row 0 is row `first_row` of the
+    /// picture. All functions count columns and rows from the band's upper left pixel.
     ///
     /// # Panics
     /// Panics if `first_row` is not a multiple of [`TILE`].
@@ -225,12 +224,13 @@ impl Film {
         &self.header.scales
     }
 
-    /// Size, scales, seed and precision.
+    /// Size, scales, seed and precision of the film.
     pub fn header(&self) -> &Header {
         &self.header
     }
 
-    /// Number of restarts. While it is unchanged, equal counts of a tile mean equal contents.
+    /// Number of restarts. As long as it is unchanged, a tile with unchanged sample counts has
+    /// unchanged contents.
     pub(super) fn epoch(&self) -> u64 {
         self.epoch
     }
@@ -256,18 +256,19 @@ impl Film {
         [index % columns * TILE, index / columns * TILE]
     }
 
-    /// Returns a tile. Returns `None` if it has not been prepared since the last restart.
+    /// Returns the tile with the number `index`. Returns `None` if it has not been prepared since
+    /// the last restart.
     pub fn tile(&self, index: usize) -> Option<&Tile> {
         Some(&self.tiles[index]).filter(|tile| tile.is_of(self.epoch))
     }
 
-    /// Iterates over the tiles that have been prepared since the last restart, with their numbers.
+    /// Iterates over the tiles that have been prepared since the last restart: number and tile.
     pub fn touched(&self) -> impl Iterator<Item = (usize, &Tile)> {
         self.tiles.iter().enumerate().filter(|(_, tile)| tile.is_of(self.epoch))
     }
 
-    /// Returns handles of tiles, in the order of `indices`. The thread that works on a tile
-    /// prepares it.
+    /// Returns handles of tiles, in the order of `indices`. The thread that works on a tile calls
+    /// [`TileHandle::prepare`].
     ///
     /// # Panics
     /// Panics if an index occurs twice or is not below [`Film::tile_count`].
@@ -343,15 +344,15 @@ impl Film {
         }
     }
 
-    /// Estimated error of the picture. Returns `None` if a tile has unequal numbers of samples in A
-    /// and B, or none.
+    /// Returns the estimated error of the picture. Returns `None` if a tile has no samples, or
+    /// unequal numbers of them in A and B.
     pub fn noise(&self, weights: &LightWeights, display: &Display) -> Option<Noise> {
         let estimator = Estimator::new(self.scales(), weights, display);
         let noise_of_tile = |index| self.tile(index).and_then(|tile| estimator.tile(tile));
         Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }
 
-    /// Samples since the last restart that were NaN or negative.
+    /// Number and positions of the samples since the last restart that were NaN or negative.
     pub fn bad_samples(&self) -> InvalidSamples {
         let mut all = InvalidSamples::default();
         self.touched().for_each(|(_, tile)| all.merge(tile.bad()));
@@ -375,8 +376,8 @@ impl Film {
         self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
     }
 
-    /// Adds the samples of another film. If films of disjoint sample ranges are added, in any
-    /// order, the result equals the film of the whole range.
+    /// Adds the samples of another film. Films of disjoint sample ranges give, in any order, the
+    /// same sums as one film of all ranges.
     ///
     /// # Errors
     /// Fails if the headers differ, or if both films hold parts of the first sample of a tile. The
@@ -391,8 +392,8 @@ impl Film {
         Ok(())
     }
 
-    /// Creates an empty tile in the place of the tile `index`, to be filled and handed to
-    /// [`Film::add_at`].
+    /// Creates an empty tile for the position of the tile `index`. After it is filled,
+    /// [`Film::add_at`] adds it.
     pub(super) fn new_tile(&self, index: usize) -> Tile {
         let mut tile = Tile::cleared(self.groups(), self.tiles[index].extent());
         tile.clear_if_stale(self.epoch);
@@ -409,7 +410,7 @@ impl Film {
         ours.add_tile(&tile).map_err(|()| Mismatch::Overlap(index))
     }
 
-    /// Checks that the samples of a film with the header `theirs` can be added.
+    /// Checks that the samples of a film with the header `theirs` can be added to this film.
     ///
     /// # Errors
     /// Fails if size, scales, seed or precision differ.

@@ -1,6 +1,6 @@
-//! Random numbers for the unit tests of `film` and `measure`, which are different crates.
+//! Random numbers for the unit tests of two crates: those of `film` and of `measure`.
 
-/// Random numbers for tests (SplitMix64).
+/// Random number generator for tests (SplitMix64). The field is its state.
 pub struct Rng(pub u64);
 
 impl Rng {

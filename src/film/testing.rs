@@ -6,7 +6,7 @@ use crate::film::{LightWeights, TILE};
 
 pub use crate::film::test_random::Rng;
 
-/// Returns an empty film with one light group per scale. Sizes in pixels.
+/// Returns an empty film of `width` x `height` pixels, with one light group for each of `scales`.
 pub fn film(width: usize, height: usize, scales: &[f64]) -> Film {
     let scales = scales.to_vec();
     Film::new(Header { width, height, scales, seed: 1, precision: "single".to_string() })
@@ -26,8 +26,8 @@ pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
     }
 }
 
-/// Adds `count` samples per pixel to both replicates. The sum of the samples of a pixel,
-/// `[group][channel]`, is `sums(x, y, replicate)` times the scale of the group, rounded.
+/// Adds `count` samples per pixel to both replicates. `sums(x, y, replicate)` returns the sum of a
+/// pixel's samples, `[group][channel]`; it is multiplied by the scale of the group and rounded.
 pub fn fill(film: &mut Film, count: u32, mut sums: impl FnMut(usize, usize, usize) -> Vec<f64>) {
     let scales = film.scales().to_vec();
     each_tile(film, |tile, [x0, y0]| {

@@ -11,10 +11,10 @@ pub const TILE_PIXELS: usize = TILE * TILE;
 /// Largest number of light groups of a film.
 pub const MAX_FILM_GROUPS: usize = 16;
 
-/// Number of sums that fit in a cache line.
+/// Number of sums in a cache line of 64 bytes.
 const CACHE_LINE: usize = 8;
 
-/// Sums that are returned for pixels without samples.
+/// Sums of a pixel without samples.
 static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 
 /// Sums of 16x16 pixels. A pixel has the number `y * 16 + x` in its tile. In tiles at the right and
@@ -38,9 +38,10 @@ pub struct Tile {
     bad: InvalidSamples,
     /// Sums, `[replicate][pixel][group][channel]`. Empty until the tile is first written.
     sums: Vec<i64>,
-    /// Bit `p % 64` of `[replicate][p / 64]` is set if pixel p has been written in this epoch. The
-    /// sums of other pixels count as zero, whatever the memory contains. A restart therefore writes
-    /// nothing per pixel, and the first samples of a large film access few of its memory pages.
+    /// Bits of the pixels that have been written in this epoch: bit `p % 64` of `[replicate][p /
+    /// 64]` belongs to pixel p. The sums of other pixels count as zero, whatever the memory
+    /// contains. A restart therefore writes nothing per pixel, and the first samples of a large
+    /// film access few of its memory pages.
     written: [[u64; TILE_PIXELS / 64]; 2],
 }
 
@@ -65,17 +66,17 @@ impl Tile {
         self.sums
     }
 
-    /// Gives memory to a tile that has not been written.
+    /// Returns a tile that uses `sums` as its memory. The tile must not have been written.
     pub(super) fn with_memory(self, sums: Vec<i64>) -> Self {
         Self { sums, ..self }
     }
 
-    /// Number of sums of a tile with this number of light groups.
+    /// Returns the number of sums of a tile with `groups` light groups.
     pub(super) fn sums_len(groups: usize) -> usize {
         2 * TILE_PIXELS * groups * 3
     }
 
-    /// Allocates the memory of the sums, unless the tile has it. The memory is not written.
+    /// Allocates the memory of the sums, unless the tile has it already. The memory is not written.
     pub(super) fn reserve(&mut self) -> Result<(), TryReserveError> {
         let len = Self::sums_len(self.stride / 3);
         if self.sums.capacity() < len {
@@ -85,8 +86,7 @@ impl Tile {
         Ok(())
     }
 
-    /// Starts a new epoch of the tile: allocates or clears it if its contents belong to another
-    /// epoch.
+    /// Allocates or clears the tile if its contents belong to another epoch than `epoch`.
     pub(super) fn clear_if_stale(&mut self, epoch: u64) {
         if self.epoch == epoch {
             return;
@@ -151,8 +151,8 @@ impl Tile {
     }
 
     /// Records that the pixels whose x and y are multiples of `step_px` (1, 2, 4, 8 or 16) have the
-    /// first sample of replicate A. With 1 these are all pixels; the sample count grows by one and
-    /// the lattice ends.
+    /// first sample of replicate A. A step of 1 includes all pixels: the sample count grows by one,
+    /// and the first pass of the tile is complete.
     ///
     /// # Panics
     /// Panics if `step_px` is another number, or larger than the step of the current lattice.
@@ -171,9 +171,8 @@ impl Tile {
         }
     }
 
-    /// Returns the sums of one pixel in one replicate (0: A, 1: B) for writing: `[group][channel]`,
-    /// length `groups * 3`. Direct addition is only allowed if the sums cannot overflow; otherwise
-    /// use [`Tile::add`].
+    /// Returns the sums of one pixel in one replicate (0: A, 1: B) for writing, `[group][channel]`.
+    /// Callers may add to them only if no sum can overflow; otherwise use [`Tile::add`].
     #[inline(always)]
     pub fn pixel_mut(&mut self, replicate: usize, pixel: usize) -> &mut [i64] {
         let start = (replicate * TILE_PIXELS + pixel) * self.stride;
@@ -214,8 +213,8 @@ impl Tile {
     }
 
     /// Adds non-negative `values` (`[group][channel]`, length `groups * 3`) to the sums of a pixel.
-    /// A sum that would exceed `i64::MAX` becomes `i64::MAX` and counts as saturated. No value is
-    /// negative, so that the order of addition has no influence even then.
+    /// A sum that would exceed `i64::MAX` becomes `i64::MAX` and counts as saturated; because no
+    /// value is negative, this too is independent of the order of addition.
     #[inline(always)]
     pub fn add(&mut self, replicate: usize, pixel: usize, values: &[i64]) {
         for (group, values) in values.chunks_exact(3).enumerate() {
@@ -263,14 +262,14 @@ impl Tile {
         self.saturated_samples
     }
 
-    /// Records an invalid sample. It counts as a sample with the value 0.
+    /// Records an invalid sample, which the sums contain as black.
     #[cold]
     pub fn record_bad(&mut self, sample: InvalidSample) {
         self.bad.record(sample);
     }
 
-    /// Sets everything but the sums, as it was in the tile of a file. `full` is `true` if a sum has
-    /// reached its limit.
+    /// Sets all values except for the sums to those of a tile in a file. `full` is `true` if a sum
+    /// has reached its limit.
     pub(super) fn restore(
         &mut self,
         counts: [u32; 2],
@@ -288,7 +287,7 @@ impl Tile {
         &self.bad
     }
 
-    /// Adds the samples of the tile at the same position of another film.
+    /// Adds the samples of a tile of another film, at the same position.
     ///
     /// # Errors
     /// Fails if both tiles hold parts of the first sample.
@@ -310,7 +309,7 @@ impl Tile {
     }
 }
 
-/// Returns the limit if `sum` has overflowed, and `sum` otherwise.
+/// Returns `i64::MAX` if the addition that gave `sum` has overflowed, and `sum` otherwise.
 #[cold]
 fn saturated_sum(sum: i64) -> i64 {
     if sum < 0 { i64::MAX } else { sum }

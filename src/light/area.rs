@@ -1,6 +1,6 @@
 //! Descriptions of lights with a size: sphere, rectangle and disk. A light is a radiating surface
-//! without a body: rays pass through it, and it casts no shadow. An object behind or inside it gives
-//! it a housing.
+//! that rays pass through and that casts no shadow. Model a visible lamp housing as an object
+//! behind or around it.
 
 use crate::value::{description, unit};
 use glam::DVec3;
@@ -70,7 +70,7 @@ pub enum EmitterSurface {
 }
 
 impl EmitterSurface {
-    /// Centre.
+    /// Centre \[scene units\].
     pub fn center(&self) -> DVec3 {
         DVec3::from(match self {
             Self::Sphere(sphere) => sphere.center,
@@ -79,7 +79,7 @@ impl EmitterSurface {
         })
     }
 
-    /// Radius of the smallest ball around the centre that contains the surface.
+    /// Radius \[scene units\] of the smallest ball around the centre that contains the surface.
     pub fn radius(&self) -> f64 {
         match self {
             Self::Sphere(sphere) => sphere.radius,
@@ -88,7 +88,7 @@ impl EmitterSurface {
         }
     }
 
-    /// Area that shines.
+    /// Area that emits light \[scene units²\].
     pub fn area(&self) -> f64 {
         match self {
             Self::Sphere(sphere) => 4.0 * PI * sphere.radius * sphere.radius,
@@ -97,7 +97,8 @@ impl EmitterSurface {
         }
     }
 
-    /// Smallest extent: the shorter side of a rectangle, otherwise the radius.
+    /// Smallest extent \[scene units\]: the shorter side of a rectangle; the radius of a sphere or
+    /// disk.
     pub fn thickness(&self) -> f64 {
         match self {
             Self::Rectangle(rectangle) => rectangle.size[0].min(rectangle.size[1]),
@@ -105,8 +106,8 @@ impl EmitterSurface {
         }
     }
 
-    /// Returns unit vectors across, up and to the side that shines. Any frame fits a sphere.
-    /// Returns `None` if the normal is zero.
+    /// Returns unit vectors across, up, and towards the side that emits light. The frame of a
+    /// sphere is arbitrary. Returns `None` if the normal is zero.
     pub fn frame(&self) -> Option<[DVec3; 3]> {
         match self {
             Self::Sphere(_) => Some([DVec3::X, DVec3::Y, DVec3::Z]),

@@ -7,7 +7,7 @@ use crate::value::unit;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// A compiled delta light.
+/// A compiled delta light: a light without a size.
 #[derive(Clone, Copy, Debug)]
 pub enum DeltaLight<S> {
     /// Point light with irradiance 1 / d^2 at the distance d.
@@ -31,12 +31,13 @@ pub enum DeltaLight<S> {
         position: [S; 3],
         /// Cone that limits the light.
         cone: SpotCone<S>,
-        /// `true` if the irradiance inside the inner cone is 1 / d^2; otherwise it is pi.
+        /// Falloff: `true` if the irradiance inside the inner cone is 1 / d^2 at the distance d;
+        /// `false` if it is pi.
         inverse_square: bool,
     },
 }
 
-/// Largest slope of a cone's edge. It is finite in single precision.
+/// Largest value of `SpotCone::scale`. It is finite in single precision.
 const SHARP: f64 = 1e30;
 
 /// Cone of a spot light: the factor of its intensity in each direction.
@@ -49,7 +50,7 @@ const SHARP: f64 = 1e30;
 pub struct SpotCone<S> {
     /// Unit vector along the axis, towards the light.
     axis: [S; 3],
-    /// s at the outer cone.
+    /// Value of s at the outer cone.
     outer: S,
     /// 1 / (s_outer - s_inner), at most [`SHARP`].
     scale: S,
@@ -82,7 +83,7 @@ impl<S: Float> SpotCone<S> {
     }
 }
 
-/// Light incident at surface points from a light of unit strength.
+/// Light that arrives at surface points from a light of unit strength, one point per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSample<L> {
     /// Unit vector towards the light.
@@ -94,8 +95,8 @@ pub struct LightSample<L> {
 }
 
 impl<S: Float> DeltaLight<S> {
-    /// Compiles `light` for a scene translated by -`origin`. Returns `None` if `light` is of no kind,
-    /// or if its direction is zero.
+    /// Compiles `light` for a scene translated by -`origin`. Returns `None` if `light` has a size
+    /// or is an environment, or if its direction is zero.
     pub fn new(light: &Light, origin: DVec3) -> Option<Self> {
         if let Some(position) = light.apex() {
             let position = (DVec3::from(position) - origin).to_array().map(S::from_f64);
@@ -128,7 +129,7 @@ impl<S: Float> DeltaLight<S> {
         matches!(self, Self::InverseSquare { .. } | Self::Spot { inverse_square: true, .. })
     }
 
-    /// Returns the light incident at `point` without occluders.
+    /// Returns the light that arrives at `point` if nothing occludes it.
     #[inline(always)]
     pub fn sample_li<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>) -> LightSample<L> {
         match self {
@@ -159,8 +160,8 @@ impl<S: Float> DeltaLight<S> {
         }
     }
 
-    /// Returns the irradiance, at normal incidence, at a typical point: the origin of the
-    /// translated scene. A distance to the light that is less than `radius` counts as `radius`.
+    /// Returns the irradiance, at normal incidence, at the origin of the translated scene.
+    /// Distances less than `radius` are replaced by `radius`.
     pub fn typical_irradiance(&self, radius: f64) -> f64 {
         match self.position().filter(|_| self.is_inverse_square()) {
             Some(position) => {
@@ -183,10 +184,11 @@ mod tests {
         Light { spot: Some(spot), falloff, ..Light::default() }
     }
 
-    /// Compares the irradiance around a spot light with smoothstep of the angle's cosine. The direction
-    /// has an error of some ten roundings: those of coordinates below 8, divided by distances of at least
-    /// 0.5, and those of two unit vectors. It is multiplied by the slope of the edge, at most 1.5 times
-    /// that of the cosine.
+    /// Compares the irradiance around a spot light with the smoothstep of the angle's cosine.
+    ///
+    /// The direction has an error of about ten rounding errors: those of coordinates below 8,
+    /// divided by distances of at least 0.5, and those of two unit vectors. The slope of the edge
+    /// multiplies it, at most 1.5 times that of the cosine.
     fn check<L: SimdFloat>(epsilon: f64) {
         let origin = DVec3::new(0.25, 0.0, 0.5);
         for (inner, outer) in [(10.0, 30.0), (0.0, 90.0), (0.0, 0.5), (70.0, 160.0), (180.0, 180.0)]

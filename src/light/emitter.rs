@@ -7,9 +7,8 @@ use crate::sampling::warp;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
-/// Solid angle, in rounding errors, below which a rectangle is sampled by area. The boundaries of
-/// the spherical rectangle are angles of about 1 with an error of some roundings, so that a
-/// rectangle of this solid angle is sampled at points that are off by 1e-5 of its size.
+/// Smallest solid angle at which a rectangle is sampled by solid angle instead of area, in rounding
+/// errors. At this solid angle rounding moves the sampled points by 1e-5 of the rectangle's size.
 pub(super) const MIN_SOLID_ANGLE: f64 = 2e5;
 
 /// Surface of a compiled emitter.
@@ -18,7 +17,7 @@ enum Surface<S> {
     Sphere {
         radius: S,
     },
-    /// Axes across and up, and the normal, to the side that shines.
+    /// Rectangle with three axes: across, up, and the normal of the side that emits light.
     Rectangle {
         axes: [[S; 3]; 3],
         size: [S; 2],
@@ -29,18 +28,18 @@ enum Surface<S> {
     },
 }
 
-/// A compiled light with a size, white and of unit intensity.
+/// A compiled light with a size, white and with intensity 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Emitter<S> {
     surface: Surface<S>,
     center: [S; 3],
-    /// Area that shines.
+    /// Area that emits light.
     area: S,
     /// Radiance, the same at every point and in every direction.
     radiance: S,
 }
 
-/// Light incident at surface points from sampled points of an emitter.
+/// Light that arrives at surface points from sampled points of an emitter, one point per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct EmitterSample<L> {
     /// Unit vector towards the sampled point.
@@ -54,10 +53,12 @@ pub struct EmitterSample<L> {
 }
 
 impl<S: Float> Emitter<S> {
-    /// Compiles `light` for a scene translated by -`origin`. The surface is lifted by `lift`, at
-    /// most 1e-4 of its size, so that rounding does not hide an emitter that touches an object: a
-    /// flat one is moved to the side that shines, a sphere grows and keeps its power. Returns
-    /// `None` if the light has no size or no direction.
+    /// Compiles `light` for a scene translated by -`origin`. Returns `None` if the light has no
+    /// size or no direction.
+    ///
+    /// The surface is lifted by `lift`, at most 1e-4 of its size, so that rounding does not hide an
+    /// emitter that touches an object: a flat emitter moves to the side that emits light, a sphere
+    /// grows and keeps its power.
     pub fn new(light: &Light, origin: DVec3, lift: f64) -> Option<Self> {
         let surface = light.surface()?;
         let frame = surface.frame()?;
@@ -109,7 +110,7 @@ impl<S: Float> Emitter<S> {
         }
     }
 
-    /// Area that shines.
+    /// Area that emits light \[scene units²\].
     pub fn area(&self) -> f64 {
         self.area.to_f64()
     }
@@ -119,7 +120,7 @@ impl<S: Float> Emitter<S> {
         self.radiance
     }
 
-    /// Returns the distance at which each ray reaches the side that shines; the largest finite
+    /// Returns the distance at which each ray hits the side that emits light; the largest finite
     /// number for rays that miss it. `direction` is a unit vector.
     #[inline(always)]
     pub fn hit<L: SimdFloat<Scalar = S>>(&self, origin: Vec3<L>, direction: Vec3<L>) -> L {
@@ -204,8 +205,8 @@ impl<S: Float> Emitter<S> {
         }
     }
 
-    /// Returns the density \[1/sr\] with which [`Emitter::sample`] draws the direction in which
-    /// the emitter is hit at `distance`.
+    /// Returns the density \[1/sr\] with which [`Emitter::sample`] draws the direction of a ray
+    /// that hits the emitter at `distance`.
     #[inline(always)]
     pub fn density<L: SimdFloat<Scalar = S>>(&self, origin: Vec3<L>, distance: L) -> L {
         let to_center = Vec3::splat(self.center) - origin;
@@ -222,7 +223,8 @@ impl<S: Float> Emitter<S> {
         }
     }
 
-    /// Creates a sample with finite irradiance, because infinity times black would be NaN.
+    /// Creates a sample whose irradiance is radiance divided by `density`, limited to the largest
+    /// finite number: infinity times black would be NaN.
     #[inline(always)]
     fn with_density<L: SimdFloat<Scalar = S>>(
         &self,
@@ -242,7 +244,8 @@ pub(super) fn local_of<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> 
     axes.map(|axis| Vec3::splat(axis).dot(v))
 }
 
-/// Returns the unit vector with the given local components, and their length.
+/// Returns the unit vector in the direction of the given local components, and the length of the
+/// components.
 #[inline(always)]
 pub(super) fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3]) -> (Vec3<L>, L) {
     let distance = (x * x + y * y + z * z).sqrt();
@@ -251,8 +254,9 @@ pub(super) fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3
     ((across * x + up * y + normal * z) * inverse, distance)
 }
 
-/// Returns the distance to the plane through the centre, which is at `to_center`, and the local
-/// coordinates of the intersection. The distance is negative for rays that miss the front.
+/// Returns the distance at which rays hit the emitter's plane, and the local coordinates of the hit
+/// points. `to_center` is the vector from the rays' origin to the emitter's centre. The distance is
+/// negative for rays that miss the front.
 #[inline(always)]
 fn plane_hit<L: SimdFloat>(
     axes: &[[L::Scalar; 3]; 3],
@@ -266,16 +270,17 @@ fn plane_hit<L: SimdFloat>(
     (t, [x.mul_add(t, -center_x), y.mul_add(t, -center_y)])
 }
 
-/// Returns the density \[1/sr\] of directions to uniform points of a surface of the given area at
-/// `distance`: distance^2 / (area cos). `height` is the coordinate of the surface along its normal;
-/// it is negative in front of the surface.
+/// Returns the density \[1/sr\] of directions to uniform points of a flat surface at `distance`:
+/// distance^2 / (area cos). `height` is the coordinate of the surface along its normal, relative to
+/// the receiver; it is negative if the receiver is in front of the surface.
 #[inline(always)]
 pub(super) fn density_of_area<L: SimdFloat>(area: L, distance: L, height: L) -> L {
     let density = distance * distance * distance / (area * -height);
     density.min(L::from_f64(L::MAX)).masked(height.lt(L::zero()))
 }
 
-/// Cone of the directions in which a sphere is seen; all directions from its inside.
+/// Cone of the directions from a point to a sphere. From a point inside of the sphere it contains
+/// all directions.
 pub(super) struct Cone<L: SimdFloat> {
     pub axis: Vec3<L>,
     pub one_minus_cos: L,
@@ -313,14 +318,16 @@ impl<L: SimdFloat> Cone<L> {
 ///
 /// Ureña, Fajardo, King 2013, *An Area-Preserving Parametrization for Spherical Rectangles*.
 pub(super) struct SphericalRectangle<L: SimdFloat> {
-    /// Local coordinates of the sides, relative to the point.
+    /// Smallest and largest coordinate across, relative to the point.
     x: [L; 2],
     y: [L; 2],
-    /// Coordinate of the plane along the normal, relative to the point; negative in front of it.
+    /// Coordinate of the rectangle's plane along the normal, relative to the point; negative if the
+    /// point is in front of it.
     height: L,
     area: L,
     solid_angle: L,
-    /// Lanes in which the solid angle is large enough for the parametrization.
+    /// Lanes in which the rectangle is sampled by solid angle; in the others it is too small and is
+    /// sampled by area.
     by_angle: L::Mask,
 }
 
@@ -338,7 +345,7 @@ impl<L: SimdFloat> SphericalRectangle<L> {
         Self { x, y, height: z, area, solid_angle, by_angle }
     }
 
-    /// Samples a point, as local coordinates relative to the origin.
+    /// Samples a point of the rectangle and returns its local coordinates relative to the receiver.
     #[inline(always)]
     pub fn sample(&self, u: L, v: L) -> [L; 2] {
         let ([x0, x1], [y0, y1]) = (self.x, self.y);
@@ -368,7 +375,7 @@ impl<L: SimdFloat> SphericalRectangle<L> {
         [L::select(self.by_angle, x, by_area[0]), L::select(self.by_angle, y, by_area[1])]
     }
 
-    /// Density of the direction \[1/sr\] in which the rectangle is at `distance`.
+    /// Density \[1/sr\] of a direction in which the rectangle is hit at `distance`.
     #[inline(always)]
     pub fn density(&self, distance: L) -> L {
         let by_area = density_of_area(self.area, distance, self.height);
@@ -377,8 +384,9 @@ impl<L: SimdFloat> SphericalRectangle<L> {
     }
 }
 
-/// Returns the solid angle of a rectangle: that of two triangles, each by the arc tangent of a
-/// quotient without cancellation for small angles (Van Oosterom and Strackee 1983).
+/// Returns the solid angle of a rectangle: the sum of two triangles, each by an arc tangent that
+/// has no cancellation at small angles (Van Oosterom and Strackee 1983). The sides are local
+/// coordinates relative to the point, `z` that of the plane.
 #[inline(always)]
 fn solid_angle<L: SimdFloat>([x0, x1]: [L; 2], [y0, y1]: [L; 2], z: L, area: L) -> L {
     let corner = |x: L, y: L| {

@@ -18,12 +18,14 @@ const GRADIENT_ROWS: u32 = 512;
 description! {
     /// Light from all directions, infinitely far away: an image around the scene, or a gradient.
     pub struct Environment: Default {
-        /// Name of an equirectangular image (Radiance HDR, OpenEXR, PNG, JPEG), relative to the folder
-        /// of the scene file. Its middle is towards -z. Empty: the gradient.
+        /// Name of an equirectangular image (Radiance HDR, OpenEXR, PNG, JPEG), relative to the
+        /// folder of the scene file. The middle of the image is towards -z. An empty name selects
+        /// the gradient.
         file: String = "";
         /// Radiance of the gradient straight above.
         zenith: Color = [1.0, 1.0, 1.0], in LIGHT;
-        /// Radiance of the gradient at the horizon. In between it changes with the sine of the height.
+        /// Radiance of the gradient at the horizon. Above and below, the radiance changes linearly
+        /// with the sine of the elevation.
         horizon: Color = [1.0, 1.0, 1.0], in LIGHT;
         /// Radiance of the gradient straight below.
         nadir: Color = [1.0, 1.0, 1.0], in LIGHT;
@@ -44,26 +46,27 @@ impl Environment {
         self.file().and(self.map.content())
     }
 
-    /// Loads the image with `load`, unless it or an error is there already.
+    /// Loads the image with `load`, unless the image or an error of reading it is stored already.
     pub fn resolve(&mut self, load: impl FnOnce(&str) -> Result<Arc<RadianceMap>, AssetError>) {
         if !self.file.is_empty() {
             self.map.resolve(|| load(&self.file));
         }
     }
 
-    /// Copies the image from `other` if both have the same file.
+    /// Copies the image from `other` if both name the same file.
     pub fn resolve_as(&mut self, other: &Self) {
         if self.file == other.file {
             self.map = other.map.clone();
         }
     }
 
-    /// Error of reading the image.
+    /// Returns the error of reading the image; `None` if there was none.
     pub(super) fn fault(&self) -> Option<ValidationError> {
         self.file().and_then(|_| self.map.fault())
     }
 
-    /// Image of the gradient: one column, because the radiance depends on the height alone.
+    /// Image of the gradient. It has one column, because the radiance depends on the elevation
+    /// alone.
     fn gradient(&self) -> RadianceMap {
         let row = |row: u32| {
             let height = (PI * (f64::from(row) + 0.5) / f64::from(GRADIENT_ROWS)).cos();
@@ -75,14 +78,14 @@ impl Environment {
     }
 }
 
-/// A compiled environment light, white and of unit intensity.
+/// A compiled environment light, white and with intensity 1.
 pub struct EnvironmentLight {
     map: Arc<RadianceMap>,
     /// Sine and cosine of the rotation.
     rotation: (f64, f64),
 }
 
-/// Light incident from sampled directions of an environment.
+/// Light that arrives from sampled directions of an environment, one direction per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct EnvironmentSample<L> {
     /// Unit vector towards the light.
@@ -94,7 +97,8 @@ pub struct EnvironmentSample<L> {
 }
 
 impl EnvironmentLight {
-    /// Compiles `light`. Returns `None` if it is no environment, or if its image is not loaded.
+    /// Compiles `light`. Returns `None` if it is no environment light, or if its image is not
+    /// loaded.
     pub fn new(light: &Light) -> Option<Self> {
         let environment = light.environment.as_ref()?;
         let map = match environment.file() {
@@ -109,15 +113,15 @@ impl EnvironmentLight {
         &self.map
     }
 
-    /// Returns the direction in the image of a direction in the scene.
+    /// Rotates `direction` of one lane from scene coordinates into the coordinates of the image.
     fn in_image<L: SimdFloat>(&self, direction: Vec3<L>, lane: usize) -> [f64; 3] {
         let (sin, cos) = self.rotation;
         let [x, y, z] = direction.lane(lane).map(L::Scalar::to_f64);
         [x * cos - z * sin, y, x * sin + z * cos]
     }
 
-    /// Returns the radiance from the unit vectors `direction` in `lanes`, and the density \[1/sr\] with
-    /// which [`EnvironmentLight::sample`] draws them; zero elsewhere.
+    /// Returns the radiance from the unit vectors `direction`, and the density \[1/sr\] with which
+    /// [`EnvironmentLight::sample`] draws them. Both are zero outside of `lanes`.
     #[inline(never)]
     pub fn radiance<L: SimdFloat>(&self, direction: Vec3<L>, lanes: L::Mask) -> (Vec3<L>, L) {
         let (mut radiance, mut density) = ([[0.0; 3]; MAX_WIDTH], [0.0; MAX_WIDTH]);
@@ -132,8 +136,8 @@ impl EnvironmentLight {
         )
     }
 
-    /// Samples a direction by luminance for each of `lanes`; elsewhere no light arrives. `u` and `v` are
-    /// uniform in [0, 1).
+    /// Samples a direction in proportion to luminance for each of `lanes`; in other lanes no light
+    /// arrives. `u` and `v` are uniform in [0, 1).
     #[inline(never)]
     pub fn sample<L: SimdFloat>(&self, (u, v): (L, L), lanes: L::Mask) -> EnvironmentSample<L> {
         let (sin, cos) = self.rotation;
@@ -203,7 +207,7 @@ mod tests {
         }
     }
 
-    /// With the rotation 90 the middle of the image, towards -z, is at -x: counter-clockwise seen from above.
+    /// Checks that the rotation 90 moves the middle of the image from -z to -x.
     #[test]
     fn rotation_is_counter_clockwise_from_above() {
         let pixels = (0..8).map(|i| [f32::from(u8::from(i % 4 == 1 || i % 4 == 2)); 3]).collect();

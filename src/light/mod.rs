@@ -20,9 +20,9 @@ use crate::value::{
 
 description! {
     /// A light: exactly one of `point`, `directional`, `spot`, `sphere`, `rectangle`, `disk` and
-    /// `environment`, a colour, an intensity.
+    /// `environment`, with a colour and an intensity.
     pub struct Light: Default {
-        /// Name; no two lights have the same.
+        /// Name. Every light has a different one.
         name: String, or "a number";
         /// Light from one point. A light has exactly one of `point`, `directional`, `spot`, `sphere`,
         /// `rectangle`, `disk` and `environment`.
@@ -39,7 +39,7 @@ description! {
         disk: Option<DiskLight>, or "another kind is needed";
         /// Light from all directions.
         environment: Option<Environment>, or "another kind is needed";
-        /// Colour; multiplies the intensity.
+        /// Colour. It multiplies the intensity.
         color: Color = [1.0, 1.0, 1.0], in LIGHT;
         /// Radiance or power of a sphere, rectangle or disk, by `unit`. Factor of the radiance of an
         /// environment. Radiant intensity [W/sr] of
@@ -114,7 +114,7 @@ choices! {
 pub const KINDS: &[&str] =
     &["point", "directional", "spot", "sphere", "rectangle", "disk", "environment"];
 
-/// Keys of `[[light]]`.
+/// Keys of a `[[light]]` table in scene files.
 pub const FIELDS: &[Field] = Light::FIELDS;
 
 impl Light {
@@ -132,7 +132,7 @@ impl Light {
         directional.or(self.spot.map(|spot| spot.direction)).or(flat)
     }
 
-    /// [`Light::direction`], to be changed.
+    /// [`Light::direction`] as a mutable reference.
     pub fn direction_mut(&mut self) -> Option<&mut [f64; 3]> {
         let directional = self.directional.as_mut().map(|sun| &mut sun.direction);
         let rectangle = self.rectangle.as_mut().map(|rectangle| &mut rectangle.normal);
@@ -140,7 +140,7 @@ impl Light {
         directional.or(self.spot.as_mut().map(|spot| &mut spot.direction)).or(flat)
     }
 
-    /// Returns the validation errors of the light.
+    /// Returns the errors of the light's keys and values.
     pub fn faults(&self) -> Vec<ValidationError> {
         let kinds = self.kinds();
         let kind_fault = match &kinds[..] {
@@ -195,7 +195,7 @@ impl Light {
         self.validator().and(kind_fault).and(other_fault).and(file_fault).errors()
     }
 
-    /// Names of the kinds that are given. A valid light has exactly one.
+    /// Names of the kinds (such as `point`) that the light has. A valid light has exactly one.
     pub fn kinds(&self) -> Vec<&'static str> {
         let given = [
             ("point", self.point.is_some()),
@@ -209,22 +209,23 @@ impl Light {
         given.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
     }
 
-    /// Surface of a light with a size. `None` for a point or directional light.
+    /// Surface of a light with a size; `None` for any other light.
     pub fn surface(&self) -> Option<EmitterSurface> {
         let sphere = self.sphere.map(EmitterSurface::Sphere);
         let rectangle = self.rectangle.map(EmitterSurface::Rectangle);
         sphere.or(rectangle).or(self.disk.map(EmitterSurface::Disk))
     }
 
-    /// Removes the kind of the light.
+    /// Removes the kind of the light, so that another one can be added.
     pub fn clear_kind(&mut self) {
         (self.point, self.directional, self.spot) = (None, None, None);
         (self.sphere, self.rectangle, self.disk) = (None, None, None);
         self.environment = None;
     }
 
-    /// Adds a surface of the kind `name` with the given radius; of a rectangle it is half of each
-    /// side. The numbers are rounded. Other names are ignored.
+    /// Adds a surface of the kind `name` (`sphere`, `rectangle` or `disk`) with the given radius.
+    /// The sides of a rectangle are twice as long. The numbers are rounded. Other names change
+    /// nothing.
     pub fn set_surface(&mut self, name: &str, center: DVec3, normal: [f64; 3], radius: f64) {
         let center = center.map(|x| round_nice(x, radius)).to_array();
         let radius = round_significant(radius, 2);
@@ -239,13 +240,13 @@ impl Light {
         }
     }
 
-    /// Position of the light: the point, or the centre of the surface. `None` for a directional
-    /// light.
+    /// Position of the light: the point, or the centre of the surface. `None` for a directional or
+    /// environment light.
     pub fn position(&self) -> Option<[f64; 3]> {
         self.apex().or(self.surface().map(|surface| surface.center().to_array()))
     }
 
-    /// Position of the light, for edits. `None` for a directional light.
+    /// Position of the light as a mutable reference. `None` for a directional or environment light.
     pub fn position_mut(&mut self) -> Option<&mut [f64; 3]> {
         let Self { point, spot, sphere, rectangle, disk, .. } = self;
         let point = point.as_mut().map(|point| &mut point.position);

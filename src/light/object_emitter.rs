@@ -1,8 +1,8 @@
-//! Emission of objects: points of their surfaces sampled by solid angle or area, and densities. Rays
-//! find the emission where they hit the object itself.
+//! Emission of objects: sampling of points on their surfaces by solid angle or area, and the
+//! densities. Rays find the emission where they hit the object itself.
 //!
-//! A sampled point is lifted off the surface to the side of the receiver, so that the object does not
-//! occlude its own points. The lift is along the normal: at any angle the point is above the
+//! A sampled point is lifted off the surface, along the normal and to the side of the receiver, so
+//! that the object does not occlude its own points. At any angle the lifted point is above the
 //! rounding errors of the surface.
 
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3};
@@ -14,10 +14,11 @@ use crate::sampling::warp;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Largest number of triangles whose solid angles are computed for each point.
+/// Largest number of triangles of which one is chosen by solid angle. The solid angles of all of
+/// them are computed for each receiver.
 const MAX_FACES: usize = 32;
 
-/// Surface of an object, from which light can be sampled.
+/// Surface of an object from which light can be sampled.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ObjectSurface {
     /// Sphere.
@@ -36,13 +37,13 @@ pub enum ObjectSurface {
         /// Width and height.
         size: [f64; 2],
     },
-    /// Triangles, with counter-clockwise corners seen from the front. Each has an area.
+    /// Triangles with an area greater than 0, counter-clockwise as seen from the front.
     Triangles(Vec<[DVec3; 3]>),
-    /// Triangles that enclose a convex solid, with counter-clockwise corners seen from outside.
+    /// Triangles that enclose a convex solid, counter-clockwise as seen from outside.
     ConvexTriangles(Vec<[DVec3; 3]>),
 }
 
-/// Emission of an object, white and of unit radiance.
+/// Emission of an object, white and with radiance 1.
 #[derive(Clone, Debug)]
 pub struct ObjectEmitter<S> {
     surface: CompiledSurface<S>,
@@ -52,7 +53,8 @@ pub struct ObjectEmitter<S> {
     radius: f64,
     /// Height of sampled points above the surface.
     lift: S,
-    /// `true` if the back emits too: of a flat surface the other side, of a solid the inside.
+    /// `true` if the back emits light, too: the other side of a flat surface, the inside of a
+    /// solid.
     two_sided: bool,
 }
 
@@ -73,7 +75,7 @@ enum CompiledSurface<S> {
         /// `true` if the triangles enclose a convex solid.
         convex: bool,
     },
-    /// More triangles, chosen by their areas, in the order of their `end`.
+    /// More than [`MAX_FACES`] triangles, chosen by their areas, in the order of their `end`.
     Mesh(Vec<Triangle<S>>),
 }
 
@@ -85,7 +87,8 @@ struct Triangle<S> {
     /// Unit normal of the front.
     normal: [S; 3],
     area: S,
-    /// Range of the random numbers that choose the triangle; its length is the share of the area.
+    /// Random numbers from `start` to `end` choose this triangle; the length of the range is its
+    /// share of the area.
     start: S,
     end: S,
 }
@@ -166,10 +169,11 @@ impl<S: Float> ObjectEmitter<S> {
         self.radius
     }
 
-    /// Samples a point for each of the surface points `origin`. `u` and `v` are uniform in [0, 1).
-    /// A sphere is sampled by the cone that it subtends, a rectangle by solid angle. Of a few
-    /// triangles one is chosen by its solid angle, of many by its area; it is then sampled by solid
-    /// angle, unless this is tiny.
+    /// Samples a point for each of the receivers at `origin`. `u` and `v` are uniform in [0, 1).
+    ///
+    /// A sphere is sampled by the cone that it subtends, a rectangle by solid angle. Of up to
+    /// 32 triangles one is chosen by its solid angle, of more by its area. The chosen
+    /// triangle is sampled by solid angle, or by area if it is tiny.
     #[inline(never)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
@@ -241,9 +245,9 @@ impl<S: Float> ObjectEmitter<S> {
         EmitterSample { wi, distance, density, irradiance }
     }
 
-    /// Returns the density \[1/sr\] that [`ObjectEmitter::sample`] gives to the direction in which the
-    /// ray from `origin` hits the object at `distance`. `triangle` is the index of the triangle of a
-    /// mesh, stored as an id.
+    /// Returns the density \[1/sr\] with which [`ObjectEmitter::sample`] draws the direction of a
+    /// ray from `origin` that hits the object at `distance`. `triangle` is the index of the
+    /// triangle of a mesh, stored as an id.
     #[inline(never)]
     pub fn density<L: SimdFloat<Scalar = S>>(
         &self,
@@ -275,8 +279,8 @@ impl<S: Float> ObjectEmitter<S> {
         }
     }
 
-    /// Returns the solid angle of each triangle as the points see it, their sum, and the lanes that see
-    /// backs. From outside of a convex solid only fronts are seen.
+    /// Returns the solid angle of each triangle as seen from the receivers at `origin`, their sum,
+    /// and the lanes that see backs. From outside of a convex solid only fronts count.
     #[inline(always)]
     fn solid_angles<L: SimdFloat<Scalar = S>>(
         &self,
@@ -302,8 +306,8 @@ impl<S: Float> ObjectEmitter<S> {
         (angles, total, backs)
     }
 
-    /// Samples a point of each triangle: its direction, distance and density. `backs` selects the lanes
-    /// that see backs.
+    /// Samples a point of each lane's triangle. Returns its direction, distance and density
+    /// \[1/sr\]. `backs` selects the lanes in which the back emits light.
     #[inline(always)]
     fn sample_triangle<L: SimdFloat<Scalar = S>>(
         &self,
@@ -326,9 +330,9 @@ impl<S: Float> ObjectEmitter<S> {
         (wi, distance, triangle.density(&seen, height, distance))
     }
 
-    /// Returns the triangle as the points see it, its corners relative to the points, and the
-    /// height of its plane. The triangle is lifted to the side of the points. The height is not
-    /// negative where no light arrives.
+    /// Lifts each lane's triangle to the side of its receiver. Returns the triangle as a solid
+    /// angle, its corners relative to the receiver, and the coordinate of its plane along the
+    /// normal; this is negative where light arrives.
     #[inline(always)]
     fn seen_triangle<L: SimdFloat<Scalar = S>>(
         &self,
@@ -343,17 +347,17 @@ impl<S: Float> ObjectEmitter<S> {
         (SphericalTriangle::new(corners, height, triangle.area), corners, height)
     }
 
-    /// Returns the density of directions to a sphere in the cone that it subtends; zero inside of a
-    /// sphere that emits outwards only.
+    /// Returns the density \[1/sr\] of directions to a sphere in the cone that it subtends. It is
+    /// zero inside of a sphere that emits outwards only.
     #[inline(always)]
     fn cone_density<L: SimdFloat<Scalar = S>>(&self, cone: &Cone<L>) -> L {
         let density = cone.density();
         if self.two_sided { density } else { density.masked(!cone.inside) }
     }
 
-    /// Returns the local coordinates of a point of a flat surface as seen from its lifted front, whose
-    /// height is negative; and the lanes that see its back, which are among `backs`. The height is not
-    /// negative where no light arrives.
+    /// Lifts a point of a flat surface to the side of the receiver. Returns the point's local
+    /// coordinates relative to the receiver, and the lanes that see the back. The third coordinate
+    /// is negative where light arrives. Only lanes in `backs` may see the back.
     #[inline(always)]
     fn lifted<L: SimdFloat<Scalar = S>>(
         &self,
@@ -366,7 +370,7 @@ impl<S: Float> ObjectEmitter<S> {
     }
 }
 
-/// Returns the value of `f` for each lane.
+/// Returns an array with the value of `f` for each lane.
 #[inline(always)]
 fn lanes_of<L: SimdFloat>(f: impl Fn(usize) -> usize) -> [usize; MAX_WIDTH] {
     let mut out = [0; MAX_WIDTH];
@@ -376,9 +380,9 @@ fn lanes_of<L: SimdFloat>(f: impl Fn(usize) -> usize) -> [usize; MAX_WIDTH] {
     out
 }
 
-/// One triangle per lane.
+/// One triangle per lane, with the receiver at the origin.
 struct PacketTriangle<L> {
-    /// Corners relative to the points from which they are seen.
+    /// Corners relative to the receiver.
     corners: [Vec3<L>; 3],
     /// Unit normal of the front.
     normal: Vec3<L>,
@@ -390,7 +394,7 @@ struct PacketTriangle<L> {
 }
 
 impl<L: SimdFloat> PacketTriangle<L> {
-    /// The same triangle in all lanes.
+    /// Returns the same triangle in all lanes.
     #[inline(always)]
     fn splat(triangle: &Triangle<L::Scalar>, origin: Vec3<L>) -> Self {
         let corner = Vec3::splat(triangle.corner) - origin;
@@ -426,8 +430,9 @@ impl<L: SimdFloat> PacketTriangle<L> {
         }
     }
 
-    /// Returns the density \[1/sr\] of the direction in which the triangle is at `distance`: that of
-    /// the choice of the triangle times that of the point. `height` is that of its plane.
+    /// Returns the density \[1/sr\] of a direction in which the triangle is hit at `distance`: the
+    /// probability of the triangle times the density of its points. `height` is the coordinate of
+    /// the triangle's plane along its normal.
     #[inline(always)]
     fn density(&self, seen: &SphericalTriangle<L>, height: L, distance: L) -> L {
         let by_area = density_of_area(self.area / self.share, distance, height);
@@ -442,15 +447,17 @@ impl<L: SimdFloat> PacketTriangle<L> {
 struct SphericalTriangle<L: SimdFloat> {
     /// Unit vectors to the corners.
     corners: [Vec3<L>; 3],
-    /// Volume of the parallelepiped of the unit vectors.
+    /// Volume of the parallelepiped that the three unit vectors span.
     volume: L,
     solid_angle: L,
-    /// Lanes in which the solid angle is large enough for the parametrization.
+    /// Lanes in which the triangle is sampled by solid angle; in the others it is too small and is
+    /// sampled by area.
     by_angle: L::Mask,
 }
 
 impl<L: SimdFloat> SphericalTriangle<L> {
-    /// Creates the triangle with corners relative to the point, in a plane of the given height.
+    /// Creates the triangle. `corners` are relative to the receiver, and `height` is the coordinate
+    /// of the triangle's plane along its normal.
     #[inline(always)]
     fn new(corners: [Vec3<L>; 3], height: L, area: L) -> Self {
         let inverse = corners.map(|corner| L::one() / corner.length_squared().sqrt());
@@ -465,7 +472,7 @@ impl<L: SimdFloat> SphericalTriangle<L> {
         Self { corners: [a, b, c], volume, solid_angle, by_angle }
     }
 
-    /// Samples a direction, uniform over the solid angle.
+    /// Samples a unit vector, uniformly over the solid angle.
     #[inline(always)]
     fn sample(&self, u: L, v: L) -> Vec3<L> {
         let [a, b, c] = self.corners;
@@ -501,7 +508,8 @@ mod tests {
 
     const LIFT: f64 = 1e-10;
 
-    /// Surfaces of every kind, with points in front, behind, beside and inside.
+    /// Surfaces of every kind. The points of [`points`] are in front, behind, beside and inside of
+    /// them.
     fn surfaces() -> Vec<ObjectSurface> {
         let tetrahedron = [
             DVec3::new(0.0, 0.0, 0.0),
@@ -520,7 +528,7 @@ mod tests {
         ]
     }
 
-    /// More triangles than [`MAX_FACES`]: a bent sheet.
+    /// A bent sheet of more than [`MAX_FACES`] triangles.
     fn grid() -> Vec<[DVec3; 3]> {
         let corner = |i: usize, j: usize| {
             let (x, y) = (0.2 * i as f64 - 0.5, 0.3 * j as f64 - 0.6);
@@ -578,8 +586,8 @@ mod tests {
         }
     }
 
-    /// The mean of 1 / density is the solid angle of all triangles together, front and back. From
-    /// outside of a convex solid that of its fronts, which is half of it.
+    /// Checks the mean of 1 / density: it is the sum of the solid angles of all triangles, front
+    /// and back. For a convex solid seen from outside it is half of this sum, that of the fronts.
     #[test]
     fn samples_of_triangles_cover_their_solid_angle() {
         for surface in surfaces() {

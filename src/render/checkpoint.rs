@@ -1,9 +1,9 @@
-//! Checkpoints: a render as a film file, with which a later process continues it, bit for bit.
+//! Checkpoints: film files from which a later process continues a render, bit for bit.
 //!
-//! A checkpoint has three chunks in addition to those of a film file. `SCEN` has the scene for which
-//! the samples were traced, and the other inputs of samples. `SCHD` has the state of the schedule.
-//! `TIME` has the seconds of rendering so far (f64); they are no part of `SCHD`, because equal
-//! renders take different times.
+//! A checkpoint has three chunks in addition to those of a film file. `SCEN` has the scene for
+//! which the samples were traced, and the other inputs of samples. `SCHD` has the state of the
+//! schedule. `TIME` has the seconds of rendering so far (f64). The seconds are no part of `SCHD`,
+//! because equal renders take different times.
 
 use crate::disk::WriteError;
 use crate::film::file::{
@@ -27,13 +27,13 @@ const SCHEDULE: Tag = *b"SCHD";
 /// Tag of the chunk with the seconds of rendering.
 pub(super) const CLOCK: Tag = *b"TIME";
 
-/// Version of the program. Samples of other versions may differ.
+/// Version of this program. Other versions may trace different samples.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
 /// Inputs of a film's samples, apart from size, seed and precision, which the film's header has.
 ///
-/// As bytes: hash of the contents of meshes and images (u64, 0 for none), length (u32) and text of
-/// the program's version, of the sampler's name and of the scene.
+/// Encoding: hash of the contents of meshes and images (u64, 0 for none), then three texts, each
+/// after its length (u32): the program's version, the sampler's name, the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampleInputs {
     /// Hash of the contents of meshes and images, see [`Scene::contents_hash`].
@@ -42,12 +42,12 @@ pub struct SampleInputs {
     pub program: String,
     /// Name of the sampler.
     pub sampler: String,
-    /// Scene file with the scene that was compiled.
+    /// Text of a scene file with the scene that was compiled.
     pub scene: String,
 }
 
 impl SampleInputs {
-    /// Inputs of the samples that this program traces of `scene`.
+    /// Creates the inputs of samples of `scene` that this version of the program traces.
     pub fn new(scene: &Scene, sampler: SamplerKind) -> Self {
         Self {
             contents_hash: scene.contents_hash(),
@@ -57,7 +57,7 @@ impl SampleInputs {
         }
     }
 
-    /// Tag and contents of the chunk.
+    /// Encodes the inputs as a chunk: its tag and its contents.
     pub fn encode(&self) -> (Tag, Vec<u8>) {
         let mut out = self.contents_hash.unwrap_or(0).to_le_bytes().to_vec();
         for text in [&self.program, &self.sampler, &self.scene] {
@@ -67,7 +67,7 @@ impl SampleInputs {
         (SCENE, out)
     }
 
-    /// Returns `true` if the samples are valid for `scene`, possibly with other light weights.
+    /// Returns `true` if the samples are valid for `scene`. Its light weights may differ.
     pub fn fit(&self, scene: &Scene) -> bool {
         let resolver = scene.resolver.clone();
         let Ok(compiled) = Scene::parse_in(&self.scene, "checkpoint", resolver) else {
@@ -79,7 +79,8 @@ impl SampleInputs {
                 .can_reuse(&compiled, scene)
     }
 
-    /// Returns the inputs in a film file. Returns `None` if there are none or they are not valid.
+    /// Reads the inputs from the header of a film file. Returns `None` if the header has no inputs,
+    /// or damaged ones.
     pub fn of(header: &FilmFileHeader) -> Option<Self> {
         let mut fields = Fields::new(header.chunks.get(&SCENE)?);
         let hash = fields.u64()?;
@@ -89,11 +90,12 @@ impl SampleInputs {
     }
 }
 
-/// Checkpoint as bytes, to be written by another thread.
+/// Checkpoint encoded as bytes, so that another thread can write it.
 pub struct EncodedCheckpoint(Vec<Vec<u8>>);
 
 impl EncodedCheckpoint {
-    /// Encodes a render on the threads of `pool`. `report` is the latest report on it.
+    /// Encodes the state of a render, on the threads of `pool`. `report` is the latest report on
+    /// this render.
     pub(super) fn new(
         state: &RenderState,
         schedule: &Schedule,
@@ -133,7 +135,7 @@ impl EncodedCheckpoint {
         write_film_file(path, &self.0)
     }
 
-    /// Writes the checkpoint to a new file.
+    /// Writes the checkpoint to a new file, and replaces none.
     ///
     /// # Errors
     /// Fails if the file exists or cannot be written.
@@ -198,7 +200,7 @@ impl Checkpoint {
         Ok(Self { path: path.to_path_buf(), header, inputs, film })
     }
 
-    /// Everything in the file but the film.
+    /// Header of the checkpoint's film file: everything in the file except for the film.
     pub fn header(&self) -> &FilmFileHeader {
         &self.header
     }
@@ -226,7 +228,7 @@ impl Checkpoint {
         &self.header.weights
     }
 
-    /// Compiles the scene of the checkpoint and shows `scene` with its samples.
+    /// Compiles the scene of the checkpoint, and shows its samples as a picture of `scene`.
     ///
     /// # Errors
     /// Fails if the samples of the checkpoint are not those of `scene` and `options`.
@@ -278,7 +280,7 @@ impl Checkpoint {
         })
     }
 
-    /// Compares size, seed, sampler and program with those of a render of `scene`.
+    /// Compares size, seed, sampler and program version with those of a render of `scene`.
     fn check_options(&self, scene: &Scene, options: &Options) -> Result<(), ReadError> {
         let film = &self.header.film;
         let [width, height] = scene.film.size.map(|n| n as usize);

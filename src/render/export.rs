@@ -1,5 +1,5 @@
-//! Export of pictures with metadata about their origin. Equal pictures have equal metadata, which
-//! therefore holds no dates, times or numbers of threads.
+//! Export of pictures with metadata about their origin. The metadata hold no dates, durations or
+//! numbers of threads, so that equal pictures have equal metadata.
 
 use crate::disk::WriteError;
 use crate::film::{Depth, Display, ImageData, ImageOutput, Tone, WholeFilm};
@@ -9,14 +9,14 @@ use crate::sampling::SamplerKind;
 use crate::scene::Scene;
 use crate::value::Fnv1a64;
 
-/// Origin of a picture: the metadata that its render state does not contain.
+/// Origin of a picture: the metadata that cannot be taken from its [`RenderState`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Provenance {
     /// Path of the scene file, as the user has given it.
     pub source: String,
     /// Hash of the scene file's text, see [`scene_hash`].
     pub scene_hash: String,
-    /// Sample sequence.
+    /// Kind of the sample sequence.
     pub sampler: SamplerKind,
     /// `true` if the picture was rendered with adaptive sampling.
     pub adaptive: bool,
@@ -43,8 +43,8 @@ impl RenderState {
     }
 }
 
-/// Hash that identifies the scene of a picture: of the scene file's text, followed by the hash of
-/// the contents of its meshes and images, if there are any.
+/// Returns the hash that identifies the scene of a picture: the hash of the scene file's text,
+/// followed by that of the contents of its meshes and images, if there are any.
 pub fn scene_hash(text: &str, scene: &Scene) -> String {
     let mut hash = Fnv1a64::default();
     hash.update(text.as_bytes());
@@ -54,7 +54,7 @@ pub fn scene_hash(text: &str, scene: &Scene) -> String {
     format!("fnv1a64:{:016x}", hash.value())
 }
 
-/// Metadata keys and values.
+/// Returns the metadata as pairs of key and value.
 pub fn metadata(
     rendering: &RenderState,
     report: &Report,
@@ -102,12 +102,13 @@ fn display_text(display: &Display) -> String {
     format!("{DISPLAY}{} EV, tone {tone}", display.exposure_ev)
 }
 
-/// Key of the metadata entry with sampler, precision, sample allocation and display transform.
+/// Key of the metadata entry that holds sampler, precision, sample allocation and display
+/// transform.
 const SETTINGS: &str = "Settings";
-/// Beginning of the display transform in the entry [`SETTINGS`].
+/// Text before the display transform in the entry [`SETTINGS`].
 const DISPLAY: &str = ", exposure ";
 
-/// Metadata that depend on the film alone.
+/// Returns the metadata that depend on the film alone.
 fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     let spp = &report.spp;
     let noise = match report.noise {
@@ -126,14 +127,14 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     ]
 }
 
-/// Replaces the metadata that depend on the film by those of `report`.
+/// Replaces the entries of [`film_entries`] in `metadata` by those of `report`.
 pub fn update_metadata(metadata: &mut [(String, String)], report: &Report) {
     for (key, value) in film_entries(report) {
         metadata.iter_mut().filter(|(k, _)| k == key).for_each(|(_, v)| v.clone_from(&value));
     }
 }
 
-/// Replaces the display transform in the metadata.
+/// Replaces the display transform in `metadata`.
 pub fn update_display(metadata: &mut [(String, String)], display: &Display) {
     for (_, settings) in metadata.iter_mut().filter(|(key, _)| key == SETTINGS) {
         if let Some(end) = settings.find(DISPLAY) {

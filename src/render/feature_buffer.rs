@@ -19,9 +19,10 @@ pub struct FeatureBuffer {
 }
 
 impl FeatureBuffer {
-    /// Traces a raster of `columns` x `rows` cells over a film of `width` x `height` pixels.
-    /// `first_hits` traces camera rays through points of the film, given in pixels, and writes
-    /// their first hits (see [`AnyWorld::first_hit`](crate::world::AnyWorld::first_hit)).
+    /// Traces one ray through the centre of each cell of a raster of `columns` x `rows` cells over
+    /// a film of `width` x `height` pixels. `first_hits` gets points of the film in pixels, and
+    /// writes the first hits of their camera rays (see
+    /// [`AnyWorld::first_hit`](crate::world::AnyWorld::first_hit)).
     pub fn new(
         [width, height]: [usize; 2],
         [columns, rows]: [usize; 2],

@@ -23,11 +23,12 @@ pub fn run(
     dispatch!(world, world => trace_first_pass(world, film, wave, context, on_stage))
 }
 
-/// Number of adjacent tiles that share packets while each tile adds only few pixels.
+/// Number of adjacent tiles that share packets as long as a stage adds only few pixels to each
+/// tile.
 const STRIP_TILES: usize = 8;
 
-/// Lattice step above which tiles share packets \[pixels\]. With smaller steps the pixels of one
-/// tile fill packets.
+/// Lattice step \[pixels\] above which adjacent tiles share packets. At smaller steps the pixels of
+/// one tile fill packets.
 const SHARED_ABOVE: usize = 2;
 
 fn trace_first_pass<L: SimdFloat>(
@@ -82,9 +83,9 @@ struct StripPixel {
     position: (u32, u32),
 }
 
-/// Returns the pixels that a stage adds to `tiles`, which are given with their origins: the pixels
-/// of the lattice with step `step` that are not in the lattice with step `previous_step` (0: no
-/// earlier lattice).
+/// Returns the pixels that a stage adds to `tiles`, each given with its origin: the pixels of the
+/// lattice with step `step` that are not in the lattice with step `previous_step` (0: no earlier
+/// lattice).
 fn pixels_to_add(
     tiles: &[([usize; 2], &mut Tile)],
     (previous_step, step): (usize, usize),
@@ -126,8 +127,8 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
         tiles.into_iter().for_each(|(_, tile)| tile.set_lattice(step));
     }
 
-    /// Traces the first sample of `pixels`, for which `tracer` was created, and adds it to their
-    /// tiles.
+    /// Traces the first sample of each of `pixels` with `tracer`, which was created for them, and
+    /// adds it to the pixel's tile.
     fn add_pixels(
         &self,
         tiles: &mut [([usize; 2], &mut Tile)],

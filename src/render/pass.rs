@@ -24,7 +24,7 @@ pub struct PassContext<'a> {
     pub cancel: &'a AtomicBool,
 }
 
-/// Traces the jobs of `wave` into `film`. The report of a cancelled job is `None`.
+/// Traces the jobs of `wave` into `film`. The entry of a cancelled job in the report is `None`.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
@@ -72,7 +72,7 @@ pub(super) struct TileRenderer<'a, L: SimdFloat> {
     pub(super) tracer: CameraTracer<'a, L>,
     /// Scale of each light group: the number of integer steps per unit of radiance.
     scales: &'a [f64],
-    /// Largest radiance of a sample that the film can hold, for each light group: 2^49 steps.
+    /// Largest radiance of one sample that the film can hold, 2^49 steps, for each light group.
     limits: [L; MAX_GROUPS],
     /// Pixels of a tile that is entirely inside the picture, see [`pixels_of`].
     whole_tile: Vec<u8>,
@@ -161,7 +161,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         });
     }
 
-    /// Calls `add(group, sums)` for each light group with the sum over all lanes.
+    /// Adds each light group's radiance over all lanes, in steps of the film, and calls `add(group,
+    /// sums)` with the result.
     #[inline(always)]
     fn sum(&self, radiance: &Radiance<L>, mut add: impl FnMut(usize, [i64; 3])) {
         for (group, scale) in self.scales.iter().enumerate() {
@@ -170,8 +171,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Calls `add(pixel, group, sums)` for each pixel and light group with the sum over the pixel's
-    /// `COUNT` lanes.
+    /// Adds each light group's radiance over the `COUNT` lanes of each pixel, in steps of the film,
+    /// and calls `add(pixel, group, sums)` with the result.
     #[inline(always)]
     pub(super) fn sum_by_pixel<const COUNT: usize, P>(
         &self,
@@ -189,8 +190,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Replaces samples that the film cannot hold, and records them. `sample_of` returns the pixel
-    /// and the sample index of a lane.
+    /// Replaces samples that the film cannot hold, and records them in `rejected`. `sample_of`
+    /// returns the pixel and the sample index of a lane.
     #[inline(always)]
     pub(super) fn reject_invalid(
         &self,
@@ -212,9 +213,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Makes samples valid. A sample that is NaN or negative in some channel of a light group
-    /// becomes black in that group. A sample above the film's limit, also an infinite one, is
-    /// reduced to the limit.
+    /// Makes samples valid. A sample that is NaN or negative in a channel of a light group becomes
+    /// black in that group. A sample above the film's limit, also an infinite one, is reduced to
+    /// the limit.
     #[cold]
     fn replace_invalid(
         &self,
@@ -254,15 +255,15 @@ impl RejectedSamples {
     }
 }
 
-/// Returns the number of samples of a pixel that the next packet holds, out of `first..end`: a
-/// power of two that divides `first`, at most `width`.
+/// Returns the number of samples of a pixel that the next packet holds, out of the sample indices
+/// `first..end`: a power of two that divides `first`, at most `width`.
 fn samples_per_packet(first: u32, end: u32, width: usize) -> usize {
     let aligned = first | width as u32;
     1 << aligned.trailing_zeros().min((end - first).ilog2())
 }
 
-/// Pixels of a tile in Morton order. Pixels are numbered row by row. In Morton order the pixels
-/// that share a packet form a block of 2 x 1, 2 x 2, 4 x 2 or 4 x 4.
+/// Pixels of a tile in Morton order, numbered row by row. Pixels that share a packet form a block
+/// of 2 x 1, 2 x 2, 4 x 2 or 4 x 4.
 const MORTON_ORDER: [u8; TILE_PIXELS] = {
     let mut order = [0; TILE_PIXELS];
     let mut i = 0;
@@ -292,8 +293,8 @@ mod tests {
     use crate::lanes::{Float, Single, Vec3};
     use crate::sampling::SamplerKind;
 
-    /// Invalid samples are counted and add nothing to the sums. Samples above the film's limit add
-    /// the limit. The sums of other light groups are not affected.
+    /// Checks that invalid samples are counted and stored as black, and that samples above the
+    /// film's limit are stored with the limit. The sums of other light groups are not affected.
     #[test]
     fn extreme_30_a_bad_sample_is_counted_and_leaves_the_pixel_finite() {
         let scene = crate::scene::Scene::parse(

@@ -1,8 +1,10 @@
-//! Render of a picture that does not fit into memory, in regions: bands of rows, from top to bottom.
+//! Render of a picture that does not fit into memory, in regions: bands of rows, from top to
+//! bottom.
 //!
-//! A region has its own film and its own schedule. The film uses the memory of the region before. A
-//! sample is a function of seed, pixel, replicate and index, so that a uniform render has the
-//! samples of a render as a whole, bit for bit. An adaptive render decides in each region for itself.
+//! Each region has its own film and its own schedule. Its film uses the memory of the previous
+//! region's film. A sample is a function of seed, pixel, replicate and index; a uniform render in
+//! regions therefore equals a render of the whole picture, bit for bit. An adaptive render
+//! allocates samples within each region.
 
 use crate::disk::WriteError;
 use crate::film::{Bands, Depth, Display, Film, ImageData, ImageOutput, Noise, TileNoise};
@@ -17,42 +19,44 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// Target duration of a piece of a wave in seconds. The observer is called between two pieces.
+/// Target duration of a piece of a wave, in seconds. The observer is called between two pieces.
 const PIECE_SECONDS: f64 = 0.25;
-/// Number of pixel samples of the first piece, which measures the speed.
+/// Number of samples, over all pixels, of the first piece. It measures the speed of tracing.
 const FIRST_PIECE_SAMPLES: u64 = 1 << 18;
-/// Largest number of samples per pixel of a job. Short jobs occupy all threads until the end of a
-/// piece.
+/// Largest number of samples per pixel of a job. Jobs are short so that all threads have work until
+/// the end of a piece.
 const LONGEST_JOB: u32 = 16 * SAMPLE_ALIGNMENT;
 
-/// Function that is called with a report between two pieces of work and before each row is written.
-/// An error ends the render.
+/// Callback that gets a report between two pieces of work and before each row is written. An error
+/// that it returns ends the render.
 pub type Observer<'a> = &'a mut dyn FnMut(&Report) -> io::Result<()>;
 
 /// Render of a picture in regions.
 pub struct RegionRender<'a> {
-    /// Compiled scene, with the film of the current region. `None` only while it is replaced.
+    /// Compiled scene, with the film of the current region. `None` only while the film is
+    /// exchanged.
     state: Option<RenderState>,
     settings: Settings,
     pool: rayon::ThreadPool,
     provenance: Provenance,
     display: Display,
-    /// Number of rows of each region but the last.
+    /// Number of rows of each region except the last, which may have fewer.
     rows: u32,
     /// Number of rows of the finished regions.
     finished_rows: u32,
-    /// Error of each tile of the finished regions, in row order.
+    /// Estimated error of each tile of the finished regions, in row order.
     estimates: Vec<Option<TileNoise>>,
-    /// Sums over the finished regions.
+    /// Report on all finished regions together.
     report: Report,
     stopped_by: StoppedBy,
     observer: Observer<'a>,
 }
 
 impl<'a> RegionRender<'a> {
-    /// Compiles `scene`, which has no faults, for regions of `rows` rows and for `threads` threads.
-    /// `rows` is a multiple of [`TILE`](crate::film::TILE). Each region is rendered to the stop
-    /// criteria of `settings`; a time limit is divided among the regions.
+    /// Compiles `scene`, which has no validation errors, for regions of `rows` rows and for
+    /// `threads` threads. `rows` is a multiple of [`TILE`](crate::film::TILE). Each region is
+    /// rendered until the stop criteria of `settings` are reached; a time limit is divided among
+    /// the regions.
     ///
     /// # Errors
     /// Returns that a thread cannot be started, or that there is not enough memory for a region.
@@ -93,7 +97,7 @@ impl<'a> RegionRender<'a> {
     }
 
     /// Renders the picture and writes its rows as they finish. Returns the report on the whole
-    /// picture and the reason for its end.
+    /// picture and the stop criterion that ended it.
     ///
     /// # Errors
     /// Fails if the file cannot be written or the observer returns an error; an existing file is
@@ -176,8 +180,8 @@ impl<'a> RegionRender<'a> {
     }
 }
 
-/// Returns the report on a picture of `height` rows whose rows before `rows` are `finished`, and
-/// whose rows `rows` are rendered by `schedule` for `seconds` so far.
+/// Returns the report on a picture of `height` rows. `finished` is the report on the rows before
+/// `rows`. `schedule` has rendered the rows `rows` for `seconds` seconds.
 fn progress(
     finished: &Report,
     schedule: &Schedule,

@@ -26,17 +26,16 @@ impl Relighting {
     }
 
     /// Returns the light weights with which the film shows `scene`. Returns `None` if `scene` needs
-    /// samples of its own. That is the case if it differs from the compiled scene in more than the
-    /// colours, intensities and on/off switches of lights, ambient light and background that have
-    /// light groups of their own.
+    /// samples of its own: it differs from the compiled scene in more than the colours, intensities
+    /// and on/off switches of sources that have light groups of their own.
     pub fn mix(&self, scene: &Scene) -> Option<LightWeights> {
         let can_reuse =
             std::ptr::eq(scene, &*self.compiled) || self.groups.can_reuse(&self.compiled, scene);
         can_reuse.then(|| LightWeights { weights: self.groups.mix(scene) })
     }
 
-    /// Returns the name of each light group, for layers of image files. `scene` is a scene that the
-    /// film can show.
+    /// Returns the name of each light group, for layers of image files. `scene` is the scene that
+    /// the picture shows.
     pub fn names(&self, scene: &Scene) -> Vec<String> {
         self.groups.names(scene)
     }

@@ -16,7 +16,7 @@ use std::sync::atomic::AtomicBool;
 /// Settings of scene compilation, sampling and noise estimation.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Compilation of the scene into a world.
+    /// Options of the compilation of the scene.
     pub world: world::Options,
     /// Seed and kind of the sampler.
     pub sampling: SampleSettings,
@@ -40,8 +40,8 @@ pub struct RenderState {
 }
 
 impl RenderState {
-    /// Compiles `scene`, which has no faults, and creates an empty film. The film reuses the memory
-    /// of the film of `previous`.
+    /// Compiles `scene`, which has no validation errors, and creates an empty film. The new film
+    /// uses the memory of the film of `previous`.
     ///
     /// # Panics
     /// Panics if there is not enough memory for the film.
@@ -65,8 +65,8 @@ impl RenderState {
         }
     }
 
-    /// Compiles `scene`, which has no faults, with a film of the rows `rows` of the picture. The
-    /// first row is a multiple of [`TILE`].
+    /// Compiles `scene`, which has no validation errors, and creates a film for the rows `rows` of
+    /// the picture. The first row is a multiple of [`TILE`].
     ///
     /// # Errors
     /// Returns that there is not enough memory for the film.
@@ -78,7 +78,8 @@ impl RenderState {
         Self::compile_rows(Arc::clone(scene), options, None, rows)
     }
 
-    /// Replaces the film by an empty one of the rows `rows`, which uses its memory.
+    /// Replaces the film by an empty film for the rows `rows`, which uses the memory of the old
+    /// one.
     ///
     /// # Errors
     /// Returns that there is not enough memory for the film. The state has no film then.
@@ -145,8 +146,8 @@ impl RenderState {
         })
     }
 
-    /// Shows `scene` from now on and returns `true` if the samples at hand are valid for it.
-    /// Otherwise returns `false` and changes nothing.
+    /// Makes `scene` the scene that the picture shows, if the samples of the film are valid for it,
+    /// and returns `true`. Otherwise changes nothing and returns `false`.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let Some(mix) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
             return false;
@@ -168,7 +169,7 @@ impl RenderState {
         self.lighting.names(&self.scene)
     }
 
-    /// Relighting of this film, which determines the scenes that its samples can show.
+    /// Relighting of this film. It determines the scenes that the film's samples can show.
     pub fn lighting(&self) -> &Arc<Relighting> {
         &self.lighting
     }
@@ -193,7 +194,7 @@ impl RenderState {
         self.estimator = Estimator::new(self.film.scales(), &self.mix, &self.display);
     }
 
-    /// Creates a schedule for this film.
+    /// Creates a schedule for the empty film of this render.
     pub fn schedule(&self, settings: Settings) -> Schedule {
         let film = &self.film;
         let pixels_of_tile = |tile: usize| {
@@ -205,9 +206,11 @@ impl RenderState {
     }
 
     /// Traces the wave that holds the first sample of every pixel, from coarse to fine. Calls
-    /// `on_refined` after each stage but the last. A raised `cancel_first_pass` ends the pass after
-    /// the first call of `on_refined`. The result is then `None`, and the film may only be
-    /// displayed: no further samples may be added to it.
+    /// `on_refined` with the film after each stage except the last.
+    ///
+    /// If `cancel_first_pass` becomes `true`, the pass ends after the first call of `on_refined`
+    /// and returns `None`. The film may then only be displayed; no further samples may be added to
+    /// it.
     pub fn trace_first_pass(
         &mut self,
         wave: &Wave,
@@ -219,7 +222,7 @@ impl RenderState {
         first_pass::run(&self.world, &mut self.film, wave, context, on_refined)
     }
 
-    /// Traces a wave. While `cancel_wave` is raised, no further job starts.
+    /// Traces a wave. No further job starts after `cancel_wave` has become `true`.
     pub fn trace_wave(
         &mut self,
         wave: &Wave,

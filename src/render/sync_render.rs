@@ -1,5 +1,5 @@
-//! Synchronous progressive render in the caller's thread. It is meant for measurements, which must
-//! not depend on the times of snapshots.
+//! Synchronous progressive render in the caller's thread. Measurements use it, because its
+//! decisions do not depend on the times of snapshots.
 
 use crate::render::schedule::{Schedule, Settings, Spp, Step, StoppedBy};
 
@@ -41,9 +41,9 @@ impl SyncRender {
         Ok(Self { rendering, schedule, pool, seconds: 0.0 })
     }
 
-    /// Traces the next decision of the schedule in both replicates, so that the error of the
-    /// picture is known afterwards. If nothing is left to trace, returns the reason; otherwise
-    /// returns `None`.
+    /// Traces the next decision of the schedule in both replicates, after which the error of the
+    /// picture is known. Returns the stop criterion that ended the render, or `None` if there is
+    /// more to trace.
     pub fn step(&mut self) -> Option<StoppedBy> {
         loop {
             let wave = match self.schedule.next(self.seconds) {
@@ -87,7 +87,7 @@ impl SyncRender {
         Some((self.seconds + low, self.seconds + high))
     }
 
-    /// The schedule, with the estimates so far.
+    /// The schedule, with its latest noise estimates.
     pub fn schedule(&self) -> &Schedule {
         &self.schedule
     }

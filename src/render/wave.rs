@@ -1,4 +1,4 @@
-//! Waves: sets of jobs in which the schedule's decisions are traced.
+//! Waves: sets of jobs that are traced concurrently. The schedule's decisions are traced as waves.
 
 use crate::film::{TILE_PIXELS, TileNoise};
 
@@ -17,18 +17,18 @@ pub struct Job {
 /// has at most one job for each tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wave {
-    /// Replicate to which the samples are added; 0: A, 1: B.
+    /// Replicate to which the samples are added: 0 for A, 1 for B.
     pub replicate: usize,
     /// The jobs, in any order.
     pub jobs: Vec<Job>,
-    /// `true` if each job ends with an estimate of its tile's error. Only waves of B estimate;
-    /// after them both replicates of the tile hold equally many samples.
+    /// `true` if each job ends with an estimate of its tile's error. Only waves of replicate B
+    /// estimate: after them both replicates of the tile hold equally many samples.
     pub estimate: bool,
 }
 
 impl Wave {
-    /// Shortens the wave to its first jobs, at least one and about `pixel_samples` pixel samples in
-    /// total, and each job to at most `longest` samples per pixel.
+    /// Shortens the wave to its first jobs, at least one, of about `pixel_samples` samples over all
+    /// pixels. Shortens each job to at most `longest` samples per pixel.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;
@@ -48,17 +48,17 @@ pub struct JobReport {
     /// Number of rays of every kind (camera, shadow, reflected, transmitted). It is the cost of the
     /// job, and is equal on every machine.
     pub rays: u64,
-    /// `true` if a path has hit a glossy lobe.
+    /// `true` if a path has sampled a glossy lobe.
     pub glossy: bool,
-    /// Estimated error of the tile's pixels, if [`Wave::estimate`] is set.
+    /// Estimated error of the tile's pixels. `None` unless [`Wave::estimate`] is set.
     pub error: Option<TileNoise>,
 }
 
 /// Result of a wave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaveReport {
-    /// One entry for each job, in the order of the wave. `None` if the job was cancelled before it
-    /// started; it has then added no samples.
+    /// One entry for each job, in the order of the wave. `None` for a job that was cancelled before
+    /// it started and therefore has added no samples.
     pub reports: Vec<Option<JobReport>>,
 }
 

@@ -26,8 +26,8 @@ pub enum Precision {
 pub struct Options {
     /// Precision in which the world is compiled.
     pub precision: Precision,
-    /// `true` if all lights share one light group, which makes the film smaller. Colours and
-    /// intensities of lights are then part of the samples.
+    /// `true` if all lights share one light group, which makes the film smaller. The samples then
+    /// contain the colours and intensities of the lights.
     pub merge_lights: bool,
 }
 
@@ -118,7 +118,8 @@ impl AnyWorld {
         dispatch!(self, world => &world.inventory)
     }
 
-    /// One sentence for each limit of the scene that truncates paths.
+    /// Returns one sentence for each limit of the scene that ends paths early, such as `max_depth`,
+    /// with a bound of the lost light.
     pub fn biases(&self) -> Vec<String> {
         dispatch!(self, world => world.truncation_biases.clone())
     }

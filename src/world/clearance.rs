@@ -3,7 +3,8 @@
 use crate::primitive::Form;
 use glam::DVec3;
 
-/// Returns a lower bound of the distance between `point` and the closest surface of `forms`. See
+/// Returns a lower bound of the distance between `point` and the closest surface of `forms`
+/// (compiled shapes). See
 /// [`CanonicalShape::clearance`](crate::primitive::CanonicalShape::clearance).
 pub(super) fn clearance(forms: &[Form], point: DVec3) -> f64 {
     forms.iter().filter_map(|form| form.clearance(point)).fold(f64::INFINITY, f64::min)
@@ -63,7 +64,8 @@ mod tests {
         near(rectangle, [0.0, 0.0, 1.5], 0.5);
     }
 
-    /// Needles and sheets, compared with many points on their surfaces.
+    /// Checks the clearance of stretched shapes (needles and sheets) against the distance to many
+    /// points on their surfaces.
     #[test]
     fn stretched_things_are_no_nearer_and_no_farther_than_their_points() {
         let shapes = [

@@ -32,9 +32,9 @@ use std::collections::HashMap;
 pub(super) struct RecenteredGeometry {
     /// Scene coordinates of the new origin.
     pub origin: DVec3,
-    /// Shape of each object, with its transform applied.
+    /// Shape of each object in canonical form, with its transform applied.
     pub forms: Vec<Form>,
-    /// Largest magnitude of a coordinate of the bounded forms and the lens.
+    /// Largest magnitude of a coordinate of the lens and of all shapes with finite bounds.
     pub extent: f64,
 }
 
@@ -62,8 +62,9 @@ impl RecenteredGeometry {
         Self { origin, forms, extent }
     }
 
-    /// Returns the largest rounding error of the coordinates in the scene file. It grows with the
-    /// distance of the scene's centre from the origin of the file's coordinates.
+    /// Returns the largest rounding error of the coordinates in the scene file. The error is in
+    /// proportion to the distance between the scene's centre and the origin of the file's
+    /// coordinates.
     pub fn input_error(&self) -> f64 {
         f64::EPSILON * self.origin.abs().max_element()
     }
@@ -75,7 +76,7 @@ struct CompiledMaterials<'a, S> {
     materials: Vec<&'a Material>,
     /// BSDF of each of `materials`.
     bsdfs: Vec<Bsdf<S>>,
-    /// Indices into `materials`, first by object, then by part of the object.
+    /// Indices into `materials`: one list for each object, one entry for each part of the object.
     of_object: Vec<Vec<u32>>,
 }
 
@@ -131,8 +132,8 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         self.materials.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3])
     }
 
-    /// Returns the limits of diffuse bounces. Returns `None` if the scene asks for none, or if no
-    /// material is matt.
+    /// Returns the limits of diffuse bounces. Returns `None` if the scene has indirect diffuse
+    /// light switched off, or if no material is matt.
     fn diffuse_limits(&self, scene: &Scene) -> Option<DiffuseLimits> {
         let IntegratorSettings { max_diffuse_depth: depth, caustics, .. } = scene.trace;
         let is_matt = |m: &&Material| m.diffuse > 0.0 && m.color.0 != [0.0; 3];
@@ -146,17 +147,19 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
     }
 }
 
-/// Height of emitters above objects that they touch, in rounding errors of the scene's extent. Rays
-/// that leave a surface start at half of this height.
+/// Height of emitters (lights with a size) above objects that they touch, in rounding errors of the
+/// scene's extent. Rays that leave a surface start at half of this height.
 const EMITTER_LIFT: f64 = 16.0;
 
-/// Returns the length by which emitters are lifted, see [`Emitter::new`].
+/// Returns the distance by which emitters are moved off the surfaces that they touch; see
+/// [`Emitter::new`].
 fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
     EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
 }
 
-/// Compiles those of the lights `emitting` for which `compile` returns a light. Each entry has the
-/// index of the light in the scene, its group and the emission that the group's samples contain.
+/// Compiles lights of one kind. `emitting` lists all lights that emit: index in the scene, light
+/// group, and emission that the group's samples contain. Lights for which `compile` returns `None`
+/// are left out.
 fn light_sources<T, S: Float>(
     scene: &Scene,
     emitting: &[(usize, usize, [f64; 3])],
@@ -212,7 +215,8 @@ impl<S: Float> CompiledLights<S> {
         Self { groups, scales, sources, emitters, environments, emission }
     }
 
-    /// Target of the shadow rays to each light without a size.
+    /// Returns the target of the shadow rays (a point or a direction) for each light without a
+    /// size.
     fn targets(&self) -> Vec<LightTarget> {
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let target_of_source = |source: &DeltaSource<S>| match &source.light.light {
@@ -246,8 +250,8 @@ impl<S: Float> CompiledLights<S> {
     }
 }
 
-/// Candidate lists (primitives that a ray must be tested against) for all rays, and the source of
-/// the lists of each tile.
+/// Candidate lists (primitives that a ray must be tested against) for rays of the whole picture,
+/// and the culler that makes the lists of a tile.
 struct CompiledCulling<S> {
     mode: CullingMode,
     all_candidates: TileCandidates,
@@ -255,8 +259,8 @@ struct CompiledCulling<S> {
 }
 
 impl<S: Float> CompiledCulling<S> {
-    /// Compiles the culling of a scene. `entered` holds `true` for each primitive that paths can be
-    /// inside of.
+    /// Compiles the culling of a scene. `entered` has one entry for each primitive: `true` if paths
+    /// can be inside of it.
     fn new<L: SimdFloat<Scalar = S>>(
         scene: &Scene,
         recentered: &RecenteredGeometry,
@@ -303,8 +307,8 @@ impl<S: Float> CompiledCulling<S> {
     }
 }
 
-/// Returns the region in which camera rays start: a ball around the eye that contains the lens, and
-/// that reaches to the farthest ray on the near plane.
+/// Returns the region in which camera rays start: a ball around the eye. It contains the lens and
+/// every start point on the near plane.
 fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
     let size = scene.film.size.map(|n| n as usize);
     let corner_distances = camera.corners([0, 0], size).map(DVec3::length);

@@ -24,7 +24,7 @@ const FILM_BYTES: u64 = 1 << 30;
 /// Bytes per pixel and light group: two replicates of three channels.
 const GROUP_BYTES: u64 = 2 * 3 * 8;
 
-/// Light sources of one group.
+/// Origin of the light in one group.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LightGroupSource {
     /// Ambient light.
@@ -40,7 +40,7 @@ pub enum LightGroupSource {
 }
 
 impl LightGroupSource {
-    /// Lights and materials of the group.
+    /// Returns the lights and materials of the group; empty for ambient light and background.
     pub fn emitting(&self) -> &[Self] {
         match self {
             Self::Ambient | Self::Background => &[],
@@ -59,7 +59,7 @@ impl LightGroupSource {
     }
 }
 
-/// Light groups of a scene. Groups that are certainly black are left out.
+/// Light groups of a scene. Groups that are black in every sample are left out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightGroups {
     /// Source of each group, in the order of the film.
@@ -71,9 +71,12 @@ pub struct LightGroups {
 }
 
 impl LightGroups {
-    /// Creates the light groups of `scene`. `lit` is `true` if some surface reflects direct light,
-    /// `ambient` if some surface reflects ambient light. A light that no surface reflects still has
-    /// a group if it is visible itself. If `merge_lights` is `true`, all lights share one group.
+    /// Creates the light groups of `scene`. If `merge_lights` is `true`, all lights share one
+    /// group.
+    ///
+    /// `lit` is `true` if some surface reflects direct light, `ambient` if some surface reflects
+    /// ambient light. A light that no surface reflects has a group only if the light itself is
+    /// visible.
     pub fn new(scene: &Scene, (lit, ambient): (bool, bool), merge_lights: bool) -> Self {
         let mut members = Vec::new();
         if ambient && scene.ambient.color != Color::BLACK {
@@ -139,7 +142,7 @@ impl LightGroups {
         self.emitting(scene, material)
     }
 
-    /// Returns a triple for each light or material to which `select` gives a name: the name, the
+    /// Returns a triple for each source that `select` accepts: the value that `select` returns, the
     /// group, and the emission that the group's samples contain.
     fn emitting<T>(
         &self,
@@ -187,8 +190,8 @@ impl LightGroups {
     }
 
     /// Returns the scale of each group: the number of integer steps per unit of radiance in the
-    /// film, a power of two. It follows from the group's [`RadianceRange`]. `lift` is the height
-    /// by which emitters are lifted.
+    /// film, a power of two. It is derived from the group's [`RadianceRange`]. `lift` is the height
+    /// by which emitters are moved off surfaces.
     pub(super) fn scales<S: Float>(
         &self,
         scene: &Scene,

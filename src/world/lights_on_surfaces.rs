@@ -11,8 +11,8 @@ use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::Form;
 use glam::DVec3;
 
-/// Largest distance between a light and a surface on which it counts as located, in rounding errors
-/// of the largest coordinate.
+/// Largest distance between a light and a surface at which the light is treated as on the surface,
+/// in rounding errors of the largest coordinate.
 const ON: f64 = 8.0;
 
 /// Height above the surface at which shadow rays end, in rounding errors of the largest coordinate.
@@ -23,7 +23,7 @@ const LIFT: f64 = 16.0;
 /// of the edge.
 const SHARPEST: f64 = 4.0;
 
-/// A light and the surfaces on which it is located.
+/// A light and the surfaces that contain its position.
 pub(super) struct OnSurface<S> {
     position: [S; 3],
     /// Unit normals at the light, one list for each convex solid, flat shape or mesh.
@@ -32,8 +32,9 @@ pub(super) struct OnSurface<S> {
 }
 
 impl<S: Float> OnSurface<S> {
-    /// Creates the record of a light at `position` among `forms`. Both have coordinates relative to
-    /// `origin`, rounded to `epsilon`. Returns `None` if the light is on no surface.
+    /// Creates the record of the light at `position`. `forms` are the shapes of all objects. All
+    /// coordinates are relative to `origin` and rounded to `epsilon`. Returns `None` if the light
+    /// is on no surface.
     pub fn new(forms: &[Form], position: DVec3, origin: DVec3, epsilon: f64) -> Option<Self> {
         let mut solids = Vec::new();
         let mut largest = 0.0f64;
@@ -54,7 +55,7 @@ impl<S: Float> OnSurface<S> {
         (!solids.is_empty()).then_some(Self { position, solids, lift })
     }
 
-    /// Returns the largest distance from the light at which shadow rays end.
+    /// Returns the largest distance between the light and an end point of its shadow rays.
     pub fn farthest(&self) -> f64 {
         SHARPEST * self.lift.to_f64() * self.solids.len() as f64
     }

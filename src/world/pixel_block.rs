@@ -9,8 +9,8 @@ use std::ops::Range;
 /// Largest number of pixels in a block; a multiple of every packet width.
 pub const MAX_BLOCK_PIXELS: usize = 256;
 
-/// Up to [`MAX_BLOCK_PIXELS`] pixels. Adjacent pixels share a packet. Copies of the last pixel fill
-/// the last packet.
+/// Up to [`MAX_BLOCK_PIXELS`] pixels. Adjacent pixels share a packet; the last packet is filled
+/// with copies of the last pixel.
 pub(super) struct PixelBlock<S> {
     count: usize,
     /// Columns of the raster \[pixels\].
@@ -70,14 +70,15 @@ impl<S: Float> PixelBlock<S> {
         (self.x[i], self.y[i])
     }
 
-    /// Returns the key of pixel `i`, and its corner direction in all lanes.
+    /// Returns the sampler key of pixel `i`, and its corner direction in all lanes.
     #[inline(always)]
     pub fn broadcast<L: SimdFloat<Scalar = S>>(&self, i: usize) -> (u32, Vec3<L>) {
         (self.keys[i], Vec3::splat(self.corner_directions.each_ref().map(|axis| axis[i])))
     }
 
-    /// Returns the keys and corner directions of the pixels from `first` on. Each pixel occupies
-    /// `COUNT` adjacent lanes. `COUNT` is a power of two, `first` a multiple of `WIDTH / COUNT`.
+    /// Returns the sampler keys and corner directions of the `WIDTH / COUNT` pixels from `first`
+    /// on. Each pixel occupies `COUNT` adjacent lanes. `COUNT` is a power of two, `first` a
+    /// multiple of `WIDTH / COUNT`.
     #[inline(always)]
     pub fn gather<L: SimdFloat<Scalar = S>, const COUNT: usize>(
         &self,
@@ -92,7 +93,7 @@ impl<S: Float> PixelBlock<S> {
         (L::SimdU32::from_fn(|lane| keys[lane / COUNT]), Vec3::new(x, y, z))
     }
 
-    /// Returns ranges of `packet_pixels` pixels each; the last one may be shorter.
+    /// Iterates over the pixels in ranges of `packet_pixels` each; the last range may be shorter.
     pub fn packets(&self, packet_pixels: usize) -> impl Iterator<Item = Range<usize>> + use<S> {
         let count = self.count;
         (0..count).step_by(packet_pixels).map(move |first| first..count.min(first + packet_pixels))

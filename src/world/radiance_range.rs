@@ -47,25 +47,25 @@ const SAMPLE_BITS: f64 = 49.0;
 /// Largest number of bits by which the scale is lowered for spots smaller than a pixel.
 const SPOT_BITS: f64 = 12.0;
 
-/// Radiance of the samples of a light group in different parts of the scene.
+/// Radiance of a light group's samples at different places of the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RadianceRange {
     /// Radiance of a white surface in the middle of the scene.
     pub typical: f64,
-    /// Radiance of the brightest spot of the dimmest surface.
+    /// Radiance of the brightest spot of the surface that reflects the least light.
     pub dimmest: f64,
-    /// Radiance of the brightest spot of the brightest surface. Spots smaller than a quarter of a
-    /// pixel are left out.
+    /// Radiance of the brightest spot of the surface that reflects the most light. Spots smaller
+    /// than a quarter of a pixel are left out.
     pub brightest: f64,
-    /// Radiance of the brightest spot of any size.
+    /// Radiance of the brightest spot, however small.
     pub spots: f64,
-    /// Radiance of highlights, and of light amplified by mirrors.
+    /// Largest radiance of highlights, and of light amplified by mirrors.
     pub extreme: f64,
 }
 
 impl RadianceRange {
-    /// Returns the range of light that is `least` times as intense in the darkest channel and
-    /// `most` times in the brightest.
+    /// Returns the range for light of another intensity: `least` is its factor in the darkest
+    /// channel, `most` in the brightest channel.
     pub fn times(self, least: f64, most: f64) -> Self {
         Self {
             typical: self.typical * most,
@@ -76,7 +76,7 @@ impl RadianceRange {
         }
     }
 
-    /// Returns the range of two light sources that share a group.
+    /// Returns the range that covers `self` and `other`, two light sources that share a group.
     pub fn or(self, other: Self) -> Self {
         Self {
             typical: self.typical.max(other.typical),
@@ -115,7 +115,7 @@ fn ceil_log2(x: f64) -> f64 {
     floor + f64::from(u8::from(bits << 12 != 0))
 }
 
-/// Factors of the light that the materials of an object reflect, relative to a white matt surface.
+/// Factors by which the materials of an object reflect light, relative to a white matt surface.
 #[derive(Clone, Copy, Debug)]
 struct Response {
     /// Smallest factor of a channel that is not black.
@@ -162,14 +162,13 @@ pub(super) struct SceneDistances<'a> {
     responses: Vec<Option<Response>>,
     /// Ambient factors of all materials, each channel separately.
     ambient: Vec<f64>,
-    /// Smallest factor by which a surface without direct lighting multiplies reflected or
-    /// transmitted light.
+    /// Smallest factor by which a mirror or glass surface without direct lighting multiplies light.
     faintest: f64,
     /// Largest product of the factors of all mirrors on a path; at least 1.
     gain: f64,
     /// Radius around the scene's centre at which the irradiance of a light counts as typical.
     radius: f64,
-    /// Position of the eye, and the side of a pixel on the plane at unit distance.
+    /// Position of the eye, and the side of a pixel at unit distance from it.
     eye: (DVec3, f64),
     /// Largest distance above a surface at which rays start.
     ray_offset: f64,
@@ -222,19 +221,19 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Range of ambient light of unit intensity.
+    /// Range of ambient light with intensity 1.
     pub fn ambient(&self) -> RadianceRange {
         let least = least_of(self.ambient.iter().copied()).unwrap_or(1.0);
         let most = self.ambient.iter().copied().fold(0.0, f64::max);
         self.range_of(1.0, (least, most, most))
     }
 
-    /// Range of a background of unit intensity.
+    /// Range of a background with intensity 1.
     pub fn background(&self) -> RadianceRange {
         self.range_of(1.0, (1.0, 1.0, 1.0))
     }
 
-    /// Range of a light of unit intensity.
+    /// Range of a light without a size, with intensity 1.
     pub fn light<S: Float>(&self, light: &DeltaLight<S>) -> RadianceRange {
         let typical = light.typical_irradiance(self.radius) * FRAC_1_PI;
         let Some(position) = light.position().filter(|_| light.is_inverse_square()) else {
@@ -280,14 +279,15 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Range of an emitter of unit intensity.
+    /// Range of a light with a size, with intensity 1. `visible` is `true` if the camera and
+    /// mirrors see it.
     pub fn emitter<S: Float>(&self, emitter: &Emitter<S>, visible: bool) -> RadianceRange {
         let ball = (emitter.center(), emitter.radius());
         self.emitting_surface(ball, emitter.area(), emitter.radiance().to_f64(), visible)
     }
 
-    /// Range of the emission of an object of unit radiance. The area of its bounding sphere stands
-    /// for its own.
+    /// Range of the light that object `index` emits with radiance 1. The area of the object is
+    /// replaced by the area of its bounding sphere.
     pub fn object(&self, index: usize) -> RadianceRange {
         match self.forms[index].bounds() {
             Some((low, high)) => {
@@ -304,8 +304,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Range of the light of a surface with the radiance `emitted` in the ball with the given centre
-    /// and radius.
+    /// Range of the light of a surface that is inside of the given ball. `area` is the area of the
+    /// surface, `emitted` its radiance. `visible` is `true` if the camera and mirrors see it.
     fn emitting_surface(
         &self,
         (center, radius): (DVec3, f64),
@@ -354,7 +354,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Range of an environment of unit intensity.
+    /// Range of an environment with intensity 1. `visible` is `true` if the camera and mirrors see
+    /// it.
     pub fn environment(&self, map: &RadianceMap, visible: bool) -> RadianceRange {
         let mean = map.mean().into_iter().fold(0.0, f64::max);
         let typical = if mean > 0.0 { mean } else { 1.0 };
@@ -376,8 +377,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Range of light with the typical radiance `light`. Surfaces multiply it by `least` to `most`,
-    /// in highlights by `peak`.
+    /// Returns the range of light with the typical radiance `light`, at surfaces that multiply it
+    /// by a factor from `least` to `most`, and by `peak` in highlights.
     fn range_of(&self, light: f64, (least, most, peak): (f64, f64, f64)) -> RadianceRange {
         RadianceRange {
             typical: light,

@@ -1,8 +1,8 @@
 //! Reuse of samples: decides if the samples of one scene are valid for an edited scene.
 //!
-//! Descriptions of scenes are compared as a whole, by `==`. Before that, the few fields that may
-//! differ are set to equal values, or are named in a pattern without `..`. A field that is added to
-//! a description is therefore compared by default, or causes a compile error here.
+//! Descriptions of scenes are compared as a whole, by `==`. The few fields that may differ are set
+//! to equal values before the comparison, or are named in a pattern without `..`. A field that is
+//! added to a description later is therefore compared by default, or causes a compile error here.
 
 use crate::light::Light;
 use crate::material::Material;
@@ -13,10 +13,10 @@ use crate::world::light_groups::{LightGroupSource, LightGroups, contributes};
 use std::borrow::Cow;
 
 impl LightGroups {
-    /// Returns `true` if the samples of the scene `compiled` are valid for `scene` after a change
-    /// of the group weights. These groups are those of `compiled`. The scenes may differ in the
-    /// emission of lights, materials, ambient light and background that have groups of their own, in
-    /// names, in unused materials, and in the cap on rays per pixel.
+    /// Returns `true` if the samples of the scene `compiled` are valid for `scene` with other group
+    /// weights. `self` has the groups of `compiled`. The scenes may differ in names, in unused
+    /// materials, in the cap on rays per pixel, and in the emission of sources that have a group of
+    /// their own.
     pub fn can_reuse(&self, compiled: &Scene, scene: &Scene) -> bool {
         let Scene {
             film,
@@ -82,8 +82,8 @@ impl LightGroups {
             && names.into_iter().all(|(a, b)| self.same_material((compiled, a), (scene, b)))
     }
 
-    /// Returns `true` if two materials are equal except for the emission that a group scales. Such a
-    /// group belongs to the name of the material.
+    /// Returns `true` if two materials are equal except for their emission. The emission may differ
+    /// only if a group with the material's name scales it.
     fn same_material(
         &self,
         (compiled, name_a): (&Scene, &str),
@@ -107,18 +107,18 @@ fn without_emission(material: &Material) -> Material {
     Material { emission: 0.0, emission_color: Color::WHITE, ..material.clone() }
 }
 
-/// Returns a copy of the settings with the cap on rays per pixel set to 0.
+/// Returns a copy of the settings without a cap on rays per pixel.
 fn uncapped(film: &FilmSettings) -> FilmSettings {
     FilmSettings { rays_per_pixel: 0, ..film.clone() }
 }
 
-/// Returns a copy of the light without name, white and of unit intensity. The samples of a light in
-/// a group of its own contain this emission.
+/// Returns a nameless copy of the light, white and with intensity 1. The samples of a light in a
+/// group of its own contain this emission.
 fn with_unit_emission(light: &Light) -> Light {
     Light { name: String::new(), color: Color::WHITE, intensity: 1.0, on: true, ..light.clone() }
 }
 
-/// Returns a copy of the shape in which the parts name no materials.
+/// Returns the shape with the names of its parts' materials removed.
 fn unnamed(shape: &Shape) -> Cow<'_, Shape> {
     if shape.named_materials().is_empty() {
         return Cow::Borrowed(shape);

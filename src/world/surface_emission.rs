@@ -27,15 +27,15 @@ pub(super) type EmissiveSource<S> = LightSource<Option<ObjectEmitter<S>>, S>;
 pub(super) struct SurfaceEmission<S> {
     /// Emissive objects; those whose points are sampled come first.
     sources: Vec<EmissiveSource<S>>,
-    /// Number of objects whose points are sampled.
+    /// Number of objects from whose surfaces points are sampled. They come first in `sources`.
     sampled: usize,
-    /// Index into `sources` of each primitive; `None` if it emits nothing.
+    /// Index into `sources`, for each primitive; `None` for primitives that emit nothing.
     source_of: Vec<Option<u32>>,
 }
 
 impl<S: Float> SurfaceEmission<S> {
-    /// Compiles the emission of the objects with the given forms. `lift` is the height of sampled
-    /// points above the surfaces.
+    /// Compiles the emission of objects. `forms` are the shapes of all objects. `lift` is the
+    /// height of sampled points above the surfaces.
     pub fn new(
         scene: &Scene,
         forms: &[Form],
@@ -96,7 +96,8 @@ impl<S: Float> SurfaceEmission<S> {
         Some(&self.sources[source? as usize])
     }
 
-    /// The emitter with the given index among those from which light is sampled, with its group.
+    /// Returns the emitter with the given index among those from which light is sampled, and its
+    /// source (light group and emission).
     #[inline(always)]
     pub fn sampled(&self, index: usize) -> Option<(&ObjectEmitter<S>, &EmissiveSource<S>)> {
         let source = self.sources[..self.sampled].get(index)?;
@@ -127,7 +128,7 @@ pub(super) fn is_sampled(form: &Form) -> bool {
     }
 }
 
-/// Returns the surface of `form` if points of it can be sampled.
+/// Returns the surface of `form`, or `None` if its points cannot be sampled.
 fn surface_of(form: &Form) -> Option<ObjectSurface> {
     if !is_sampled(form) {
         return None;
@@ -186,7 +187,8 @@ fn triangles_of_polyhedron(form: &ConvexPolyhedronForm) -> Vec<[DVec3; 3]> {
     triangles
 }
 
-/// Returns the triangles of the mesh in the scene, counter-clockwise as seen from their front.
+/// Returns the triangles of the mesh in scene coordinates, counter-clockwise as seen from their
+/// front.
 fn triangles_of_mesh(form: &MeshForm) -> Vec<[DVec3; 3]> {
     let mesh = form.mesh.mesh();
     let mirrored = form.scene_from_mesh.matrix3.determinant() < 0.0;

@@ -10,7 +10,7 @@ use crate::world::pixel_block::PixelBlock;
 use crate::world::world::World;
 use std::ops::Range;
 
-/// A world together with the sample sequence of a picture; source of [`TileTracer`]s.
+/// A world and the sample sequence of a picture. It creates the [`TileTracer`]s.
 pub struct CameraTracer<'a, L: SimdFloat> {
     world: &'a World<L>,
     sampler: Sampler<L>,
@@ -22,9 +22,9 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
     }
 
     /// Creates the tracer of `pixels`, at most [`MAX_BLOCK_PIXELS`](crate::world::MAX_BLOCK_PIXELS)
-    /// columns and rows. All pixels are in the rectangle of the raster that `origin` and `extent`
-    /// give, and culling assumes this. Returns `None` if all samples of the rectangle are certainly
-    /// black: every camera ray misses and the background is black.
+    /// columns and rows. All pixels must be in the rectangle of the raster with corner `origin` and
+    /// size `extent`, because culling uses this rectangle. Returns `None` if every camera ray of
+    /// the rectangle misses and the background is black.
     pub fn tile(
         &self,
         replicate: usize,
@@ -55,8 +55,8 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
     }
 }
 
-/// Tracer of the samples of some pixels in one replicate. It tests rays against the candidate
-/// primitives of the tile.
+/// Tracer of the samples of up to [`MAX_BLOCK_PIXELS`](crate::world::MAX_BLOCK_PIXELS) pixels in
+/// one replicate. It tests rays against the candidate primitives of the tile.
 pub struct TileTracer<'a, L: SimdFloat> {
     world: &'a World<L>,
     sampler: &'a Sampler<L>,
@@ -110,7 +110,7 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         }
     }
 
-    /// Number of rays of all packets traced so far, with [`Counts::glossy`].
+    /// Returns the number of rays traced so far, and if reflections were random.
     pub fn counts(&self) -> Counts {
         self.counts
     }
@@ -156,7 +156,7 @@ impl<S: Float> TracedPacket<'_, S> {
     }
 }
 
-/// Mask of the first `count` lanes.
+/// Returns the mask of the first `count` lanes.
 fn first_lanes<L: SimdFloat>(count: usize) -> L::Mask {
     if count == L::WIDTH {
         return L::mask(true);

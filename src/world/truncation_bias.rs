@@ -6,7 +6,7 @@ use crate::scene::{Object, RayTypes, Scene};
 use crate::world::surface_emission::is_sampled;
 use glam::DVec3;
 
-/// Returns the largest share of light that a material reflects and transmits together, over all
+/// Returns the largest fraction of light that a material reflects and transmits together, over all
 /// channels and angles.
 fn max_albedo(material: &Material, flat: bool) -> f64 {
     let (k_r, k_t) = (material.reflection, material.transmission);
@@ -24,8 +24,8 @@ fn max_albedo(material: &Material, flat: bool) -> f64 {
     }
 }
 
-/// Returns the largest share of light that a material reflects diffusely, over all channels; infinite
-/// if nothing bounds the colours of a mesh.
+/// Returns the largest fraction of light that a material reflects diffusely, over all channels. It
+/// is infinite for meshes, because vertex colours have no bound.
 fn max_diffuse_albedo(material: &Material, object: &Object) -> f64 {
     let mut factor = 1.0f64;
     if let Some(Texture::Checker(checker)) = &material.texture {
@@ -38,10 +38,10 @@ fn max_diffuse_albedo(material: &Material, object: &Object) -> f64 {
     if albedo > 0.0 { albedo * factor } else { 0.0 }
 }
 
-/// Properties of an object's geometry on which the bound depends.
+/// Properties of an object's geometry that determine the bound of the bias.
 struct ObjectTraits {
     flat: bool,
-    /// `true` if a ray that leaves the outside may hit the object again.
+    /// `true` if a ray that leaves the object outwards may hit it again.
     concave: bool,
     /// `true` if camera rays may start inside of the object.
     contains_eye: bool,
@@ -69,18 +69,19 @@ impl ObjectTraits {
         }
     }
 
-    /// Returns `true` if a path may hit the object twice in a row. A ray that leaves the outside of
-    /// a convex form cannot hit it again. Only rays inside can, and paths are inside only if they
-    /// start there or are transmitted. Bump maps change nothing: a reflected direction that would
-    /// point into the surface is mirrored out of it, and a transmitted direction that would point
-    /// out is mirrored into it.
+    /// Returns `true` if a path may hit the object at two consecutive vertices. A ray that leaves a
+    /// convex form outwards cannot hit it again. Rays inside of the form can, and paths are inside
+    /// only if they start there or are transmitted. Bump maps make no difference: a reflected
+    /// direction that would point into the surface is mirrored out of it, and a transmitted
+    /// direction that would point out is mirrored into it.
     fn sees_itself(&self, material: &Material) -> bool {
         let let_in = !self.flat && material.transmission > 0.0;
         self.concave || let_in || self.contains_eye && material.two_sided
     }
 }
 
-/// Largest factors by which surfaces of the scene multiply the throughput of a path.
+/// Largest factors by which surfaces of the scene multiply the throughput of a path. They bound the
+/// light that truncation loses.
 #[derive(Clone, Copy)]
 struct Reach {
     /// Largest factor of one surface.
@@ -92,7 +93,8 @@ struct Reach {
 }
 
 impl Reach {
-    /// Creates the factors of mirrors and glass, and with `diffuse` of matt surfaces as well.
+    /// Computes the factors of mirrors and glass. If `diffuse` is `true`, they include the diffuse
+    /// albedo of matt surfaces.
     fn new(scene: &Scene, diffuse: bool) -> Self {
         let default = Material::default();
         let (mut first, mut second, mut round_trip_albedo) = (0.0f64, 0.0f64, 0.0f64);
@@ -140,18 +142,18 @@ impl Reach {
         }
     }
 
-    /// Returns the largest total throughput that is cut off where it falls below `least` in a scene
-    /// with up to `bounces` diffuse bounces. Each generation of a path is cut off at its start and
-    /// then as a path without diffuse bounces.
+    /// Returns the largest total throughput of the paths that end because their throughput is below
+    /// `least`, in a scene with up to `bounces` diffuse bounces and `depth` surfaces per generation
+    /// (the part of a path between two diffuse bounces).
     fn ended_by_generation(&self, least: f64, depth: u32, bounces: u32) -> f64 {
         let rest = if self.through { 8.0 * least * f64::from(depth) } else { least };
         (least + rest) * (f64::from(bounces) + 1.0)
     }
 
-    /// Returns the largest total throughput that is cut off where it falls below `least`, at up to
-    /// `depth` surfaces after the first. A path that never splits is cut off once. Among split
-    /// paths, each surface cuts off at most two branches of each of at most four simultaneous
-    /// paths.
+    /// Returns the largest total throughput of the paths that end because their throughput is below
+    /// `least`, at up to `depth` surfaces after the first. A path that never splits ends once.
+    /// Among split paths, each surface ends at most two branches of each of at most four
+    /// simultaneous paths.
     fn ended(&self, least: f64, depth: u32) -> f64 {
         if !self.through {
             return least;

@@ -22,15 +22,15 @@ use crate::world::lights_on_surfaces::OnSurface;
 use crate::world::surface_emission::SurfaceEmission;
 use crate::world::tile_tracer::CameraTracer;
 
-/// A light of the world, with its light group. `T` is the compiled light, `S` the type of numbers.
+/// A compiled light of type `T`, with its light group. `S` is the scalar type.
 pub(super) struct LightSource<T, S> {
     pub light: T,
     /// Index of the light group.
     pub group: usize,
-    /// Emission that is multiplied into the samples of the group. `None` means 1 in every channel.
+    /// Emission that the samples of the group contain. `None` means 1 in every channel.
     pub emission: Option<[S; 3]>,
-    /// `true` if the camera and reflected rays see the light. Lights without a size are invisible
-    /// whatever it says.
+    /// `true` if the camera and reflected rays see the light. Lights without a size are never
+    /// visible; the field has no effect on them.
     pub visible: bool,
 }
 
@@ -44,7 +44,7 @@ impl<T, S: Float> LightSource<T, S> {
         }
     }
 
-    /// The same source with `light` in place of its light.
+    /// Returns the same source with its light replaced by `light`.
     #[inline(always)]
     pub fn with_light<U>(&self, light: U) -> LightSource<U, S> {
         let Self { group, emission, visible, .. } = *self;
@@ -52,7 +52,7 @@ impl<T, S: Float> LightSource<T, S> {
     }
 }
 
-/// A light without a size.
+/// A light without a size, and the end points of shadow rays to it.
 pub(super) struct ShadowRayTarget<S> {
     pub light: DeltaLight<S>,
     /// End points of shadow rays. `None` for a light that is not on a surface.
@@ -81,7 +81,7 @@ pub struct World<L: SimdFloat> {
     pub(super) emitters: Vec<EmitterSource<L::Scalar>>,
     /// Environment lights.
     pub(super) environments: Vec<EnvironmentSource<L::Scalar>>,
-    /// Emission of objects.
+    /// Emission of objects with an emissive material.
     pub(super) emission: SurfaceEmission<L::Scalar>,
     /// Light group of ambient light. `None` if no surface reflects ambient light.
     pub(super) ambient: Option<usize>,
@@ -106,13 +106,13 @@ pub struct World<L: SimdFloat> {
     pub(super) diffuse_limits: Option<DiffuseLimits>,
     /// Throughput below which a path is cut off.
     pub(super) min_weight: f64,
-    /// `true` if sampled lobe directions that point into the surface are mirrored out of it.
+    /// `true` if sampled directions that point into the surface are mirrored at its tangent plane.
     pub(super) fold: bool,
     pub(super) camera: PerspectiveCamera,
     /// Candidates of rays for which no culling is possible.
     pub(super) all_candidates: TileCandidates,
-    /// Light buffer of each light: its possible occluders by direction. The list is empty, or the
-    /// entry `None`, if shadow rays to the light traverse the BVH.
+    /// Light buffer of each light: its possible occluders by direction. Shadow rays to a light
+    /// without a buffer traverse the BVH.
     pub(super) light_buffers: Vec<Option<LightBuffer<L::Scalar>>>,
     pub(super) culling: CullingMode,
     pub(super) groups: LightGroups,
@@ -123,7 +123,8 @@ pub struct World<L: SimdFloat> {
     /// `true` if samples are distributed over the area of their pixel instead of its centre.
     pub(super) jitter: bool,
     pub(super) inventory: Inventory,
-    /// One sentence for each limit of the scene that truncates paths.
+    /// One sentence for each limit of the scene that ends paths early, with a bound of the lost
+    /// light.
     pub(super) truncation_biases: Vec<String>,
 }
 
@@ -159,9 +160,9 @@ impl<L: SimdFloat> World<L> {
         CameraTracer::new(self, sampling)
     }
 
-    /// Returns the candidates of the camera rays through the rectangle of the raster at `origin`
-    /// with size `extent`, and of the shadow rays from their hit points. Returns `None` if no
-    /// primitive can be excluded.
+    /// Returns the candidates of the camera rays through a rectangle of the raster, and of the
+    /// shadow rays from their hit points. The rectangle has the corner `origin` and the size
+    /// `extent` \[pixels\]. Returns `None` if no primitive can be excluded.
     pub(super) fn candidates(
         &self,
         origin: [usize; 2],
@@ -171,15 +172,14 @@ impl<L: SimdFloat> World<L> {
         self.culling.candidates(&self.geometry, lights, &self.camera, (origin, extent))
     }
 
-    /// Returns `true` if the world has emitters, environment lights or emissive objects.
+    /// Returns `true` if the world has lights with a size, environment lights or emissive objects.
     #[inline(always)]
     pub(super) fn has_emitters(&self) -> bool {
         !self.emitters.is_empty() || !self.environments.is_empty() || !self.emission.is_empty()
     }
 
-    /// Returns `true` if the samples of a tile with these candidates are certainly black: no
-    /// primitive is a candidate of its camera rays, the background is black, and no emitter is
-    /// visible.
+    /// Returns `true` if all samples of a tile with these candidates are black: its camera rays
+    /// have no candidate primitive, the background is black, and no emitter is visible.
     pub(super) fn is_black(&self, candidates: &TileCandidates) -> bool {
         self.background.is_none()
             && candidates.primary.is_empty()

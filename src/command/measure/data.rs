@@ -17,13 +17,13 @@ struct Document<'a> {
     reference_linear: f64,
     reference_seconds: f64,
     compared_at_codes: f64,
-    /// Largest relative change of the errors that another reference picture could cause.
+    /// Largest relative change of the measured errors that another reference picture could cause.
     errors_spread: f64,
-    /// Largest relative spread of the times in the table.
+    /// Largest relative spread of the repeated times in the table.
     times_spread: f64,
-    /// Largest share of the processors' time that other programs used. Null if unknown.
+    /// Largest fraction of the processors' time that other programs used. Null if unknown.
     taken_by_others: Option<f64>,
-    /// Noise targets that were not reached, with extrapolated times.
+    /// Noise targets that were not reached, each with an extrapolated time.
     expected: Vec<Expected>,
     variations: Vec<Variation<'a>>,
 }
@@ -41,7 +41,7 @@ struct Variation<'a> {
     efficiency: Option<f64>,
     bias_z: Option<f64>,
     bias_codes: Option<f64>,
-    /// Least bias that can be distinguished from noise, in 8-bit levels.
+    /// Smallest bias that can be distinguished from noise, in 8-bit levels.
     bias_least_codes: Option<f64>,
     crossings: Vec<TimeToTarget>,
     points: Vec<Point>,
@@ -63,7 +63,7 @@ struct Expected {
     seconds_high: f64,
 }
 
-/// One point of an error curve.
+/// One point of a curve of error against time.
 #[derive(Serialize)]
 struct Point {
     samples: u64,

@@ -113,7 +113,7 @@ fn plot(path: &Path, about: &table::About) -> Result<(), Failure> {
     write_file(path, &bytes)
 }
 
-/// Reads the reference picture from an EXR file.
+/// Reads the reference picture at `path`, an EXR file that must have the given size.
 fn given_reference(path: &Path, size: [u32; 2], display: &Display) -> Result<Reference, Failure> {
     let failed = |reason: String| Failure::Failed(format!("{}: {reason}", path.display()));
     let read = film::read_exr(path).map_err(failed)?;

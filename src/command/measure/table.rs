@@ -4,7 +4,7 @@ use crate::measure::{Experiment, Measured, Measurement, Steadiness, TimeToTarget
 use std::fmt;
 use std::path::Path;
 
-/// A measurement with the scene and the settings that the report names.
+/// A measurement, with the scene and the settings that its table names.
 pub struct About<'a> {
     pub scene: &'a Path,
     pub threads: usize,
@@ -15,7 +15,7 @@ pub struct About<'a> {
 }
 
 impl About<'_> {
-    /// Returns the title of a plot.
+    /// Returns the title for a plot of the measurement.
     pub fn title(&self) -> String {
         let [width, height] = self.measurement.size;
         format!("{}, {width} x {height}, {} threads", self.scene.display(), self.threads)
@@ -32,7 +32,7 @@ impl About<'_> {
     }
 }
 
-/// Formats a time with three significant digits: `1.23 s`, `35.1 ms`.
+/// Formats seconds with three significant digits, such as `1.23 s` or `35.1 ms`.
 fn time(seconds: f64) -> String {
     match seconds {
         s if s < 0.9995 => format!("{:.*} ms", digits(1e3 * s), 1e3 * s),
@@ -41,7 +41,7 @@ fn time(seconds: f64) -> String {
     }
 }
 
-/// Returns the number of decimals with which `value` has three significant digits.
+/// Returns the number of decimals with which `value` is formatted to three significant digits.
 fn digits(value: f64) -> usize {
     if value >= 99.95 {
         0
@@ -61,7 +61,8 @@ fn reached(target: &TimeToTarget) -> String {
     format!("{bound}{} {}", time(target.seconds), percent(target.spread))
 }
 
-/// Formats a range of times, such as `12.0 to 30.0 s`. A common unit is written once.
+/// Formats a range of seconds, such as `12.0 to 30.0 s`. If both have the same unit, it is written
+/// once.
 fn between((low, high): (f64, f64)) -> String {
     let (low, high) = (time(low), time(high));
     match (low.split_once(' '), high.split_once(' ')) {
@@ -70,13 +71,13 @@ fn between((low, high): (f64, f64)) -> String {
     }
 }
 
-/// Relative spread of repeated times beyond which they count as unsteady.
+/// Relative spread of repeated times above which the table warns that they are unsteady.
 const UNSTEADY: f64 = 0.1;
-/// Share of the processors' time beyond which its use by other programs is reported.
+/// Fraction of the processors' time used by other programs, above which the table warns.
 const STOLEN: f64 = 0.03;
 
-/// Returns a warning about unsteady times or about other programs. Returns `None` if there is no
-/// reason for a warning.
+/// Returns a warning if times are unsteady or other programs used the processors. Returns `None`
+/// otherwise.
 fn caution(steadiness: &Steadiness) -> Option<String> {
     let Steadiness { spread, stolen, .. } = steadiness;
     let others = stolen.filter(|share| *share > STOLEN).map(|share| {

@@ -9,22 +9,22 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Time without another edit after which edits are written.
 const DEBOUNCE: Duration = Duration::from_millis(400);
-/// Maximum time between an edit and its writing, also while edits continue.
+/// Longest time between an edit and its write, even if edits continue.
 const MAX_DELAY: Duration = Duration::from_secs(1);
 
-/// Autosave of a scene, and storage of orphaned edits. Orphaned edits are the unsaved edits in the
-/// recovery files of crashed sessions, which are searched at the start.
+/// Autosave of a scene, and the orphaned edits. These are the unsaved edits of crashed sessions,
+/// which are found in recovery files at the start.
 pub struct Autosave {
     /// Recovery file of this session.
     recovery: Recovery,
-    /// User's state folder.
+    /// State folder of the user.
     state: Option<PathBuf>,
     pending: Option<Pending>,
     /// Scene in the recovery file, if this session has written it.
     kept: Option<Arc<Scene>>,
     /// Orphaned edits that the user has neither recovered nor discarded. The last is offered next.
     found: Vec<Orphan>,
-    /// Cause of the failure of the last write. It has been reported.
+    /// Cause of the failure of the last write, after it was reported.
     failed: Option<String>,
 }
 
@@ -52,8 +52,8 @@ impl Autosave {
         }
     }
 
-    /// Prepares a save of `scene`: an existing recovery file is updated to `scene` first. If the
-    /// program is killed during the save, the next start then does not offer outdated edits.
+    /// Updates an existing recovery file to `scene` before a save of `scene`. If the program is
+    /// killed during the save, the next start then does not offer outdated edits.
     pub fn saving(&mut self, file: &SceneFile, scene: &Arc<Scene>) {
         if self.recovery.path().is_some() {
             // An error is ignored here because the save reports it.
@@ -94,8 +94,8 @@ impl Autosave {
         self.pending.as_ref().map(|p| (p.last + DEBOUNCE).min(p.first + MAX_DELAY))
     }
 
-    /// Writes pending edits to the recovery file, as the text that saving would write to `file`.
-    /// Returns a warning on the first of several consecutive failures, otherwise `None`.
+    /// Writes pending edits to the recovery file, as the text that a save would write to `file`.
+    /// Returns a warning at the first of several consecutive failures.
     pub fn write(&mut self, file: &SceneFile) -> Option<Message> {
         let scene = self.pending.take()?.scene;
         let text = file.text_of(&scene);
@@ -136,7 +136,7 @@ impl Autosave {
         }
     }
 
-    /// Returns a recovery of the same scene that writes to the state folder only.
+    /// Returns a recovery of the same scene whose recovery files are in the state folder.
     pub fn elsewhere(&self) -> Recovery {
         self.recovery.elsewhere()
     }
@@ -179,8 +179,8 @@ impl Autosave {
         messages
     }
 
-    /// Returns the next orphaned edits, or a warning if they are unreadable. Discards edits that
-    /// `file` already contains. Returns `None` if no orphaned edits are left.
+    /// Returns the offer of the next orphaned edits, or a warning if they are unreadable. Edits
+    /// that `file` already contains are discarded. Returns `None` if no orphaned edits are left.
     pub fn offer(&mut self, file: Result<&SceneFile, &Path>) -> Option<Message> {
         loop {
             let orphan = self.found.last()?;
@@ -207,8 +207,8 @@ impl Autosave {
     }
 
     /// Adopts the offered edits as the unsaved edits of this session. `path` is the path of an
-    /// unreadable scene file; `None` if the scene file is readable. For an unreadable file, returns
-    /// a scene file with the recovered text. Returns `None` otherwise.
+    /// unreadable scene file, or `None` if the scene file is readable. For an unreadable file,
+    /// returns a scene file with the recovered text.
     pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let orphan = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, orphan.text.clone()).ok());

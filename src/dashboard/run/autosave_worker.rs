@@ -26,7 +26,7 @@ pub enum AutosaveJob {
     End(Sender<Result<Option<PathBuf>, String>>),
 }
 
-/// The thread's data.
+/// State of the thread that writes the recovery file.
 pub struct AutosaveWorker {
     pub autosave: Autosave,
     /// Path of the scene file at the start; `None` for a scene without file.
@@ -98,8 +98,8 @@ impl AutosaveWorker {
         }
     }
 
-    /// Calls `call` with the scene file, or with the path of an unreadable one, which is empty for
-    /// a scene without file.
+    /// Calls `call` with the scene file, or with the path of an unreadable one. The path is empty
+    /// for a scene without a file.
     fn with_file<R>(
         &mut self,
         call: impl FnOnce(&mut Autosave, Result<&SceneFile, &Path>) -> R,

@@ -14,9 +14,9 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Timeout for a reply from a terminal that has replied before.
 const LONG_PATIENCE: Duration = Duration::from_secs(10);
-/// Transfer time beyond the round trip from which a measured rate is precise enough.
+/// Smallest time that a transfer must take beyond the round trip for a precise rate.
 const MEASURED: Duration = Duration::from_millis(300);
-/// Size in bytes from which a transfer is not enlarged further, even if it is faster than
+/// Largest size of a transfer in bytes. It is used even if the transfer takes less time than
 /// [`MEASURED`].
 const MOST_BYTES: usize = 1 << 20;
 
@@ -82,8 +82,8 @@ pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<Terminal
     Ok(TerminalReport { terminal, mode, cells, pixels, rate })
 }
 
-/// Writes `before` and requests the cursor position, through the multiplexer `through` if there is
-/// one. Returns the time until the reply. Returns `None` if there is no reply within `patience`.
+/// Writes `before` and a request of the cursor position, through `through` if there is a
+/// multiplexer. Returns the time until the reply, or `None` if there is no reply within `patience`.
 fn answer(
     tty: &Tty,
     keyboard: &mut Keyboard,
@@ -105,8 +105,9 @@ fn answer(
     }
 }
 
-/// Measures the transfer rate in bytes per second with transfers that grow by a factor of 4.
-/// `round_trip` is the time of a reply without transfer. Returns `None` if a reply does not arrive.
+/// Measures the transfer rate in bytes per second, by transfers that grow by a factor of 4.
+/// `round_trip` is the time of a reply without a transfer. Returns `None` if a reply does not
+/// arrive.
 fn rate(
     tty: &Tty,
     keyboard: &mut Keyboard,
@@ -128,8 +129,8 @@ fn rate(
     }
 }
 
-/// Returns `bytes` pseudo-random characters in the attribute "hidden", which start at the upper
-/// left corner. Random text keeps SSH compression from distorting the measured rate.
+/// Returns `bytes` pseudo-random characters with the attribute "hidden", which start at the upper
+/// left corner. They are random because SSH compression would distort the measured rate.
 fn hidden_text(bytes: usize) -> Vec<u8> {
     let mut text = b"\x1b[8m\x1b[H".to_vec();
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;

@@ -18,8 +18,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Niceness of tracing threads with low priority, the lowest of Linux. Such threads take little
-/// more than idle processor time.
+/// Niceness of tracing threads with low priority: the lowest priority of Linux, at which threads
+/// use only idle processors.
 const LOW_PRIORITY: i32 = 19;
 
 /// Parameters of an [`EffectRunner`].
@@ -49,7 +49,7 @@ pub enum Outcome {
     Quit,
 }
 
-/// Executor of effects, which is also the source of snapshots.
+/// Executor of effects. It is also the source of snapshots.
 pub trait Effects {
     /// Returns the channel that receives a message whenever a new snapshot is published.
     fn wakeup(&self) -> &Receiver<()>;
@@ -57,14 +57,15 @@ pub trait Effects {
     /// Takes the latest snapshot. Returns `None` if it has been taken already.
     fn take_snapshot(&self) -> Option<Snapshot>;
 
-    /// Pauses (`true`) or resumes (`false`) rendering while the connection is silent.
+    /// Pauses (`true`) or resumes (`false`) rendering. The event loop pauses it while the
+    /// connection is silent.
     fn rest(&self, resting: bool);
 
     /// Returns the receiver of the results of effects, as messages. Each message must be passed to
     /// [`Effects::observe`] before it updates the model.
     fn done(&self) -> &Receiver<Message>;
 
-    /// Notes a result.
+    /// Notes the result of an effect.
     fn observe(&mut self, message: &Message);
 
     /// Executes `effect`, whose results come as messages. `frames` is the output to the terminal,
@@ -80,10 +81,10 @@ pub trait Effects {
     /// edits are written, at most for `patience`.
     fn flush(&self, patience: Duration);
 
-    /// Completes pending writes and ends the threads. Returns the remaining results, and the path of
-    /// the recovery file if there are unsaved edits, or the reason why they are lost. Pictures that
-    /// are being written and the renderer are given up at `deadline`; `None` waits for them without
-    /// limit. Unsaved edits never wait for them.
+    /// Completes pending writes and ends the threads. Returns the remaining results, and the path
+    /// of the recovery file if there are unsaved edits, or the reason for which these are lost.
+    /// After `deadline` it no longer waits for the renderer and for pictures that are being
+    /// written; `None` sets no limit. Unsaved edits never wait for them.
     fn finish(
         self: Box<Self>,
         deadline: Option<Instant>,
@@ -145,7 +146,7 @@ impl EffectRunner {
         self.session.set_scene(scene)
     }
 
-    /// Continues the render of `checkpoint` with `scene`.
+    /// Continues the render of `checkpoint` and shows `scene`.
     pub fn resume(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) {
         self.session.continue_from(scene, checkpoint);
     }
@@ -189,7 +190,8 @@ impl Effects for EffectRunner {
         &self.done
     }
 
-    /// Renames future exports when `message` reports that the scene was saved at another path.
+    /// Bases the names of future exports on the new path if `message` reports that the scene was
+    /// saved at another path.
     fn observe(&mut self, message: &Message) {
         if let Message::Saved(_, Ok(path)) = message {
             self.exporter.stem = stem(Some(path), "");
@@ -307,7 +309,8 @@ impl Effects for EffectRunner {
     }
 }
 
-/// Executes an effect on the terminal, or one that shows an image file. Ignores others.
+/// Executes an effect on the terminal, or one that shows an image file. All other effects are
+/// ignored.
 pub fn run_on_terminal(
     effect: Effect,
     frames: &mut FramePipeline,

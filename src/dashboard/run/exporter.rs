@@ -28,7 +28,7 @@ pub struct Exporter {
     pub file: SharedFile,
     /// Folder that exports are written to.
     pub folder: PathBuf,
-    /// Part of the file name before the counter.
+    /// Beginning of the file name, before the counter.
     pub stem: String,
     /// Sampler, for the metadata.
     pub sampler: SamplerKind,
@@ -37,7 +37,7 @@ pub struct Exporter {
 }
 
 impl Exporter {
-    /// Writes the picture of `rendering` under the next free name.
+    /// Writes the picture of `rendering` to a file with the next free name.
     pub fn write(
         &self,
         rendering: &RenderState,
@@ -73,7 +73,7 @@ impl Exporter {
         }
     }
 
-    /// Writes a checkpoint under the next free name.
+    /// Writes a checkpoint to a file with the next free name.
     pub fn write_checkpoint(
         &self,
         checkpoint: Option<EncodedCheckpoint>,
@@ -189,8 +189,8 @@ fn render(
     Some(written.unwrap_or_else(|| Err("the renderer has no picture".to_string())))
 }
 
-/// Returns the part of the exports' file names before the counter: the file stem of the scene's
-/// `path`, or of `name` for a scene without a file.
+/// Returns the beginning of the exports' file names, before the counter: the stem of the scene's
+/// file name in `path`, or that of `name` for a scene without a file.
 pub fn stem(path: Option<&Path>, name: &str) -> String {
     let path = path.unwrap_or(Path::new(name));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());

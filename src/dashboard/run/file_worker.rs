@@ -18,13 +18,13 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Interval between checks of the scene file for changes by other programs.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
-/// Longest wait before a save for the update of the recovery file.
+/// Longest wait for the update of the recovery file before a save.
 const PREPARED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait at the end for pending saves.
+/// Longest wait for pending saves when the program ends.
 const SAVED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait at the end for the recovery file, and for the one in the state folder if the first
-/// one cannot be written in this time. The sum of the three waits is less than the grace period
-/// after a terminating signal.
+/// Longest wait for the recovery file when the program ends, and as much again for one in the state
+/// folder if the first cannot be written in time. The sum of the three waits is less than the grace
+/// period after a terminating signal.
 const KEPT_WITHIN: Duration = Duration::from_secs(1);
 
 pub(super) enum Job {
@@ -36,12 +36,12 @@ pub(super) enum Job {
         prepared: Receiver<()>,
     },
     Load,
-    /// Continue with this file, recovered in place of an unreadable one.
+    /// Continue with this scene file, which was recovered in place of an unreadable one.
     Adopt(Box<SceneFile>),
     End,
 }
 
-/// Handle of the threads of the scene file and of the recovery file.
+/// Handle of two threads: the one of the scene file, and the one of the recovery file.
 pub struct Files {
     jobs: Sender<Job>,
     autosaves: Sender<AutosaveJob>,
@@ -136,8 +136,8 @@ impl Files {
     }
 
     /// Waits for pending writes, at most four seconds in total. Returns the path of the recovery
-    /// file if there are unsaved edits. If the disk of the scene does not respond in time, they are
-    /// kept in the state folder.
+    /// file if there are unsaved edits. If the disk of the scene file does not respond in time, the
+    /// edits are kept in the state folder.
     ///
     /// # Errors
     /// An explanation if there are unsaved edits that cannot be kept.
@@ -160,7 +160,7 @@ impl Files {
         }
     }
 
-    /// Returns a handle of the scene file as last read or written.
+    /// Returns the shared handle of the scene file as it was last read or written.
     pub fn shared(&self) -> SharedFile {
         self.shared.clone()
     }
@@ -183,8 +183,8 @@ impl Drop for Files {
     }
 }
 
-/// Keeps `scene` as the unsaved edits of `file` by `recovery`, in a thread of its own, since this
-/// disk may not respond either.
+/// Writes `scene` as unsaved edits of `file` with `recovery`, in a thread of its own, because the
+/// disk of the state folder may not respond either.
 fn keep_elsewhere(
     scene: &Scene,
     file: &SceneFile,
@@ -327,7 +327,7 @@ mod tests {
     use super::*;
     use crate::scene::starter;
 
-    /// Timeout that only a failing test reaches.
+    /// Time limit that every machine meets; reached only if a test fails.
     const PATIENCE: Duration = Duration::from_secs(60);
 
     fn opened(path: &Path) -> (Files, Receiver<Message>) {
@@ -433,7 +433,7 @@ mod tests {
         assert_eq!(fs::read_to_string(&path).unwrap(), starter());
     }
 
-    /// Scene file in `folder`, and a scene that differs from it.
+    /// Returns a scene file in `folder`, and a scene that differs from it.
     fn edited(folder: &Path) -> (PathBuf, Arc<Scene>) {
         let path = folder.join("a.toml");
         fs::write(&path, starter()).unwrap();
@@ -442,7 +442,7 @@ mod tests {
         (path, Arc::new(scene))
     }
 
-    /// Opens the file with a channel without reader, which blocks as a disk that does not respond.
+    /// Opens a scene file whose autosave blocks, as on a disk that does not respond.
     fn opened_blocking(path: &Path, state: Option<PathBuf>) -> (Files, Receiver<Message>) {
         let (results, inbox) = bounded(0);
         (Files::new(Ok(SceneFile::open(path).unwrap()), state, results).unwrap(), inbox)

@@ -16,7 +16,7 @@ use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Sequences that start and end a synchronised update, which the terminal shows at once.
+/// Sequences that start and end a synchronised update, which the terminal displays as a whole.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
 
 /// Upper bound of the bytes of an acknowledgement request (a request of the cursor position, 14
@@ -30,14 +30,14 @@ pub struct FramePipeline {
     flow: FlowControl,
     /// Send queue of the SSH connection in the kernel, if it can be read.
     queue: Option<TcpSendQueue>,
-    /// The terminal supports synchronised updates.
+    /// `true` if the terminal supports synchronised updates.
     synchronised: bool,
     writer: Writer,
     /// Time at which the frame that is being written was sent.
     writing_since: Option<Duration>,
     /// Bytes of frames sent so far.
     sent: u64,
-    /// The last drawn frame, of which parts may not have been sent yet.
+    /// Last frame that was drawn. Parts of it may not have been sent yet.
     target: Buffer,
     /// Position of the text cursor, if visible.
     cursor: Option<Position>,
@@ -49,7 +49,7 @@ pub struct FramePipeline {
     upload: Option<ImageUpload>,
     /// Sequence that removes the previous image, to be sent before the next frame; may be empty.
     removal: Vec<u8>,
-    /// The frame being written contains the removal of an image.
+    /// `true` if the frame that is being written removes an image.
     removing: bool,
 }
 
@@ -146,7 +146,7 @@ impl FramePipeline {
         }
     }
 
-    /// Sends the next slice of the image upload, as large as `budget` allows.
+    /// Sends the next slice of the image upload, at most as large as `budget` allows.
     fn slice(&mut self, now: Duration, budget: FrameBudget) -> DrawOutcome {
         let Some(upload) = self.upload.as_mut().filter(|_| budget.picture) else {
             return DrawOutcome::Nothing;
@@ -178,8 +178,8 @@ impl FramePipeline {
         self.writer.ready()
     }
 
-    /// Returns two values: `true` if visible differences of the picture are pending, and the bytes
-    /// of frames sent so far.
+    /// Returns two values: `true` if the screen differs visibly from the picture, and the number of
+    /// bytes of frames sent so far.
     pub fn load(&self) -> (bool, u64) {
         (self.diff.pending().visible, self.sent)
     }
@@ -189,7 +189,7 @@ impl FramePipeline {
         self.flow.reading()
     }
 
-    /// Records user input for flow control.
+    /// Records user input at the time `now` for flow control.
     pub fn act(&mut self, now: Duration) {
         self.flow.act(now);
     }
@@ -199,7 +199,7 @@ impl FramePipeline {
         self.flow.on_ack(at);
     }
 
-    /// Returns the longest time to wait for acknowledgements before the terminal is given back.
+    /// Returns the longest time to wait for acknowledgements before the terminal is restored.
     /// Returns `None` if none are outstanding.
     pub fn awaits(&self) -> Option<Duration> {
         self.flow.awaits()
@@ -210,7 +210,8 @@ impl FramePipeline {
         self.flow.is_waiting()
     }
 
-    /// Updates flow control: gives up overdue acknowledgements and reads the kernel's send queue.
+    /// Updates flow control: stops waiting for overdue acknowledgements, and reads the length of
+    /// the kernel's send queue.
     pub fn look(&mut self, now: Duration) {
         self.flow.expire(now);
         if self.flow.asks_kernel(now) {
@@ -224,8 +225,8 @@ impl FramePipeline {
         self.flow.measures_at(now)
     }
 
-    /// Returns the time from which the connection counts as silent if nothing comes before. Returns
-    /// `None` if nothing is under way to the terminal.
+    /// Returns the time at which the connection will count as silent if nothing is received until
+    /// then. Returns `None` if no output is under way.
     pub fn silent_at(&self) -> Option<Duration> {
         self.flow.silent_at(self.writing_since)
     }

@@ -3,8 +3,8 @@
 use crate::terminal::image::ViewerImage;
 use std::sync::Arc;
 
-/// Maximum slice size in bytes. No frame can be sent while a slice is being written, so the size
-/// bounds the latency of keys.
+/// Largest size of a slice in bytes. It bounds the latency of keys, because no frame can be sent
+/// while a slice is being written.
 const SLICE: usize = 1 << 18;
 /// String terminator (ST), which ends an incomplete escape sequence.
 const END: &[u8] = b"\x1b\\";
@@ -15,9 +15,10 @@ pub struct ImageUpload {
     image: Arc<ViewerImage>,
     /// Number of bytes sent.
     sent: usize,
-    /// The bytes sent end inside an escape sequence, so only its remainder may be sent next.
+    /// `true` if the bytes sent so far end inside an escape sequence. Then only its remainder may
+    /// be sent next.
     open: bool,
-    /// The image is already visible as half blocks.
+    /// `true` if the image is already visible as half blocks.
     pub seen: bool,
 }
 
@@ -49,8 +50,8 @@ impl ImageUpload {
         self.sent < self.image.transfer.bytes.len()
     }
 
-    /// Returns `true` if the image covers its half blocks or is to be sent next. `waits` is `true`
-    /// if visible differences of the half blocks are pending.
+    /// Returns `true` if the uploaded image covers its half blocks already, or may be sent next.
+    /// `waits` is `true` if half blocks still differ visibly from the screen.
     pub fn follows(&self, waits: bool) -> bool {
         self.has_begun() || self.is_unfinished() && (self.seen || !waits)
     }

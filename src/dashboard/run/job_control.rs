@@ -13,9 +13,9 @@ use std::time::Duration;
 const SETTLED: Duration = Duration::from_millis(90);
 /// Maximum time between the first resize of a series and its effect.
 const LONGEST: Duration = Duration::from_millis(400);
-/// Maximum wait for the autosave before the program is suspended.
+/// Longest wait for the autosave before the program is suspended.
 const SECURED_WITHIN: Duration = Duration::from_secs(2);
-/// Maximum wait for the stop signal to take effect. After it the program resumes by itself.
+/// Longest wait for the stop signal to take effect. The program resumes by itself after it.
 const STOPS_WITHIN: Duration = Duration::from_millis(500);
 
 /// The terminal, and the receivers of its events.
@@ -26,7 +26,8 @@ pub(super) struct TerminalIo {
     pub input: Receiver<io::Result<Timed>>,
     /// Receiver of signals.
     pub signals: Receiver<SignalEvent>,
-    /// Receiver of a notification that the terminal has been restored for good, as by a panic.
+    /// Receiver of the notification that the terminal has been restored for good, for example by a
+    /// panic.
     pub left: Receiver<()>,
 }
 

@@ -6,7 +6,7 @@ use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Frame that is the response to an event.
+/// Frame that counts as the response to an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Answer {
     /// The next frame of any kind.
@@ -27,14 +27,15 @@ struct Awaiting {
 struct Answered {
     /// Time at which the event was read, since the start of the recorder.
     read: Duration,
-    /// The response needed a new picture.
+    /// `true` if the response is a new picture.
     picture: bool,
-    /// Latency.
+    /// Time from reading the event until the response was written.
     after: Duration,
 }
 
-/// Recorder of input latencies. It always tracks pending events, because frames that respond to an
-/// event are sent without waiting for the frame interval. It stores latencies only on request.
+/// Recorder of input latencies. It always tracks events without a response, because frames that
+/// respond to an event are sent without waiting for the frame interval. It stores latencies only on
+/// request.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,
@@ -47,12 +48,13 @@ pub struct LatencyRecorder {
     load: Load,
 }
 
-/// Traffic during the time in which visible differences between screen and picture were pending.
+/// Output sent while the screen differed visibly from the picture.
 #[derive(Clone, Copy, Debug, Default)]
 struct Load {
-    /// Time of the last update, `true` if differences were pending then, and bytes sent until then.
+    /// Values of the last update: time, `true` if the screen differed from the picture, and bytes
+    /// sent until then.
     last: (Duration, bool, u64),
-    /// Total time during which differences were pending.
+    /// Total time during which the screen differed from the picture.
     waited: Duration,
     /// Bytes sent during that time.
     bytes: u64,
@@ -109,8 +111,9 @@ impl LatencyRecorder {
         }
     }
 
-    /// Records the state of the connection at time `now`, after a frame. `waits` is `true` if
-    /// visible differences are pending; `sent` is the number of bytes sent since the start.
+    /// Records the state of the connection at the time `now`, after a frame. `waits` is `true` if
+    /// the screen differs visibly from the picture; `sent` is the number of bytes sent since the
+    /// start.
     pub fn line(&mut self, now: Duration, waits: bool, sent: u64) {
         let Load { last: (before, waited, known), .. } = self.load;
         if waited {
@@ -175,8 +178,8 @@ impl Awaiting {
     }
 }
 
-/// Returns the quantile `share` of `sorted`: the smallest element that is at least as large as this
-/// fraction (0 to 1) of all elements. Returns 0 if `sorted` is empty.
+/// Returns the smallest element of `sorted` that is at least as large as the fraction `share` (0 to
+/// 1) of all elements. Returns 0 if `sorted` is empty.
 fn quantile(sorted: &[Duration], share: f64) -> Duration {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied().unwrap_or_default()

@@ -127,8 +127,8 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     run_on_terminal(Box::new(effects), start, terminal, trace)
 }
 
-/// Shows `films`, which other processes write, until the user quits or a signal arrives. `threads`
-/// is the number of threads that compute the picture.
+/// Shows `films`, which other processes write, until the user quits or a signal arrives. Tracing
+/// nothing, it uses `threads` threads for noise estimates and pictures.
 pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
     let start = Start {
         path: None,
@@ -234,7 +234,7 @@ struct Dashboard {
     model: Model,
     effects: Box<dyn Effects>,
     frames: FramePipeline,
-    /// Capabilities of the terminal that are known so far.
+    /// Capabilities of the terminal, as far as they are known.
     terminal: Capabilities,
     latency: LatencyRecorder,
     began: Instant,
@@ -247,13 +247,13 @@ struct Dashboard {
     resizing: ResizeDebounce,
     /// Time at which the model last received the connection's status or upload progress.
     status_sent_at: Duration,
-    /// The renderer is paused because the connection is silent.
+    /// `true` if rendering is paused because the connection is silent.
     resting: bool,
-    /// The model has changed since the last frame.
+    /// `true` if the model has changed since the last frame.
     changed: bool,
-    /// The program is to be suspended after the current messages.
+    /// `true` if the program is suspended after the current messages.
     suspend: bool,
-    /// The program is to quit after the current messages.
+    /// `true` if the program quits after the current messages.
     quit: bool,
 }
 
@@ -332,7 +332,7 @@ impl Dashboard {
         Ok(None)
     }
 
-    /// Handles a terminal reply at once. Appends user input to `waiting`.
+    /// Handles a terminal reply at once, and appends user input to `waiting`.
     fn enqueue(&mut self, Timed { at, event }: Timed, waiting: &mut Vec<Input>) {
         let message = match event {
             Event::Key(key) => Message::Key(key),
@@ -352,8 +352,8 @@ impl Dashboard {
         input::join(waiting, Input { at, message });
     }
 
-    /// Waits for outstanding replies of the terminal before it is given back, so that the shell
-    /// does not read the replies as input.
+    /// Waits for outstanding replies of the terminal before it is restored. Otherwise the shell
+    /// would read the replies as input.
     fn await_answers(&mut self, input: &Receiver<io::Result<Timed>>) {
         let end = self.frames.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
@@ -490,8 +490,8 @@ impl Dashboard {
         times.into_iter().flatten().min().map(|at| at.saturating_sub(now))
     }
 
-    /// Pauses the renderer while the connection is silent, because its pictures arrive nowhere.
-    /// Returns the time of the next pause if nothing comes from the terminal before.
+    /// Pauses rendering while the connection is silent, because pictures would not arrive. Returns
+    /// the time at which rendering will be paused if nothing is received until then.
     fn rest(&mut self, now: Duration) -> Option<Duration> {
         let silent_at = self.frames.silent_at();
         let is_silent = silent_at.is_some_and(|at| at <= now);

@@ -13,7 +13,7 @@ struct State {
 }
 
 impl SharedFile {
-    /// Creates a handle without file. `elsewhere` writes recovery files to the state folder.
+    /// Creates a handle without a file. `elsewhere` writes recovery files to the state folder.
     pub fn new(elsewhere: Recovery) -> Self {
         Self(Arc::new(Mutex::new(State { file: None, elsewhere })))
     }

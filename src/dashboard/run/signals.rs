@@ -19,8 +19,7 @@ pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 /// that it can report where unsaved edits are kept.
 pub(super) const ENDED_WITHIN: Duration = Duration::from_secs(4);
 
-/// Difference between the exit status that shells report for a killed program and the number of the
-/// signal.
+/// Number that is added to the number of a signal to form the exit status, as in shells.
 const SIGNALLED: i32 = 128;
 
 /// Exit status after the loss of the terminal, equal to that of SIGHUP.
@@ -43,7 +42,7 @@ pub(super) enum SignalEvent {
 pub(super) struct Signals {
     /// Receiver of the events, in the order of the signals.
     pub events: Receiver<SignalEvent>,
-    /// A terminating signal has arrived.
+    /// `true` after a terminating signal has arrived.
     ending: Arc<AtomicBool>,
 }
 
@@ -101,9 +100,9 @@ pub(super) fn watch(
     Ok(Signals { events, ending })
 }
 
-/// Stops the processes of `target`, possibly with a delay. SIGTSTP has a handler in this program,
-/// so SIGTTIN is sent. Without a shell that could continue the processes nothing happens: the
-/// kernel ignores every stop signal but SIGSTOP for orphaned process groups.
+/// Stops the processes of `target`, possibly with a delay. It sends SIGTTIN, because SIGTSTP has a
+/// handler in this program. Without a shell that could continue the processes, nothing happens: in
+/// orphaned process groups the kernel ignores every stop signal except SIGSTOP.
 pub(super) fn stop(target: StopTarget) -> io::Result<()> {
     match target {
         StopTarget::Itself => kill_process(getpid(), Signal::TTIN)?,

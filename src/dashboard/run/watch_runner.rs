@@ -1,5 +1,5 @@
-//! Execution of effects while files are watched: nothing is edited or rendered, the picture is
-//! displayed and exported.
+//! Execution of effects while files are watched: the picture is displayed and exported; there is no
+//! scene to edit or render.
 
 use crate::dashboard::message::{Effect, Exported, Format, Message};
 use crate::dashboard::run::effects::{Effects, Outcome, run_on_terminal};
@@ -17,14 +17,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Longest wait for the first report on the files.
+/// Longest wait for the first report on the watched files.
 const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
 
 /// Executor of effects that shows watched files.
 pub struct WatchRunner {
     session: WatchSession,
     view: View,
-    /// Exports that have not been written yet.
+    /// Number of exports that have not been written yet.
     exporting: usize,
     results: Sender<Message>,
     done: Receiver<Message>,
@@ -59,7 +59,7 @@ impl WatchRunner {
     }
 }
 
-/// Writes a picture under the next free name, which begins with that of the scene file.
+/// Writes a picture to a file with the next free name. The name begins with that of the scene file.
 fn write(
     film: &Film,
     header: &FilmFileHeader,

@@ -1,19 +1,19 @@
-//! Threads whose end is awaited for a limited time.
+//! Threads with a limited wait for their end.
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, bounded};
 use std::io;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// Thread that may never end, because a disk or the renderer does not respond.
+/// Thread that may never end, because a disk or the renderer may not respond.
 pub struct Worker {
     thread: JoinHandle<()>,
-    /// Disconnected at the end of the thread.
+    /// Receiver that is disconnected at the end of the thread.
     ended: Receiver<()>,
 }
 
 impl Worker {
-    /// Starts a thread.
+    /// Starts the thread `name`, which runs `run`.
     pub fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> io::Result<Self> {
         let (running, ended) = bounded(0);
         let thread = thread::Builder::new().name(name.into()).spawn(move || {

@@ -21,7 +21,7 @@ pub struct Written {
 pub struct Writer {
     frames: Sender<Vec<u8>>,
     written: Receiver<Written>,
-    /// A frame is being written.
+    /// `true` if a frame is being written.
     in_flight: bool,
     /// Empty buffer, for reuse by the next frame.
     spare: Vec<u8>,
@@ -53,7 +53,7 @@ impl Writer {
         std::mem::take(&mut self.spare)
     }
 
-    /// Takes back an empty buffer that is not sent.
+    /// Takes back the buffer of a frame that was not sent.
     pub fn keep(&mut self, buffer: Vec<u8>) {
         self.spare = buffer;
     }

@@ -11,17 +11,18 @@ use crate::scene::edit::{
 const ORBIT_DEGREES: f64 = 5.0;
 /// Degrees per step of a look.
 const LOOK_DEGREES: f64 = 3.0;
-/// Step of a pan, as a fraction of the distance to the pivot, the point that the camera orbits.
+/// Step of a pan, as a fraction of the distance between camera and pivot (the point that the camera
+/// orbits).
 const PAN_SHARE: f64 = 0.05;
-/// Factor of the distance to the pivot for a coarse step of a dolly inwards.
+/// Factor by which a coarse dolly step towards the pivot multiplies the distance to it.
 const DOLLY: f64 = 0.9;
-/// Factor of the distance to the pivot for a fine step of a dolly inwards.
+/// Factor by which a fine dolly step towards the pivot multiplies the distance to it.
 const DOLLY_FINE: f64 = 0.99;
-/// Factor of the visible width for a step to a narrower view angle.
+/// Factor by which a zoom step inwards multiplies the visible width.
 const ZOOM: f64 = 0.95;
 
-/// Returns the components of a direction: to the right and upwards. Both are 0 for the directions
-/// along the view.
+/// Returns the components of a direction: to the right and upwards. Both are 0 for directions along
+/// the view direction.
 fn right_up(direction: Direction) -> [f64; 2] {
     match direction {
         Direction::Left => [-1.0, 0.0],
@@ -68,7 +69,7 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
     }
 
-    /// Dollies by `ticks` of the wheel. Positive ticks move nearer.
+    /// Dollies by `ticks` of the wheel. Positive ticks move the camera nearer.
     pub(super) fn dolly_by_wheel(&mut self, ticks: i32) {
         let factor = DOLLY.powi(ticks.clamp(-50, 50));
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
@@ -102,8 +103,8 @@ impl UpdateContext<'_> {
         self.say(format!("{key} view angle {degrees}°"));
     }
 
-    /// Moves the camera such that the selection fills the picture, or the scene if the selection
-    /// has no bounds.
+    /// Moves the camera so that the selection fills the picture. If the selection has no bounds,
+    /// the scene does.
     pub(super) fn frame(&mut self) {
         let scene = self.scene();
         let ball = bounds(scene, &self.model.selection).unwrap_or_else(|| scene_bounds(scene));
@@ -167,8 +168,8 @@ impl UpdateContext<'_> {
         scene.camera.half_size(width / height)[0]
     }
 
-    /// Returns the amount for a drag of one half cell, where `across` is the amount for a drag
-    /// across the full width of the picture.
+    /// Returns the amount for a drag of one half cell. `across` is the amount for a drag across the
+    /// full width of the picture.
     pub(super) fn per_half_cell(&self, across: f64) -> f64 {
         self.model.layout().map_or(0.0, |layout| across / layout.raster[0] as f64)
     }

@@ -74,7 +74,7 @@ pub enum HintLine {
 pub struct Hint {
     /// States in which the hint is shown.
     pub lines: &'static [HintLine],
-    /// Sorting key within the hint line.
+    /// Position of the hint in the hint line; smaller numbers come first.
     pub position: u8,
     /// Keys as displayed, such as `PgUp PgDn`.
     pub keys: &'static str,
@@ -94,11 +94,13 @@ pub struct Command {
     pub keys: &'static [(KeyContext, &'static str)],
     /// Hints for the command and related ones.
     pub hints: &'static [Hint],
-    /// The command runs while a value is being typed. Before other commands the value is applied.
+    /// `true` if the command runs while a value is being typed. Before any other command the value
+    /// is applied.
     pub(super) while_typing: bool,
-    /// The command also runs in the viewer of exported images. Any other key closes the viewer.
+    /// `true` if the command also runs in the viewer of exported images. All other keys close the
+    /// viewer.
     pub(super) over_image: bool,
-    /// The command also runs in `zerkalo watch`, where nothing is edited or rendered.
+    /// `true` if the command also runs in `zerkalo watch`, where nothing is edited or rendered.
     pub while_watching: bool,
     /// Returns `true` if the command can run on the model.
     pub(super) available: fn(&Model) -> bool,
@@ -139,8 +141,8 @@ fn with_scene(model: &Model) -> bool {
     !model.file.unreadable
 }
 
-/// Returns `true` if there is a scene, or if a palette or question is open, which are answered even
-/// without a scene.
+/// Returns `true` if there is a scene, or if a palette or question is open, whose answers need no
+/// scene.
 fn with_scene_or_choice(model: &Model) -> bool {
     with_scene(model) || matches!(model.overlay, Some(Overlay::Palette(_) | Overlay::Question(_)))
 }
@@ -373,7 +375,7 @@ impl Command {
         self.formatted_keys(key, |context| Some(context.place()))
     }
 
-    /// Returns the keys of the command outside of overlays while files are watched.
+    /// Returns the keys that the command has while files are watched and no overlay is open.
     pub fn watch_keys(&self, key: impl Fn(&str) -> String) -> String {
         self.formatted_keys(key, |context| match context {
             Anywhere | Outline => Some(""),
@@ -382,7 +384,7 @@ impl Command {
         })
     }
 
-    /// Formats the keys in the contexts that `place` names.
+    /// Formats the keys of the contexts for which `place` returns a name.
     fn formatted_keys(
         &self,
         key: impl Fn(&str) -> String,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// Change of exposure per step, in stops.
 const EXPOSURE_STEP: f64 = 0.25;
-/// Limit of the exposure in stops, positive or negative. Beyond it any picture is white or black.
+/// Largest absolute value of the exposure, in stops. Beyond it every picture is white or black.
 const MOST_EXPOSURE: f64 = 20.0;
 
 impl UpdateContext<'_> {
@@ -101,7 +101,7 @@ impl UpdateContext<'_> {
         self.say(format!("pinned at {spp:.0} spp · c flips · C shows the difference"));
     }
 
-    /// Toggles between the live picture and the view `what`.
+    /// Toggles between the live picture and the view `what` of a comparison.
     pub(super) fn compare(&mut self, what: CompareView) {
         if self.model.comparison.pinned.is_none() {
             self.say("No picture is pinned yet · k pins one");

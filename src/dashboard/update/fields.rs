@@ -42,14 +42,14 @@ impl UpdateContext<'_> {
         self.model.field_lines().get(self.cursor())?.field().cloned()
     }
 
-    /// Returns the property of the scene that a field belongs to. A property that is a list of
+    /// Returns the property of the scene to which `field` belongs. A property that is a list of
     /// numbers has one field for each number.
     fn row(&self, field: &FieldLine) -> Option<Property> {
         let rows = edit::rows(self.scene(), &field.subject).ok()?;
         rows.into_iter().find(|row| row.key == field.key)
     }
 
-    /// Opens a text editor for the field under the cursor. The editor contains `typed`, or the
+    /// Opens a text editor for the field under the cursor, with the text `typed`, or with the
     /// field's value if `typed` is `None`. A switch is toggled instead, and a choice opens its
     /// list.
     pub(super) fn open_field(&mut self, typed: Option<char>) {
@@ -82,8 +82,8 @@ impl UpdateContext<'_> {
         matches!(self.model.overlay, Some(Overlay::Form(_)))
     }
 
-    /// Applies the typed value and closes the editor. Returns `true` if the editor is closed. If
-    /// the value is invalid, the editor stays open with the reason, and the result is `false`.
+    /// Applies the typed value and closes the editor. Returns `false` if the value is not valid;
+    /// the editor then stays open and shows the reason.
     pub(super) fn apply_field(&mut self) -> bool {
         let Some(field) = self.field() else {
             self.set_editor(None);

@@ -51,8 +51,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Requests a write of the scene to the scene file, or to `path`, which becomes the scene file.
-    /// `overwrite` allows the replacement of content from other programs.
+    /// Requests that the scene be written to the scene file, or to `path`, which then becomes the
+    /// scene file. `overwrite` permits replacing content from other programs.
     pub(super) fn write(&mut self, path: Option<PathBuf>, overwrite: bool) {
         let scene = Arc::clone(self.model.history.scene());
         self.emit(Effect::Save { scene, path, overwrite });

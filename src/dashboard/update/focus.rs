@@ -1,12 +1,12 @@
-//! Focus and modes, which determine the panel and the part of the scene that the keys act on.
+//! Focus and modes: the panel and the part of the scene on which keys act.
 
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{CompareView, Inspector, Mode};
 use crate::dashboard::update::{UpdateContext, cycled};
 
 impl UpdateContext<'_> {
-    /// Enters a mode and gives the focus to the picture. Does nothing if the selection cannot be
-    /// moved or turned as the mode requires.
+    /// Enters `mode` and gives the focus to the picture. Does nothing if the selection cannot be
+    /// moved or turned in this mode.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
         let movable = match mode {
             Mode::Move => self.check_movable(),
@@ -20,8 +20,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Leaves the first of these that is active: overlay, text editor, mode, panel, full screen,
-    /// comparison.
+    /// Leaves the innermost state that is active, in this order: overlay, text editor, mode, panel,
+    /// full screen, comparison.
     pub(super) fn leave(&mut self) {
         if self.model.overlay.is_some() {
             self.close_overlay();

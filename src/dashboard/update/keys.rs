@@ -1,4 +1,5 @@
-//! Key dispatch: an open text editor gets a key first, the command table second.
+//! Key dispatch. An open text editor receives a key first; the command table receives the keys that
+//! the editor does not use.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::key_context::KeyContext;
@@ -97,15 +98,15 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Updates the results that depend on the text being typed: the commands in the palette.
+    /// Updates the palette's list of commands after a change of its text.
     fn text_changed(&mut self) {
         if let Some(Overlay::Palette(_)) = self.model.overlay {
             self.search();
         }
     }
 
-    /// Applies a typed character to the open list, form or question. Returns `true` if an overlay
-    /// is open, so that the character runs no command.
+    /// Applies the character `c` to the open list, form or question. Returns `true` if an overlay
+    /// is open; the character then runs no command.
     fn typed_in_overlay(&mut self, c: char) -> bool {
         match &self.model.overlay {
             Some(Overlay::Question(question)) => {

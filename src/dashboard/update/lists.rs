@@ -51,7 +51,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Moves the cursor by `pages`. The height of a page is the number of visible rows less one.
+    /// Moves the cursor by `pages` pages. A page has one row less than are visible.
     pub(super) fn page(&mut self, pages: isize) {
         let rows = match (self.model.overlay_layout(), self.model.focus) {
             (Some(layout), _) => layout.list.height,
@@ -127,7 +127,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Closes the text editor of a form if one is open, otherwise cancels the overlay.
+    /// Closes the text editor of a form if one is open, otherwise closes the overlay.
     pub(super) fn close_overlay(&mut self) {
         match &mut self.model.overlay {
             Some(Overlay::Form(form)) if form.editor.is_some() => form.editor = None,

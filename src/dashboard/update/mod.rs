@@ -36,8 +36,8 @@ use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Maximum time between edits by repeated keys that form one undo step. It is longer than the delay
-/// before a held key starts to repeat.
+/// Longest time between edits by repeated keys that form one undo step. It is longer than the delay
+/// after which a held key starts to repeat.
 const REPEAT_WINDOW: Duration = Duration::from_millis(700);
 
 /// Returns the initial effects of a new model.
@@ -66,8 +66,8 @@ struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
-    /// Outline and inspector scroll to keep their cursor visible. `false` after updates that must
-    /// not undo scrolling by the user.
+    /// `true` if outline and inspector scroll to keep their cursor visible; `false` after updates
+    /// that must not undo scrolling by the user.
     follow: bool,
     /// Character of the key that ran the current command, if the key types one.
     typed: Option<char>,
@@ -93,7 +93,7 @@ enum StepSize {
     Fine,
 }
 
-/// Rule for merging an edit with the previous one into one undo step.
+/// Rule that decides if an edit is merged with the previous one into one undo step.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Coalesce {
     /// The edit is a separate undo step.
@@ -165,8 +165,8 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Adds an effect. The effect replaces an earlier one of the same kind, unless it saves or
-    /// exports.
+    /// Adds `effect` to the results of the update. It replaces an earlier effect of the same kind,
+    /// unless it saves or exports.
     fn emit(&mut self, effect: Effect) {
         if !matches!(effect, Effect::Save { .. } | Effect::Export(_) | Effect::ExportSized { .. }) {
             self.effects.retain(|e| discriminant(e) != discriminant(&effect));
@@ -179,7 +179,7 @@ impl<'a> UpdateContext<'a> {
         self.model.picture_version += 1;
     }
 
-    /// Requests a render of the current scene.
+    /// Requests a render of the scene.
     fn show(&mut self) {
         let scene = Arc::clone(self.model.scene());
         self.emit(Effect::Show(scene));
@@ -190,7 +190,7 @@ impl<'a> UpdateContext<'a> {
         self.model.scene()
     }
 
-    /// Commits an edit or reports its error. Returns `true` if the scene has changed.
+    /// Commits an edit, or shows its error as a notice. Returns `true` if the scene has changed.
     fn commit(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) -> bool {
         match edit {
             Ok(edit) => self.record(edit, coalesce),

@@ -102,8 +102,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens the clicked line if the cursor is already on it, otherwise moves the cursor to the
-    /// line.
+    /// Opens the clicked line of the overlay if the cursor is on it already, otherwise moves the
+    /// cursor there.
     fn press_in_overlay(&mut self, mouse: Mouse) {
         let Some(layout) = self.model.overlay_layout() else { return };
         match &self.model.overlay {
@@ -168,8 +168,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Returns `true` in the modes Move and Rotate. All edits of the same label in such a mode form
-    /// one undo step.
+    /// Returns `true` in the modes Move and Rotate, in which all edits of the same label form one
+    /// undo step.
     fn moves_or_turns(&self) -> bool {
         matches!(self.model.mode, Mode::Move | Mode::Rotate)
     }

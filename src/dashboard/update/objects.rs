@@ -8,8 +8,8 @@ use glam::{DVec2, DVec3};
 /// Degrees per step of a rotation.
 const TURN_DEGREES: f64 = 15.0;
 const TURN_DEGREES_FINE: f64 = 1.0;
-/// Maximum of the factor that lengthens the depth component of a drag because the ground plane is
-/// foreshortened. At grazing view angles the exact factor, 1 / sin of the angle, has no bound.
+/// Largest factor by which the depth component of a drag is lengthened. The exact factor for a
+/// foreshortened ground plane, 1 / sin of the view angle, has no bound at grazing angles.
 const MOST_STRETCH: f64 = 4.0;
 
 /// Returns the coordinate axis in the ground plane that is nearest to `v`.
@@ -18,8 +18,9 @@ fn nearest_axis(v: DVec3) -> DVec3 {
 }
 
 impl UpdateContext<'_> {
-    /// Returns the coordinate axes in the ground plane that point most nearly right and away in the
-    /// picture. Steps along coordinate axes keep round coordinates round.
+    /// Returns two coordinate axes in the ground plane: those that point most nearly to the right
+    /// and away from the eye in the picture. Steps along coordinate axes keep round coordinates
+    /// round.
     fn ground_axes(&self) -> [DVec3; 2] {
         let [right, _, _] = self.scene().camera.frame();
         let right = nearest_axis(right);
@@ -58,8 +59,8 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    /// Returns the rule for merging a step into an undo step: with the whole gesture in a mode or
-    /// drag, otherwise with recent steps.
+    /// Returns the rule for undo steps of the current step: in a mode or drag it is merged with the
+    /// whole gesture, otherwise with recent steps.
     fn gesture(&self) -> Coalesce {
         let in_mode = matches!(self.model.mode, Mode::Move | Mode::Rotate);
         if in_mode || self.model.drag.is_some() { Coalesce::Gesture } else { Coalesce::Repeat }

@@ -80,8 +80,8 @@ impl UpdateContext<'_> {
         self.prompt(PromptFor::ExportSized, "render at another size", help, text);
     }
 
-    /// Applies the text of the open prompt and closes it. If the text is invalid, the prompt stays
-    /// open and shows the reason.
+    /// Applies the text of the open prompt and closes it. If the text is not valid, the prompt
+    /// stays open and shows the reason.
     pub(super) fn answer_prompt(&mut self) {
         let Some(Overlay::Prompt(prompt)) = &self.model.overlay else { return };
         let (purpose, text) = (prompt.purpose.clone(), prompt.editor.text().trim().to_string());
@@ -166,8 +166,8 @@ pub(super) fn stop_text(stop: &Stop) -> String {
     if text.is_empty() { "none".to_string() } else { text }
 }
 
-/// Parses stop criteria in the format of [`stop_text`]. Commas and equals signs may separate words
-/// too.
+/// Parses stop criteria in the format of [`stop_text`]. Commas and equals signs may also separate
+/// words.
 fn parse_stop(text: &str) -> Result<Stop, String> {
     let mut stop = Stop::default();
     let mut words = text.split([' ', ',', '=']).filter(|word| !word.is_empty());

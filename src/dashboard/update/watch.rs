@@ -14,7 +14,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 impl UpdateContext<'_> {
-    /// Shows a report on the watched files. The cursor stays on its row, whose index may change.
+    /// Stores a report on the watched files. The cursor stays on the same file or shard, whose row
+    /// may change.
     pub(super) fn watched(&mut self, report: WatchReport) {
         let before = self.model.watch.take();
         if let Some(size) = report.size.filter(|size| *size != self.scene().film.size) {
@@ -52,7 +53,8 @@ impl UpdateContext<'_> {
         table.scroll = scrolled(table.scroll, table.cursor, len, rows);
     }
 
-    /// Handles the mouse outside of overlays: the table selects and scrolls, the probe follows.
+    /// Handles mouse events outside of overlays: the table selects and scrolls, the probe follows
+    /// clicks in the picture.
     pub(super) fn mouse_on_watch(&mut self, mouse: Mouse) {
         let Some(layout) = self.model.layout() else { return };
         let in_picture = layout.image.contains(mouse.column, mouse.row);

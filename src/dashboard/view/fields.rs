@@ -18,7 +18,8 @@ use ratatui::layout::Position;
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
 
-/// Unit of lengths. Nearly every number has it, so it is shown only for the field under the cursor.
+/// Unit of lengths. Because nearly every number has this unit, it is shown only for the field under
+/// the cursor.
 const LENGTH: &str = "scene units";
 
 /// A list of fields and the areas that it is drawn in.
@@ -35,14 +36,15 @@ pub struct Fields<'a> {
     pub scroll: usize,
     /// Text editor of the field under the cursor, if one is open.
     pub editor: Option<&'a Editor>,
-    /// Problem of the last step of a field, shown unless the editor has a problem.
+    /// Reason for which the last step of a field was refused. It is shown unless the editor has a
+    /// reason of its own.
     pub problem: Option<&'a str>,
-    /// The fields receive the keys.
+    /// `true` if the fields receive the keys.
     pub active: bool,
 }
 
-/// Draws the inspector. Draws nothing if the panel is folded. Returns the position of the text
-/// cursor. Returns `None` if the cursor is hidden.
+/// Draws the inspector, or nothing if the panel is folded. Returns the position of the text cursor,
+/// or `None` if the cursor is hidden.
 pub fn inspector(
     model: &Model,
     layout: &Layout,
@@ -68,7 +70,7 @@ pub fn inspector(
 }
 
 impl Fields<'_> {
-    /// Draws the fields. Returns the position of the text cursor. Returns `None` if the cursor is
+    /// Draws the fields. Returns the position of the text cursor, or `None` if the cursor is
     /// hidden.
     pub fn draw(&self, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
         let rows = usize::from(self.list.height);
@@ -180,8 +182,8 @@ fn heading(mut to: Row, title: &str, theme: &Theme) {
     to.put(&"─".repeat(left), theme.border(false));
 }
 
-/// Draws a text editor in the free columns of the row `to`. Returns the position of the text
-/// cursor. Returns `None` if there is no room.
+/// Draws the text of `editor` in the free columns of the row `to`. Returns the position of the text
+/// cursor, or `None` if there is no room.
 pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     let width = to.left().saturating_sub(1);
     if width == 0 {
@@ -198,9 +200,10 @@ pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     Some(Position { x: x + column, y })
 }
 
-/// Rounds a long number to six significant digits for display. The text editor shows all digits.
+/// Rounds a number with many digits to six significant digits for display. The text editor shows
+/// all digits.
 fn brief(value: &str) -> Cow<'_, str> {
-    /// Maximum length of a number that is shown with all its digits, in characters.
+    /// Largest length of a number, in characters, that is shown with all its digits.
     const SHORT: usize = 9;
     match value.parse::<f64>() {
         Ok(x) if value.len() > SHORT && x.is_finite() => number(round_significant(x, 6)).into(),

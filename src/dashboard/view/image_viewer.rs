@@ -11,8 +11,8 @@ use crate::terminal::image::{Protocol, ViewerImage};
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Style};
 
-/// Draws the image in half blocks. If the terminal supports an image protocol, the upload replaces
-/// the half blocks later. Returns the cells of the image. Returns `None` if only text is visible.
+/// Draws the image in half blocks. If the terminal supports an image protocol, the uploaded image
+/// replaces them later. Returns the cells of the image, or `None` if only text is visible.
 pub fn draw(
     model: &Model,
     viewed: &ViewedImage,

@@ -44,8 +44,8 @@ impl Legend {
         columns(&self.low) + columns(&self.high) + columns(&self.unit) + BAR + 5
     }
 
-    /// Draws the legend at the right end of `row` of `area`. Omits the unit, or draws nothing, if
-    /// there is no room.
+    /// Draws the legend at the right end of the row `row` of `area`. If there is no room, omits the
+    /// unit, or draws nothing.
     pub fn draw(&self, area: Area, row: u16, theme: &Theme, buffer: &mut Buffer) {
         let mut line = Row::new(buffer, area, row);
         let words = columns(&self.unit) + 1;

@@ -38,7 +38,7 @@ pub struct View {
     /// Inputs of the cached picture; `None` before the first one.
     made_for: Option<Version>,
     picture: PictureCells,
-    /// Rectangle of the last drawn picture on the screen.
+    /// Rectangle of the screen in which the picture was last drawn.
     place: Rect,
     /// Row-major mask of the cells of `place` that no overlay or mark covers.
     uncovered: Vec<bool>,
@@ -67,7 +67,7 @@ impl View {
     }
 
     /// Draws `model` into `buffer`, which must be empty and have the size of the model's screen.
-    /// Returns the position of the text cursor. Returns `None` if the cursor is hidden.
+    /// Returns the position of the text cursor, or `None` if the cursor is hidden.
     pub fn draw(&mut self, model: &Model, buffer: &mut Buffer) -> Option<Position> {
         let theme = Theme::new(model.colors);
         if let Some(Overlay::ViewerImage(viewed)) = &model.overlay {

@@ -14,7 +14,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::Style;
 
-/// Draws the overlay. Returns the position of the text cursor. Returns `None` if the cursor is
+/// Draws the open overlay. Returns the position of the text cursor, or `None` if the cursor is
 /// hidden.
 pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
     let mut painter = Painter { place: model.overlay_layout()?, theme, buffer };
@@ -45,8 +45,8 @@ impl Painter<'_> {
         overlay(self.place.frame, title, self.theme, self.buffer);
     }
 
-    /// Draws the scroll bar of a list of `len` lines whose first visible one is `scroll`. Returns
-    /// the visible lines as pairs of row on the screen and index.
+    /// Draws the scroll bar of a list of `len` lines, of which the line `scroll` is the first
+    /// visible one. Iterates over the visible lines: row of the screen, and index of the line.
     fn window(&mut self, scroll: usize, len: usize) -> impl Iterator<Item = (u16, usize)> + use<> {
         let rows = usize::from(self.place.list.height);
         let first = scroll.min(len.saturating_sub(rows));
@@ -55,7 +55,7 @@ impl Painter<'_> {
         (0..).zip(first..len.min(first + rows))
     }
 
-    /// Draws text in the help rows.
+    /// Draws `text` in the area for help.
     fn say(&mut self, text: &str, style: Style) {
         let help = self.place.help;
         let lines = wrapped(text, help.width);

@@ -33,8 +33,9 @@ struct PinnedCache {
     radiance: Vec<[f32; 3]>,
 }
 
-/// Returns `true` if the picture changes only by user input or rarely, because rendering has ended or
-/// is paused, because files are watched, or because the pinned picture or an exported image is visible.
+/// Returns `true` if the picture rarely changes except by user input. That is so if rendering has
+/// ended or is paused, if files are watched, or if the pinned picture or an exported image is
+/// visible.
 pub fn is_settled(model: &Model) -> bool {
     if let Some(Overlay::ViewerImage(_)) = model.overlay {
         return true;
@@ -46,8 +47,7 @@ pub fn is_settled(model: &Model) -> bool {
 }
 
 impl PictureView {
-    /// Returns the legend of the last raster. Returns `None` if its colours do not represent
-    /// numbers.
+    /// Returns the legend of the last raster. Returns `None` if its colours stand for no numbers.
     pub fn legend(&self) -> Option<&Legend> {
         self.legend.as_ref()
     }
@@ -198,8 +198,8 @@ fn displayed(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 
     Raster::from_fn(width, height, |i| to_8(radiance[i].map(f64::from)))
 }
 
-/// Scales a raster to the given size without interpolation. After a resize the old picture is shown
-/// in this way until the next snapshot.
+/// Scales a raster to the given size without interpolation. It shows the old picture after a resize
+/// until the next snapshot.
 fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
     if [raster.width, raster.height] == [width, height] || raster.pixels.is_empty() {
         return raster;

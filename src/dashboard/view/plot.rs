@@ -21,8 +21,8 @@ struct Axis {
 }
 
 impl Axis {
-    /// Creates an axis that includes all positive finite `values`, with a margin of a tenth at both
-    /// ends. Returns `None` if there are no such values.
+    /// Creates an axis for all positive finite `values`, with a margin of a tenth of its length at
+    /// both ends. Returns `None` if there are no such values.
     fn around(values: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
         for value in values.filter(|v| *v > 0.0 && v.is_finite()) {
@@ -42,8 +42,8 @@ impl Axis {
         (value / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Returns the values of the ticks: powers of ten, and on an axis that spans less than a factor
-    /// of 50 also their multiples by 2 and 5.
+    /// Returns the values of the ticks: powers of ten. If the axis spans less than a factor of 50,
+    /// also 2 and 5 times these.
     fn ticks(&self) -> Vec<f64> {
         let steps: &[f64] = if self.high / self.low < 50.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let first = self.low.log10().floor() as i32;

@@ -16,13 +16,13 @@ use ratatui::style::{Modifier, Style};
 
 /// A part of the status line.
 struct Part {
-    /// Rank of omission if the line is too long: parts with larger values are omitted first.
+    /// Order of omission if the line is too long: parts with larger values are omitted first.
     expendable: u8,
     /// Pieces of text, each with a style.
     text: Vec<(String, Style)>,
 }
 
-/// Draws the status line. Omits whole parts until the others fit.
+/// Draws the status line. If it is too long, omits whole parts until the others fit.
 pub fn draw(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
     let mut parts = parts(model, theme);
     let width = |parts: &[Part]| -> usize {
@@ -98,7 +98,7 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     parts
 }
 
-/// Returns the parts of the status line while files are watched.
+/// Returns the parts of the status line in `zerkalo watch`.
 fn watch_parts(model: &Model, watched: &WatchReport, theme: &Theme) -> Vec<Part> {
     let part = |expendable, text| Part { expendable, text };
     let mut parts: Vec<Part> = watch::summary(watched, theme)
@@ -122,7 +122,8 @@ fn watch_parts(model: &Model, watched: &WatchReport, theme: &Theme) -> Vec<Part>
     parts
 }
 
-/// Formats a rate with two or three digits, such as `118 KB/s`. More digits would flicker.
+/// Formats a rate with two or three digits, such as `118 KB/s`. More digits would change too often
+/// to read.
 fn rate(bytes_per_second: f64) -> String {
     let kilobytes = bytes_per_second / 1e3;
     match kilobytes {
@@ -132,7 +133,8 @@ fn rate(bytes_per_second: f64) -> String {
     }
 }
 
-/// Returns the name of a pacing mode.
+/// Returns the name of a pacing mode (the way in which output is limited to the rate of the
+/// connection).
 fn mode(mode: PacingMode) -> &'static str {
     match mode {
         PacingMode::Unlimited => "local",
@@ -175,7 +177,8 @@ fn spp(model: &Model, report: &Report, theme: &Theme) -> Vec<(String, Style)> {
     text
 }
 
-/// Formats the noise with its target and the estimated time: `noise 0.84 → 0.5 levels in 3–5 s`.
+/// Formats the noise, its target and the time until the target, such as `noise 0.84 → 0.5 levels in
+/// 3–5 s`.
 fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<(String, Style)> {
     let dim = |text: &str| (text.to_string(), theme.dim());
     let mut text = vec![dim("noise "), (number(codes), theme.text())];
@@ -212,8 +215,8 @@ pub fn hints_line(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer)
     }
 }
 
-/// Removes hints until the others fit whole in `width` columns. The last two hints lead to all
-/// commands; they and the first hint are removed last.
+/// Removes hints until the others fit in `width` columns. The first hint and the last two, which
+/// lead to all commands, are removed last.
 fn fitting(mut hints: Vec<&Hint>, width: usize) -> Vec<&Hint> {
     let width_of = |hints: &[&Hint]| -> usize {
         let columns_of = |hint: &&Hint| columns(hint.keys) + 1 + columns(hint.text) + 3;

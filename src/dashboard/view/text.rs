@@ -107,8 +107,8 @@ impl<'a> Row<'a> {
         self.put(&visible, style).skip(gap)
     }
 
-    /// Draws `text` at the right end of the free columns. Draws nothing if `text` and `gap` free
-    /// columns before it do not fit.
+    /// Draws `text` at the right end of the free columns. Draws nothing if there is no room for
+    /// `text` and `gap` free columns before it.
     pub fn put_right(&mut self, text: &str, gap: usize, style: Style) -> &mut Self {
         let text = safe(text);
         let width = columns(&text);
@@ -135,7 +135,7 @@ impl<'a> Row<'a> {
     }
 }
 
-/// Escapes control characters, which the buffer would drop silently.
+/// Escapes control characters, because the buffer would drop them without notice.
 fn safe(text: &str) -> Cow<'_, str> {
     if text.chars().any(char::is_control) {
         Cow::Owned(sanitized(text))
@@ -167,7 +167,8 @@ pub fn durations(from: f64, to: f64) -> String {
     if from == to { format!("{to} {unit}") } else { format!("{from}–{to} {unit}") }
 }
 
-/// Returns the number and the unit of `seconds`, in the unit that suits `reference` seconds.
+/// Returns the value and the unit of `seconds`, in the unit (s, min, h) that suits a duration of
+/// `reference` seconds.
 fn in_unit(seconds: f64, reference: f64) -> (String, &'static str) {
     let (value, unit) = match reference {
         r if r < 99.5 => (seconds, "s"),

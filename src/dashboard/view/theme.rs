@@ -13,7 +13,8 @@ pub struct Theme {
     colors: Colors,
 }
 
-/// A colour at each colour depth: 24 bits, index in the 256-colour palette, and one of 16 colours.
+/// A colour in three colour depths: 24 bits, an index of the 256-colour palette, and one of 16
+/// colours.
 type Tone = ([u8; 3], u8, Color);
 
 const ACCENT: Tone = ([98, 160, 242], 75, Color::Cyan);
@@ -40,8 +41,8 @@ impl Theme {
         }
     }
 
-    /// Returns the style with the colour `tone`. On terminals without colours the style has the
-    /// text attributes `plain` instead.
+    /// Returns the style with the colour `tone`, or with the text attributes `plain` on terminals
+    /// without colours.
     fn toned(&self, tone: Tone, plain: Modifier) -> Style {
         match self.color(tone) {
             Some(color) => Style::new().fg(color),

@@ -14,11 +14,11 @@ use ratatui::buffer::Buffer;
 use ratatui::style::Style;
 use std::time::Duration;
 
-/// Width of the column of ages.
+/// Width of the column of ages, in columns of the terminal.
 const AGE: usize = 7;
-/// Width of the column of shares in percent.
+/// Width of the column of percentages, in columns of the terminal.
 const SHARE: usize = 5;
-/// Width of the column of sample counts.
+/// Width of the column of sample counts, in columns of the terminal.
 const SAMPLES: usize = 12;
 
 /// Draws the table of watched files. Draws nothing if the panel is folded.
@@ -71,7 +71,7 @@ pub fn draw(
     }
 }
 
-/// Draws texts at the right end of a row, the last one first, each right-aligned in its width.
+/// Draws `texts` at the right end of a row, each right-aligned in the given width.
 fn right<const N: usize>(to: &mut Row, texts: [(&str, usize); N], style: Style) {
     for (text, width) in texts {
         to.put_right(&format!("{text:>width$}"), 0, style);
@@ -82,7 +82,7 @@ fn age_column(age: &str) -> String {
     format!("{age:>AGE$}")
 }
 
-/// Draws the file and the state of a row.
+/// Draws the path and the state of a watched file, or of missing shards, below the table.
 fn explain(shard: &WatchedShards, area: Area, theme: &Theme, buffer: &mut Buffer) {
     if area.height == 0 {
         return;
@@ -108,7 +108,7 @@ fn title(report: &WatchReport) -> String {
     }
 }
 
-/// Name of a row: its shards, or the name of its file.
+/// Returns the name of a row: the numbers of its shards, or the name of its file.
 fn label(shard: &WatchedShards) -> String {
     match (&shard.path, shard.shards.as_str()) {
         (Some(path), "") => short_name(path),
@@ -146,7 +146,7 @@ fn sentence(state: &WatchedState) -> &'static str {
     }
 }
 
-/// Formats the share of a row's samples in percent, rounded down.
+/// Formats the fraction of its samples that a row has, in percent, rounded down.
 fn share(shard: &WatchedShards) -> String {
     match shard.total {
         Some(total) if total > 0 => {
@@ -157,7 +157,8 @@ fn share(shard: &WatchedShards) -> String {
     }
 }
 
-/// Formats the samples of a row and those of its shards: `1.2/4.8M`.
+/// Formats the number of samples in a row's file and the number that its shards need, such as
+/// `1.2/4.8M`.
 fn samples(shard: &WatchedShards) -> String {
     let most = shard.total.unwrap_or(shard.samples).max(1) as f64;
     let units = [(1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k")];
@@ -172,7 +173,7 @@ fn samples(shard: &WatchedShards) -> String {
     }
 }
 
-/// Formats an age in whole units: `40 s`, `12 min`, `3 h`, `2 d`.
+/// Formats an age in whole units, such as `40 s`, `12 min`, `3 h` or `2 d`.
 fn age(age: Duration) -> String {
     let seconds = age.as_secs();
     match seconds {
@@ -183,8 +184,8 @@ fn age(age: Duration) -> String {
     }
 }
 
-/// Returns the summary of the files for the status line: state, share of the samples, numbers of
-/// files that are late, missing or not used.
+/// Returns the summary of the watched files for the status line: state, percentage of the samples,
+/// and numbers of files that are late, missing or refused.
 pub fn summary(report: &WatchReport, theme: &Theme) -> Vec<(String, Style)> {
     let mut texts = Vec::new();
     match report.complete {

@@ -1,5 +1,5 @@
-//! Reader of film files. Every length is compared with the length of the file before memory is
-//! allocated.
+//! Reader of film files. It compares every length with the length of the file before it allocates
+//! memory.
 
 use crate::disk::open_regular;
 use crate::film::display::Display;
@@ -19,15 +19,15 @@ use std::io::{BufReader, ErrorKind, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Smallest size of a tile record \[bytes\].
+/// Smallest number of bytes of a tile in a film file.
 const RECORD_BYTES: u64 = 8;
 
-/// Reason for which a film file cannot be used.
+/// Error that makes a film file unusable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReadError {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Problem, as a clause of a sentence.
+    /// Description of the error, as a clause of a sentence.
     pub what: String,
     /// Advice to the user, as a clause of a sentence.
     pub remedy: String,
@@ -47,22 +47,22 @@ pub fn is_film_file(path: &Path) -> bool {
     open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == MAGIC
 }
 
-/// Film file of which everything before the tiles has been read.
+/// Reader of a film file. Everything before the tiles has been read.
 #[derive(Debug)]
 pub struct FilmReader<R> {
     input: Input<R>,
     header: FilmFileHeader,
-    /// The first `TILE` chunk, or the `DONE` chunk.
+    /// Next chunk: the first `TILE` chunk, or `DONE` for a film without samples.
     next: Chunk,
     checksums: crc32fast::Hasher,
 }
 
-/// Bytes of a film file.
+/// Bytes of a film file that have not been read yet.
 #[derive(Debug)]
 struct Input<R> {
     path: PathBuf,
     bytes: R,
-    /// Number of bytes that are left in the file.
+    /// Number of bytes that have not been read yet.
     left: u64,
 }
 
@@ -149,7 +149,7 @@ impl<R: Read> FilmReader<R> {
         Ok(Self { input, header, next, checksums })
     }
 
-    /// Everything before the tiles.
+    /// Header of the film: everything before the tiles.
     pub fn header(&self) -> &FilmFileHeader {
         &self.header
     }
@@ -164,7 +164,7 @@ impl<R: Read> FilmReader<R> {
         Ok((header, film))
     }
 
-    /// Adds the samples of the file to `film`. After an error the film may hold a part of them.
+    /// Adds the samples of the file to `film`. After an error `film` may contain some of them.
     ///
     /// # Errors
     /// Fails if size, scales, seed or precision differ from those of `film`, or if the file cannot
@@ -188,7 +188,7 @@ impl<R: Read> FilmReader<R> {
         })
     }
 
-    /// Reads the file to its end and verifies all checksums, without a film.
+    /// Reads the file to its end and verifies all checksums. It creates no film.
     ///
     /// # Errors
     /// Fails if the file cannot be read or is damaged.
@@ -196,8 +196,8 @@ impl<R: Read> FilmReader<R> {
         self.visit_tiles(|_, _| Some(()))
     }
 
-    /// Calls `visit` with the records of each `TILE` chunk and the numbers of their tiles. The
-    /// result of `visit` is `None` if a record is not valid.
+    /// Calls `visit` for each `TILE` chunk with its records and the numbers of its tiles. `visit`
+    /// returns `None` if a record is not valid.
     fn visit_tiles(
         self,
         mut visit: impl FnMut(&mut Fields, Range<usize>) -> Option<()>,
@@ -242,7 +242,8 @@ impl FilmFileHeader {
     }
 }
 
-/// Decodes the `HEAD` chunk of a file with `length` bytes. Metadata and other chunks stay empty.
+/// Decodes the `HEAD` chunk of a file with `length` bytes. The metadata and the other chunks of the
+/// result are empty.
 fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
     let [width, height, groups] = [fields.u32()?, fields.u32()?, fields.u32()?].map(|n| n as usize);
     let tiles = width.div_ceil(TILE) as u64 * height.div_ceil(TILE) as u64;
@@ -302,7 +303,7 @@ impl<R: Read> Input<R> {
         )
     }
 
-    /// Reads `length` bytes of the part of the file that `part` describes.
+    /// Reads `length` bytes. `part` describes this part of the file in errors.
     fn take(&mut self, length: u64, part: &str) -> Result<Vec<u8>, ReadError> {
         let cut = |input: &Self| {
             let what = format!("it ends in the middle of {part}: it was not copied as a whole");
@@ -347,12 +348,12 @@ impl<R: Read> Input<R> {
     }
 }
 
-/// Fields at the start of a byte string, which are removed as they are read. All methods return
-/// `None` if there are too few bytes or a value is not valid.
+/// Reader of fields at the start of a byte string. Each method removes the bytes that it reads, and
+/// returns `None` if there are too few of them or the value is not valid.
 pub struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {
-    /// Creates the fields in `bytes`.
+    /// Creates a reader of the fields in `bytes`.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self(bytes)
     }
@@ -369,27 +370,27 @@ impl<'a> Fields<'a> {
         Some(taken)
     }
 
-    /// Reads a byte.
+    /// Reads an unsigned 8-bit number.
     pub fn u8(&mut self) -> Option<u8> {
         self.take(1).map(|bytes| bytes[0])
     }
 
-    /// Reads a 32-bit number.
+    /// Reads an unsigned 32-bit number, little-endian.
     pub fn u32(&mut self) -> Option<u32> {
         self.take(4).and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes)
     }
 
-    /// Reads a 64-bit number.
+    /// Reads an unsigned 64-bit number, little-endian.
     pub fn u64(&mut self) -> Option<u64> {
         self.take(8).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes)
     }
 
-    /// Reads a floating-point number.
+    /// Reads a 64-bit floating-point number, little-endian.
     pub fn f64(&mut self) -> Option<f64> {
         self.u64().map(f64::from_bits)
     }
 
-    /// Reads a text.
+    /// Reads a UTF-8 text after its length (u32).
     pub fn text(&mut self) -> Option<String> {
         let length = self.u32()? as usize;
         String::from_utf8(self.take(length)?.to_vec()).ok()

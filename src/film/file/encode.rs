@@ -53,7 +53,7 @@ pub fn tile_chunks(film: &Film) -> usize {
     film.tile_count().div_ceil(TILES_PER_CHUNK)
 }
 
-/// Encodes the `TILE` chunk with the number `index`, which is below [`tile_chunks`]. Parts of a
+/// Encodes the `TILE` chunk with the number `index`, which is below [`tile_chunks`]. Samples of a
 /// first pass that is in progress are left out.
 pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
     let first = index * TILES_PER_CHUNK;

@@ -46,7 +46,7 @@ const TILES_PER_CHUNK: usize = 64;
 /// Largest width and height of a film that is read [pixels].
 const MAX_SIDE: usize = 1 << 17;
 
-/// Tag of a chunk.
+/// Tag of a chunk: four ASCII letters.
 pub type Tag = [u8; 4];
 
 const HEAD: Tag = *b"HEAD";
@@ -63,7 +63,7 @@ pub struct FilmFileHeader {
     pub weights: LightWeights,
     /// Name of each light group.
     pub group_names: Vec<String>,
-    /// Display transform under which the noise was estimated.
+    /// Display transform with which the noise was estimated.
     pub display: Display,
     /// Keys and values that describe the picture, as in picture files.
     pub metadata: Vec<(String, String)>,

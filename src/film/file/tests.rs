@@ -6,7 +6,8 @@ use crate::film::{Film, InvalidSample, TILE};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Returns a film with sums of all sizes, empty tiles, partial tiles and counts that differ.
+/// Returns a film with sums of all sizes, empty tiles, partial tiles, and tiles with different
+/// sample counts.
 fn sample_film() -> Film {
     let mut film = film(150, 37, &[2f64.powi(20), 2f64.powi(-3)]);
     let mut rng = Rng(7);
@@ -140,7 +141,7 @@ fn altered_bytes_are_refused() {
     assert!(error.contains("1 bytes follow its end"), "{error}");
 }
 
-/// Parts of two valid files do not make a valid file.
+/// Checks that a file made of parts of two valid files is refused.
 #[test]
 fn parts_of_different_files_are_refused() {
     let film = sample_film();
@@ -157,7 +158,7 @@ fn parts_of_different_files_are_refused() {
     assert!(read(&missing).is_err());
 }
 
-/// A head that claims a large film is refused before memory is allocated for it.
+/// Checks that a `HEAD` chunk with a large size is refused before memory is allocated.
 #[test]
 fn claimed_size_is_compared_with_the_length_of_the_file() {
     let film = film(1, 1, &[1.0]);

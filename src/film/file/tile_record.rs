@@ -1,4 +1,4 @@
-//! Records of tiles in film files.
+//! Encoding of tiles in film files.
 
 use crate::film::TILE;
 use crate::film::file::decode::Fields;
@@ -8,7 +8,7 @@ use crate::film::tile::{TILE_PIXELS, Tile};
 /// Largest value of a sample in steps of the film's scale.
 const LARGEST_SAMPLE: u64 = 1 << 49;
 
-/// Length of a sum in memory \[bytes\].
+/// Number of bytes of a sum in memory.
 const WORD: usize = 8;
 
 /// Appends the record of a tile to `out`. `None` is a tile without samples.
@@ -38,7 +38,7 @@ pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     }
 }
 
-/// Appends the plane of the sums `i` of all pixels.
+/// Appends the plane of sum `i`: the bytes of this sum for all pixels.
 fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
     let all = pixels.iter().fold(0, |all, sums| all | sums[i] as u64);
     let bytes = (64 - all.leading_zeros()).div_ceil(8) as usize;

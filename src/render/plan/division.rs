@@ -19,7 +19,8 @@ use crate::render::schedule::SAMPLE_ALIGNMENT;
 use std::ops::Range;
 
 impl PlannedTile {
-    /// Number of blocks after the base.
+    /// Number of blocks of [`SAMPLE_ALIGNMENT`] samples after the base; the first and the last one
+    /// may be shorter.
     fn blocks(&self) -> u32 {
         if self.end > self.base {
             self.end.div_ceil(SAMPLE_ALIGNMENT) - self.base / SAMPLE_ALIGNMENT
@@ -28,7 +29,7 @@ impl PlannedTile {
         }
     }
 
-    /// Index of the first sample of a block.
+    /// Index of the first sample of the block with the number `block`.
     fn block_start(&self, block: u32) -> u32 {
         let aligned = (self.base / SAMPLE_ALIGNMENT + block).saturating_mul(SAMPLE_ALIGNMENT);
         aligned.clamp(self.base, self.end)
@@ -36,8 +37,8 @@ impl PlannedTile {
 }
 
 impl Plan {
-    /// Returns the sample indices that `shard` traces in both replicates of each tile, in row
-    /// order. Ranges may be empty. [`BASE`] has the samples of the base.
+    /// Returns the sample indices that `shard` traces in each tile, the same in both replicates.
+    /// Tiles are in row order. Ranges may be empty. The shard [`BASE`] has the samples of the base.
     ///
     /// # Panics
     /// Panics if there is no such shard.

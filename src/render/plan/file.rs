@@ -1,7 +1,8 @@
-//! Plan files: text with one setting or tile a line, in a fixed order, and a checksum at the end.
+//! Plan files: text with one setting or tile per line, in a fixed order, and a checksum at the end.
 //!
-//! A tile's line holds the samples per replicate in the base and in the merged picture, the
-//! expected number of rays per sample, and `g` if a path has hit a glossy lobe, otherwise `-`.
+//! The line of a tile has four fields: samples per replicate in the base, samples per replicate in
+//! the merged picture, the expected number of rays per sample, and `g` if a path has sampled a
+//! glossy lobe, otherwise `-`.
 
 use crate::disk::open_regular;
 use crate::film::{Display, Tone};
@@ -33,14 +34,14 @@ pub fn is_plan_file(path: &Path) -> bool {
     open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == START
 }
 
-/// Reason for which a plan cannot be used.
+/// Error that makes a plan file, or a film file with a plan, unusable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlanError {
-    /// Name of the file that holds the plan, or of the part that does.
+    /// Path of the plan file, or of the film file that contains the plan.
     pub path: PathBuf,
-    /// Line of the fault, counted from 1; 0 for the file as a whole.
+    /// Line of the error, counted from 1; 0 for the file as a whole.
     pub line: usize,
-    /// Problem: what was found, and what was expected.
+    /// Description of the error: the text that was found, and the text that was expected.
     pub what: String,
     /// Advice to the user, as a clause of a sentence.
     pub remedy: &'static str,
@@ -72,7 +73,7 @@ impl Plan {
         fnv1a64(self.body().as_bytes())
     }
 
-    /// Formats everything before the checksum. Writing into a string cannot fail.
+    /// Formats all lines before the checksum.
     fn body(&self) -> String {
         let s = &self.settings;
         let base = s.base_plan.map_or("pilot".to_string(), |plan| format!("{plan:016x}"));
@@ -232,7 +233,7 @@ impl Plan {
     }
 }
 
-/// Remedy for files that are damaged.
+/// Remedy in errors of damaged files.
 const DAMAGED: &str = "copy it again or plan again";
 
 /// Lines of a plan file.
@@ -255,7 +256,8 @@ impl<'a> Lines<'a> {
         Some(line)
     }
 
-    /// Reads the line of the setting `key`.
+    /// Reads the line of the setting `key` and parses its value. `expected` describes a valid value
+    /// in errors.
     fn setting<T>(
         &mut self,
         key: &str,
@@ -299,7 +301,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Parses a number, which begins with a digit or a minus sign.
+/// Parses a number. The text must begin with a digit or a minus sign.
 fn number<T: FromStr>(text: &str) -> Option<T> {
     let digits = text.strip_prefix('-').unwrap_or(text);
     digits.starts_with(|c: char| c.is_ascii_digit()).then(|| text.parse().ok())?

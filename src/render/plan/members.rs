@@ -1,4 +1,4 @@
-//! Parts that are added to one film: checks that they belong to one plan and do not overlap.
+//! Members of a merged film: film files of one plan whose shards do not overlap.
 
 use crate::render::plan::part::{Part, PartShard};
 use crate::render::plan::{BASE, Plan};
@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Part of a plan and the file that holds it.
+/// A film file with samples of a plan, and the shards that it holds.
 #[derive(Clone, Debug)]
 pub(super) struct Member {
     pub path: PathBuf,
@@ -19,12 +19,12 @@ pub(super) struct Member {
     pub rays: u64,
 }
 
-/// Plans by checksum, so that parts of one plan share it in memory.
+/// Plans by checksum. Film files of the same plan share it in memory.
 #[derive(Debug, Default)]
 pub(super) struct Plans(HashMap<u64, Arc<Plan>>);
 
 impl Plans {
-    /// Creates a member of the part in the file at `path`.
+    /// Creates the member for the film file at `path`, whose plan and shards are `part`.
     pub fn member(&mut self, path: &Path, part: Part) -> Member {
         let Part { plan, shards, rays } = part;
         let checksum = plan.checksum();
@@ -33,11 +33,11 @@ impl Plans {
     }
 }
 
-/// Each shard of a film, with the file that holds it.
+/// Shards of a merged film by number, each with the file that holds it.
 pub(super) type ShardFiles = BTreeMap<u32, (PathBuf, PartShard)>;
 
-/// Returns the plan of all members, and each shard with the file that holds it. The merged film of
-/// the plan that the others continue becomes their base.
+/// Returns the plan of all members, and each shard with the file that holds it. A plan may continue
+/// the merged film of another plan; that film then becomes the base.
 ///
 /// # Errors
 /// Fails if the members belong to different plans or if two of them hold the same shard.

@@ -1,4 +1,4 @@
-//! Merging of parts: adds the films of a plan's shards.
+//! Merging: adds the films of a plan's shards.
 
 use crate::film::file::{FilmFileHeader, FilmReader};
 use crate::film::{Film, Noise};
@@ -8,19 +8,19 @@ use crate::render::plan::{BASE, Plan};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Sum of the parts of a plan.
+/// Sum of the films of a plan's shards.
 pub struct Merged {
     /// Sum of the films.
     pub film: Film,
-    /// Header of the part with the lowest shard, with the plan and all shards.
+    /// Header of the film file with the lowest shard, to which the plan and all shards are added.
     pub header: FilmFileHeader,
     /// Plan and shards of the film.
     pub part: Part,
 }
 
 impl Merged {
-    /// Adds the films of the files at `paths`, in any order. With `partial` shards may be missing
-    /// or unfinished.
+    /// Adds the films of the files at `paths`, in any order. If `partial` is `true`, shards may be
+    /// missing or unfinished.
     ///
     /// # Errors
     /// Fails if a file cannot be read or is no part, if the files belong to different plans, if two
@@ -75,7 +75,7 @@ impl Merged {
     }
 }
 
-/// Message about a film file that belongs to no plan.
+/// Returns the message about the film file at `path`, which belongs to no plan.
 pub(super) fn without_plan(path: &Path) -> String {
     format!(
         "cannot add {} to other films: it belongs to no plan; name files that `zerkalo render \

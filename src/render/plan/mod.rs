@@ -32,10 +32,10 @@ use crate::sampling::SamplerKind;
 /// Largest number of shards of a plan.
 pub const MAX_SHARDS: u32 = 1 << 16;
 
-/// Number of the shard that stands for the base of a plan.
+/// Number of the base in lists of shards. Shards have the numbers from 1.
 pub const BASE: u32 = 0;
 
-/// Settings that determine the samples of a plan, and its target.
+/// Settings of a plan: the inputs of its samples, and its noise target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSettings {
     /// Path of the scene file, as the user has given it.
@@ -52,7 +52,7 @@ pub struct PlanSettings {
     pub precision: String,
     /// Display transform under which the noise is estimated.
     pub display: Display,
-    /// Cap on samples per pixel of tiles with glossy lobes; 0 is no cap.
+    /// Largest number of samples per pixel in tiles with glossy lobes; 0 for no limit.
     pub rays_per_pixel: u32,
     /// Target: RMSE of the displayed picture in 8-bit levels.
     pub noise_codes: f64,
@@ -69,13 +69,14 @@ pub struct Plan {
     pub settings: PlanSettings,
     /// Expected RMSE of the merged picture in 8-bit levels.
     pub predicted_codes: f64,
-    /// Slope of the error of tiles without and with glossy lobes: RMSE ~ n^-slope.
+    /// Exponents with which the error falls in tiles without and with glossy lobes: RMSE ~ n^-slope
+    /// for n samples.
     pub slopes: [f64; 2],
     /// Tiles in row order.
     pub tiles: Vec<PlannedTile>,
 }
 
-/// Samples of one tile.
+/// Numbers of samples of one tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlannedTile {
     /// Samples per replicate in the base.
@@ -84,14 +85,14 @@ pub struct PlannedTile {
     pub end: u32,
     /// Expected number of rays per sample.
     pub rays_per_sample: f32,
-    /// `true` if a path has hit a glossy lobe.
+    /// `true` if a path in the tile has sampled a glossy lobe.
     pub glossy: bool,
 }
 
 impl Plan {
-    /// Plans the render that continues the samples of `schedule` until its target. `usual_slopes`
-    /// replace slopes that the schedule does not know yet. Returns `None` if the schedule has no
-    /// target, or no estimate of the noise.
+    /// Plans the render that continues the samples of `schedule` until its noise target.
+    /// `usual_slopes` (see [`Plan::slopes`]) are used where the schedule has no measured slope.
+    /// Returns `None` if the schedule has no noise target, or no estimate of the noise.
     pub fn of_schedule(
         schedule: &Schedule,
         usual_slopes: [f64; 2],
@@ -118,7 +119,7 @@ impl Plan {
         self.rays_of(self.ranges(shard).into_iter())
     }
 
-    /// Expected number of rays of base and shards together.
+    /// Expected number of rays of the base and all shards together.
     pub fn all_rays(&self) -> f64 {
         self.rays_of(self.tiles.iter().map(|tile| 0..tile.end))
     }
@@ -149,7 +150,8 @@ impl Plan {
         samples as f64 / (width * height) as f64
     }
 
-    /// Returns the number of a tile whose counts in `film` differ from the samples of `shards`.
+    /// Compares the sample counts of `film` with those that the base and `shards` should have.
+    /// Returns the number of the first tile with a difference.
     pub fn differing_tile(&self, film: &Film, shards: &[u32]) -> Option<usize> {
         let mut expected = vec![0u32; self.tiles.len()];
         for shard in shards {
@@ -161,8 +163,8 @@ impl Plan {
         (0..self.tiles.len()).find(|tile| counts(*tile) != [expected[*tile]; 2])
     }
 
-    /// Returns the schedule of `film`, which is the complete film of this plan, with `settings`.
-    /// Returns `None` if a tile has no estimate of its error.
+    /// Returns the schedule that continues `film`, which holds all samples of this plan. Returns
+    /// `None` if a tile has no estimate of its error.
     pub fn schedule(
         &self,
         film: &Film,
@@ -183,7 +185,8 @@ impl Plan {
         Some(Schedule::of_samples(&samples?, settings))
     }
 
-    /// Returns the first setting in which two plans differ, with both values.
+    /// Returns the first setting in which two plans differ, with both values, as text for a
+    /// message.
     fn difference(&self, other: &Self) -> String {
         let [ours, theirs] = [self, other].map(Self::text);
         let different = ours.lines().zip(theirs.lines()).find(|(a, b)| a != b);
@@ -191,12 +194,12 @@ impl Plan {
     }
 }
 
-/// Number of tiles of a picture.
+/// Returns the number of tiles of a picture of the given size.
 fn tiles_of([width, height]: [u32; 2]) -> usize {
     width.div_ceil(TILE as u32) as usize * height.div_ceil(TILE as u32) as usize
 }
 
-/// Number of pixels of a tile that are inside the picture.
+/// Returns the number of pixels of tile number `tile` that are inside a picture of the given size.
 fn pixels_of(size: [u32; 2], tile: usize) -> u64 {
     let [width, height] = size.map(|n| n as usize);
     let columns = width.div_ceil(TILE);

@@ -1,4 +1,4 @@
-//! Parts: film files that hold the samples of some shards of a plan.
+//! Parts: film files that hold the samples of some shards of a plan, together with the plan.
 
 use crate::film::file::FilmFileHeader;
 use crate::render::plan::{BASE, Plan};
@@ -11,7 +11,7 @@ const PLAN_TAG: [u8; 4] = *b"PLAN";
 /// `shard K unfinished` for each shard.
 const PART_TAG: [u8; 4] = *b"PART";
 
-/// Plan of a film file, and the shards that the film holds.
+/// Plan that a film file contains, and the shards that its film holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
     /// The plan.
@@ -22,7 +22,7 @@ pub struct Part {
     pub rays: u64,
 }
 
-/// Shard in a film file.
+/// State of one shard in a film file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PartShard {
     /// Number of the shard; [`BASE`] is the base.
@@ -32,8 +32,8 @@ pub struct PartShard {
 }
 
 impl Part {
-    /// Adds the plan and the shards to the header of a film file, and the metadata entry `Shards` for
-    /// pictures of the film.
+    /// Adds the plan and the shards to `header`, and the metadata entry `Shards`, which pictures of
+    /// the film get.
     pub fn record(&self, header: &mut FilmFileHeader) {
         let mut text = format!("rays {}\n", self.rays);
         for PartShard { number, complete } in &self.shards {
@@ -110,8 +110,9 @@ impl Part {
         (!missing.is_empty()).then(|| ranges(&missing))
     }
 
-    /// Returns the metadata entry with the shards in the film, the other ones, and the plan, such
-    /// as `0-2, 4 of 5, unfinished 4, missing 3, 5, plan 0123456789abcdef`.
+    /// Returns the metadata entry `Shards`: the shards in the film, the number of shards, the
+    /// unfinished and the missing ones, and the plan. Example: `0-2, 4 of 5, unfinished 4, missing
+    /// 3, 5, plan 0123456789abcdef`.
     fn origin(&self) -> (String, String) {
         let numbers = |wanted: &dyn Fn(&PartShard) -> bool| -> Vec<u32> {
             self.shards.iter().filter(|shard| wanted(shard)).map(|shard| shard.number).collect()
@@ -138,7 +139,7 @@ impl Plan {
     }
 }
 
-/// Formats ascending numbers: `3, 5-7`.
+/// Formats ascending numbers as a list of ranges, such as `3, 5-7`.
 pub(super) fn ranges(numbers: &[u32]) -> String {
     let mut text = Vec::new();
     for run in numbers.chunk_by(|a, b| a + 1 == *b) {

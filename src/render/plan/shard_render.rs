@@ -1,4 +1,4 @@
-//! Render of the samples that a plan gives to one shard.
+//! Render of the samples that a plan assigns to one shard.
 
 use crate::film::TILE_PIXELS;
 use crate::render::RenderState;
@@ -11,34 +11,36 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// Target duration of a step in seconds. Between two steps the caller can save the film.
+/// Target duration of a step, in seconds. The caller can save the film between two steps.
 const STEP_SECONDS: f64 = 0.25;
-/// Target duration of one job in seconds. Short jobs occupy all threads until the end of a step.
+/// Target duration of one job, in seconds. Jobs are short so that all threads have work until the
+/// end of a step.
 const JOB_SECONDS: f64 = 0.01;
-/// Largest number of samples per pixel and replicate of a job, whatever the measured speed is.
+/// Largest number of samples per pixel and replicate of a job, even if tracing is so fast that
+/// [`JOB_SECONDS`] allows more.
 const LONGEST_JOB: u32 = 1 << 20;
-/// Number of pixel samples of the first step, which measures the speed.
+/// Number of samples, over all pixels, of the first step. It measures the speed of tracing.
 const FIRST_STEP_SAMPLES: u64 = 1 << 18;
 
-/// Render of the samples of one shard. After each step both replicates of every tile hold equally
-/// many samples: the first ones of the tile's range. A film that was saved between two steps
-/// therefore suffices to continue.
+/// Render of the samples of one shard. After each step both replicates of every tile hold the same
+/// number of samples: the first ones of the tile's range. A render can therefore continue from a
+/// film that was saved between two steps.
 pub struct ShardRender {
     state: RenderState,
     pool: rayon::ThreadPool,
     /// Samples that are still to be traced in both replicates.
     remaining: VecDeque<Job>,
-    /// Number of pixel samples of the shard, and of those in the film.
+    /// Number of samples of the shard, and number of those that the film holds, over all pixels.
     samples: [u64; 2],
     rays: u64,
-    /// Samples and seconds of the steps so far.
+    /// Number of samples and seconds of all steps so far, for the speed of tracing.
     measured: (u64, f64),
 }
 
 impl ShardRender {
-    /// Continues the film of `state`, which holds the first samples of some of `ranges`, with
-    /// `threads` threads. `ranges` holds the sample indices of each tile. `rays` is the number of
-    /// rays of the film.
+    /// Continues the render of a shard on `threads` threads. `ranges` holds the shard's sample
+    /// indices of each tile; the film of `state` holds the first samples of some of these ranges.
+    /// `rays` is the number of rays of the film so far.
     ///
     /// # Errors
     /// Fails if a tile has sample counts that no interrupted render of these ranges has, or if the
@@ -74,7 +76,7 @@ impl ShardRender {
         Ok(Self { state, pool, remaining, samples, rays, measured: (0, 0.0) })
     }
 
-    /// Traces samples for about a quarter of a second. Returns `false` if none are left.
+    /// Traces samples for about [`STEP_SECONDS`]. Returns `false` if no samples are left.
     pub fn step(&mut self) -> bool {
         let speed = match self.measured {
             (samples, seconds) if seconds > 0.0 => samples as f64 / seconds,
@@ -137,13 +139,13 @@ impl ShardRender {
         self.rays
     }
 
-    /// Share of the shard's samples that the film holds, 0..=1.
+    /// Fraction of the shard's samples that the film holds, 0..=1.
     pub fn progress(&self) -> f64 {
         let [total, done] = self.samples;
         if total == 0 { 1.0 } else { done as f64 / total as f64 }
     }
 
-    /// Report on the progress.
+    /// Report on the film, with the progress of the shard.
     pub fn report(&self) -> Report {
         let [total, done] = self.samples;
         let (traced, seconds) = self.measured;

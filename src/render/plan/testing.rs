@@ -1,11 +1,11 @@
-//! Plans for tests.
+//! Plans with given sample counts, for tests.
 
 use crate::film::Display;
 use crate::render::plan::{Plan, PlanSettings, PlannedTile};
 use crate::sampling::SamplerKind;
 
-/// Creates a plan of a picture of `tiles.len()` tiles in a row, with the given base and end of
-/// each.
+/// Creates a plan for `shards` shards and a picture with one row of tiles. Each entry of `tiles`
+/// holds the samples per replicate in the base and in the merged picture.
 pub fn plan(shards: u32, tiles: &[[u32; 2]]) -> Plan {
     let tile = |[base, end]: &[u32; 2]| PlannedTile {
         base: *base,

@@ -1,8 +1,8 @@
-//! Films that other processes write: reads their files again when they are replaced, and keeps the
-//! sum.
+//! Watched films: film files that other processes write. They are read again when they are
+//! replaced, and their sum is kept.
 //!
-//! The sum of the complete files is kept, since they change no more. The unfinished ones are added
-//! to a copy of it. The memory is that of two films, whatever the number of files.
+//! Complete files do not change, so that their sum is kept; the unfinished files are added to a
+//! copy of it. The memory is that of two films, whatever the number of files.
 
 use crate::film::Film;
 use crate::film::file::{Fields, FilmFileHeader, FilmReader, ReadError};
@@ -18,7 +18,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
-/// Age of an unfinished file from which it is late. `zerkalo render` writes its files every minute.
+/// Time without replacement after which an unfinished file counts as late. `zerkalo render`
+/// replaces its files every minute.
 const LATE: Duration = Duration::from_secs(180);
 
 /// Film files that other processes write, and the sum of their films.
@@ -26,13 +27,14 @@ const LATE: Duration = Duration::from_secs(180);
 pub struct WatchedFilms {
     files: Vec<WatchedFile>,
     plans: Plans,
-    /// The plan file that was named, as a member without shards.
+    /// Plan file that the user named, as a member without shards. `None` if film files were named.
     named: Option<Member>,
-    /// Plan of all files. `None` for a checkpoint, or before the first file.
+    /// Plan that all files share. `None` for a checkpoint, or before the first file is read.
     plan: Option<Arc<Plan>>,
-    /// Sum of the complete files, with their numbers and stamps.
+    /// Sum of the complete files, and the stamp of each by its index in `files`.
     complete: Option<(BTreeMap<usize, FileStamp>, Film)>,
-    /// Sum of all files. `None` if all of them are complete, or none can be read.
+    /// Sum of all files. `None` if all of them are complete (then `complete` is this sum), or if
+    /// none can be read.
     all: Option<Film>,
     header: Option<FilmFileHeader>,
 }
@@ -41,14 +43,15 @@ pub struct WatchedFilms {
 #[derive(Debug)]
 struct WatchedFile {
     path: PathBuf,
-    /// Shard that the file should hold, if the plan file was named.
+    /// Number of the shard that the file should hold. `None` if film files were named instead of a
+    /// plan.
     shard: Option<u32>,
     /// State of the file when it was last read. `None` for a missing file.
     stamp: Option<FileStamp>,
     contents: Contents,
-    /// Samples of the file in the sum.
+    /// Number of samples that the file contributes to the sum, over all pixels.
     samples: u64,
-    /// Samples of all shards of the file in the plan.
+    /// Number of samples that the plan assigns to the shards of the file, over all pixels.
     total: Option<u64>,
 }
 
@@ -63,10 +66,10 @@ struct FileStamp {
 #[derive(Debug)]
 enum Contents {
     Missing,
-    /// The file cannot be used; the text is the reason.
+    /// The file cannot be used, for this reason.
     Refused(String),
     Part(Member),
-    /// Checkpoint of a render without plan, with its seconds of rendering.
+    /// Checkpoint of a render without plan. The number is its seconds of rendering.
     Checkpoint(f64),
 }
 
@@ -77,34 +80,34 @@ pub enum WatchedState {
     Complete,
     /// The file is unfinished, and was replaced in the last three minutes.
     Running,
-    /// The file is unfinished, and was not replaced for three minutes.
+    /// The file is unfinished, and has not been replaced for three minutes.
     Late,
     /// There is no file.
     Missing,
-    /// The file cannot be used; the text is the reason.
+    /// The file cannot be used, for this reason.
     Refused(String),
 }
 
-/// A watched file, or shards of the plan that no named file holds.
+/// State of a watched file, or of shards of the plan that no file holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WatchedShards {
     /// Numbers of the shards, such as `3` or `5-7`; empty if they are unknown.
     pub shards: String,
-    /// File. `None` for shards that no named file holds.
+    /// Path of the file. `None` for shards that no file holds.
     pub path: Option<PathBuf>,
     /// State of the file.
     pub state: WatchedState,
-    /// Samples in the file.
+    /// Number of samples in the file, over all pixels.
     pub samples: u64,
-    /// Samples of its shards in the plan. `None` if they are unknown.
+    /// Number of samples that the plan assigns to the shards of the file. `None` if it is unknown.
     pub total: Option<u64>,
     /// Time since the file was written.
     pub age: Option<Duration>,
 }
 
 impl WatchedFilms {
-    /// Reads the film files at `paths`. A plan file stands for the files that the documentation
-    /// names after it: `job.plan` for `job-0.zk`, `job-1.zk` and so on. Files may be missing.
+    /// Reads the film files at `paths`. A path of a plan file stands for the film files of its
+    /// shards: `job.plan` for `job-0.zk`, `job-1.zk` and so on. Files may be missing.
     ///
     /// # Errors
     /// Fails if a plan file cannot be used, or if the films of two files cannot be added.
@@ -152,7 +155,7 @@ impl WatchedFilms {
         Ok(())
     }
 
-    /// Reads the files that were replaced. Returns `true` if there are any.
+    /// Reads the files that were replaced since the last call. Returns `true` if there are any.
     pub fn poll(&mut self) -> bool {
         let changed = self.read_changed();
         if changed.is_empty() {
@@ -168,12 +171,12 @@ impl WatchedFilms {
         self.all.as_ref().or(self.complete.as_ref().map(|(_, film)| film))
     }
 
-    /// Header of the sum, with plan and shards. `None` if no file can be read.
+    /// Header of the sum's film file, with plan and shards. `None` if no file can be read.
     pub fn header(&self) -> Option<&FilmFileHeader> {
         self.header.as_ref()
     }
 
-    /// Plan of the films. `None` for a checkpoint, or before the first file.
+    /// Plan that all files share. `None` for a checkpoint, or before the first file is read.
     pub fn plan(&self) -> Option<&Plan> {
         self.plan.as_deref()
     }
@@ -183,8 +186,8 @@ impl WatchedFilms {
         self.members().map(|(_, member)| member.rays).sum()
     }
 
-    /// Seconds of rendering of a checkpoint; otherwise those between the oldest and the newest
-    /// file.
+    /// Seconds of rendering: for a checkpoint those of its render, otherwise the time between the
+    /// oldest and the newest file.
     pub fn seconds(&self) -> f64 {
         if let [WatchedFile { contents: Contents::Checkpoint(seconds), .. }] = self.files[..] {
             return seconds;
@@ -196,16 +199,17 @@ impl WatchedFilms {
             .map_or(0.0, |d| d.as_secs_f64())
     }
 
-    /// Number of complete shards, the base included, and of all shards. `None` without a plan.
+    /// Number of complete shards and number of all shards, the base included in both. `None`
+    /// without a plan.
     pub fn complete_shards(&self) -> Option<[usize; 2]> {
         let plan = self.plan.as_ref()?;
         let shards = self.members().flat_map(|(_, member)| &member.shards);
         Some([shards.filter(|shard| shard.complete).count(), plan.settings.shards as usize + 1])
     }
 
-    /// Returns the state of all files at the time `now`, and the shards without a file. Missing and
-    /// refused files come first, then late ones, then running ones, then complete ones; within these
-    /// those with the smallest share of their samples.
+    /// Returns the state of all files at the time `now`, and the shards without a file. The order
+    /// is: missing and refused files, late, running, complete. Files of equal state are sorted by
+    /// the fraction of their samples, smallest first.
     pub fn shards(&self, now: SystemTime) -> Vec<WatchedShards> {
         let mut rows: Vec<_> = self.files.iter().map(|file| file.row(now)).collect();
         rows.extend(self.unnamed().map(|shards| WatchedShards {
@@ -226,8 +230,8 @@ impl WatchedFilms {
         rows
     }
 
-    /// Shards of the plan that no file holds, unless the plan file was named: their files are then
-    /// listed as missing.
+    /// Returns the shards of the plan that no file holds, such as `3, 5-7`. Returns `None` if the
+    /// plan file was named, because its files are then listed as missing.
     fn unnamed(&self) -> Option<String> {
         let plan = self.plan.as_ref().filter(|_| self.named.is_none())?;
         let mut held: Vec<u32> =
@@ -245,7 +249,7 @@ impl WatchedFilms {
         })
     }
 
-    /// Reads the files that differ from their stamps. Returns their numbers.
+    /// Reads the files whose stamps have changed. Returns their indices.
     fn read_changed(&mut self) -> Vec<usize> {
         let mut changed = Vec::new();
         for (i, file) in self.files.iter_mut().enumerate() {
@@ -260,8 +264,8 @@ impl WatchedFilms {
         changed
     }
 
-    /// Refuses those of the `changed` files whose films cannot be added to the others. Returns the
-    /// first reason.
+    /// Refuses each of the `changed` files whose film cannot be added to those of the other files.
+    /// Returns the first reason.
     fn accept(&mut self, changed: &[usize]) -> Option<String> {
         let mut refused = None;
         let all: Vec<usize> = (0..self.files.len()).collect();
@@ -280,7 +284,8 @@ impl WatchedFilms {
         refused
     }
 
-    /// Checks that the films of `numbers` can be added, and notes their plan.
+    /// Checks that the films of the files with the indices `numbers` can be added, and stores their
+    /// plan.
     fn try_join(&mut self, numbers: &[usize]) -> Result<(), String> {
         let checkpoint = |i: &&usize| matches!(self.files[**i].contents, Contents::Checkpoint(_));
         let parts: Vec<usize> = numbers
@@ -310,7 +315,8 @@ impl WatchedFilms {
         Ok(())
     }
 
-    /// Adds the films of all accepted files. A file that cannot be added is refused.
+    /// Adds the films of all accepted files. If one of them cannot be added, refuses it and starts
+    /// again.
     fn add(&mut self) {
         while let Err((i, message)) = self.try_add() {
             self.files[i].contents = Contents::Refused(message);
@@ -318,7 +324,8 @@ impl WatchedFilms {
         }
     }
 
-    /// Adds the films. The error is the number of the file at fault, and the reason.
+    /// Adds the films of all accepted files. An error contains the index of the file that cannot be
+    /// added, and the reason.
     fn try_add(&mut self) -> Result<(), (usize, String)> {
         (self.all, self.header) = (None, None);
         let mut order: Vec<(u32, usize)> =
@@ -363,7 +370,7 @@ impl WatchedFilms {
         Ok(())
     }
 
-    /// Adds the film of the file `i` to `film`.
+    /// Adds the film of the file with the index `i` to `film`. The error is that of `try_add`.
     fn add_file(&mut self, i: usize, film: &mut Film) -> Result<(), (usize, String)> {
         let before = film.samples();
         self.open_film(i)?.add_to(film).map_err(|error| (i, error.to_string()))?;
@@ -390,7 +397,7 @@ impl WatchedFilms {
         FilmReader::open(&self.files[i].path).map_err(|error| (i, error.to_string()))
     }
 
-    /// Returns the header of the sum, with the shards of all files.
+    /// Returns `header` with the plan and the shards of all files.
     fn with_shards(&self, mut header: FilmFileHeader) -> FilmFileHeader {
         let mut shards: Vec<PartShard> =
             self.members().flat_map(|(_, member)| member.shards.clone()).collect();
@@ -403,7 +410,7 @@ impl WatchedFilms {
     }
 }
 
-/// Creates a film without samples, if there is memory for it.
+/// Creates a film without samples, with the size of `header`. Fails if there is not enough memory.
 fn empty(header: &FilmFileHeader) -> Result<Film, String> {
     let film = &header.film;
     let (size, groups) = ([film.width, film.height].map(|n| n as u32), film.scales.len());
@@ -466,7 +473,7 @@ impl WatchedFile {
 }
 
 impl WatchedState {
-    /// Position in the order of urgency.
+    /// Position in the order of display; 0 is the most urgent.
     fn rank(&self) -> u8 {
         match self {
             Self::Refused(_) => 0,
@@ -479,7 +486,7 @@ impl WatchedState {
 }
 
 impl FileStamp {
-    /// Returns the stamp of the file at `path`. `None` without such a file.
+    /// Returns the stamp of the file at `path`, or `None` if there is no such file.
     fn of(path: &Path) -> Option<Self> {
         let metadata = fs::metadata(path).ok()?;
         #[cfg(unix)]

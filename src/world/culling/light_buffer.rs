@@ -10,7 +10,8 @@ use crate::world::culling::light_projection::{LightProjection, ProjectedBounds};
 /// Largest number of entries in a cell. The primitives closest to the light are kept.
 const MAX_PER_CELL: usize = 16;
 
-/// Value of [`Entry::exempt_item`] for primitives that may occlude rays from their own outside.
+/// Value of [`Entry::exempt_item`] for primitives without exemption: they may occlude rays that
+/// start on their own outside.
 const NO_ITEM: u32 = u32::MAX;
 
 /// Possible occluders of one light, in a grid of cells over the projection from the light.
@@ -18,8 +19,8 @@ pub(crate) struct LightBuffer<S> {
     projection: LightProjection<S>,
     /// Number of rows of cells on a face of the projection; the number of columns is the same.
     side: usize,
-    /// Largest coordinate of the occluders and the light. Rays with origins at larger coordinates
-    /// have larger rounding errors than the bounds allow, and traverse the BVH.
+    /// Largest coordinate of the occluders and the light. Rays with an origin beyond it traverse
+    /// the BVH, because their rounding errors exceed the bounds.
     max_coordinate: S,
     /// Cells of all faces, face by face and row by row.
     cells: Vec<Cell<S>>,
@@ -60,8 +61,8 @@ struct Entry<S> {
 }
 
 impl<S: Float> LightBuffer<S> {
-    /// Creates the buffer of a light. Returns `None` if at least half of the occluders do not fit
-    /// in most of their cells.
+    /// Creates the buffer of a light. Returns `None` if the buffer would be incomplete: half of the
+    /// occluders or more do not fit in most of their cells.
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
         let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match target {

@@ -31,7 +31,7 @@ impl<S: Float> LightProjection<S> {
 
     /// Returns the cell that contains the origin of each ray as seen from the light, and the depth
     /// of the origin. Points outside of the projection get an arbitrary cell. `limit` is the
-    /// distance between origin and light, `side` the number of cells in a row.
+    /// distance between origin and light, `side` the number of cells along a side of a face.
     #[inline(always)]
     pub fn lookup<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
         let side = L::from_f64(side as f64);
@@ -104,12 +104,12 @@ pub(crate) struct ProjectedBounds<S> {
     pub projection: LightProjection<S>,
     /// Rectangles of each ball, one for each face that it overlaps.
     pub rects: Vec<Vec<FaceRect>>,
-    /// Recommended number of cells in a row.
+    /// Recommended number of cells along a side of a face.
     pub side: usize,
 }
 
 impl<S: Float> ProjectedBounds<S> {
-    /// Projects balls. For a point light, their centres are relative to the light.
+    /// Projects the balls. For a point light, `balls` have centres relative to the light.
     pub fn new(target: &LightTarget, balls: &[BoundingSphere]) -> Self {
         let (projection, rects) = match target {
             LightTarget::Direction(direction) => orthographic(*direction, balls),
@@ -260,7 +260,8 @@ pub(crate) mod tests {
         check_points_of_ball::<Single>(1e-4);
     }
 
-    /// Directions for which a projection divides by zero get an arbitrary cell.
+    /// Checks that every direction gets a valid cell. Directions for which a projection divides by
+    /// zero get an arbitrary one.
     #[test]
     fn light_projection_has_a_cell_for_every_direction() {
         let balls = [BoundingSphere { center: DVec3::NEG_Y * 5.0, radius: 1.0 }];

@@ -20,8 +20,9 @@ const MARGIN_PX: f64 = 0.25;
 const MAX_SLANT_ERROR: f64 = 5e-7;
 
 impl ScreenBounds {
-    /// Projects the corners of a form's bounding box. The result is infinite if a corner is not in
-    /// front of the eye. A lens widens the bounds by the largest blur of a point in the box.
+    /// Projects the corners of the bounding box of `form` to the raster. The result is infinite if
+    /// a corner is not in front of the eye. A lens widens the bounds by the largest blur of a point
+    /// in the box.
     pub fn project(form: &Form, camera: &PerspectiveCamera) -> Self {
         let infinite = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
         let Some((low, high)) = form.bounds() else { return infinite };
@@ -63,7 +64,8 @@ impl ScreenBounds {
         out
     }
 
-    /// Returns `true` if the bounds overlap a rectangle of the raster.
+    /// Returns `true` if the bounds overlap the rectangle of the raster with corner `origin` and
+    /// size `extent` \[pixels\].
     pub fn overlaps(&self, origin: [usize; 2], extent: [usize; 2]) -> bool {
         (0..2).all(|axis| {
             let begin = origin[axis] as f64;
@@ -117,8 +119,8 @@ impl ScreenGrid {
         Self { columns, rows, candidates }
     }
 
-    /// Returns the candidates of a rectangle of the raster, in ascending order. Returns `None` if
-    /// there are more than [`MAX_PER_CELL`].
+    /// Returns the candidates of the rectangle with corner `origin` and size `extent` \[pixels\],
+    /// in ascending order. Returns `None` if there are more than [`MAX_PER_CELL`].
     pub fn candidates(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Vec<u32>> {
         let span = |axis: usize, count: usize| {
             let end = (origin[axis] + extent[axis]).div_ceil(CELL_PX);

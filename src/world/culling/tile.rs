@@ -22,14 +22,14 @@ pub struct TileCandidates {
 }
 
 impl TileCandidates {
-    /// Candidates for rays without culling: all primitives, for camera rays and for each of
-    /// `lights` lights.
+    /// Returns the candidates of rays without culling: all primitives, for camera rays and for each
+    /// of `lights` lights.
     pub(crate) fn all<L: SimdFloat>(geometry: &Aggregate<L>, lights: usize) -> Self {
         Self { primary: geometry.all().clone(), occluders: vec![geometry.all().clone(); lights] }
     }
 }
 
-/// Method by which a tile's candidates are found.
+/// Method that finds the candidates of a tile.
 pub(crate) enum CullingMode {
     /// Bounding volumes are tested against the tile's view frustum, and against the space between
     /// the frustum and the lights.

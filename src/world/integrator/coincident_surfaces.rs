@@ -2,9 +2,9 @@
 //! of a glass and the table below it.
 //!
 //! Rounding decides which of two coincident surfaces a ray hits first, and a ray that leaves one of
-//! them starts beyond the others. If at least one of the surfaces transmits, paths therefore cross
-//! coincident surfaces in a fixed order, as if the primitives had a gap of zero width: a ray first
-//! leaves the solids that it is inside, then crosses flat primitives, then enters the solids
+//! them starts beyond the others. Paths therefore cross coincident surfaces in a fixed order if at
+//! least one of them transmits. The order is that of primitives with a gap of zero width: a ray
+//! first leaves the solids that it is inside, then crosses flat primitives, then enters the solids
 //! behind. Several solids on the same side are nested: transparent ones enclose opaque ones, and
 //! transparent solids that are listed later enclose those listed earlier. Flat transparent
 //! primitives are on both sides of opaque ones.
@@ -21,9 +21,9 @@ use crate::primitive::{Aggregate, Form, PrimitiveId, SphereForm};
 use crate::world::integrator::nested_dielectrics::MediumStack;
 use glam::DVec3;
 
-/// Tie distance, in rounding errors of the largest coordinate. A surface is coincident with a hit
-/// point if its distance along the normal is at most one tie. The parts of compounds use the same
-/// value.
+/// Tie distance: the largest distance along the normal between a hit point and a surface that
+/// coincides with it, in rounding errors of the largest coordinate. The parts of compounds use the
+/// same value.
 const TIE: f64 = 16.0;
 
 /// Offset of rays that leave coincident surfaces, in tie distances.
@@ -33,7 +33,7 @@ const OFFSET_TIES: f64 = 1.5;
 /// intersect.
 const MIN_COSINE: f64 = 0.5;
 
-/// Kind of a surface. It determines the layer.
+/// Kind of a surface. It determines the order in which rays cross coincident surfaces.
 #[derive(Clone, Copy, Debug)]
 enum SurfaceKind {
     /// Boundary of a transparent solid with this priority (see [`MediumStack`]).
@@ -51,7 +51,7 @@ enum SurfaceKind {
 struct Contact<S> {
     /// Id of the primitive. For a compound, the id of its first part.
     item: u32,
-    /// Smallest tie distance at this contact, see [`TIE`].
+    /// Smallest tie distance (see [`TIE`]) at this contact, in scene units.
     tie: S,
     /// Corners of the bounding box; infinite along axes on which the primitive is unbounded.
     low: [S; 3],
@@ -65,15 +65,16 @@ impl<S: Float> Contact<S> {
         Self { item, tie: S::from_f64(tie), low, high }
     }
 
-    /// Returns the tie distance at points whose coordinates have the given [`rounding`].
+    /// Returns the tie distance at points whose coordinates have the rounding error `rounding`; see
+    /// [`rounding`].
     #[inline(always)]
     fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
         rounding.max(L::splat(self.tie))
     }
 
-    /// Mask of lanes whose point may be on the primitive: its distance from the bounding box is at
-    /// most two ties. One tie is the length of the search, the other one covers the rounding error
-    /// of the search, which is far smaller.
+    /// Returns the lanes whose point may be on the primitive: its distance from the bounding box is
+    /// at most two ties. One tie is the reach of the search for coincident surfaces, the other one
+    /// covers the search's own rounding error.
     #[inline(always)]
     fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
         let distance =
@@ -84,7 +85,7 @@ impl<S: Float> Contact<S> {
     }
 }
 
-/// Rounding error of the points' largest coordinates, times [`TIE`].
+/// Returns [`TIE`] times the rounding error of each point's largest coordinate.
 #[inline(always)]
 fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
     point.max_abs() * L::from_f64(TIE * L::EPSILON)
@@ -94,7 +95,8 @@ fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
 pub(crate) struct Contacts<S> {
     /// Contacts of each primitive.
     contacts: Vec<Vec<Contact<S>>>,
-    /// Kind of each primitive's surface, and the magnitude of its layer.
+    /// Kind of each primitive's surface, and the magnitude of its layer (position in the order of
+    /// coincident surfaces).
     kinds: Vec<(SurfaceKind, S)>,
 }
 
@@ -103,7 +105,7 @@ pub(crate) struct Contacts<S> {
 pub(crate) struct CoincidentState<L: SimdFloat> {
     /// Lanes whose rays start on such a surface.
     pub lanes: L::Mask,
-    /// Ids of the primitives on which the rays start.
+    /// Ids of the primitives on which the rays start, by lane.
     pub item: L,
     /// Start points on the primitives.
     pub point: Vec3<L>,
@@ -115,14 +117,14 @@ pub(crate) struct CoincidentState<L: SimdFloat> {
 
 /// Result of a search for the next coincident surface along the rays.
 pub(crate) struct CoincidentQuery<L: SimdFloat> {
-    /// Lanes in which a surface was found.
+    /// Lanes in which a next surface was found.
     pub lanes: L::Mask,
     /// Lanes whose current surface coincides with another one.
     pub touching: L::Mask,
     pub item: L,
     pub triangle: L,
     pub layer: L,
-    /// Offset of rays that leave the surface.
+    /// Distance above the surface at which rays that leave it start.
     pub offset: L,
 }
 
@@ -132,7 +134,8 @@ impl<L: SimdFloat> CoincidentState<L> {
         Self { axis: -self.axis, layer: -self.layer, ..*self }
     }
 
-    /// Returns `yes` in lanes where `mask` is true and `no` elsewhere. `lanes` is that of `no`.
+    /// Returns the state `yes` in lanes where `mask` is true and `no` elsewhere. The field `lanes`
+    /// is a copy of that in `no`.
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self {
             lanes: no.lanes,
@@ -145,10 +148,12 @@ impl<L: SimdFloat> CoincidentState<L> {
 }
 
 impl<S: Float> Contacts<S> {
-    /// Finds the contacts of `forms`. Coordinates are rounded to `epsilon`, and have the error
-    /// `input_error` in the scene file. `transparent` holds `true` for each primitive that
-    /// transmits. `priority_of` holds the priority of the transparent solid that each primitive
-    /// bounds. Returns `None` if no transmissive primitive touches another one.
+    /// Finds the contacts of `forms`. Returns `None` if no transmissive primitive touches another
+    /// one.
+    ///
+    /// Coordinates are rounded to `epsilon`, and have the error `input_error` in the scene file.
+    /// `transparent` holds `true` for each primitive that transmits. `priority_of` holds the
+    /// priority of the transparent solid that each primitive bounds.
     pub fn new(
         forms: &[Form],
         primitives: &[PrimitiveId],
@@ -195,9 +200,9 @@ impl<S: Float> Contacts<S> {
         Some(Self { contacts, kinds })
     }
 
-    /// Returns the lanes among `lanes` whose `point`, on the primitive `items`, may touch another
-    /// primitive. Most primitives touch others in small regions only; the bounding boxes of the
-    /// others exclude the remaining points.
+    /// Returns the lanes whose `point`, on the primitive `items`, may touch another primitive. Most
+    /// primitives touch others in small regions only; the bounding boxes of the others exclude the
+    /// remaining points.
     #[inline(always)]
     pub fn near<L: SimdFloat<Scalar = S>>(
         &self,
@@ -216,9 +221,9 @@ impl<S: Float> Contacts<S> {
         near
     }
 
-    /// Returns the layer of `item` for rays that come from a surface with the layer `before`.
-    /// `leaves` selects rays that run in the direction of the item's outward normal and therefore
-    /// leave it.
+    /// Returns the layer of primitive `item` for rays that come from a surface with the layer
+    /// `before`. `leaves` selects rays that leave the primitive: those that run along its outward
+    /// normal.
     fn layer<L: SimdFloat<Scalar = S>>(&self, item: u32, leaves: L::Mask, before: L) -> L {
         let (kind, layer) = &self.kinds[item as usize];
         let layer = L::splat(*layer);
@@ -250,9 +255,9 @@ impl<S: Float> Contacts<S> {
         out
     }
 
-    /// Finds the first surface along the rays among the surface of `coincident` and the surfaces
-    /// that coincide with it. The layer in `coincident` is ignored. `leaves` selects rays that run
-    /// in the direction of the outward normal of the surface.
+    /// Finds the first surface that the rays cross among their start surface, given in
+    /// `coincident`, and the surfaces that coincide with it. The layer in `coincident` is ignored.
+    /// `leaves` selects rays that run in the direction of the outward normal of the start surface.
     pub fn first<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,

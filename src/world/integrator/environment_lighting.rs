@@ -1,9 +1,10 @@
 //! Light of environments, by multiple importance sampling.
 //!
-//! Three techniques find the light of an environment: a direction sampled by luminance, the direction of
-//! the reflected ray for glossy lobes, and a cosine-weighted direction for matt surfaces. Each pair is
-//! weighted by the power heuristic. Highlights of lights use the luminance alone, mirrors and the camera the
-//! ray alone. A ray that starts at a diffuse bounce adds nothing where it escapes: the surface that it
+//! Three techniques find the light of an environment: a direction sampled by luminance, the
+//! direction of the reflected ray for glossy lobes, and a cosine-weighted direction for matt
+//! surfaces. Glossy lobes and matt surfaces combine two techniques with the power heuristic.
+//! Highlights of lights use the sampled luminance alone. Mirrors and the camera use the ray alone.
+//! A ray that starts at a diffuse bounce adds nothing where it escapes, because the surface that it
 //! left has the light of all environments already.
 
 use crate::bvh::Ray;
@@ -16,11 +17,12 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::{EnvironmentSource, World};
 use std::f64::consts::FRAC_1_PI;
 
-/// Number of the random numbers of the first environment; emitters have smaller ones.
+/// Index of the first environment's random numbers. Emitters have smaller indices.
 const ENVIRONMENT_SALT: u32 = 1 << 30;
 
-/// Adds the radiance of the visible environments to the rays of `lanes`, which hit no surface. A medium
-/// in which the rays escape leaves the share `transmittance` of the light; `None` means all.
+/// Adds the radiance of the visible environments to the rays of `lanes`, which hit no surface.
+/// `transmittance` is the fraction of light that the medium around the rays lets through; `None`
+/// means all.
 pub(crate) fn visible_environments<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
@@ -44,7 +46,8 @@ pub(crate) fn visible_environments<L: SimdFloat>(
 }
 
 /// Adds the light of all environments that the surfaces reflect. `bounce` is the number of earlier
-/// surfaces of the path. `glossy` selects lanes with a lobe that has a density.
+/// surfaces of the path. `glossy` selects lanes with a glossy lobe, whose directions have a finite
+/// density.
 #[inline(never)]
 pub(crate) fn environment_lighting<L: SimdFloat>(
     world: &World<L>,
@@ -102,7 +105,8 @@ pub(crate) fn environment_lighting<L: SimdFloat>(
     }
 }
 
-/// Adds the reflected radiance `value` from the directions `wi` to the sums, where no surface occludes it.
+/// Adds the reflected radiance `value` from the directions `wi` to `out`, in lanes whose shadow ray
+/// reaches the environment.
 #[inline(always)]
 fn add<L: SimdFloat>(
     world: &World<L>,

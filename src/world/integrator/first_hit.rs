@@ -14,12 +14,12 @@ pub struct FirstHit {
     /// Unit geometric normal in scene coordinates, on the side that faces the eye; zero for the
     /// background.
     pub normal: [f32; 3],
-    /// `true` if the surface reflects rays on the side that faces the eye.
+    /// `true` if the surface reflects rays (mirror or glossy lobe) on the side that faces the eye.
     pub reflects: bool,
 }
 
 impl FirstHit {
-    /// Value for a ray that hits no primitive.
+    /// First hit of a ray that hits no primitive.
     pub const MISS: Self =
         Self { object: None, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
 }
@@ -111,7 +111,8 @@ mod tests {
         hits
     }
 
-    /// Ten pixels cover one unit of the picture plane. The rectangles are 5 units away.
+    /// Checks object, distance and normal of first hits. Ten pixels cover one unit of the picture
+    /// plane; the rectangles are 5 units away.
     #[test]
     fn first_hits_have_objects_distances_and_normals() {
         let points = [[15.0, 10.0], [21.0, 10.0], [9.0, 10.0], [15.0, 0.5], [21.0, 19.9]];

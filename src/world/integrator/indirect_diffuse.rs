@@ -1,14 +1,15 @@
 //! Indirect diffuse light: bounces from matt surfaces, in generations.
 //!
-//! The first generation of a path is the tree of mirrors and glass that the camera ray reaches, as in
-//! a scene without indirect diffuse light. One of its hits is chosen for the diffuse bounce, with a
-//! probability in proportion to the light that it can pass on (weighted reservoir sampling, Chao
-//! 1982, *A General Purpose Unequal Probability Sampling Plan*). There the next generation starts, in
-//! a direction whose density is the cosine to the normal, divided by pi. Mirrors stay as free of
-//! noise as without diffuse bounces, and a path has at most one start per generation.
+//! A generation is the tree of mirror and glass surfaces that a ray reaches. The first generation
+//! starts at the camera, as in a scene without indirect diffuse light. One hit of a generation is
+//! chosen for the diffuse bounce, with a probability in proportion to the light that it can pass on
+//! (weighted reservoir sampling, Chao 1982, *A General Purpose Unequal Probability Sampling Plan*).
+//! The next generation starts there, in a direction whose density is the cosine to the normal,
+//! divided by pi. Mirrors have no more noise than without diffuse bounces, and a path has at most
+//! one start per generation.
 //!
-//! Emitters and environments are sampled at every hit. A ray that starts at a diffuse bounce therefore
-//! adds nothing where it reaches an emitter or escapes to an environment.
+//! Emitters and environments are sampled at every hit. A ray that starts at a diffuse bounce
+//! therefore adds nothing where it reaches an emitter or escapes to an environment.
 
 use crate::bvh::Ray;
 use crate::lanes::{Frame, Mask, SimdFloat, Vec3};
@@ -23,8 +24,9 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::integrator::transmission::{Branch, TransmissionIntegrator};
 use crate::world::world::World;
 
-/// Density of diffuse bounces for the weight of emitters that they reach: so small that the points
-/// sampled on the emitters have all the weight. Environments leave out rays of this density.
+/// Density \[1/sr\] that rays of diffuse bounces have in multiple importance sampling. It is so
+/// small that samples of points on emitters get all the weight. The radiance of environments is not
+/// added to rays of this density.
 pub(crate) const NO_DENSITY: f64 = 1e-30;
 
 /// Limits of the diffuse bounces of a world.
@@ -36,9 +38,10 @@ pub(crate) struct DiffuseLimits {
     pub caustics: bool,
 }
 
-/// The hit that is chosen for the diffuse bounce, in each lane, among those of a generation.
+/// Hits of a generation, reduced to one per lane by weighted reservoir sampling: the hit at which
+/// the diffuse bounce starts.
 pub(crate) struct DiffuseReservoir<L: SimdFloat> {
-    /// Number of hits that were offered, over all lanes together.
+    /// Number of packets of hits that were offered.
     offers: u32,
     /// Lanes that have a hit.
     lanes: L::Mask,
@@ -71,9 +74,9 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         }
     }
 
-    /// Offers the hits of `path`. `media` and `coincident` are those of a ray that leaves on the
-    /// side from which the path arrived. Returns the lanes whose diffuse light is left to the
-    /// bounce.
+    /// Offers the hits of `path` for the diffuse bounce. `media` and `coincident` are the state of
+    /// a ray that leaves on the side from which the path arrived. Returns the lanes that reflect
+    /// diffusely; they get their indirect light from the bounce instead of ambient light.
     #[inline(never)]
     pub fn offer(
         &mut self,
@@ -121,7 +124,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         lanes
     }
 
-    /// Returns the rays of the next generation, whose direction comes from the numbers `u` and `v`.
+    /// Returns the rays of the next generation. `u` and `v` are uniform in [0, 1) and determine the
+    /// direction.
     fn start(&self, world: &World<L>, (u, v): (L, L)) -> Branch<L> {
         let direction = Frame::around(self.normal).to_world(cosine_hemisphere(u, v));
         // The largest channel of the throughput becomes the sum of all weights.

@@ -17,11 +17,11 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     pub point: Vec3<L>,
     /// Distance from `point` along the geometric normal at which secondary rays start.
     pub offset: L,
-    /// Lanes whose rays hit the outside of the primitive, to which its own normal points.
+    /// Lanes whose rays hit the primitive from the side to which its own normal points.
     pub front: L::Mask,
     /// Ids of the primitives.
     pub item: L,
-    /// Indices of the BSDFs, stored as ids.
+    /// Indices of the BSDFs in the world's list, stored as ids.
     bsdf: L,
     /// Factor by which textures and vertex colours multiply the albedo of the BSDF.
     pub albedo_factor: Vec3<L>,
@@ -73,15 +73,16 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.reflecting = self.reflecting.and_not(lanes);
     }
 
-    /// Excludes `lanes` from direct lighting, and their lobes from points of emitters.
+    /// Excludes `lanes` from direct lighting, and their lobes from the sampling of points on
+    /// emitters.
     #[inline(always)]
     pub fn shade(&mut self, lanes: L::Mask) {
         self.direct_mask = self.direct_mask.and_not(lanes);
         self.shaded = self.shaded | lanes;
     }
 
-    /// Returns `direction`. Where it points into the surface, it is mirrored at the geometric
-    /// tangent plane.
+    /// Returns `direction`, mirrored at the tangent plane of the geometric normal in lanes where it
+    /// points into the surface.
     #[inline(always)]
     pub fn reflect_into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
         let height = direction.dot(self.geometric).min(L::zero());
@@ -125,8 +126,8 @@ pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     }
 }
 
-/// Creates the interactions of a packet whose rays hit several primitives. `first` holds the
-/// interactions of one primitive; the lanes in `remaining` hit other primitives.
+/// Creates the interactions of a packet whose rays hit several primitives. `first` is one of them,
+/// in the lanes `first_lanes`. The lanes `remaining` hit other primitives.
 #[inline(never)]
 fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

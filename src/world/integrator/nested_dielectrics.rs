@@ -44,7 +44,7 @@ impl<L: SimdFloat> MediumStack<L> {
         self.priorities.iter().fold(L::mask(false), |found, entry| found | equal(*entry, priority))
     }
 
-    /// Returns the stack without `priority`.
+    /// Returns the stack with `priority` removed.
     #[inline(always)]
     fn without(&self, priority: L) -> Self {
         let mut out = *self;
@@ -57,7 +57,7 @@ impl<L: SimdFloat> MediumStack<L> {
         out
     }
 
-    /// Returns the stack with `priority`.
+    /// Returns the stack with `priority` added.
     #[inline(always)]
     fn with(&self, priority: L) -> Self {
         let mut out = self.without(priority);
@@ -69,7 +69,7 @@ impl<L: SimdFloat> MediumStack<L> {
         out
     }
 
-    /// Returns `yes` in lanes where `mask` is true and `no` elsewhere.
+    /// Returns the stack `yes` in lanes where `mask` is true and `no` elsewhere.
     #[inline(always)]
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self { priorities: array_from_fn(|i| L::select(mask, yes.priorities[i], no.priorities[i])) }
@@ -97,7 +97,7 @@ impl StartRegion {
     }
 }
 
-/// Transmissive surfaces of a world, and the solids that they bound.
+/// Transmissive surfaces of a world, and the media inside of them.
 pub(crate) struct NestedDielectrics<L: SimdFloat> {
     /// Priority of the transparent solid that each primitive bounds; 0 if it bounds none.
     priority_of: Vec<u32>,
@@ -106,7 +106,8 @@ pub(crate) struct NestedDielectrics<L: SimdFloat> {
     /// Absorption coefficients of the solid with each priority [1 / scene unit]; 0 for priority 0.
     /// `None` if no solid absorbs light.
     absorption: Option<Vec<[L::Scalar; 3]>>,
-    /// Solids that may contain the origins of camera rays: the priority of each, and its boundary.
+    /// Solids that may contain the origins of camera rays: the priority of each, and its boundary
+    /// as geometry.
     around_eye: Vec<(u32, Aggregate<L>)>,
     /// Contacts between primitives, at least one of each touching pair transmissive. `None` if
     /// there are none.
@@ -185,7 +186,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         Some(Self { priority_of, indices, absorption, around_eye, contacts })
     }
 
-    /// Returns `true` for each primitive that bounds a solid that paths can be inside of.
+    /// Returns one value for each primitive: `true` if it bounds a solid that paths can be inside
+    /// of.
     pub fn entered(&self) -> Vec<bool> {
         self.priority_of.iter().map(|priority| *priority > 0).collect()
     }
@@ -209,9 +211,9 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         media
     }
 
-    /// Returns the share of light that is left after `distance` [scene units] in `media`, in each
-    /// channel, by Beer's law. `distance` may be the largest finite number. Returns `None` if no
-    /// solid of the world absorbs light.
+    /// Returns the fraction of light that is left after `distance` [scene units] in `media`, in
+    /// each channel, by Beer's law. `distance` may be the largest finite number. Returns `None` if
+    /// no solid of the world absorbs light.
     #[inline(always)]
     pub fn transmittance(&self, media: &MediumStack<L>, distance: L) -> Option<Vec3<L>> {
         let absorption = self.absorption.as_ref()?;

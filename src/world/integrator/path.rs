@@ -11,7 +11,7 @@ pub struct Radiance<L> {
     pub groups: [Vec3<L>; MAX_GROUPS],
 }
 
-/// Cost of traced packets, and the kind of their reflections.
+/// Number of rays of traced packets, and the kind of their reflections.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     /// Number of rays: camera, shadow, reflected and transmitted.
@@ -33,8 +33,8 @@ pub(crate) struct Path<L> {
 }
 
 impl<L: SimdFloat> Path<L> {
-    /// Largest throughput. A larger one would saturate the film, and infinity times 0 (black) is
-    /// NaN.
+    /// Largest throughput of a path. A larger one would saturate the film, and infinity times 0
+    /// (black) is NaN.
     const MAX_THROUGHPUT: f64 = (1u64 << 60) as f64;
 
     /// Creates the path of camera rays.

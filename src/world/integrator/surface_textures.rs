@@ -126,8 +126,8 @@ impl<L: SimdFloat> SurfaceTextures<L> {
     }
 }
 
-/// Returns texture coordinates. They are the mesh's own coordinates if the mesh has some and
-/// `mapping` uses them, and otherwise those of the projection.
+/// Returns the texture coordinates at the hit points: those of the mesh if `mapping` uses them and
+/// the mesh has some, otherwise those of the projection.
 fn coordinates<L: SimdFloat>(
     geometry: &Aggregate<L>,
     mapping: &TextureMapping<L::Scalar>,

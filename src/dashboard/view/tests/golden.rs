@@ -5,7 +5,7 @@ use crate::dashboard::view::tests::{drawn, row_text};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Terminal sizes, columns and rows.
+/// Columns and rows of the terminals for which screens are compared.
 const SIZES: [[u16; 2]; 5] = [[200, 60], [120, 36], [80, 24], [40, 12], [39, 11]];
 
 #[test]

@@ -23,8 +23,7 @@ use crate::scene::{Scene, built_in};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The name of a state, and the function that puts a model into it. The model shows a render in
-/// progress before.
+/// Name of a state, and the function that changes a model with a running render into this state.
 pub type Named = (&'static str, fn(&mut Model));
 
 /// Creates a model of the built-in scene after 212 samples.
@@ -179,7 +178,7 @@ fn watched(
     WatchedShards { shards: shards.to_string(), path, state, samples, total: Some(total), age }
 }
 
-/// Report on a plan of eight shards with a problem of each kind.
+/// Returns a report on a plan of eight shards, with one shard for each kind of problem.
 fn watched_plan() -> WatchReport {
     let reason = "cannot use parts/job-6.zk: it ends in the middle of the part TILE: it was not \
                   copied as a whole; copy it again, or use an older one";
