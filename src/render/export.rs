@@ -127,7 +127,7 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     ]
 }
 
-/// Replaces the entries of [`film_entries`] in `metadata` by those of `report`.
+/// Replaces the entries of `film_entries` in `metadata` by those of `report`.
 pub fn update_metadata(metadata: &mut [(String, String)], report: &Report) {
     for (key, value) in film_entries(report) {
         metadata.iter_mut().filter(|(k, _)| k == key).for_each(|(_, v)| v.clone_from(&value));

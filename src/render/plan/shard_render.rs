@@ -76,7 +76,7 @@ impl ShardRender {
         Ok(Self { state, pool, remaining, samples, rays, measured: (0, 0.0) })
     }
 
-    /// Traces samples for about [`STEP_SECONDS`]. Returns `false` if no samples are left.
+    /// Traces samples for about a quarter of a second. Returns `false` if no samples are left.
     pub fn step(&mut self) -> bool {
         let speed = match self.measured {
             (samples, seconds) if seconds > 0.0 => samples as f64 / seconds,
