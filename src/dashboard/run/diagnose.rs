@@ -40,7 +40,7 @@ pub struct TerminalReport {
 /// measures the transfer rate, which takes a second or more.
 ///
 /// # Errors
-/// If there is no terminal, or the terminal is closed during the probe.
+/// Fails if there is no terminal, or the terminal is closed during the probe.
 pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<TerminalReport> {
     // The alternate screen hides text that a terminal prints for requests that it does not support.
     let signals = block()?;

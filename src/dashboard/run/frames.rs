@@ -348,7 +348,7 @@ impl FramePipeline {
     /// Records that a frame was written. Returns the time at which the write was completed.
     ///
     /// # Errors
-    /// If the write failed.
+    /// Fails if the write failed.
     pub fn written_at(&mut self, frame: Written) -> io::Result<Instant> {
         if std::mem::take(&mut self.removing) {
             self.tty.set_exit_sequence(&[]);

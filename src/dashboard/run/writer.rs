@@ -74,7 +74,7 @@ impl Writer {
     /// Records that a frame was written. Returns the time at which the write was completed.
     ///
     /// # Errors
-    /// If the write failed.
+    /// Fails if the write failed.
     pub fn done(&mut self, written: Written) -> io::Result<Instant> {
         self.in_flight = false;
         self.spare = written.buffer;
