@@ -11,30 +11,30 @@ use std::f64::consts::FRAC_1_PI;
 /// the power is the exponent times about 1.5e-7.
 pub const SHARP_EXPONENT: f64 = 1024.0;
 
-/// Formula for the highlights of lights.
+/// Formula of highlights (reflections of lights).
 #[derive(Clone, Copy, Debug)]
 pub enum SpecularModel<S> {
     /// No highlight.
     None,
     /// k_s (R.V)^alpha.
     Phong {
-        /// k_s.
+        /// Specular coefficient k_s.
         strength: S,
-        /// alpha.
+        /// Phong exponent alpha.
         exponent: S,
         /// `true` if alpha exceeds `SHARP_EXPONENT`.
         sharp: bool,
     },
     /// k_s D G F / (4 N.L N.V).
     MicrofacetDistribution {
-        /// k_s.
+        /// Specular coefficient k_s.
         strength: S,
-        /// Microfacets, which define D and G.
+        /// Microfacet distribution, which defines D and G.
         facets: MicrofacetDistribution<S>,
     },
 }
 
-/// Distribution of reflected rays.
+/// Reflection lobe: distribution of the directions of reflected rays.
 #[derive(Clone, Copy, Debug)]
 pub enum ReflectionLobe<S> {
     /// All rays in the mirror direction.
@@ -56,11 +56,11 @@ pub enum ReflectionLobe<S> {
 /// Transmission through a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Transmission<S> {
-    /// k_t.
+    /// Transmission coefficient k_t.
     pub strength: S,
-    /// Index of refraction inside of the surface.
+    /// Index of refraction inside of the solid that the surface bounds.
     pub index: S,
-    /// Absorption coefficients of the inside [1 / scene unit]; 0 absorbs nothing.
+    /// Absorption coefficients [1 / scene unit] inside of the solid; 0 absorbs nothing.
     pub absorption: [S; 3],
     /// Distribution of the transmitted rays about the refracted direction; `Mirror` is clear glass.
     pub lobe: ReflectionLobe<S>,
@@ -72,28 +72,28 @@ pub struct Transmission<S> {
 /// A compiled material.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf<S> {
-    /// k_a x colour.
+    /// Ambient coefficient times colour.
     pub ambient: [S; 3],
-    /// k_d x colour.
+    /// Diffuse coefficient times colour.
     pub diffuse: [S; 3],
     /// Highlights of lights.
     pub specular: SpecularModel<S>,
-    /// k_r and the reflection lobe; `None` if nothing is reflected.
+    /// Reflection coefficient k_r and the reflection lobe; `None` if nothing is reflected.
     pub reflection: Option<(S, ReflectionLobe<S>)>,
-    /// k_t and the index of refraction; `None` if the material is opaque.
+    /// Transmission through the surface; `None` if the material is opaque.
     pub transmission: Option<Transmission<S>>,
     /// Fresnel reflectance of the highlight.
     pub highlight_fresnel: Reflectance<S>,
     /// Fresnel reflectance of reflected rays. It is 1 for a transparent dielectric, whose
     /// reflectance depends on the medium on the other side and is computed at each intersection.
     pub reflection_fresnel: Reflectance<S>,
-    /// `true` if lights contribute directly to the colour of the surface.
+    /// `true` if the surface reflects light that arrives directly from lights.
     pub has_direct: bool,
     /// `true` if the back of a surface has the same material as its front.
     pub two_sided: bool,
 }
 
-/// Returns 1 - cos(atan(r)) without cancellation: r^2 / (1 + r^2 + sqrt(1 + r^2)).
+/// Returns 1 - cos(atan(r)), computed without cancellation: r^2 / (1 + r^2 + sqrt(1 + r^2)).
 pub fn one_minus_cos_of_tan(r: f64) -> f64 {
     let square = r * r;
     if square.is_infinite() { 1.0 } else { square / (1.0 + square + (1.0 + square).sqrt()) }
@@ -159,7 +159,7 @@ impl<S: Float> Bsdf<S> {
     }
 }
 
-/// Direction and weight of a reflected ray.
+/// Direction of a reflected ray, and the factor of its radiance.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfSample<L> {
     /// Unit direction.
@@ -208,8 +208,8 @@ fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
     (-(alpha * s * series)).exp().masked(along.gt(L::zero()))
 }
 
-/// Samples a direction of the lobe `cone` or `square` about the direction `axis`, whose length is 1
-/// within rounding; `u` and `v` are uniform in [0, 1). Returns `axis` for other lobes.
+/// Samples a direction of the lobe `Cone` or `Square` about the direction `axis`, whose length is 1
+/// within rounding. `u` and `v` are uniform in [0, 1). Returns `axis` for other lobes.
 #[inline(always)]
 pub(super) fn spread<L: SimdFloat>(
     lobe: &ReflectionLobe<L::Scalar>,
@@ -231,7 +231,7 @@ impl<S: Float> Bsdf<S> {
         !matches!(self.specular, SpecularModel::None)
     }
 
-    /// Returns `true` if the surface bounds solids that absorb light.
+    /// Returns `true` if the surface bounds a solid that absorbs light.
     pub fn absorbs(&self) -> bool {
         let absorption = self.transmission.map(|t| t.absorption.map(S::to_f64));
         absorption.is_some_and(|absorption| absorption != [0.0; 3])
@@ -321,8 +321,8 @@ impl<S: Float> Bsdf<S> {
         BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }
     }
 
-    /// Samples the reflection at a visible microfacet. G is zero below the surface, and so is the
-    /// weight. Elsewhere f N.L / density = F G / G_1 is at most 1.
+    /// Samples the reflection at a visible microfacet. Directions below the surface get the weight
+    /// 0, because G is zero there. Elsewhere the weight f N.L / density = F G / G_1 is at most 1.
     #[inline(always)]
     fn sample_microfacet<L: SimdFloat<Scalar = S>>(
         &self,
@@ -345,8 +345,9 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction`, before directions
-    /// below the surface are mirrored up, or `None` for a mirror. All directions are unit vectors.
+    /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction` if directions below
+    /// the surface are not mirrored up. Returns `None` for a mirror. All directions are unit
+    /// vectors.
     #[inline(always)]
     pub fn density<L: SimdFloat<Scalar = S>>(
         &self,
@@ -378,10 +379,10 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Returns the reflection lobe in the given direction: its value [1/sr], with the cosine of the
-    /// light, and the density [1/sr] with which [`Bsdf::sample`] draws the direction. The quotient
-    /// is the weight of the sample. Both are zero for a mirror, and for directions below the
-    /// surface. The parameters are those of [`Bsdf::sample`].
+    /// Returns the value [1/sr] of the reflection lobe in `direction`, times the cosine of the
+    /// light, and the density [1/sr] with which [`Bsdf::sample`] draws `direction`. The weight of a
+    /// sample is the quotient of the two. Both are zero for a mirror, and for directions below the
+    /// surface. The other parameters are those of [`Bsdf::sample`].
     #[inline(always)]
     pub fn evaluate_lobe<L: SimdFloat<Scalar = S>>(
         &self,

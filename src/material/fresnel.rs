@@ -54,8 +54,8 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// Returns `value` times the reflectance at the cosine `c()`. The closure is called only if the
-    /// mode depends on the angle.
+    /// Returns `value` times the reflectance at the cosine that the closure `c` returns. The
+    /// closure is called only if the reflectance depends on the angle.
     #[inline(always)]
     pub fn times<L: SimdFloat<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> Vec3<L> {
         match self.mode {
@@ -117,7 +117,7 @@ mod tests {
         })
     }
 
-    /// Extreme test 24: F is in [0, 1], F(1) = F0, without NaN, for every F0 and cosine.
+    /// Extreme test 24: F is in [0, 1], F(1) = F0 and F is never NaN, for every F0 and cosine.
     #[test]
     fn extreme_24_fresnel() {
         let mut worst = 0f64;
@@ -145,7 +145,7 @@ mod tests {
         println!("extreme 24 | single | all in [0, 1 + 1e-6]");
     }
 
-    /// F is 1 at grazing incidence and 4 % at normal incidence for n = 1.5.
+    /// Checks textbook values for n = 1.5: F is 1 at grazing incidence and 4 % at normal incidence.
     #[test]
     fn fresnel_has_textbook_values() {
         assert!((index_from_f0(0.04) - 1.5).abs() < 1e-12);

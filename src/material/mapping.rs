@@ -9,7 +9,7 @@ use crate::material::texture::{Axis, Mapping, Placement};
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
-/// Formula of texture coordinates in texture space: x to the right, y up, z to the front.
+/// Formula of texture coordinates. Texture space has x to the right, y up, z to the front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
     /// u = x, v = y.
@@ -20,7 +20,7 @@ pub enum Projection {
     Cylindrical,
     /// Planar projection of each side of a box, seen from outside.
     Box,
-    /// Texture coordinates of the shape.
+    /// The shape's own texture coordinates.
     Uv,
 }
 
@@ -29,8 +29,8 @@ pub enum Projection {
 /// wrap v to the opposite rim.
 const RIM: f64 = 1.0 / 16_384.0;
 
-/// Factor in favour of the later of two axes in the choice of the side of a box. Rounding errors
-/// therefore do not choose between axes with which the normal has equal angles.
+/// Factor by which the later of two axes is preferred when the side of a box is chosen. Rounding
+/// errors therefore do not decide between axes that have equal angles with the normal.
 const TIE: f64 = 1.001;
 
 /// Texture coordinates and their gradients in texture space. The unit of the coordinates is one
@@ -41,24 +41,24 @@ pub struct TexCoord<L> {
     pub u: L,
     /// Coordinate upwards.
     pub v: L,
-    /// Gradient of u.
+    /// Gradient of u in texture space.
     pub grad_u: Vec3<L>,
-    /// Gradient of v.
+    /// Gradient of v in texture space.
     pub grad_v: Vec3<L>,
 }
 
-/// Projection of a texture onto one part of an object.
+/// Placement of a texture on one part of an object, compiled.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureMapping<S> {
     projection: Projection,
-    /// Columns of the linear map from scene to texture space.
+    /// Columns of the linear map from scene space to texture space.
     texture_from_scene: [[S; 3]; 3],
     /// Columns of the inverse map.
     scene_from_texture: [[S; 3]; 3],
     /// Centre of the part in the scene. Points are mapped relative to this centre: rounding errors
     /// scale with the size of the part.
     center: [S; 3],
-    /// Centre of the part in texture space, relative to the origin of the projection.
+    /// Centre of the part in texture space, relative to the origin of the projection's formula.
     texture_center: [S; 3],
     /// Lengths of the part's bounding box in texture space.
     extent: [S; 3],
@@ -66,9 +66,9 @@ pub struct TextureMapping<S> {
     offset: [S; 2],
 }
 
-/// Returns the rotation from texture space to axes in which the projection is along z (planar) or
-/// around y (spherical and cylindrical). `axis` is the axis along or around which the mapping
-/// projects.
+/// Returns the rotation from texture space to the axes of the projection's formula: it projects
+/// along z (planar) or around y (spherical and cylindrical). `axis` is the axis of texture space
+/// that takes this role.
 fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     let rows = match (projection, axis) {
@@ -136,9 +136,9 @@ impl<S: Float> TextureMapping<S> {
         Vec3::new(x.dot(n), y.dot(n), z.dot(n))
     }
 
-    /// Returns the texture coordinates at `point`. `normal` is the outer normal at `point`; both
-    /// are in scene space. If [`TextureMapping::wants_uv`] is `true`, the coordinates are those of
-    /// u = v = 0.
+    /// Returns the texture coordinates at `point`. `normal` is the outer normal there. Both are in
+    /// scene space. Where [`TextureMapping::wants_uv`] is `true`, the shape's own coordinates must
+    /// be used instead; the result is that of u = v = 0.
     pub fn coordinates<L: SimdFloat<Scalar = S>>(
         &self,
         point: Vec3<L>,
@@ -192,7 +192,7 @@ impl<S: Float> TextureMapping<S> {
     }
 }
 
-/// Returns the vector of the given length along a coordinate axis.
+/// Returns a vector of length `length` along the coordinate axis number `axis`.
 #[inline(always)]
 fn along_axis<L: SimdFloat>(axis: usize, length: L) -> Vec3<L> {
     let zero = L::zero();
@@ -207,7 +207,8 @@ fn planar<L: SimdFloat>(p: Vec3<L>) -> TexCoord<L> {
     TexCoord { u: p.x, v: p.y, grad_u: along_axis(0, L::one()), grad_v: along_axis(1, L::one()) }
 }
 
-/// Returns the angle around y in turns, its gradient, and the squared distance from the axis.
+/// Returns three values: the angle of `p` around the y axis in turns, the gradient of this angle,
+/// and the squared distance from the axis.
 #[inline(always)]
 fn around<L: SimdFloat>(p: Vec3<L>) -> (L, Vec3<L>, L) {
     let across2 = p.x.mul_add(p.x, p.z * p.z);
@@ -241,8 +242,8 @@ fn cylindrical<L: SimdFloat>(p: Vec3<L>, height: L) -> TexCoord<L> {
     }
 }
 
-/// Returns the planar projection of one side of a box, measured from the lower left corner of that
-/// side. The side is that which faces in the direction of `normal`.
+/// Returns the planar projection on one side of a box, measured from the lower left corner of that
+/// side. The side is the one that `normal` points out of.
 fn sides<L: SimdFloat>(p: Vec3<L>, normal: Vec3<L>, extent: Vec3<L>) -> TexCoord<L> {
     let zero = L::zero();
     let [ax, ay, az] = [normal.x, normal.y, normal.z].map(L::abs);
@@ -285,7 +286,7 @@ mod tests {
         p.coordinates(Vec3::of(point.to_array()), Vec3::of(normal.to_array()))
     }
 
-    /// Gradients, mapped to the scene, equal central differences of the coordinates.
+    /// Checks that gradients, mapped to the scene, equal central differences of the coordinates.
     #[test]
     fn gradients_match_finite_differences() {
         let normal = DVec3::new(0.3, 0.8, -0.2).normalize();

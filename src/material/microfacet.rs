@@ -5,8 +5,8 @@ use crate::material::Masking;
 use crate::sampling::warp;
 use std::f64::consts::PI;
 
-/// Smallest alpha of a microfacet distribution. For a smaller alpha the reflection lobe is a
-/// mirror, and the highlights of lights use this value.
+/// Smallest alpha of a microfacet distribution. A reflection lobe of smaller alpha is a mirror, and
+/// highlights of lights use this value instead.
 pub const SMOOTH_ALPHA: f64 = 1e-3;
 
 /// A distribution of microfacets.
@@ -51,32 +51,32 @@ impl<S: Float> MicrofacetDistribution<S> {
     }
 }
 
-/// Terms of a microfacet BSDF in SIMD lanes.
+/// Terms of a microfacet BSDF, evaluated in SIMD lanes.
 pub trait MicrofacetEval<L: SimdFloat> {
     /// Returns the density D of microfacet normals [1/sr]. `tan2` is the squared tangent of the
     /// angle between microfacet normal and surface normal.
     fn density(&self, tan2: L) -> L;
-    /// Returns G as numerator and denominator. G is the fraction of the microfacets with normal h
-    /// that are visible from both directions. `nh`, `nv`, `nl`, `vh` are positive cosines; `nh` and
-    /// `vh` may have a common factor.
+    /// Returns G, the fraction of the microfacets with normal h that are visible from both
+    /// directions, as numerator and denominator. `nh`, `nv`, `nl` and `vh` are positive cosines.
+    /// `nh` and `vh` may have a common factor, as for an h that is not normalised.
     fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L);
-    /// Returns G_1, the fraction of the microfacets with normal h that are visible from the view.
+    /// Returns G_1, the fraction of the microfacets with normal h that are visible from the viewer.
     /// The parameters are those of [`MicrofacetEval::masking`].
     fn visibility(&self, nh: L, nv: L, vh: L) -> L;
-    /// Returns G / G_1 in [0, 1]: the weight of a reflected ray for visible normals of unit
-    /// reflectance. The parameters are those of [`MicrofacetEval::masking`].
+    /// Returns G / G_1 in [0, 1]. It is the weight of a reflected ray if visible normals are
+    /// sampled and the reflectance is 1. The parameters are those of [`MicrofacetEval::masking`].
     fn shadowing(&self, nh: L, nv: L, nl: L, vh: L) -> L;
-    /// Returns G / G_1 in [0, 1] of rays that are transmitted to the other side: the weight of a
-    /// transmitted ray for visible normals of unit transmittance. `nh`, `nv` and `vh` are those of
-    /// [`MicrofacetEval::masking`]; `nt` and `lh` are the positive cosines of the transmitted ray with the
-    /// reversed surface normal and microfacet normal.
+    /// Returns G / G_1 in [0, 1] of rays that are transmitted to the other side. It is the weight
+    /// of a transmitted ray if visible normals are sampled and the transmittance is 1. `nh`, `nv`
+    /// and `vh` are those of [`MicrofacetEval::masking`]; `nt` and `lh` are the positive cosines of
+    /// the transmitted ray with the reversed surface normal and microfacet normal.
     fn shadowing_behind(&self, view: (L, L, L), transmitted: (L, L)) -> L;
     /// Returns Smith's Lambda for a direction with the cosine `c` > 0 to the normal.
     fn lambda(&self, c: L) -> L;
 }
 
-/// Value of 1 / (alpha tan) from which masking is neglected: Beckmann's Lambda is below 3e-10
-/// there.
+/// Value of a = 1 / (alpha tan) from which masking is neglected, because Beckmann's Lambda is below
+/// 3e-10.
 const STEEP: f64 = 4.0;
 
 /// Returns Beckmann's Lambda (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)) for 0 < a < [`STEEP`] (Heitz
@@ -166,7 +166,7 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         }
     }
 
-    /// Returns Lambda as a function of a = 1 / (alpha tan).
+    /// Returns Lambda, which depends on a = 1 / (alpha tan) of the angle with cosine `c`.
     #[inline(always)]
     fn lambda(&self, c: L) -> L {
         let alpha2 = L::splat(self.alpha2);

@@ -84,7 +84,7 @@ description! {
     }
 }
 
-/// Keys of `[materials.NAME]`.
+/// Keys of a `[materials.NAME]` table in scene files.
 pub const FIELDS: &[Field] = Material::FIELDS;
 
 choices! {
@@ -182,15 +182,15 @@ impl Material {
         self.fresnel.unwrap_or(default)
     }
 
-    /// Returns the alpha of the microfacet distribution. Without the key `alpha`, it is the value
-    /// that gives the distribution the second moment of the reflection cone.
+    /// Returns the alpha of the microfacet distribution. If the key `alpha` is not given, the
+    /// distribution has the same second moment as the reflection cone of `roughness`.
     pub fn microfacet_alpha(&self) -> f64 {
         self.alpha.unwrap_or(self.roughness / 8f64.sqrt())
     }
 
-    /// Returns the absorption coefficients of the inside [1 / scene unit] by Beer's law: light of
-    /// intensity 1 has the intensity exp(-coefficient x distance) after a distance. They are at most
-    /// 1e30. A channel of 0 counts as 1e-38.
+    /// Returns the absorption coefficients of the inside [1 / scene unit], by Beer's law: light of
+    /// intensity 1 has the intensity exp(-coefficient x distance) after a distance. They are at
+    /// most 1e30. A channel of `attenuation_color` that is 0 is replaced by 1e-38.
     pub fn absorption(&self) -> [f64; 3] {
         let coefficient = |c: f64| -c.max(1e-38).ln() / self.attenuation_distance;
         self.attenuation_color.0.map(|c| coefficient(c).clamp(0.0, 1e30))
@@ -212,7 +212,7 @@ impl Material {
             || self.highlight == Highlight::CookTorrance && self.specular > 0.0
     }
 
-    /// Returns the validation errors of the material.
+    /// Returns the errors of the material's keys and values.
     pub fn faults(&self) -> Vec<ValidationError> {
         let both = self.f0.is_some() && self.metal.is_some();
         let dielectric = self.fresnel == Some(Fresnel::Dielectric);

@@ -5,7 +5,7 @@ use crate::material::{Fresnel, Highlight, Lobe};
 /// Energy balance of a model at coefficient 1 and reflectance 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Energy {
-    /// The albedo is 1 at every angle (with lobes folded at the horizon).
+    /// The albedo is 1 at every angle, if directions below the horizon are mirrored up.
     Conserving,
     /// The albedo is at most 1: multiple scattering between microfacets is lost.
     Losing,
@@ -48,7 +48,7 @@ impl Lobe {
 }
 
 impl Highlight {
-    /// Returns the properties of the formula.
+    /// Returns the properties of reflection by this formula.
     pub fn properties(self) -> BsdfProperties {
         match self {
             Self::Phong => BsdfProperties { reciprocal: false, energy: Energy::Unbounded },
@@ -58,7 +58,8 @@ impl Highlight {
 }
 
 impl Fresnel {
-    /// Returns the properties of a transparent surface, for reflection and transmission together.
+    /// Returns the properties of a transparent surface in this Fresnel mode, for reflection and
+    /// transmission together.
     pub fn transmission_properties(self) -> BsdfProperties {
         match self {
             Self::Dielectric => BsdfProperties { reciprocal: true, energy: Energy::Conserving },

@@ -10,7 +10,7 @@ use crate::material::bsdf::Transmission;
 pub struct Interface<L: SimdFloat> {
     /// Unit direction of the refracted rays; undefined in lanes of `tir`.
     pub refracted: Vec3<L>,
-    /// Lanes with total internal reflection.
+    /// Lanes with total internal reflection (TIR).
     pub tir: L::Mask,
     /// Cosine of the angle of incidence.
     cos_i: L,
@@ -25,7 +25,7 @@ pub struct Interface<L: SimdFloat> {
 /// Weights of reflected and transmitted rays.
 #[derive(Clone, Copy, Debug)]
 pub struct FresnelSplit<L> {
-    /// Factor of the BSDF's reflection lobe.
+    /// Factor of the light that the BSDF's reflection lobe reflects.
     pub reflected: L,
     /// Factor of the transmitted ray.
     pub transmitted: L,
@@ -124,8 +124,8 @@ impl<L: SimdFloat> Interface<L> {
         FresnelSplit { reflected: f, transmitted: k_t * (L::one() - f), tir: L::zero() }
     }
 
-    /// Returns the weights of [`Interface::split`], and those of [`Interface::split_thin`] in the lanes
-    /// of `thin`.
+    /// Returns the weights of [`Interface::split_thin`] in the lanes of `thin`, and those of
+    /// [`Interface::split`] elsewhere.
     #[inline(always)]
     pub fn split_at(
         &self,
@@ -153,14 +153,15 @@ mod tests {
     use crate::lanes::{Double, Single};
     use crate::material::f0_from_index;
 
-    /// Refracts downward rays at `degrees` from the normal +z.
+    /// Refracts rays that travel downwards, at `degrees` from the normal +z.
     fn interface<L: SimdFloat>(degrees: f64, n_i: f64, n_t: f64) -> Interface<L> {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let up = Vec3::of([0.0, 0.0, 1.0]);
         Interface::new(Vec3::of([sin, 0.0, -cos]), up, L::from_f64(n_i), L::from_f64(n_t))
     }
 
-    /// Returns the transmitted fraction of the energy: n_t cos t / (n_i cos i) times the squared amplitudes.
+    /// Returns the fraction of the energy that is transmitted: n_t cos t / (n_i cos i) times the
+    /// squared amplitudes.
     fn transmittance(i: &Interface<f64>) -> f64 {
         let Interface { cos_i, cos_t, n_i, n_t, .. } = *i;
         let s = 2.0 * n_i * cos_i / (n_i * cos_i + n_t * cos_t);
@@ -187,7 +188,8 @@ mod tests {
         }
     }
 
-    /// Extreme test 25: R + T = 1 near the critical angle and far from it, and R is continuous there.
+    /// Extreme test 25: R + T = 1 at all angles, also near the critical angle, and R is continuous
+    /// there.
     #[test]
     fn extreme_25_total_reflection() {
         let mut worst = 0f64;
@@ -229,7 +231,7 @@ mod tests {
         println!("extreme 25 | single | R in [0, 1 + 1e-6]");
     }
 
-    /// Refraction obeys Snell's law and is reversible.
+    /// Checks Snell's law, and that the refracted ray refracts back into the incident one.
     #[test]
     fn refraction_obeys_snell_and_is_reversible() {
         for degrees in [0.0, 1e-6, 20.0, 45.0, 70.0, 89.0, 89.999] {

@@ -17,15 +17,15 @@ pub struct InterfaceMedia<L: SimdFloat> {
     pub n_i: L,
     /// Index of refraction behind the interface. For thin surfaces, that of their material.
     pub n_t: L,
-    /// Lanes whose rays arrive from outside of a solid.
+    /// Lanes whose rays arrive from outside of the solid.
     pub outer: L::Mask,
     /// Lanes of thin surfaces, which bound no solid and do not refract.
     pub thin: L::Mask,
 }
 
 impl<L: SimdFloat> InterfaceMedia<L> {
-    /// Lanes in which the index of refraction is the same on both sides. Nothing refracts there, whatever
-    /// the roughness.
+    /// Lanes in which the index of refraction is the same on both sides. Rays are not refracted
+    /// there, even by a rough surface.
     #[inline(always)]
     fn same(&self) -> L::Mask {
         (self.n_i.le(self.n_t) & self.n_t.le(self.n_i)).and_not(self.thin)

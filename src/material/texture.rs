@@ -57,7 +57,7 @@ description! {
     pub struct Checker: Default {
         /// Colour of the square that begins at u = v = 0.
         even: Color = [1.0, 1.0, 1.0], in COEFFICIENT;
-        /// Colour of its neighbours.
+        /// Colour of the other squares.
         odd: Color = [0.1, 0.1, 0.1], in COEFFICIENT;
         /// Source of the coordinates u (to the right) and v (up).
         mapping: Mapping = "auto";
@@ -146,7 +146,7 @@ choices! {
     }
 }
 
-/// Placement of a texture on shapes.
+/// Placement keys of a texture: how its coordinates arise from the shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Source of the coordinates.
@@ -159,7 +159,7 @@ pub struct Placement {
     pub offset: [f64; 2],
 }
 
-/// Implements `placement` for textures with the common placement keys.
+/// Implements `placement` for texture kinds that have the placement keys.
 macro_rules! placed {
     ($($kind:ident),+) => {$(
         impl $kind {
@@ -175,14 +175,14 @@ macro_rules! placed {
 placed!(ImageTexture, Checker, HeightImage);
 
 impl ImageTexture {
-    /// Returns the pixels; `None` if no readable file has been loaded.
+    /// Returns the pixels; `None` if no file has been loaded, or if it is unreadable.
     pub fn image(&self) -> Option<&Arc<Image>> {
         self.content.content()
     }
 }
 
 impl HeightImage {
-    /// Returns the pixels; `None` if no readable file has been loaded.
+    /// Returns the pixels; `None` if no file has been loaded, or if it is unreadable.
     pub fn image(&self) -> Option<&Arc<Image>> {
         self.content.content()
     }
@@ -215,8 +215,8 @@ impl Texture {
         }
     }
 
-    /// Returns a texture of the kind `key` with the same placement; `None` if there is no such
-    /// kind.
+    /// Returns a texture of the kind `key` with the placement of this one; `None` if there is no
+    /// such kind.
     pub fn changed(&self, key: &str) -> Option<Self> {
         let Placement { mapping, axis, scale, offset } = self.placement();
         Some(match Self::new(key)? {
@@ -259,13 +259,13 @@ impl Bump {
     }
 }
 
-/// Kinds of `texture`.
+/// Keys of the kinds of `texture` in scene files.
 const TEXTURE_KINDS: &[Field] = &[
     Field::required("image", ImageTexture::TYPE, "", ImageTexture::DOC),
     Field::required("checker", Checker::TYPE, "", Checker::DOC),
 ];
 
-/// Kinds of `bump`.
+/// Keys of the kinds of `bump` in scene files.
 const BUMP_KINDS: &[Field] = &[Field::required("image", HeightImage::TYPE, "", HeightImage::DOC)];
 
 impl FieldValue for Texture {
@@ -302,7 +302,7 @@ impl FieldValue for Bump {
 }
 
 impl crate::material::Material {
-    /// Returns the names of the files of texture and bump map, each with its content.
+    /// Iterates over the files of the texture and the bump map: name and content of each.
     fn files_mut(&mut self) -> impl Iterator<Item = (&String, &mut Loaded<Image>)> {
         let texture = match &mut self.texture {
             Some(Texture::Image(image)) => Some((&image.file, &mut image.content)),
@@ -312,7 +312,7 @@ impl crate::material::Material {
         [texture, bump].into_iter().flatten().filter(|(file, _)| !file.is_empty())
     }
 
-    /// Returns the files that the material names.
+    /// Returns the names of the files of the texture and the bump map.
     pub fn files(&self) -> impl Iterator<Item = &str> {
         let texture = match &self.texture {
             Some(Texture::Image(image)) => Some(image.file.as_str()),
@@ -322,7 +322,7 @@ impl crate::material::Material {
         [texture, bump].into_iter().flatten().filter(|file| !file.is_empty())
     }
 
-    /// Returns the images of texture and bump that were read.
+    /// Returns the loaded images of the texture and the bump map.
     pub fn images(&self) -> impl Iterator<Item = &Arc<Image>> {
         let texture = match &self.texture {
             Some(Texture::Image(image)) => image.image(),
@@ -332,15 +332,15 @@ impl crate::material::Material {
         [texture, bump].into_iter().flatten()
     }
 
-    /// Loads the files that the material names with `load`, unless content or an error is there
-    /// already.
+    /// Loads the files of the texture and the bump map with `load`, unless the content or an error
+    /// of reading it is stored already.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Image>, AssetError>) {
         for (file, content) in self.files_mut() {
             content.resolve(|| load(file));
         }
     }
 
-    /// Copies the content of the files that both materials name from `other`.
+    /// Copies the contents of files from `other`, if both materials name the same files.
     pub fn resolve_as(&mut self, other: &Self) {
         let mut known = other.clone();
         let known: Vec<_> = known.files_mut().collect();

@@ -5,10 +5,11 @@ use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
 use crate::material::texture::{Bump, Texture, TextureFilter, Wrap};
 use std::sync::Arc;
 
-/// Compiled texture. The unit of its coordinates is one repetition of the image.
+/// Compiled texture. Its coordinates count repetitions of the image.
 #[derive(Clone, Debug)]
 pub enum CompiledTexture<S> {
-    /// Squares, two by two per repetition: colour of the first square, and that of its neighbours.
+    /// Squares of two colours, two by two per repetition: the colour of the first square, and the
+    /// colour of its neighbours.
     Checker([[S; 3]; 2]),
     /// An image.
     Image {
@@ -21,18 +22,18 @@ pub enum CompiledTexture<S> {
     },
 }
 
-/// Compiled bump map. The unit of its coordinates is one repetition of the image.
+/// Compiled bump map. Its coordinates count repetitions of the image.
 #[derive(Clone, Debug)]
 pub struct BumpMap {
     image: Arc<Image>,
     wrap: Wrap,
-    /// Height of white above black.
+    /// Height of white pixels above black ones [scene units], before the object's transform.
     height: f64,
 }
 
-/// Returns the position of the coordinate `x`, in repetitions, among `size` pixels. The index is
-/// that of the pixel whose centre is at or before `x`; it may be out of range. The fraction, from 0
-/// to 1, is the way from there to the next centre.
+/// Returns the position of the coordinate `x` (in repetitions) among `size` pixels: the index of
+/// the pixel whose centre is at or before `x`, and the fraction, from 0 to 1, of the way to the
+/// next centre. The index may be out of range.
 #[inline(always)]
 fn pixel_position(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
     let size = f64::from(size);
@@ -46,7 +47,7 @@ fn pixel_position(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
     (x.floor() as i32, x - x.floor())
 }
 
-/// Maps the index `i`, which may be out of range, to one of `size` pixels.
+/// Maps the index `i`, which may be out of range, to one of `size` pixels by the rule `wrap`.
 #[inline(always)]
 fn wrapped(i: i32, size: u32, wrap: Wrap) -> u32 {
     match wrap {

@@ -1,4 +1,5 @@
-//! All primitives of a scene, compiled for rays: batches, and a BVH over them where it is faster.
+//! Aggregate: all primitives of a scene, compiled for rays. It holds a batch for each kind of
+//! primitive, and a BVH over all of them where a BVH is faster.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -12,10 +13,11 @@ use crate::primitive::scene_bvh::SceneBvh;
 use std::fmt;
 use std::ops::Range;
 
-/// Least number of bounded items for a BVH. With rays in a ball of spheres the BVH is faster than a
-/// list from about 50 items for coherent packets, and from about 300 for incoherent ones. Whole
-/// pictures, whose tiles skip the items of the list that they cannot see, are faster with the list
-/// up to 95 (`benches/acceleration.rs`).
+/// Smallest number of primitives with finite bounds for which a BVH is built.
+///
+/// With rays in a ball of spheres the BVH is faster than a list from about 50 primitives for
+/// coherent packets, and from about 300 for incoherent ones. Whole pictures, whose tiles skip the
+/// primitives that they cannot see, are faster with the list up to 95 (`benches/acceleration.rs`).
 pub const BVH_MIN_PRIMITIVES: usize = 96;
 
 impl PrimitiveSet {
@@ -25,24 +27,26 @@ impl PrimitiveSet {
     }
 }
 
-/// One batch and the range of its items in the numbering of all items.
+/// One batch, and the range of its items (primitives) in the numbering of all items.
 struct BatchRange<L: SimdFloat> {
     batch: PrimitiveBatch<L>,
     base: u32,
     end: u32,
 }
 
-/// Primitives of a scene, compiled for item_hit lane type.
+/// All primitives of a scene, compiled for one lane type. A primitive in it is an *item*: it has a
+/// number, by which hits name it.
 pub struct Aggregate<L: SimdFloat> {
     parts: Vec<BatchRange<L>>,
     all: PrimitiveSet,
     tree: Option<SceneBvh>,
-    /// Items of the BVH, as `(part, number in the part)`.
+    /// Items of the BVH, as pairs of batch and number in the batch.
     tree_items: Vec<(u32, u32)>,
-    /// Box of each item, tested before the item; `None` for an infinite item. Empty if no boxes are
-    /// used.
+    /// Bounding box of each item, tested before the item; `None` for an infinite item. The list is
+    /// empty if no boxes are used.
     extents: Vec<Option<ItemBox<L::Scalar>>>,
-    /// Form of each item, by position in the list given to [`Aggregate::new`], and its part.
+    /// Origin of each item: position of its form (shape in canonical form) in the list given to
+    /// [`Aggregate::new`], and its part.
     source: Vec<PrimitiveId>,
     counts: Vec<String>,
 }
@@ -50,19 +54,19 @@ pub struct Aggregate<L: SimdFloat> {
 /// Set of items of an [`Aggregate`].
 #[derive(Clone, Debug, Default)]
 pub struct PrimitiveSet {
-    /// Items outside the BVH, by part and number in the part.
+    /// Items outside of the BVH, as pairs of batch and range of numbers in the batch.
     ranges: Vec<(u32, Range<u32>)>,
     /// `true` if the set includes all items of the BVH.
     tree: bool,
 }
 
 impl<L: SimdFloat> Aggregate<L> {
-    /// Compiles `forms`, as a list or with a BVH depending on their number.
+    /// Compiles `forms`, with a BVH if there are many.
     pub fn new(forms: &[Form]) -> Self {
         Self::accelerated(forms, Acceleration::Auto)
     }
 
-    /// Compiles `forms` with or without a BVH, regardless of their number.
+    /// Compiles `forms`, with a BVH if `tree` is `true`, whatever their number.
     pub fn with_tree(forms: &[Form], tree: bool) -> Self {
         Self::compiled(forms, if tree { Acceleration::Bvh } else { Acceleration::Auto }, tree)
     }
@@ -130,8 +134,8 @@ impl<L: SimdFloat> Aggregate<L> {
         out
     }
 
-    /// Returns the items for which `wanted` is true, and all items of the BVH, which culls by
-    /// itself.
+    /// Returns the set of the items for which `wanted` is true, and of all items of the BVH, which
+    /// excludes items by itself.
     pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
         let mut ranges: Vec<(u32, Range<u32>)> = Vec::new();
         for (part, range) in &self.all.ranges {
@@ -146,7 +150,7 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, tree: self.all.tree }
     }
 
-    /// Returns `items` of the BVH, and all items outside it.
+    /// Returns the set of those of `items` that are in the BVH, and of all items outside of it.
     pub fn select_indices(&self, items: &[u32]) -> PrimitiveSet {
         let mut ranges = self.all.ranges.clone();
         for item in items {
@@ -158,7 +162,7 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, tree: false }
     }
 
-    /// Returns the items in the BVH, in ascending order.
+    /// Returns the numbers of the items in the BVH, in ascending order.
     pub fn in_tree(&self) -> Vec<u32> {
         let item = |(part, i): &(u32, u32)| self.parts[*part as usize].base + i;
         self.tree_items.iter().map(item).collect()
@@ -169,7 +173,7 @@ impl<L: SimdFloat> Aggregate<L> {
         self.tree.is_some()
     }
 
-    /// Returns `true` if there are neither BVH nor boxes: only lists.
+    /// Returns `true` if there is neither a BVH nor bounding boxes.
     pub fn has_no_tree(&self) -> bool {
         self.tree.is_none() && self.extents.is_empty()
     }
@@ -189,20 +193,21 @@ impl<L: SimdFloat> Aggregate<L> {
         self.source.is_empty()
     }
 
-    /// Returns the form and part of each item.
+    /// Returns the origin of each item: form and part.
     pub fn sources(&self) -> &[PrimitiveId] {
         &self.source
     }
 
     /// Returns the closest hit of each ray with the items of `set`. At equal distances the item
-    /// with the lowest number wins, so that the result depends neither on the order in the BVH nor
-    /// on the other rays of the packet.
+    /// with the lowest number is hit, so that the result depends neither on the order of the BVH
+    /// nor on the other rays of the packet.
     #[inline(always)]
     pub fn closest(&self, ray: &Ray<L>, set: &PrimitiveSet) -> Hit<L> {
         self.closest_masked(ray, set, L::mask(true))
     }
 
-    /// [`Aggregate::closest`] for the lanes in `wanted`; other lanes are meaningless.
+    /// Returns the result of [`Aggregate::closest`] in the lanes `wanted`; other lanes are
+    /// undefined.
     #[inline(always)]
     pub fn closest_masked(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         if !self.extents.is_empty() {
@@ -215,7 +220,8 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// [`Aggregate::closest_masked`] for items outside the BVH, without tests of boxes.
+    /// Returns the result of [`Aggregate::closest_masked`] for the items outside of the BVH,
+    /// without box tests.
     #[inline(always)]
     pub fn closest_linear(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         let mut hit = nearest_wanted(wanted);
@@ -242,7 +248,8 @@ impl<L: SimdFloat> Aggregate<L> {
         hit
     }
 
-    /// Returns each item of `set` with its batch range, its number in that range and its box.
+    /// Iterates over the items of `set`: batch of the item, its number in the batch, and its
+    /// bounding box.
     #[inline(always)]
     fn boxed<'a>(
         &'a self,
@@ -302,7 +309,8 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// [`Aggregate::occluded`] by items outside the BVH, without tests of boxes.
+    /// Returns the result of [`Aggregate::occluded`] for the items outside of the BVH, without box
+    /// tests.
     #[inline(always)]
     pub fn occluded_linear(
         &self,
@@ -323,8 +331,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// [`Aggregate::occluded`] by item_hit item of the BVH; `number` is its position in
-    /// [`Aggregate::in_tree`].
+    /// Returns the result of [`Aggregate::occluded`] for one item of the BVH. `number` is its
+    /// position in [`Aggregate::in_tree`].
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (part, i) = self.tree_items[number as usize];
@@ -350,8 +358,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Returns hits nearer than `limit` with `item`; the first part of a compound represents all of
-    /// it.
+    /// Returns the hits with the primitive `item` that are nearer than `limit`. For a compound,
+    /// `item` is its first part and stands for all parts.
     pub fn closest_to(&self, item: u32, ray: &Ray<L>, limit: L) -> Hit<L> {
         let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
         let (i, mut hit) = ((item - part.base) as usize, Hit::with_t_max(limit));
@@ -359,7 +367,8 @@ impl<L: SimdFloat> Aggregate<L> {
         hit
     }
 
-    /// Returns the surface of `item` near `point`; `triangle_tag` is the triangle of the hit.
+    /// Returns the surface of `item` at `point`, a hit point with rounding errors. `triangle_tag`
+    /// is the id of the triangle that was hit, if the item is a mesh.
     #[inline(always)]
     pub fn surface(&self, item: u32, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         for part in &self.parts {
@@ -370,7 +379,8 @@ impl<L: SimdFloat> Aggregate<L> {
         unreachable!("every item belongs to a part")
     }
 
-    /// Returns the meshes and the number of the first mesh item. Meshes are last in the numbering.
+    /// Returns the meshes, and the number of the first mesh among all items. Meshes have the
+    /// largest numbers.
     fn meshes(&self) -> Option<(&Meshes<L::Scalar>, u32)> {
         match self.parts.last()? {
             BatchRange { batch: PrimitiveBatch::Meshes(meshes), base, .. } => Some((meshes, *base)),
@@ -378,19 +388,20 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns `true` if any surface has interpolated normals: [`Aggregate::shading_normal`].
+    /// Returns `true` if some primitive has interpolated normals; see
+    /// [`Aggregate::shading_normal`].
     pub fn is_smooth(&self) -> bool {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_smooth())
     }
 
-    /// Returns `true` if primitives have colours of their own: [`Aggregate::color`].
+    /// Returns `true` if some primitive has a colour of its own; see [`Aggregate::color`].
     pub fn is_colored(&self) -> bool {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
     }
 
-    /// Returns the shading normal at `at`, the point of `item` that rays along `direction` hit and
-    /// its geometric normal on the viewer's side. The shading normal is on the same side and faces
-    /// the viewer.
+    /// Returns the shading normal of `item` at a hit point. `at` is the hit point and the geometric
+    /// normal on the viewer's side. `direction` is that of the rays. The shading normal is on the
+    /// viewer's side and faces the viewer.
     pub fn shading_normal(
         &self,
         (item, triangle_tag): (u32, L),
@@ -405,21 +416,23 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns the colour of `item` at the triangle `triangle_tag`; `None` if the item has none.
+    /// Returns the primitive's own colour at the triangle with the id `triangle_tag`; `None` if it
+    /// has none.
     pub fn color(&self, item: u32, triangle_tag: L) -> Option<Vec3<L>> {
         let (meshes, base) = self.meshes()?;
         (item >= base).then(|| meshes.color((item - base) as usize, triangle_tag))?
     }
 
-    /// Returns the texture coordinates of `item` at `point`, near its triangle `triangle_tag`;
-    /// `None` if the item has none.
+    /// Returns the primitive's own texture coordinates at `point`, a point of the triangle with the
+    /// id `triangle_tag`; `None` if it has none.
     pub fn uv(&self, item: u32, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
         let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
         part.batch.uv((item - part.base) as usize, triangle_tag, point)
     }
 }
 
-/// Returns an empty hit; inactive lanes get a negative `t_max`.
+/// Returns an empty hit for the lanes `wanted`. The other lanes are inactive: they get a negative
+/// distance limit.
 #[inline(always)]
 fn nearest_wanted<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
     Hit::with_t_max(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))

@@ -1,5 +1,5 @@
-//! Batches of compiled primitives: one per form, all items of a form side by side, so that a form
-//! that does not occur costs nothing.
+//! Batches of compiled primitives: one list for each kind of primitive that the scene contains. A
+//! kind that the scene does not contain costs nothing.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -15,30 +15,30 @@ use crate::primitive::sphere::Sphere;
 use crate::primitive::torus::Torus;
 use std::ops::Range;
 
-/// Surface at the point that a ray hits.
+/// Surface of a primitive at a hit point.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint<L> {
-    /// Point projected onto the surface as exactly as the precision allows.
+    /// Hit point, projected onto the surface as exactly as the precision allows.
     pub point: Vec3<L>,
     /// Unit geometric normal: outward for solids, on the front for flat shapes.
     pub normal: Vec3<L>,
-    /// Largest magnitude of a coordinate that took part in computing the point: its rounding error
-    /// is a few units of the last place of this.
+    /// Largest magnitude of a coordinate from which the point was computed. The rounding error of
+    /// the point is a few units of the last place of this value.
     pub max_coordinate: L,
 }
 
-/// Texture coordinates that a shape has of its own, at one point.
+/// Texture coordinates of a primitive at one point.
 #[derive(Clone, Copy, Debug)]
 pub struct UvGradients<L> {
-    /// Coordinates: u to the right, v up.
+    /// Texture coordinates: u to the right, v up.
     pub uv: [L; 2],
     /// Gradients of u and v along the surface, in the space of the shape.
     pub gradients: [Vec3<L>; 2],
 }
 
 impl<L: SimdFloat> SurfacePoint<L> {
-    /// Returns the distance above the surface at which rays that leave it start: a few roundings of
-    /// the largest number involved.
+    /// Returns the distance above the surface at which rays that leave it start: a few rounding
+    /// errors of the largest coordinate involved.
     #[inline(always)]
     pub fn ray_offset(&self) -> L {
         self.max_coordinate.max(self.point.max_abs()) * L::from_f64(8.0 * L::EPSILON)
@@ -47,12 +47,11 @@ impl<L: SimdFloat> SurfacePoint<L> {
 
 /// One primitive, compiled for the lane type.
 pub trait Primitive<L: SimdFloat> {
-    /// Returns the first distance in front of the ray's origin at which each line hits the
-    /// primitive, and the mask of lines that hit it. A distance that is not positive is no hit.
-    /// `None` if no lane hits.
+    /// Returns the smallest distance at which each ray hits the primitive, and the lanes that hit
+    /// it. Only distances greater than 0 are hits. Returns `None` if no lane hits.
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;
 
-    /// Returns the surface at `point`, which is near it, from `ray.at(t)`.
+    /// Returns the surface at `point`, a hit point with rounding errors.
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L>;
 
     /// Returns the primitive's own texture coordinates at `point`. Forms whose default mapping is
@@ -64,17 +63,17 @@ pub trait Primitive<L: SimdFloat> {
 
 macro_rules! batches {
     ($($(#[$doc:meta])+ $kind:ident($item:ident)),+ $(,)?) => {
-        /// All primitives of one form.
+        /// All primitives of one kind.
         pub enum PrimitiveBatch<L: SimdFloat> {
             $($(#[$doc])+ $kind(Vec<$item<L::Scalar>>),)+
-            /// Compounds, whose items are parts.
+            /// Compounds. Each of their parts is an item.
             Compounds(Compounds<L::Scalar>),
             /// Meshes.
             Meshes(Meshes<L::Scalar>),
         }
 
-        /// Evaluates one expression for the primitives of any form but compounds and meshes, and
-        /// one for each of those.
+        /// Evaluates one expression for a batch of any kind except for compounds and meshes, and
+        /// one each for compounds and meshes.
         macro_rules! each {
             ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
                 $meshes:ident => $third:expr) => {
@@ -86,7 +85,7 @@ macro_rules! batches {
             };
         }
 
-        /// Compiles `forms` to one batch per form that occurs.
+        /// Compiles `forms` into one batch for each kind of primitive that occurs.
         pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
             let mut out = Vec::new();
             $(
@@ -133,7 +132,8 @@ batches! {
 }
 
 impl<L: SimdFloat> PrimitiveBatch<L> {
-    /// Narrows `hit` by the items in `range`; an item's tag is `base` + its number.
+    /// Replaces `hit` in the lanes in which an item of `range` is nearer. The id of an item is
+    /// `base` plus its number.
     #[inline(always)]
     pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         each!(self,
@@ -142,8 +142,8 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.closest(range, base, ray, hit));
     }
 
-    /// Returns the lanes that hit an item in `range` at a distance in (0, limit) of the ray. The
-    /// search may stop once all lanes of `wanted` are blocked.
+    /// Returns the lanes that hit an item of `range` at a distance between 0 and `limit`. The
+    /// search may stop once all lanes of `wanted` are occluded.
     #[inline(always)]
     pub fn occluded(
         &self,
@@ -158,8 +158,8 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.occluded(range, ray, limit, wanted))
     }
 
-    /// Returns the surface of `item` at `point`, which is near it, from `ray.at(t)`; `triangle_tag`
-    /// is the triangle of a mesh.
+    /// Returns the surface of `item` at `point`, a hit point with rounding errors. `triangle_tag`
+    /// is the id of the triangle that was hit, if the item is a mesh.
     #[inline(always)]
     pub fn surface(&self, item: usize, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         each!(self,
@@ -168,7 +168,7 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.surface(item, triangle_tag, point))
     }
 
-    /// Returns the texture coordinates of `item` at `point`; `None` if it has none.
+    /// Returns the texture coordinates of `item` at `point`; `None` if the item has none.
     pub fn uv(&self, item: usize, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
         each!(self,
             items => items[item].uv(point),
@@ -205,32 +205,32 @@ fn occluded<L: SimdFloat>(
     occluded
 }
 
-/// Origin of an item: its form and part.
+/// Origin of an item: the form (shape) and its part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PrimitiveId {
-    /// Position in the list given to `compile`.
+    /// Position of the form in the list given to `compile`.
     pub form: usize,
-    /// Part of a compound; 0 for all other forms. Part 0 represents the whole compound in the
-    /// numbering of items; the other parts are never intersected by themselves.
+    /// Number of the part of a compound; 0 for all other forms. In lists of items part 0 stands for
+    /// the whole compound; the other parts are never intersected on their own.
     pub part: usize,
 }
 
-/// Compiled batch with the origins of its items.
+/// One compiled batch, with the origins of its items and its name.
 pub struct LabelledBatch<L: SimdFloat> {
     /// Compiled batch.
     pub batch: PrimitiveBatch<L>,
     /// Form and part of each item.
     pub sources: Vec<PrimitiveId>,
-    /// Singular and plural by which the inventory counts the items.
+    /// Singular and plural of the noun for the items in the inventory.
     pub noun: (&'static str, &'static str),
-    /// Text of the inventory after the noun.
+    /// Text that follows the noun in the inventory.
     pub detail: String,
-    /// `true` if the items are infinite; a BVH cannot hold them.
+    /// `true` if the items have no finite bounds; a BVH cannot hold them.
     pub infinite: bool,
 }
 
 impl<L: SimdFloat> LabelledBatch<L> {
-    /// Creates the batch of the primitives that `sources` lists; `None` if there are none.
+    /// Creates the batch of the primitives in `sources`. Returns `None` if there are none.
     fn new(batch: PrimitiveBatch<L>, sources: Vec<PrimitiveId>, forms: &[Form]) -> Option<Self> {
         let noun = forms[sources.first()?.form].noun();
         let triangles: usize = sources.iter().map(|s| forms[s.form].triangles()).sum();
@@ -243,7 +243,7 @@ impl<L: SimdFloat> LabelledBatch<L> {
     }
 }
 
-/// Returns `n` with thousands separators: `69,451`.
+/// Formats `n` with thousands separators, such as `69,451`.
 fn with_thousands_separators(n: usize) -> String {
     let digits = n.to_string();
     let mut out = String::new();
@@ -256,7 +256,7 @@ fn with_thousands_separators(n: usize) -> String {
     out
 }
 
-/// Largest magnitude of a coordinate in a bounded form.
+/// Returns the largest magnitude of a coordinate of a form with finite bounds.
 pub(crate) fn max_coordinate(form: &Form) -> f64 {
     form.bounds().map_or(0.0, |(low, high)| low.abs().max(high.abs()).max_element())
 }

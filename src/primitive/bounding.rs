@@ -1,12 +1,12 @@
-//! Bounding volumes that rule out hits of rays with a primitive. They are in double precision with
-//! room for the roundings of single precision: a primitive that a ray in lanes may hit is never
-//! ruled out.
+//! Bounding volumes, which exclude primitives that rays cannot hit. They are in double precision,
+//! with a margin for the rounding errors of single precision: a primitive that a ray may hit is
+//! never excluded.
 
 use crate::primitive::form::Form;
 use glam::DVec3;
 
-/// Relative error of rays in single precision, more than the few times 2^-24 of the largest
-/// coordinate that they stray by.
+/// Relative error of rays in single precision, with a margin. The true error is a few times 2^-24
+/// of the largest coordinate.
 pub const F32_RAY_ERROR: f64 = 1e-5;
 
 /// A ball.
@@ -14,7 +14,7 @@ pub const F32_RAY_ERROR: f64 = 1e-5;
 pub struct BoundingSphere {
     /// Centre.
     pub center: DVec3,
-    /// Radius; infinite for forms without an end.
+    /// Radius; infinite for forms without finite bounds.
     pub radius: f64,
 }
 
@@ -23,32 +23,33 @@ pub struct BoundingSphere {
 pub enum LightTarget {
     /// A point.
     Point(DVec3),
-    /// A direction of unit length to a distant light.
+    /// A unit vector towards a distant light.
     Direction(DVec3),
 }
 
-/// Lines from one point through a convex quadrilateral, and the lines through a lens around that
-/// point.
+/// All rays from one point (the apex) through a convex quadrilateral, and, with a lens, all rays
+/// from the lens around the apex.
 ///
-/// A line through the apex has the direction d, of unit length along `forward`. The lines through
-/// the point apex + o of the lens have the directions d - o / f: at the depth z they are displaced
-/// by o (1 - z / f), which is largest at one end of an interval of depths.
+/// A ray from the apex has the direction d, whose component along `forward` is 1. The ray from the
+/// point apex + o of the lens has the direction d - o / f. At the depth z the two are o (1 - z / f)
+/// apart; within an interval of depths this is largest at one end.
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
-    /// Common point of the lines: the centre of the lens.
+    /// Common origin of the rays: the centre of the lens.
     pub apex: DVec3,
     /// Forward direction, of unit length, perpendicular to the lens.
     pub forward: DVec3,
-    /// Vectors from the apex to the corners of the quadrilateral, at distance 1 along `forward`.
+    /// Vectors from the apex to the corners of the quadrilateral, whose component along `forward`
+    /// is 1.
     pub corners: [DVec3; 4],
-    /// Radius of the lens; 0 if all lines meet in the apex.
+    /// Radius of the lens; 0 if all rays start at the apex.
     pub lens_radius: f64,
-    /// Depth f at which the lines through one point of the quadrilateral meet, greater than 0.
+    /// Depth f, greater than 0, at which rays from different points of the lens meet.
     pub focus: f64,
 }
 
 impl Frustum {
-    /// Returns the largest displacement of lines by the lens between two depths.
+    /// Returns the largest displacement of rays by the lens between the depths `near` and `far`.
     fn blur(&self, near: f64, far: f64) -> f64 {
         if self.lens_radius == 0.0 {
             return 0.0;
@@ -62,8 +63,8 @@ impl Frustum {
         ray_error(self.apex) + F32_RAY_ERROR * self.lens_radius
     }
 
-    /// Returns the ball, grown by the displacement of lines inside of it and by the rounding errors
-    /// of rays.
+    /// Returns the ball with a larger radius, which includes the displacement of rays by the lens
+    /// and the rounding errors of rays.
     fn blurred(&self, ball: &BoundingSphere) -> BoundingSphere {
         let depth = (ball.center - self.apex).dot(self.forward);
         let radius = ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center);
@@ -71,9 +72,9 @@ impl Frustum {
         BoundingSphere { radius: ball.radius + blur + F32_RAY_ERROR * self.lens_radius, ..*ball }
     }
 
-    /// Returns `true` if a ball may reach between the lines. The test is against the cone around
-    /// the lines if it is narrower than a half-space; otherwise, as no wider cone is convex,
-    /// against the inner side of the four planes through the apex and neighbouring corners.
+    /// Returns `true` if a ray may hit the ball. A frustum narrower than a half-space is replaced
+    /// by the cone around it. A wider one is tested by the four planes through the apex and
+    /// neighbouring corners, because a wider cone is not convex.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let ball = &self.blurred(ball);
         let Self { apex, forward, corners, .. } = self;
@@ -98,11 +99,11 @@ impl Frustum {
 #[derive(Clone, Copy, Debug)]
 pub struct BoundingVolume {
     ball: BoundingSphere,
-    /// Unit normal and offset of the plane that a flat form lies in.
+    /// Unit normal and offset of the plane that contains a flat form; `None` for other forms.
     plane: Option<(DVec3, f64)>,
-    /// `true` if the outside of the form cannot see itself.
+    /// `true` if no ray that leaves the outside of the form hits the form again.
     convex: bool,
-    /// Largest distance between the end of a ray and its nominal end.
+    /// Largest distance between the end point of a shadow ray and the light.
     slack: f64,
 }
 
@@ -113,15 +114,15 @@ impl BoundingSphere {
         Self { center, radius }
     }
 
-    /// Returns `true` if the balls overlap, with room for the roundings of rays that start in
-    /// `other`.
+    /// Returns `true` if the balls overlap, with a margin for the rounding errors of rays that
+    /// start in `other`.
     pub fn overlaps(&self, other: &Self) -> bool {
         let errors = ray_error(self.center) + ray_error(other.center);
         self.center.distance(other.center)
             <= self.radius + errors + other.radius * (1.0 + F32_RAY_ERROR)
     }
 
-    /// Returns the radius with room for the roundings of rays from `apex`.
+    /// Returns the radius with a margin for the rounding errors of rays from `apex`.
     fn reach(&self, apex: DVec3) -> f64 {
         self.radius * (1.0 + F32_RAY_ERROR) + ray_error(self.center) + ray_error(apex)
     }
@@ -139,7 +140,7 @@ impl BoundingVolume {
         Self { ball, plane, convex, slack: 0.0 }
     }
 
-    /// Returns a ball around the form.
+    /// Returns a ball that contains the form.
     pub fn ball(&self) -> BoundingSphere {
         self.ball
     }
@@ -149,13 +150,13 @@ impl BoundingVolume {
         self.plane.is_some()
     }
 
-    /// Returns `true` if the form is convex: its outside cannot see itself.
+    /// Returns `true` if no ray that leaves the outside of the form hits the form again.
     pub fn is_convex(&self) -> bool {
         self.convex
     }
 
-    /// Returns a ball around the part of the form that the pencil's lines can hit in front of the
-    /// apex; `None` if there is none.
+    /// Returns a ball that contains the part of the form that rays of `pencil` can hit; `None` if
+    /// they cannot hit the form.
     pub fn clip_to(&self, pencil: &Frustum) -> Option<BoundingSphere> {
         let Frustum { apex, forward, corners, .. } = pencil;
         let ball = self.ball;
@@ -203,14 +204,15 @@ impl BoundingVolume {
         Some(if part.radius < ball.radius { part } else { ball })
     }
 
-    /// Returns the volume grown by `by`, for shadow rays that end within `by` of their lights.
+    /// Returns the volume with a larger margin, for shadow rays that end within the distance `by`
+    /// of their lights.
     pub fn grown(self, by: f64) -> Self {
         let ball = BoundingSphere { radius: self.ball.radius + by, ..self.ball };
         Self { ball, slack: self.slack + by, ..self }
     }
 
-    /// Returns the distance from the plane of a flat form within which rays that lead to `point`
-    /// may hit it.
+    /// Returns the largest distance from the plane of a flat form at which rays that lead to
+    /// `point` may still hit the form by rounding.
     fn ray_error(&self, point: DVec3) -> f64 {
         let BoundingSphere { center, radius } = self.ball;
         let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
@@ -218,9 +220,9 @@ impl BoundingVolume {
         self.slack + ray_error(point) + F32_RAY_ERROR * reach.max(offset)
     }
 
-    /// Returns `true` if the form is flat, and the points of `lit` and the light are on the same
-    /// side of its plane. `above` returns the height of the light above a plane, and the error
-    /// within which the light may be on either side.
+    /// Returns `true` if the form is flat and the light and all points of `lit` are on the same
+    /// side of its plane. `above` returns, for a plane, the height of the light above it, and the
+    /// error of this height.
     fn is_beside(&self, lit: &BoundingSphere, above: impl Fn((DVec3, f64)) -> (f64, f64)) -> bool {
         let Some((normal, offset)) = self.plane else { return false };
         let height = normal.dot(lit.center) - offset;
@@ -289,8 +291,8 @@ impl BoundingVolume {
     }
 }
 
-/// Returns the distance of `point` from the convex hull of two balls; negative inside. The hull is
-/// the union of all balls whose centres and radii are interpolated between those of `a` and `b`.
+/// Returns the distance between `point` and the convex hull of two balls; negative inside. The hull
+/// is the union of all balls whose centres and radii are interpolated between those of `a` and `b`.
 fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64 {
     let axis = b.center - a.center;
     let length = axis.length().max(f64::MIN_POSITIVE);
@@ -310,7 +312,7 @@ fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64
     distance(nearest.clamp(0.0, length)).min(ends)
 }
 
-/// All directions within an angle below 90 degrees of an axis.
+/// All directions that form an angle below a limit (less than 90 degrees) with an axis.
 struct Cone {
     apex: DVec3,
     axis: DVec3,
@@ -319,8 +321,8 @@ struct Cone {
 }
 
 impl Cone {
-    /// Returns `true` if a ball may reach into the cone: some of it is in front of the apex, and
-    /// its centre is no farther from the cone's side than its radius.
+    /// Returns `true` if a ball may overlap the cone: a part of the ball is in front of the apex,
+    /// and its centre is no farther from the cone's side than its radius.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let to = ball.center - self.apex;
         let along = to.dot(self.axis);
@@ -339,13 +341,13 @@ mod tests {
         Form::Sphere(SphereForm { center: center.into(), radius })
     }
 
-    /// A square of side 2 about `center`, facing up.
+    /// Returns a square of side 2 with the centre `center` and the normal +y.
     fn tile(center: [f64; 3]) -> Form {
         let corner = DVec3::from(center) - DVec3::new(1.0, 0.0, 1.0);
         Form::Parallelogram(ParallelogramForm { corner, u: DVec3::Z * 2.0, v: DVec3::X * 2.0 })
     }
 
-    /// Looks from (0, 0, 5) along -z, 0.1 to each side at unit distance.
+    /// Returns a frustum from (0, 0, 5) along -z that extends 0.1 to each side at unit distance.
     fn pencil() -> Frustum {
         let corners = [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)];
         Frustum {
@@ -374,8 +376,8 @@ mod tests {
         assert!(floor.radius.is_infinite());
     }
 
-    /// Balls that cut a segment between two points of the hull's balls are near the hull, and the
-    /// hull ends within the sum of the balls.
+    /// Checks balls that intersect a segment between two points of the hull's balls: they are near
+    /// the hull. The hull ends within the sum of the balls.
     #[test]
     fn hull_of_two_balls_holds_every_segment_between_them() {
         let mut random = 7u64;
@@ -430,8 +432,8 @@ mod tests {
         }
     }
 
-    /// Lines in all directions that a picture of 175 degrees shows in its only tile; the eye is not
-    /// in the middle of the tile's corners, which lie more than 90 degrees from their mean.
+    /// Checks a frustum of 175 degrees with rays in all of its directions. The eye is not in the
+    /// middle of the corners, which are more than 90 degrees from their mean direction.
     #[test]
     fn a_wide_pencil_meets_what_its_lines_meet() {
         let apex = DVec3::new(1.0, -2.0, 5.0);
@@ -464,7 +466,8 @@ mod tests {
         assert!(!meets(apex + DVec3::Z, 0.5) && meets(apex + DVec3::Z, 2.0));
     }
 
-    /// A plane whose height above the eye is lost in rounding is seen from either side.
+    /// Checks that a plane through the eye is never excluded. Its height above the eye is lost in
+    /// rounding, so that rays may hit either side.
     #[test]
     fn a_plane_through_the_eye_is_not_ruled_out() {
         for offset in [5.0 - 1e-7, 5.0, 5.0 + 1e-7] {
@@ -473,7 +476,8 @@ mod tests {
         }
     }
 
-    /// No point of a form seen through the pencil lies outside the ball.
+    /// Checks that no point of a form that is seen through the frustum is outside of the clipped
+    /// ball.
     #[test]
     fn the_part_seen_holds_every_point_met() {
         let mut random = 1u64;

@@ -1,5 +1,5 @@
-//! Properties that every canonical form has. Each primitive implements all of them in its own file,
-//! so that a new one cannot inherit an answer by default.
+//! Properties that every canonical form (kind of primitive) has. Each primitive implements all of
+//! them in its own file. None has a default, so that a new primitive must decide each of them.
 
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::form::Form;
@@ -11,28 +11,28 @@ pub type Bounds = (DVec3, DVec3);
 /// One side of a plane: the points p with `normal . p <= offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {
-    /// Outward unit normal.
+    /// Outward normal of unit length.
     pub normal: DVec3,
     /// Signed distance of the plane from the origin along `normal`.
     pub offset: f64,
 }
 
-/// Mapping of a texture to a form that a material leaves open.
+/// Default mapping of textures to a form, used if a material does not choose one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DefaultMapping {
-    /// Planar: the form is flat.
+    /// Planar, for flat forms.
     Planar,
-    /// Spherical: the form is round on all sides.
+    /// Spherical, for forms that are round on all sides.
     Spherical,
-    /// Cylindrical: the form is round about an axis.
+    /// Cylindrical, for forms that are round about an axis.
     Cylindrical,
-    /// Box: the form has flat sides, or sides of any kind.
+    /// Box, for forms with flat sides, or with sides of any kind.
     Box,
-    /// Texture coordinates that the form has of its own.
+    /// Texture coordinates of the form's own.
     Uv,
 }
 
-/// Surface that another one may come close to, within a box.
+/// Face of a proxy: a plane or a sphere that replaces a part of the surface.
 #[derive(Clone, Copy, Debug)]
 pub enum ProxyFace {
     /// A plane.
@@ -41,10 +41,10 @@ pub enum ProxyFace {
     Round(BoundingSphere),
 }
 
-/// Stand-in for a form in the search for narrow gaps: its faces and its box.
+/// Simplified form for the search for narrow gaps between objects: some faces, and a bounding box.
 #[derive(Clone, Debug)]
 pub struct Proxy {
-    /// Faces that may come close to those of other forms.
+    /// Faces that may be close to the faces of other forms.
     pub faces: Vec<ProxyFace>,
     /// Lowest corner of the box.
     pub low: DVec3,
@@ -53,13 +53,14 @@ pub struct Proxy {
 }
 
 impl Proxy {
-    /// Creates the proxy of a form with these bounds; `None` is a form without an end.
+    /// Creates the proxy of a form with the given bounds; `None` for a form without finite bounds.
     pub fn new(faces: Vec<ProxyFace>, bounds: Option<Bounds>) -> Self {
         let (low, high) = bounds.unwrap_or((DVec3::NEG_INFINITY, DVec3::INFINITY));
         Self { faces, low, high }
     }
 
-    /// Proxy of a round form: the faces of its box, each of which touches it.
+    /// Creates the proxy of a round form: the faces of its bounding box, each of which touches the
+    /// form.
     pub fn around((low, high): Bounds) -> Self {
         let faces = DVec3::AXES
             .into_iter()
@@ -70,75 +71,77 @@ impl Proxy {
     }
 }
 
-/// Geometry in double precision, in the space of the scene.
+/// Geometry of one kind of primitive, in double precision and scene coordinates.
 pub trait CanonicalShape {
-    /// Singular and plural by which the inventory counts primitives of this form.
+    /// Singular and plural of the noun for such primitives in the inventory.
     const NOUN: (&'static str, &'static str);
 
-    /// Image under the invertible affine map `map`.
+    /// Returns the image under the invertible affine map `map`.
     fn transformed(self, map: &DAffine3) -> Form;
 
     /// Number of parts that can have a material of their own.
     fn parts(&self) -> usize;
 
-    /// Axis-parallel box around the form, the smallest but for compounds; `None` if it has no end.
+    /// Axis-parallel bounding box; `None` if the form has no finite bounds. It is the smallest one
+    /// except for compounds.
     fn bounds(&self) -> Option<Bounds>;
 
-    /// Sphere around the form; its radius is infinite if the form has no end.
+    /// Bounding sphere; its radius is infinite if the form has no finite bounds.
     fn bounding_sphere(&self) -> BoundingSphere;
 
-    /// The map from the space in which the form was described, and its box there; `None` if the
-    /// form has no space of its own.
+    /// Bounding box in the form's own space, with the map from this space to the scene; `None` if
+    /// the form has no space of its own.
     fn oriented_box(&self) -> Option<(DAffine3, Bounds)>;
 
-    /// Plane that a flat form lies in, its front on the side of the normal; `None` if the form is
-    /// not flat.
+    /// Plane that contains a flat form, with its normal on the front; `None` if the form is not
+    /// flat.
     fn plane(&self) -> Option<HalfSpace>;
 
-    /// Returns `true` if the outside of the form cannot see itself.
+    /// Returns `true` if no ray that leaves the outside of the form hits the form again.
     fn is_convex(&self) -> bool;
 
-    /// Smallest thickness of a solid, or the smaller edge of a flat form. Of a compound that of its
-    /// thinnest part: what is left between cuts is found as a gap.
+    /// Smallest thickness of a solid, or shorter edge of a flat form. For a compound it is that of
+    /// its thinnest part; thin remains between cuts are found by the search for gaps.
     fn thickness(&self) -> f64;
 
-    /// Lower bound of the distance of `point` from the surface, exact close to it; outside of a box
-    /// the box may stand for the form. `None` if there is no surface.
+    /// Lower bound of the distance between `point` and the surface; `None` if there is no surface.
+    /// It is exact close to the surface. For points outside of a box around the form it may be the
+    /// distance to the box.
     fn clearance(&self, point: DVec3) -> Option<f64>;
 
-    /// Unit normals of the surfaces that pass `point` within `slack`, a list for each solid that
-    /// the form is made of; empty if none does.
+    /// Unit normals of the surfaces within the distance `slack` of `point`, one list for each solid
+    /// that the form consists of. Empty if there are none.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
-    /// Smallest t > 0 at which `origin + t direction` lies on the surface; `None` if there is none.
+    /// Smallest t > 0 at which `origin + t direction` is on the surface; `None` if there is none.
     /// The unit of t is the length of `direction`.
     fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64>;
 
-    /// Mapping of textures that leave it open.
+    /// Mapping of textures to the form if a material does not choose one.
     fn default_mapping(&self) -> DefaultMapping;
 
-    /// Proxies for the search for narrow gaps; none for a form whose details are too many.
+    /// Proxies for the search for narrow gaps; empty for a form with too many details.
     fn proxies(&self) -> Vec<Proxy>;
 
-    /// Least and largest value of `axis . p` over the form, or bounds of them; `None` if it has no
-    /// end in that direction. `axis` is a unit vector.
+    /// Smallest and largest value of `axis . p` over the points p of the form, or bounds of them;
+    /// `None` if the form is unbounded along the axis. `axis` is a unit vector.
     fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)>;
 
-    /// Corners on which the form can stand.
+    /// Corners on which the form can stand, when it is snapped to the ground.
     fn corners(&self) -> Vec<DVec3>;
 
-    /// Number of triangles.
+    /// Number of triangles; 0 except for meshes.
     fn triangles(&self) -> usize;
 }
 
-/// Box around points; `None` if there are none.
+/// Returns the bounding box of points; `None` if there are none.
 pub fn bounds_of_points(points: &[DVec3]) -> Option<Bounds> {
     let low = points.iter().copied().reduce(DVec3::min)?;
     let high = points.iter().copied().reduce(DVec3::max)?;
     Some((low, high))
 }
 
-/// Sphere through the corners of a box.
+/// Returns the sphere through the corners of a box.
 pub fn sphere_around_box(bounds: Option<Bounds>) -> BoundingSphere {
     match bounds {
         Some((low, high)) => {
@@ -148,14 +151,14 @@ pub fn sphere_around_box(bounds: Option<Bounds>) -> BoundingSphere {
     }
 }
 
-/// Least and largest value of `axis . p` over points.
+/// Returns the smallest and the largest value of `axis . p` over the points p.
 pub fn extent_of_points(points: &[DVec3], axis: DVec3) -> Option<(f64, f64)> {
     let heights = points.iter().map(|p| axis.dot(*p));
     let low = heights.clone().fold(f64::INFINITY, f64::min);
     Some((low, heights.fold(f64::NEG_INFINITY, f64::max)))
 }
 
-/// Least and largest value of `axis . p` over a box.
+/// Returns the smallest and the largest value of `axis . p` over the points p of a box.
 pub fn extent_of_box(bounds: Option<Bounds>, axis: DVec3) -> Option<(f64, f64)> {
     let (low, high) = bounds?;
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
@@ -163,8 +166,9 @@ pub fn extent_of_box(bounds: Option<Bounds>, axis: DVec3) -> Option<(f64, f64)> 
     Some((center - reach, center + reach))
 }
 
-/// Normals of those sides of one convex solid, given by height and normal, whose surfaces pass a
-/// point within `slack`: near the solid the height over the farthest side is the distance.
+/// Returns the normals of those sides of a convex solid that are within `slack` of a point. `sides`
+/// holds the height of the point above each side, and the normal of the side. The largest height is
+/// the distance between point and solid.
 pub fn normals_of_solid(sides: Vec<(f64, DVec3)>, slack: f64) -> Vec<Vec<DVec3>> {
     let near = sides.iter().all(|(height, _)| *height <= slack);
     let on = sides.into_iter().filter(|(height, _)| near && *height >= -slack);
@@ -172,12 +176,12 @@ pub fn normals_of_solid(sides: Vec<(f64, DVec3)>, slack: f64) -> Vec<Vec<DVec3>>
     if normals.is_empty() { Vec::new() } else { vec![normals] }
 }
 
-/// Distance of `point` from a box; 0 inside it.
+/// Returns the distance between `point` and a box; 0 inside of the box.
 pub fn box_distance((low, high): Bounds, point: DVec3) -> f64 {
     (low - point).max(point - high).max(DVec3::ZERO).length()
 }
 
-/// Distance of `point` from the segment between `a` and `b`.
+/// Returns the distance between `point` and the segment from `a` to `b`.
 pub fn segment_distance([a, b]: [DVec3; 2], point: DVec3) -> f64 {
     let along = b - a;
     let length2 = along.length_squared();
@@ -185,14 +189,14 @@ pub fn segment_distance([a, b]: [DVec3; 2], point: DVec3) -> f64 {
     point.distance(a + along * t)
 }
 
-/// Plane through `point` with a normal along `normal`.
+/// Returns the half-space behind the plane through `point` with a normal along `normal`.
 pub fn half_space(point: DVec3, normal: DVec3) -> HalfSpace {
     let normal = normal.normalize();
     HalfSpace { normal, offset: normal.dot(point) }
 }
 
-/// Factor by which a linear map scales every length; `None` if it depends on the direction by more
-/// than rounding.
+/// Returns the factor by which a linear map scales lengths; `None` if it depends on the direction
+/// by more than rounding.
 pub fn similarity(linear: &DMat3) -> Option<f64> {
     let gram = linear.transpose() * *linear;
     let square = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;

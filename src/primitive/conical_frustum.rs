@@ -1,6 +1,6 @@
-//! Tapered cylinders: cylinders, cones and what lies between, under any affine map. The ray goes
-//! back to the canonical solid's space, with the origin in the middle of its axis:
-//!   x^2 + y^2 <= (middle + slope z)^2, |z| <= 1/2
+//! Conical frusta (tapered cylinders, including cylinders and cones) under any affine map. Rays are
+//! transformed into the space of the canonical solid, with the origin in the middle of its axis:
+//! x^2 + y^2 <= (middle + slope z)^2, |z| <= 1/2
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -16,19 +16,19 @@ use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::TAU;
 
-/// The image under an invertible affine map of the solid with x^2 + y^2 <= (1 + (top - 1) z)^2 and
-/// 0 <= z <= 1. [`Form::conical_frustum`] makes one of any proportions.
+/// Image of the solid x^2 + y^2 <= (1 + (top - 1) z)^2, 0 <= z <= 1 under an invertible affine map.
+/// [`Form::conical_frustum`] creates it for any proportions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConicalFrustumForm {
-    /// Map from the space of that solid to the scene.
+    /// Map from the space of the solid to the scene.
     pub scene_from_unit: DAffine3,
-    /// Radius at z = 1 over radius at z = 0: from 0, a cone, to 1, a cylinder.
+    /// Radius at z = 1 divided by the radius at z = 0: between 0, a cone, and 1, a cylinder.
     pub top_radius: f64,
 }
 
 impl Form {
-    /// Creates the image under `scene_from_canonical` of the solid with x^2 + y^2 <= (1 + (s - 1)
-    /// z)^2 and 0 <= z <= 1, for any s >= 0.
+    /// Creates the image of the solid x^2 + y^2 <= (1 + (s - 1) z)^2, 0 <= z <= 1 under
+    /// `scene_from_canonical`, for any s >= 0.
     pub fn conical_frustum(scene_from_canonical: DAffine3, s: f64) -> Self {
         let (scene_from_unit, top_radius) = if s <= 1.0 {
             (scene_from_canonical, s)
@@ -153,9 +153,9 @@ impl CanonicalShape for ConicalFrustumForm {
     }
 }
 
-/// Returns the distance of `point` from the image of a frustum. The surface consists of outlines of
-/// three segments, from the middle of the base over both rims to the middle of the cap, one for
-/// each angle.
+/// Returns the distance between `point` and the surface of the image of a frustum. For each angle
+/// around the axis the surface has an outline of three segments: from the middle of the base over
+/// both rims to the middle of the cap. `top` is the radius of the cap, that of the base is 1.
 fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
     const ANGLES: usize = 64;
     let place = |x, y, z| scene_from_unit.transform_point3(DVec3::new(x, y, z));
@@ -188,7 +188,7 @@ fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
 /// Compiled frustum. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct ConicalFrustum<S> {
-    /// Image of the middle of the axis.
+    /// Image of the middle of the axis in the scene.
     center: [S; 3],
     unit_from_scene: [[S; 3]; 3],
     /// Change of the radius along z, from -1 (a cone) to 0 (a cylinder).
@@ -197,17 +197,17 @@ pub struct ConicalFrustum<S> {
     mid_radius: S,
     /// Unit normal of the plane z = 1/2, outward.
     cap_normal: [S; 3],
-    /// Distance of the planes of both ends.
+    /// Distance in the scene between the planes of both ends.
     height: S,
     reach: S,
 }
 
-/// Squared radius of the ball around the middle of the axis that holds the canonical solid, with
-/// room for rounding.
+/// Squared radius of a ball around the middle of the axis that contains the canonical solid, with a
+/// margin for rounding errors.
 const AROUND2: f64 = 1.26;
 
 impl<S: Float> ConicalFrustum<S> {
-    /// Compiles a conical frustum; `None` if the form is another.
+    /// Compiles a conical frustum; `None` for any other form.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit: m, top_radius }) = form
         else {
@@ -228,19 +228,20 @@ impl<S: Float> ConicalFrustum<S> {
     }
 }
 
-/// Chord of a line in a frustum.
+/// Chord: the segment of a line that is inside of a frustum.
 struct Chord<L: SimdFloat> {
-    /// Point of the line nearest to the middle of the axis, and the direction, of unit length in
-    /// the canonical space.
+    /// Point of the line closest to the middle of the axis, and the direction of the line, both in
+    /// canonical space. The direction has unit length there.
     point: Vec3<L>,
     direction: Vec3<L>,
-    /// Distance of `point` in the scene, and length in the scene of a step of length 1.
+    /// Distance in the scene between the ray's origin and `point`, and length in the scene of a
+    /// step of length 1.
     start: L,
     scale: L,
-    /// Steps from `point` to both ends.
+    /// Steps from `point` to both ends of the chord.
     enter: L,
     leave: L,
-    /// Lanes with an end on the side rather than on a flat end.
+    /// Lanes in which this end is on the side of the frustum; in the others it is on a flat end.
     enters_side: L::Mask,
     leaves_side: L::Mask,
     meets: L::Mask,
@@ -253,13 +254,14 @@ impl<L: SimdFloat> Chord<L> {
     }
 }
 
-/// Returns the chord of a line. Steps are counted from the line's point nearest to the solid's
-/// middle, so that a distant origin costs no digits. With p the point, d the direction, r the
-/// radius at p and k the slope, the side is crossed where a t^2 + 2 b t + c = 0. Its discriminant
-/// is computed as |r d' - k d_z p'|^2 - (p' x d')^2 (primes: without z), which for a cylinder
-/// compares the radius with the line's distance from the axis and does not cancel as b^2 - a c
-/// does. Its roots are computed as q / a and c / q, so that a = 0, a line parallel to a generator,
-/// leaves one of them finite.
+/// Returns the chord of a line in the frustum.
+///
+/// Steps are counted from the line's point closest to the solid's middle, so that a distant origin
+/// costs no precision. With p the point, d the direction, r the radius at p and k the slope, the
+/// side is crossed where a t^2 + 2 b t + c = 0. The discriminant is computed as |r d' - k d_z p'|^2
+/// - (p' x d')^2 (primes: without z), which does not cancel as b^2 - a c does; for a cylinder it
+/// compares the radius with the line's distance from the axis. The roots are computed as q / a and
+/// c / q, so that for a = 0, a line parallel to a generator, one of them stays finite.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let (zero, half) = (L::zero(), L::from_f64(0.5));
@@ -344,8 +346,8 @@ impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), chord.meets))
     }
 
-    /// Returns the surface of the nearest of side, base and cap: the largest height outside, or the
-    /// least depth inside.
+    /// Returns the surface of the closest of side, base and cap: the one with the largest height
+    /// outside, or the smallest depth inside.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let s = self;

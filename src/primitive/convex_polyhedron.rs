@@ -12,12 +12,12 @@ use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
-/// A bounded convex solid: the intersection of half-spaces, with its corners.
+/// A bounded convex solid: intersection of half-spaces, and its corners.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvexPolyhedronForm {
-    /// Half-spaces behind the faces.
+    /// Half-space behind each face.
     pub faces: Vec<HalfSpace>,
-    /// Corners.
+    /// Corners in scene coordinates.
     pub corners: Vec<DVec3>,
 }
 
@@ -118,14 +118,14 @@ impl CanonicalShape for ConvexPolyhedronForm {
     }
 }
 
-/// Points p with low <= normal . (p - center) <= high.
+/// Slab: the points p with low <= normal . (p - center) <= high.
 struct Slab<S> {
     normal: [S; 3],
     low: S,
     high: S,
 }
 
-/// Points p with normal . (p - center) <= high.
+/// Half-space: the points p with normal . (p - center) <= high.
 struct Face<S> {
     normal: [S; 3],
     high: S,
@@ -141,7 +141,7 @@ pub struct ConvexPolyhedron<S> {
 }
 
 impl<S: Float> ConvexPolyhedron<S> {
-    /// Compiles a convex polyhedron; `None` if the form is another.
+    /// Compiles a convex polyhedron; `None` for any other form.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners }) = form else {
             return None;
@@ -181,7 +181,8 @@ impl<S: Float> ConvexPolyhedron<S> {
 }
 
 impl<S: Float> ConvexPolyhedron<S> {
-    /// Returns the distances at which the line enters and leaves, and the lanes that hit the solid.
+    /// Returns the distances at which each line enters and leaves the solid, and the lanes that hit
+    /// it.
     #[inline(always)]
     fn chord<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
         let from_center = ray.origin - Vec3::splat(self.center);
@@ -229,8 +230,8 @@ impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), meets))
     }
 
-    /// Returns the surface of the face with the plane nearest to the point: the largest height
-    /// outside, or the least depth inside.
+    /// Returns the surface of the face whose plane is closest to the point: the one with the
+    /// largest height outside, or the smallest depth inside.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let from_center = point - Vec3::splat(self.center);

@@ -1,14 +1,14 @@
-//! Compounds: unions, intersections and differences of convex solids, by intervals (Roth 1982, *Ray
-//! Casting for Modeling Solids*).
+//! Compounds (constructive solid geometry): unions, intersections and differences of solids, by
+//! intervals (Roth 1982, *Ray Casting for Modeling Solids*).
 //!
-//! Each part returns the span in which a line is inside it. The sorted ends of all spans cut the
-//! line into gaps. In each gap every part is either inside or outside, and so is the compound. A
-//! change from one gap to the next is a surface.
+//! Each part returns the spans in which a line is inside of it. The sorted ends of all spans divide
+//! the line into gaps. Within a gap each part is either inside or outside, and so is the compound.
+//! A change from one gap to the next is a surface.
 //!
-//! Ends that are nearer to each other than [`TIE`] roundings across the surface coincide: there is
-//! no gap between them. A cut flush with a face therefore leaves no skin, and parts in contact
-//! leave no crack, regardless of the order that rounding gives to equal faces. Parts thinner than
-//! that are dropped.
+//! Ends closer to each other than [`TIE`] rounding errors, measured across the surface, coincide:
+//! there is no gap between them. A cut flush with a face therefore leaves no skin, and parts in
+//! contact leave no crack, whatever order rounding gives to equal faces. Parts thinner than this
+//! distance are dropped.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -26,31 +26,32 @@ use crate::primitive::sphere::Sphere;
 use crate::primitive::torus::Torus;
 use std::ops::Range;
 
-/// Distance within which surfaces coincide, in roundings of the largest coordinate: two faces given
-/// four units of the last place apart, each hit with a few roundings.
+/// Distance within which surfaces coincide, in rounding errors of the largest coordinate. It
+/// suffices for two faces whose coordinates differ by four units of the last place, each hit with a
+/// few rounding errors.
 const TIE: f64 = 16.0;
 
-/// Operation on a stack that computes "inside the compound" from "inside a part".
+/// Operation of a stack machine that computes "inside the compound" from "inside each part".
 #[derive(Clone, Copy, Debug)]
 enum Op {
-    /// Pushes a part.
+    /// Pushes the value of the part with this number.
     Part(u32),
     /// Replaces the top two stack entries by their union.
     Or,
     /// Replaces the top two stack entries by their intersection.
     And,
-    /// Replaces the top two stack entries by the lower one without the upper one.
+    /// Replaces the top two stack entries by the lower one minus the upper one.
     Minus,
 }
 
 macro_rules! leaves {
     ($($kind:ident($spans:literal)),+ $(,)?) => {
-        /// The solid of a part.
+        /// Compiled solid of a part.
         enum CsgLeaf<S> {
             $($kind($kind<S>),)+
         }
 
-        /// Evaluates one expression for a solid of any form.
+        /// Evaluates one expression for a solid of any kind.
         macro_rules! each {
             ($solid:expr, $item:ident => $value:expr) => {
                 match $solid {
@@ -60,12 +61,12 @@ macro_rules! leaves {
         }
 
         impl<S: Float> CsgLeaf<S> {
-            /// Compiles a part; `None` if its form is no solid that compounds can be made of.
+            /// Compiles a part; `None` if compounds cannot contain its form.
             fn new(form: &Form) -> Option<Self> {
                 None$(.or_else(|| $kind::new(form).map(Self::$kind)))+
             }
 
-            /// Largest number of spans of one line.
+            /// Largest number of spans of one line in this solid.
             fn max_spans(&self) -> usize {
                 match self {
                     $(Self::$kind(_) => $spans,)+
@@ -87,35 +88,35 @@ leaves! {
     Plane(1),
 }
 
-/// A part of a compound.
+/// One part of a compound.
 struct Part<S> {
     solid: CsgLeaf<S>,
-    /// `true` if the outside of the compound is on the inside of the solid.
+    /// `true` if the inside of the part's solid is outside of the compound, as for a cut.
     reversed: bool,
-    /// Range of its spans among those of the compound.
+    /// Indices of its spans among those of the compound.
     spans: Range<usize>,
 }
 
-/// One compound: a ball around it and the ranges of its parts and operations.
+/// One compound: a ball around it, and the ranges of its parts and operations.
 struct SolidOperand<S> {
     center: [S; 3],
     radius2: S,
     reach: S,
     parts: Range<usize>,
     ops: Range<usize>,
-    /// Largest number of spans of all parts.
+    /// Largest total number of spans of all parts.
     spans: usize,
     /// Largest number of entries on the stack.
     depth: usize,
 }
 
-/// All compounds of a scene. Every part is an item, so that a hit names the part; the first part of
-/// a compound represents it in the numbering of items.
+/// All compounds of a scene. Every part is an item, so that a hit names the part. The first part
+/// stands for the whole compound in lists of items.
 pub struct Compounds<S> {
     compounds: Vec<SolidOperand<S>>,
     parts: Vec<Part<S>>,
     ops: Vec<Op>,
-    /// Compound of each part that is the first of one; `None` for other parts.
+    /// Number of the compound for each part that is the first of one; `None` for other parts.
     first: Vec<Option<u32>>,
 }
 
@@ -156,8 +157,8 @@ impl<S: Float> Compounds<S> {
         });
     }
 
-    /// Appends the operations of `tree` and returns the depth of the stack; `reversed` is `true` if
-    /// the inside of the tree is outside the compound.
+    /// Appends the operations of `tree` and returns the depth of the stack that they need.
+    /// `reversed` is `true` if the inside of the tree is outside of the compound.
     fn build(&mut self, tree: &CsgTree, first_part: usize, reversed: bool) -> usize {
         let (list, op) = match tree {
             CsgTree::Part(i) => {
@@ -194,7 +195,7 @@ impl<S: Float> Compounds<S> {
         &spans[self.parts[compound.parts.start + i as usize].spans.clone()]
     }
 
-    /// Returns the lanes whose point at distance `t` is inside the compound.
+    /// Returns the lanes in which the point at the distance `t` is inside of the compound.
     #[inline(always)]
     fn inside<L: SimdFloat<Scalar = S>, const SINGLE: bool>(
         &self,
@@ -222,7 +223,8 @@ impl<S: Float> Compounds<S> {
         })
     }
 
-    /// Returns the visible change of the surface between the distances `before` and `after`.
+    /// Returns the change of the compound between the distances `before` and `after`, with the
+    /// surface that is visible there.
     fn change<L: SimdFloat<Scalar = S>, const SINGLE: bool>(
         &self,
         compound: &SolidOperand<S>,
@@ -265,7 +267,7 @@ impl<S: Float> Compounds<S> {
         })
     }
 
-    /// Narrows `hit` by the lanes of `wanted`.
+    /// Replaces `hit` in the lanes of `wanted` in which `compound` is nearer.
     fn intersect_item<L: SimdFloat<Scalar = S>>(
         &self,
         compound: &SolidOperand<S>,
@@ -316,7 +318,8 @@ impl<S: Float> Compounds<S> {
         });
     }
 
-    /// Narrows `hit` by the first surface of the lanes in `open`, from gap to gap along the lines.
+    /// Replaces `hit` by the first surface of the compound in the lanes `open`, by a walk from gap
+    /// to gap along the lines.
     ///
     /// Coincident faces have the same angle to the line, so ends coincide only within the ties of
     /// both: the wide tie of a grazing face does not absorb other faces.
@@ -361,7 +364,8 @@ impl<S: Float> Compounds<S> {
 }
 
 impl<S: Float> Compounds<S> {
-    /// Narrows `hit` by the compounds that begin in `range`; a part's tag is `base` + its number.
+    /// Replaces `hit` in the lanes in which a compound that begins in `range` is nearer. The id of
+    /// a part is `base` plus its number.
     #[inline(never)]
     pub fn closest<L: SimdFloat<Scalar = S>>(
         &self,
@@ -375,8 +379,8 @@ impl<S: Float> Compounds<S> {
         }
     }
 
-    /// Returns the lanes of `wanted` that hit a compound beginning in `range` at a distance in (0,
-    /// limit) of the ray.
+    /// Returns the lanes of `wanted` that hit a compound beginning in `range` at a distance between
+    /// 0 and `limit`.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
@@ -398,7 +402,7 @@ impl<S: Float> Compounds<S> {
         occluded
     }
 
-    /// Returns the surface of a part at `point`, outward of the compound.
+    /// Returns the surface of a part at `point`, with the normal outward of the compound.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -421,7 +425,7 @@ impl<S: Float> Compounds<S> {
     }
 }
 
-/// Returns the lanes whose point at distance `t` is in any of `spans`.
+/// Returns the lanes in which the point at the distance `t` is inside of some of `spans`.
 #[inline(always)]
 fn inside_any<L: SimdFloat>(spans: &[Interval<L>], t: L) -> L::Mask {
     let [first, others @ ..] = spans else { return L::mask(false) };

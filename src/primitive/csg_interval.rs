@@ -1,20 +1,21 @@
-//! Interval algebra of compounds: sorted ends of spans, intervals inside, and transitions between
-//! them.
+//! Intervals of compounds: sorted ends of spans, intervals inside of solids, and transitions
+//! between inside and outside.
 
 use crate::lanes::SimdFloat;
 use crate::primitive::solid::Span;
 
-/// Least cosine that widens a tie; flatter hits are not distinguished.
+/// Smallest cosine for which a tie is widened. Hits at smaller angles are not distinguished.
 const FLATTEST: f64 = 1e-9;
 
-/// End of a span: its distance, and the distance within which another end coincides with it.
+/// End of a span: its distance, and the tie, the distance within which another end coincides with
+/// it.
 #[derive(Clone, Copy)]
 pub struct Event<L> {
     pub t: L,
     pub tie: L,
 }
 
-/// Interval of a part without its cosines.
+/// Interval in which a line is inside of a part.
 #[derive(Clone, Copy)]
 pub struct Interval<L> {
     pub enter: L,
@@ -28,12 +29,12 @@ impl<L: SimdFloat> Interval<L> {
     }
 }
 
-/// Change of a subtree at a surface.
+/// Change of a subtree between inside and outside at a surface, by lane.
 #[derive(Clone, Copy)]
 pub struct Transition<L: SimdFloat> {
     pub before: L::Mask,
     pub after: L::Mask,
-    /// Distance and tag of the visible part; meaningless without a change.
+    /// Distance of the visible part; undefined in lanes without a change.
     pub t: L,
     pub tag: L,
 }
@@ -43,7 +44,8 @@ impl<L: SimdFloat> Transition<L> {
         Self { before: !self.before, after: !self.after, ..self }
     }
 
-    /// Combines both transitions; the first one that changes in the right sense is visible.
+    /// Combines two transitions into one with the given values `before` and `after`. The distance
+    /// is that of `self` if it changes in the same sense, otherwise that of `other`.
     fn joined(self, other: Self, before: L::Mask, after: L::Mask) -> Self {
         let same = (self.after & after) | (!self.after & !after);
         let first = same & ((self.before & !self.after) | (!self.before & self.after));
@@ -64,7 +66,8 @@ impl<L: SimdFloat> Transition<L> {
     }
 }
 
-/// Runs `use_it` with room for `n` values: on the stack if they are at most `FEW`, else on the heap.
+/// Calls `use_it` with a slice of `n` values `fill`. It is on the stack if `n` is at most `FEW`,
+/// otherwise on the heap.
 #[inline(always)]
 pub fn with_scratch<const FEW: usize, T: Copy, R>(
     n: usize,
@@ -81,7 +84,7 @@ pub fn with_scratch<const FEW: usize, T: Copy, R>(
     })
 }
 
-/// Returns the ends of a span; those of lines that miss the solid are behind all others.
+/// Returns the ends of a span. In lanes that miss the solid they are beyond all other ends.
 #[inline(always)]
 pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     let never = L::from_f64(L::MAX);
@@ -95,7 +98,7 @@ pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     [end(span.enter, span.enter_cosine), end(span.leave, span.leave_cosine)]
 }
 
-/// Inserts `end` into the first `count` of `ends`, which are sorted in every lane.
+/// Inserts `end` into the first `count` elements of `ends`, which are sorted in every lane.
 #[inline(always)]
 pub fn insert<L: SimdFloat>(mut end: Event<L>, ends: &mut [Event<L>], count: usize) {
     for slot in &mut ends[..count] {

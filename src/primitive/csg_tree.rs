@@ -1,4 +1,4 @@
-//! Compound solids as parts and their combination.
+//! Compound solids: their parts, and the tree that combines them.
 
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
@@ -7,10 +7,10 @@ use crate::primitive::canonical::{
 use crate::primitive::form::{Form, cast_compiled};
 use glam::{DAffine3, DVec3};
 
-/// Combination of parts.
+/// Tree of set operations on the parts of a compound.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CsgTree {
-    /// One part, by its position in [`CsgSolid::parts`].
+    /// One part, by its index in [`CsgSolid::parts`].
     Part(usize),
     /// Points in any of the operands.
     Union(Vec<CsgTree>),
@@ -21,7 +21,7 @@ pub enum CsgTree {
 }
 
 impl CsgTree {
-    /// Returns the tree with the positions of its parts increased by `by`.
+    /// Returns the tree with all part indices increased by `by`.
     pub(crate) fn shifted(self, by: usize) -> Self {
         let all = |list: Vec<Self>| list.into_iter().map(|t| t.shifted(by)).collect();
         match self {
@@ -33,13 +33,13 @@ impl CsgTree {
     }
 }
 
-/// Solid composed of solids.
+/// Compound solid: a set of solids combined by set operations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CsgSolid {
-    /// Parts: `Sphere`, `Ellipsoid`, `ConvexPolyhedron`, `ConicalFrustum`, `Torus`, and `Plane` for
-    /// the half-space behind it.
+    /// Solids that are combined: `Sphere`, `Ellipsoid`, `ConvexPolyhedron`, `ConicalFrustum`,
+    /// `Torus`, and `Plane` for the half-space behind it.
     pub parts: Vec<Form>,
-    /// Combination, in which every part occurs once, in order.
+    /// Tree of operations, in which every part occurs once, in the order of `parts`.
     pub tree: CsgTree,
 }
 

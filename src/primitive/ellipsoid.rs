@@ -1,5 +1,5 @@
-//! Images of the unit sphere under affine maps. Rays are transformed into the space of the unit
-//! sphere.
+//! Ellipsoids: images of the unit sphere under affine maps. Rays are transformed into the space of
+//! the unit sphere.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
@@ -107,10 +107,12 @@ impl CanonicalShape for EllipsoidForm {
     }
 }
 
-/// Returns the distance of `point` from the image of the unit sphere. With Q = (M M^T)^-1 and p
-/// relative to the centre, the nearest point q of q^T Q q = 1 is (I + l Q)^-1 p for the only l at
-/// which q is on the surface and I + l Q is positive definite; q^T Q q decreases with l. (Eberly
-/// 2013, *Distance from a Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid*.)
+/// Returns the distance between `point` and the image of the unit sphere.
+///
+/// With Q = (M M^T)^-1 and p relative to the centre, the closest point q of q^T Q q = 1 is (I + l
+/// Q)^-1 p. l is the only number for which q is on the surface and I + l Q is positive definite;
+/// q^T Q q decreases with l. (Eberly 2013, *Distance from a Point to an Ellipse, an Ellipsoid, or a
+/// Hyperellipsoid*.)
 fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_unit.matrix3.inverse();
     let q = inverse.transpose() * inverse;
@@ -147,19 +149,19 @@ pub struct Ellipsoid<S> {
     reach: S,
 }
 
-/// Returns the rows of a matrix, rounded.
+/// Returns the rows of a matrix, rounded to the precision `S`.
 pub(crate) fn rows<S: Float>(m: DMat3) -> [[S; 3]; 3] {
     m.transpose().to_cols_array_2d().map(|row| row.map(S::from_f64))
 }
 
-/// Returns the product of a matrix, given by rows, and a vector.
+/// Returns the product of the matrix with the rows `m` and the vector `v`.
 #[inline(always)]
 pub(crate) fn times<L: SimdFloat>(m: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> Vec3<L> {
     Vec3::new(Vec3::splat(m[0]).dot(v), Vec3::splat(m[1]).dot(v), Vec3::splat(m[2]).dot(v))
 }
 
 impl<S: Float> Ellipsoid<S> {
-    /// Compiles an ellipsoid; `None` if the form is another.
+    /// Compiles an ellipsoid; `None` for any other form.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Ellipsoid(EllipsoidForm { scene_from_unit: m }) = form else { return None };
         Some(Self {
@@ -171,7 +173,8 @@ impl<S: Float> Ellipsoid<S> {
     }
 }
 
-/// Returns the ends of the chord in the scene's distances, and the lanes that have one.
+/// Returns the distances along the ray at which it enters and leaves the ellipsoid, and the lanes
+/// that hit it.
 #[inline(always)]
 fn chord<L: SimdFloat>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
     let f = times(&e.unit_from_scene, ray.origin - Vec3::splat(e.center));

@@ -1,5 +1,5 @@
-//! Canonical forms. Every shape and transform is reduced to one of them before it is compiled for a
-//! lane type.
+//! Canonical forms: the kinds of geometry that are compiled for a lane type. Every shape with its
+//! transform is reduced to one of them first.
 
 use crate::bvh::Ray;
 use crate::lanes::Vec3;
@@ -19,7 +19,8 @@ use glam::{DAffine3, DVec3};
 
 macro_rules! forms {
     ($($(#[$doc:meta])+ $kind:ident($form:ident)),+ $(,)?) => {
-        /// Geometry in double precision, in the space of the scene.
+        /// Geometry of one object in double precision and scene coordinates. Each variant is a kind
+        /// of primitive.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Form {
             $($(#[$doc])+ $kind($form),)+
@@ -33,7 +34,7 @@ macro_rules! forms {
             }
         )+
 
-        /// Evaluates one expression for the form of any kind.
+        /// Evaluates one expression for the form of any variant.
         macro_rules! dispatch {
             ($any:expr, $one:ident => $value:expr) => {
                 match $any {
@@ -43,7 +44,7 @@ macro_rules! forms {
         }
 
         impl Form {
-            /// Singular and plural by which the inventory counts primitives of this form.
+            /// Singular and plural of the noun for such primitives in the inventory.
             pub(crate) fn noun(&self) -> (&'static str, &'static str) {
                 match self {
                     $(Self::$kind(_) => $form::NOUN,)+
@@ -63,7 +64,7 @@ forms! {
     ConvexPolyhedron(ConvexPolyhedronForm),
     /// Image of a circular cylinder, cone or frustum.
     ConicalFrustum(ConicalFrustumForm),
-    /// Solids joined, intersected, cut out of each other.
+    /// Compound of solids: union, intersection or difference.
     Csg(CsgSolid),
     /// Image of a triangle mesh.
     Mesh(MeshForm),
@@ -76,34 +77,35 @@ forms! {
 }
 
 impl Form {
-    /// Image under the invertible affine map `map`. Similarities keep a sphere a sphere; any other
-    /// map makes it an ellipsoid. The other forms keep their kind.
+    /// Returns the image under the invertible affine map `map`. A similarity maps a sphere to a
+    /// sphere, any other map to an ellipsoid. All other forms keep their kind.
     pub fn transformed(self, map: &DAffine3) -> Self {
         dispatch!(self, form => form.transformed(map))
     }
 
-    /// Number of parts that can have a material of their own: 1 but for compounds.
+    /// Number of parts that can have a material of their own; 1 except for compounds.
     pub fn parts(&self) -> usize {
         dispatch!(self, form => form.parts())
     }
 
-    /// Axis-parallel box around the form, the smallest but for compounds; `None` if it has no end.
+    /// Axis-parallel bounding box; `None` if the form has no finite bounds. It is the smallest one
+    /// except for compounds.
     pub fn bounds(&self) -> Option<Bounds> {
         dispatch!(self, form => form.bounds())
     }
 
-    /// Sphere around the form; its radius is infinite if the form has no end.
+    /// Bounding sphere; its radius is infinite if the form has no finite bounds.
     pub fn bounding_sphere(&self) -> BoundingSphere {
         dispatch!(self, form => form.bounding_sphere())
     }
 
-    /// The map from the space in which the form was described, and its box there, if it has such a
-    /// space.
+    /// Bounding box in the form's own space, with the map from this space to the scene; `None` if
+    /// the form has no space of its own.
     pub(crate) fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
         dispatch!(self, form => form.oriented_box())
     }
 
-    /// Plane that a flat form lies in; `None` if the form is not flat.
+    /// Plane that contains the form; `None` if the form is not flat.
     pub fn plane(&self) -> Option<HalfSpace> {
         dispatch!(self, form => form.plane())
     }
@@ -118,34 +120,35 @@ impl Form {
         !self.is_flat()
     }
 
-    /// Returns `true` if the outside of the form cannot see itself.
+    /// Returns `true` if no ray that leaves the outside of the form hits the form again.
     pub fn is_convex(&self) -> bool {
         dispatch!(self, form => form.is_convex())
     }
 
-    /// Smallest thickness of a solid, or the smaller edge of a flat form.
+    /// Smallest thickness of a solid, or shorter edge of a flat form.
     pub fn thickness(&self) -> f64 {
         dispatch!(self, form => form.thickness())
     }
 
-    /// Lower bound of the distance of `point` from the surface ([`CanonicalShape::clearance`]).
+    /// Lower bound of the distance between `point` and the surface; see
+    /// [`CanonicalShape::clearance`].
     pub fn clearance(&self, point: DVec3) -> Option<f64> {
         dispatch!(self, form => form.clearance(point))
     }
 
-    /// Unit normals of the surfaces that pass `point` within `slack`, a list for each solid that
-    /// the form is made of; empty if none does.
+    /// Unit normals of the surfaces within the distance `slack` of `point`, one list for each solid
+    /// that the form consists of. Empty if there are none.
     pub fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
         dispatch!(self, form => form.normals_at(point, slack))
     }
 
-    /// Smallest t > 0 at which `origin + t direction` lies on the surface; `None` if there is none.
+    /// Smallest t > 0 at which `origin + t direction` is on the surface; `None` if there is none.
     /// The unit of t is the length of `direction`.
     pub fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         dispatch!(self, form => form.cast(origin, direction))
     }
 
-    /// Mapping of textures that leave it open.
+    /// Mapping of textures to the form if a material does not choose one.
     pub fn default_mapping(&self) -> DefaultMapping {
         dispatch!(self, form => form.default_mapping())
     }
@@ -155,24 +158,24 @@ impl Form {
         dispatch!(self, form => form.proxies())
     }
 
-    /// Least and largest value of `axis . p` over the form, or bounds of them; `None` if it has no
-    /// end in that direction.
+    /// Smallest and largest value of `axis . p` over the points p of the form, or bounds of them;
+    /// `None` if the form is unbounded along the axis.
     pub fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
         dispatch!(self, form => form.extent_along(axis))
     }
 
-    /// Corners on which the form can stand.
+    /// Corners on which the form can stand, when it is snapped to the ground.
     pub fn corners(&self) -> Vec<DVec3> {
         dispatch!(self, form => form.corners())
     }
 
-    /// Number of triangles.
+    /// Number of triangles; 0 except for meshes.
     pub(crate) fn triangles(&self) -> usize {
         dispatch!(self, form => form.triangles())
     }
 
-    /// Largest magnitude of a coordinate that the surface is computed from: of a plane its distance
-    /// from the origin.
+    /// Largest magnitude of a coordinate from which the surface is computed. For a plane it is its
+    /// distance from the origin.
     pub fn max_coordinate(&self) -> f64 {
         match self.bounds() {
             Some((low, high)) => low.abs().max(high.abs()).max_element(),
@@ -181,7 +184,7 @@ impl Form {
     }
 }
 
-/// [`CanonicalShape::cast`] by the compiled primitive in double precision.
+/// Implements [`CanonicalShape::cast`] with the compiled primitive in double precision.
 pub fn cast_compiled(form: Form, origin: DVec3, direction: DVec3) -> Option<f64> {
     let length = direction.length();
     let vector = |v: DVec3| Vec3::<f64>::of(v.to_array());

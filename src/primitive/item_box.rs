@@ -12,19 +12,20 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Acceleration {
-    /// The fastest by measurement: a BVH for many primitives, otherwise candidate lists for each
-    /// tile.
+    /// The structure that is fastest by measurement: a BVH for many primitives, otherwise candidate
+    /// lists for each tile.
     #[default]
     Auto,
-    /// Every ray tests every primitive.
+    /// No structure: every ray tests every primitive.
     None,
-    /// Screen rectangles: camera rays test only the primitives whose rectangle they pass.
+    /// Screen rectangles: camera rays test only the primitives whose rectangle contains their
+    /// pixel.
     ScreenBounds,
-    /// Each primitive has a box in its own space.
+    /// A bounding box for each primitive, in the primitive's own space.
     Obb,
-    /// Each primitive has a box in the scene's space.
+    /// A bounding box for each primitive, along the axes of the scene.
     Aabb,
-    /// A tree of boxes.
+    /// A bounding volume hierarchy over all primitives.
     Bvh,
 }
 
@@ -33,7 +34,7 @@ impl Acceleration {
     pub const ALL: [Self; 6] =
         [Self::Auto, Self::None, Self::ScreenBounds, Self::Obb, Self::Aabb, Self::Bvh];
 
-    /// Names and meanings.
+    /// Name and description of each structure.
     pub const CHOICES: &'static [Choice] = &[
         Choice { name: "auto", doc: "the fastest, by measurement" },
         Choice { name: "none", doc: "every ray tests every primitive" },
@@ -52,7 +53,7 @@ impl Acceleration {
     }
 
     /// Returns the name in earlier versions, which scene files and the command line still accept;
-    /// `None` if it is the same.
+    /// `None` if it was the same.
     pub fn former_name(self) -> Option<&'static str> {
         match self {
             Self::Auto | Self::None => None,
@@ -63,7 +64,7 @@ impl Acceleration {
         }
     }
 
-    /// Returns the structure with this name or former name.
+    /// Returns the structure whose name or former name is `name`.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|s| s.name() == name || s.former_name() == Some(name))
     }
@@ -73,35 +74,35 @@ impl Acceleration {
 pub struct ItemBox<S> {
     low: [S; 3],
     high: [S; 3],
-    /// Space of the box; `None` if it is the scene's.
+    /// Space of the box; `None` if its axes are those of the scene.
     space: Option<BoxFrame<S>>,
 }
 
-/// Space of an oriented box: p becomes `rows (p - center)`.
+/// Space of an oriented box: a point p of the scene has the coordinates `rows (p - center)`.
 struct BoxFrame<S> {
     center: [S; 3],
     rows: [[S; 3]; 3],
-    /// Sum of magnitudes of each row: the largest growth of a coordinate.
+    /// Sum of the magnitudes of each row: the largest factor by which a coordinate grows.
     growth: [S; 3],
     /// Largest magnitude of a coordinate of the primitive in the scene.
     reach: S,
 }
 
-/// Returns the corners rounded outward by four `epsilon` of the largest coordinate, which also
-/// bounds the error of an item's own test, in any direction.
+/// Returns the corners, moved outward by four times `epsilon` times the largest coordinate. This
+/// bounds rounding errors of the box and of the primitive's own intersection test.
 pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
     let reach = low.abs().max(high.abs()).max_element();
     let pad = DVec3::splat(reach * 4.0 * epsilon);
     [low - pad, high + pad]
 }
 
-/// Largest difference between faces and corners of one solid, as a fraction of its extent: in a
-/// scene far from the origin of its file both were rounded in double precision.
+/// Largest difference between the faces and the corners of one solid, as a fraction of its extent.
+/// In a scene far from the origin of its file both have been rounded in double precision.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> ItemBox<S> {
-    /// Creates the box of a form, in its own space if `oriented` is set and the form has one;
-    /// `None` for an infinite form.
+    /// Creates the box of a form; in the form's own space if `oriented` is `true` and it has one.
+    /// Returns `None` for a form without finite bounds.
     pub fn new(form: &Form, oriented: bool) -> Option<Self> {
         let bounds = form.bounds()?;
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
@@ -124,7 +125,7 @@ impl<S: Float> ItemBox<S> {
         Some(made((low - middle, high - middle), Some(space)))
     }
 
-    /// Returns the rays that may hit the primitive within `limit`.
+    /// Returns the lanes whose ray may hit the primitive at a distance up to `limit`.
     #[inline(always)]
     pub fn meets<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L) -> L::Mask {
         let far = ray.origin.max_abs();

@@ -21,7 +21,7 @@ use glam::{DAffine3, DVec3};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Ratio of the extent of a mesh to that of its details, as assumed for the choice of the
+/// Assumed ratio of the extent of a mesh to that of its details, for the choice of single or double
 /// precision.
 const EXTENT_PER_DETAIL: f64 = 64.0;
 
@@ -123,7 +123,7 @@ impl CanonicalShape for MeshForm {
         }
     }
 
-    /// `None`: the faces are triangles, whose corners are in single precision.
+    /// Returns no proxies: the faces are triangles, whose corners are in single precision.
     fn proxies(&self) -> Vec<Proxy> {
         Vec::new()
     }
@@ -141,7 +141,8 @@ impl CanonicalShape for MeshForm {
     }
 }
 
-/// Returns the unit normal of a triangle that passes `point` within `slack`.
+/// Returns the unit normal of a triangle that is within the distance `slack` of `point`; `None` for
+/// other triangles.
 fn normal_of_triangle([a, b, c]: [DVec3; 3], point: DVec3, slack: f64) -> Option<DVec3> {
     let normal = (b - a).cross(c - a).try_normalize()?;
     if normal.dot(point - a).abs() > slack {
@@ -169,7 +170,7 @@ fn triangle_distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the distance of `point` from the nearest triangle.
+/// Returns the distance between `point` and the closest triangle.
 fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_mesh.inverse();
     let inside = inverse.transform_point3(point);
@@ -215,19 +216,20 @@ fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3
 /// One mesh placed in the scene.
 struct MeshInstance<S> {
     mesh: Arc<asset::Mesh>,
-    /// Box in the scene; rays that miss it are not transformed.
+    /// Bounding box in the scene. Rays that miss it are not transformed.
     extent: ItemBox<S>,
-    /// Columns of the linear part.
+    /// Columns of the linear part of the map from scene to mesh.
     mesh_from_scene: [[S; 3]; 3],
-    /// Centre of the mesh's box in the scene and in the mesh. Points are transformed relative to
-    /// it, so that their error is that of the mesh's size and distance.
+    /// Centre of the mesh's bounding box, in the scene and in the mesh. Points are transformed
+    /// relative to it, so that their rounding error is in proportion to the mesh's size and
+    /// distance.
     center: [S; 3],
     mesh_center: [S; 3],
     reach: S,
     smooth: bool,
 }
 
-/// All meshes of a scene. Each mesh is one item; a hit names its triangle by a tag.
+/// All meshes of a scene. Each mesh is one item; a hit has the id of a triangle in addition.
 pub struct Meshes<S> {
     items: Vec<MeshInstance<S>>,
 }
@@ -269,8 +271,8 @@ impl<S: Float> MeshInstance<S> {
         x * v.x + y * v.y + z * v.z
     }
 
-    /// Returns the normal in the scene for one in the mesh, not normalised: by the inverse's
-    /// transpose.
+    /// Transforms the normal `n` from the mesh to the scene, by the transpose of the inverse. The
+    /// result has any length.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(&self, n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = self.mesh_from_scene.map(Vec3::splat);
@@ -282,7 +284,8 @@ impl<S: Float> MeshInstance<S> {
         self.vector(p - Vec3::splat(self.center)) + Vec3::splat(self.mesh_center)
     }
 
-    /// Returns the ray in the space of the mesh, and the length there of its directions.
+    /// Transforms a ray to the space of the mesh. The second value is the length there of the ray's
+    /// unit directions.
     #[inline(always)]
     fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
         let direction = self.vector(ray.direction);
@@ -291,8 +294,8 @@ impl<S: Float> MeshInstance<S> {
         (Ray { origin: self.point(ray.origin), direction }, length)
     }
 
-    /// Returns for each lane the elements of `attributes` at the vertices of the triangle
-    /// `triangle_tag`.
+    /// Returns, for each lane, the elements of `attributes` at the three vertices of the triangle
+    /// with the id `triangle_tag`.
     #[inline(always)]
     fn vertices<L: SimdFloat<Scalar = S>>(
         &self,
@@ -309,8 +312,8 @@ impl<S: Float> MeshInstance<S> {
         })
     }
 
-    /// Returns for each lane the pairs of `attributes` at the vertices of the triangle
-    /// `triangle_tag`.
+    /// Returns, for each lane, the pairs of `attributes` at the three vertices of the triangle with
+    /// the id `triangle_tag`.
     #[inline(always)]
     fn pairs<L: SimdFloat<Scalar = S>>(
         &self,
@@ -340,8 +343,8 @@ impl<L: SimdFloat> Triangle<L> {
         (b - a).cross(c - a)
     }
 
-    /// Returns the gradients, in the plane of the triangle, of the weights of the second and the
-    /// third corner.
+    /// Returns the gradients, in the plane of the triangle, of the barycentric weights of the
+    /// second and the third corner.
     #[inline(always)]
     fn gradients(&self) -> [Vec3<L>; 2] {
         let [a, b, c] = self.corners;
@@ -351,8 +354,8 @@ impl<L: SimdFloat> Triangle<L> {
         [to_c.cross(normal) * inverse, normal.cross(to_b) * inverse]
     }
 
-    /// Returns the weights of the corners at the point nearest to `p`, approximately: positive,
-    /// with the sum 1.
+    /// Returns the barycentric weights of the triangle's point closest to `p`, approximately. They
+    /// are positive, and their sum is 1.
     #[inline(always)]
     fn weights(&self, p: Vec3<L>) -> [L; 3] {
         let normal = self.normal();
@@ -370,7 +373,8 @@ impl<S: Float> Meshes<S> {
         Self { items: forms.iter().filter_map(MeshInstance::new).collect() }
     }
 
-    /// Narrows `hit` by the meshes in `range`; a mesh's tag is `base` + its number.
+    /// Replaces `hit` in the lanes in which a mesh of `range` is nearer. The id of a mesh is `base`
+    /// plus its number.
     #[inline(never)]
     pub fn closest<L: SimdFloat<Scalar = S>>(
         &self,
@@ -397,7 +401,8 @@ impl<S: Float> Meshes<S> {
         }
     }
 
-    /// Returns the lanes of `wanted` that hit a mesh in `range` at a distance in (0, limit).
+    /// Returns the lanes of `wanted` that hit a mesh of `range` at a distance between 0 and
+    /// `limit`.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
@@ -423,7 +428,8 @@ impl<S: Float> Meshes<S> {
         occluded
     }
 
-    /// Returns the surface of `item` at `point`, which is near its triangle `triangle_tag`.
+    /// Returns the surface of `item` at `point`, a hit point with rounding errors on the triangle
+    /// with the id `triangle_tag`.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -447,9 +453,12 @@ impl<S: Float> Meshes<S> {
         SurfacePoint { point, normal, max_coordinate: L::splat(item.reach) }
     }
 
-    /// Returns the shading normal where rays along `direction` hit the triangle `triangle_tag` of
-    /// `item` at `point`; `normal` is the geometric normal on the viewer's side. The shading normal
-    /// stays on that side; one that would turn away from the viewer is bent back.
+    /// Returns the shading normal of `item` at the hit point `point` on the triangle with the id
+    /// `triangle_tag`. `normal` is the geometric normal on the viewer's side; `direction` is that
+    /// of the rays.
+    ///
+    /// The shading normal is on the same side. One that would turn away from the viewer is bent
+    /// back.
     #[inline(never)]
     pub fn shading_normal<L: SimdFloat<Scalar = S>>(
         &self,
@@ -470,8 +479,8 @@ impl<S: Float> Meshes<S> {
         keep_visible(smooth, normal, direction)
     }
 
-    /// Returns the texture coordinates of `item` at `point`, which is near its triangle
-    /// `triangle_tag`; `None` if its file has none.
+    /// Returns the texture coordinates of `item` at `point`, a point of the triangle with the id
+    /// `triangle_tag`; `None` if the mesh file has none.
     #[inline(never)]
     pub fn uv<L: SimdFloat<Scalar = S>>(
         &self,
@@ -493,8 +502,8 @@ impl<S: Float> Meshes<S> {
         Some(UvGradients { uv: [u, v], gradients: [du, dv] })
     }
 
-    /// Returns the base colour of the triangle `triangle_tag` of `item`; `None` if its file has
-    /// none.
+    /// Returns the colour of the triangle with the id `triangle_tag` of `item`; `None` if the mesh
+    /// file has no colours.
     #[inline(never)]
     pub fn color<L: SimdFloat<Scalar = S>>(&self, item: usize, triangle_tag: L) -> Option<Vec3<L>> {
         let mesh = self.items[item].mesh.mesh();
@@ -506,12 +515,12 @@ impl<S: Float> Meshes<S> {
         }))
     }
 
-    /// Returns `true` if any mesh has interpolated normals.
+    /// Returns `true` if some mesh has interpolated normals.
     pub fn is_smooth(&self) -> bool {
         self.items.iter().any(|item| item.smooth)
     }
 
-    /// Returns `true` if any mesh has colours.
+    /// Returns `true` if some mesh has colours.
     pub fn is_colored(&self) -> bool {
         self.items.iter().any(|item| item.mesh.mesh().color(0).is_some())
     }

@@ -1,4 +1,4 @@
-//! Flat parallelograms: rectangles and platforms.
+//! Flat parallelograms, the canonical form of rectangles and platforms.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
@@ -11,10 +11,11 @@ use crate::primitive::canonical::{
 use crate::primitive::form::Form;
 use glam::{DAffine3, DVec3};
 
-/// The flat parallelogram `corner + a u + b v`, 0 <= a, b <= 1. Its front is the side of u x v.
+/// Flat parallelogram of the points `corner + a u + b v`, 0 <= a, b <= 1. Its front is the side of
+/// u x v.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParallelogramForm {
-    /// Corner that both edges leave.
+    /// Corner at which both edges start.
     pub corner: DVec3,
     /// First edge.
     pub u: DVec3,
@@ -119,7 +120,8 @@ impl CanonicalShape for ParallelogramForm {
     }
 }
 
-/// Compiled parallelogram. A point p of its plane has the coordinates (p - corner) . dual, both in
+/// Compiled parallelogram. A point p of its plane has the two coordinates (p - corner) . dual,
+/// which are in 0..1 inside.
 /// 0..1 inside.
 #[derive(Clone, Copy)]
 pub struct Parallelogram<S> {
@@ -131,7 +133,7 @@ pub struct Parallelogram<S> {
 }
 
 impl<S: Float> Parallelogram<S> {
-    /// Compiles a parallelogram; `None` if the form is another.
+    /// Compiles a parallelogram; `None` for any other form.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Parallelogram(ParallelogramForm { corner, u, v }) = form else { return None };
         let n = u.cross(*v);

@@ -12,12 +12,12 @@ use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
-/// An infinite plane. Its front is the side that `normal` points to.
+/// An infinite plane. Its front is the side to which `normal` points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneForm {
     /// Unit normal.
     pub normal: DVec3,
-    /// `normal . p` of its points.
+    /// Value of `normal . p` for all its points p.
     pub offset: f64,
 }
 
@@ -104,7 +104,7 @@ pub struct Plane<S> {
 }
 
 impl<S: Float> Plane<S> {
-    /// Compiles a plane; `None` if the form is another.
+    /// Compiles a plane; `None` for any other form.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Plane(PlaneForm { normal, offset }) = form else { return None };
         Some(Self { normal: normal.to_array().map(S::from_f64), offset: S::from_f64(*offset) })
@@ -129,7 +129,7 @@ impl<L: SimdFloat> Primitive<L> for Plane<L::Scalar> {
     }
 }
 
-/// Half-spaces behind planes.
+/// Half-space behind a plane, as a part of compounds.
 impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
     type Spans = Option<Span<L>>;
 

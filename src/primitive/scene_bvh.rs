@@ -1,4 +1,5 @@
-//! BVH over the items of a scene: coherent packets traverse it together, others ray by ray.
+//! BVH over the primitives of a scene. Coherent packets traverse it together, other packets ray by
+//! ray.
 
 use crate::bvh::Ray;
 use crate::bvh::packet::{PacketBounds, SlabPacket, traverse_packet, with_stack};
@@ -8,26 +9,28 @@ use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::item_box::padded;
 use glam::DVec3;
 
-/// Coherence limit: packets traverse together if their directions differ by no more than this for
-/// each lane, over the root of the number of items (length of the difference of unit vectors), and
-/// their origins by no more than that share of the items' extent. Measured with spheres in a ball:
-/// with 100 even random rays are as fast together as apart, with 256 such packets of eight that
+/// Limit of the differences between rays up to which a packet traverses the BVH together.
+///
+/// It applies to the length of the difference of unit directions, and to the difference of origins
+/// as a fraction of the items' extent. Each may be up to this limit, times the number of lanes,
+/// divided by the square root of the number of items. Measured with spheres in a ball: with 100
+/// spheres even random rays are as fast together as apart; with 256 such packets of eight that
 /// differ by 0.8, with 1000 by 0.4, with 10,000 by 0.13; packets of four up to half of that.
 const COHERENCE_LIMIT: f64 = 1.5;
 
-/// BVH over items, one item per leaf.
+/// BVH over items (primitives), one item per leaf.
 pub struct SceneBvh {
     boxes: Bvh8,
-    /// Item of each leaf.
+    /// Number of the item in each leaf.
     items: Vec<u32>,
-    /// Largest difference for each lane between the rays of a coherent packet, in direction and in
-    /// origin.
+    /// Largest difference between the rays of a coherent packet, divided by the number of lanes, in
+    /// direction and in origin.
     turn: f64,
     shift: f64,
 }
 
 impl SceneBvh {
-    /// Builds the BVH over the boxes of all items, at least one, in item order.
+    /// Builds the BVH over bounding boxes, one for each item and at least one.
     pub fn new(bounds: &[(DVec3, DVec3)]) -> Self {
         // The builder takes boxes in single precision.
         let corners = |i: usize| {
@@ -44,8 +47,8 @@ impl SceneBvh {
     }
 
     /// Calls `leaf(item, limit)` for the items whose boxes rays may enter within `limit`,
-    /// approximately nearest first; lanes with a negative limit are inactive. `leaf` returns the
-    /// new limits. Items at exactly that distance are still visited.
+    /// approximately nearest first. `leaf` returns the new limits. Items at exactly the limit are
+    /// still visited. Lanes with a negative limit are inactive.
     #[inline(always)]
     pub fn traverse<L: SimdFloat>(
         &self,
@@ -81,7 +84,8 @@ impl SceneBvh {
         });
     }
 
-    /// Returns `true` if the wanted rays of a packet are coherent enough to traverse together.
+    /// Returns `true` if the lanes `wanted` of a packet are coherent enough to traverse the BVH
+    /// together.
     #[inline(always)]
     fn is_together<L: SimdFloat>(&self, ray: &Ray<L>, wanted: u32) -> bool {
         if L::WIDTH == 1 || wanted.count_ones() < 2 {

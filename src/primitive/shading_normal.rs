@@ -2,12 +2,14 @@
 
 use crate::lanes::{SimdFloat, Vec3};
 
-/// Least cosine between a shading normal and the direction to the viewer.
+/// Smallest cosine between a shading normal and the direction to the viewer.
 const LEAST_COSINE: f64 = 0.02;
 
-/// Returns the unit normal `shading` on the side of the geometric normal `normal`, which faces a
-/// viewer who looks along `direction`. A shading normal that would turn away from the viewer is
-/// bent back; `normal` replaces one that is not finite.
+/// Returns the unit vector of `shading` on the viewer's side of the surface. `normal` is the
+/// geometric normal on the viewer's side, `direction` that in which the viewer looks.
+///
+/// A shading normal that would turn away from the viewer is bent back. One that is not finite is
+/// replaced by `normal`.
 #[inline(always)]
 pub fn keep_visible<L: SimdFloat>(
     shading: Vec3<L>,

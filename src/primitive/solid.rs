@@ -1,29 +1,29 @@
-//! Intervals of lines inside solids, the input of compounds.
+//! Spans of lines inside of solids, from which compounds are computed.
 
 use crate::bvh::Ray;
 use crate::lanes::SimdFloat;
 use crate::primitive::batch::Primitive;
 
-/// Interval of a packet's lines inside a solid.
+/// Interval of each lane's line inside of a solid.
 #[derive(Clone, Copy, Debug)]
 pub struct Span<L: SimdFloat> {
-    /// Distance of entry; `-L::MAX` if the line starts inside.
+    /// Distance at which the line enters; `-L::MAX` if the line starts inside.
     pub enter: L,
-    /// Distance of exit; `L::MAX` if the line stays inside.
+    /// Distance at which the line leaves; `L::MAX` if the line stays inside.
     pub leave: L,
-    /// Absolute cosine of the angle between line and normal at the entry.
+    /// Absolute cosine of the angle between line and normal where the line enters.
     pub enter_cosine: L,
-    /// Absolute cosine of the angle between line and normal at the exit.
+    /// Absolute cosine of the angle between line and normal where the line leaves.
     pub leave_cosine: L,
-    /// Lanes with such an interval; the other fields are meaningless elsewhere.
+    /// Lanes that have such an interval; the other fields are undefined in other lanes.
     pub meets: L::Mask,
 }
 
-/// Solid that can be a part of a compound.
+/// Primitive that bounds a solid, so that it can be a part of a compound.
 pub trait SolidPrimitive<L: SimdFloat>: Primitive<L> {
     /// Spans of one packet of lines, in ascending order and without overlap.
     type Spans: IntoIterator<Item = Span<L>>;
 
-    /// Returns the intervals of the lines inside the solid; none if no line of the packet hits it.
+    /// Returns the intervals of the packet's lines inside of the solid; none if no line hits it.
     fn spans(&self, ray: &Ray<L>) -> Self::Spans;
 }

@@ -1,4 +1,4 @@
-//! Spheres.
+//! Spheres: canonical form and intersection.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -13,7 +13,7 @@ use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
-/// A sphere.
+/// Canonical form of a sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereForm {
     /// Centre.
@@ -104,7 +104,7 @@ impl CanonicalShape for SphereForm {
     }
 }
 
-/// Returns the smallest t > 0 with |o + t d| = 1.
+/// Returns the smallest t > 0 with |o + t d| = 1; `None` if there is none.
 pub fn cast_at_unit_sphere(o: DVec3, d: DVec3) -> Option<f64> {
     let (a, b, c) = (d.length_squared(), o.dot(d), o.length_squared() - 1.0);
     let root = (b * b - a * c).sqrt();
@@ -112,7 +112,7 @@ pub fn cast_at_unit_sphere(o: DVec3, d: DVec3) -> Option<f64> {
     [(-b - root) / a, (-b + root) / a].into_iter().find(|t| *t > 0.0 && t.is_finite())
 }
 
-/// One sphere, rounded to the precision of the kernel.
+/// Compiled sphere, rounded to the precision of the lanes.
 #[derive(Clone, Copy)]
 pub struct Sphere<S> {
     center: [S; 3],
@@ -122,7 +122,7 @@ pub struct Sphere<S> {
 }
 
 impl<S: Float> Sphere<S> {
-    /// Compiles a sphere; `None` if the form is another.
+    /// Compiles a sphere; `None` for any other form.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Sphere(SphereForm { center, radius }) = form else { return None };
         Some(Self {
@@ -134,13 +134,13 @@ impl<S: Float> Sphere<S> {
     }
 }
 
-/// Returns the distances at which a line enters and leaves a sphere, and the lanes that hit it.
+/// Returns the distances at which each line enters and leaves a sphere, and the lanes that hit it.
 ///
 /// `f` is the line's origin relative to the centre, `d` its unit direction. The discriminant is
-/// computed from the vector f - (f.d) d, whose length is the line's distance from the centre, and
-/// the root nearer to the origin from the product of both, so that neither cancels for small or
-/// distant spheres (Haines, Günther, Akenine-Möller 2019, *Precision Improvements for Ray/Sphere
-/// Intersection*, Ray Tracing Gems, chapter 7).
+/// computed from the vector f - (f.d) d, whose length is the line's distance from the centre. The
+/// root closer to the origin is computed from the product of both. Neither of them cancels for
+/// small or distant spheres (Haines, Günther, Akenine-Möller 2019, *Precision Improvements for
+/// Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
 #[inline(always)]
 pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option<(L, L, L::Mask)> {
     let b = -f.dot(d);

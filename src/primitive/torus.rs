@@ -1,15 +1,14 @@
-//! Tori under any affine map. The ray goes back to the space of the torus about the y axis with a
-//! ring of radius 1 and a tube of radius r:
-//!   (rho - 1)^2 + y^2 <= r^2, rho^2 = x^2 + z^2
+//! Tori under any affine map. Rays are transformed into the space of a torus about the y axis, with
+//! a ring of radius 1 and a tube of radius r: (rho - 1)^2 + y^2 <= r^2, rho^2 = x^2 + z^2
 //!
-//! With s the distance along the line from its point nearest to the centre, half the derivative of
-//! the left side is s - rho'(s). rho is the norm of an affine function, a hyperbola whose second
-//! derivative is largest at the point nearest to the axis and exceeds 1 between two known places.
-//! So the derivative is monotone on three pieces of the line and has one or three zeros, and the
-//! quartic is monotone between those: each of its roots has a bracket, and Newton's method kept
-//! inside it finds the root (bracketing by the derivative after Yuksel 2022, *High-Performance
-//! Polynomial Root Finding for Graphics*, with the distance from the ring in place of coefficients,
-//! which cancel for thin tubes).
+//! Let s be the distance along the line from its point closest to the centre. Half the derivative
+//! of the left side is s - rho'(s). rho is the norm of an affine function: a hyperbola, whose
+//! second derivative is largest at the point closest to the axis and exceeds 1 between two known
+//! positions. The derivative is therefore monotone on three pieces of the line and has one or three
+//! zeros. The quartic is monotone between these zeros, so that each of its roots has a bracket, in
+//! which Newton's method finds it (bracketing by the derivative after Yuksel 2022,
+//! *High-Performance Polynomial Root Finding for Graphics*). The distance from the ring replaces
+//! polynomial coefficients, which cancel for thin tubes.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -25,12 +24,12 @@ use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::TAU;
 
-/// Image under an invertible affine map of a torus about the y axis.
+/// Image of a torus about the y axis under an invertible affine map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorusForm {
-    /// Map from the space of the torus, with its centre at the origin, to the scene.
+    /// Map from the space of the torus, whose centre is the origin there, to the scene.
     pub scene_from_torus: DAffine3,
-    /// Radius of the circle in the middle of the tube, greater than 0.
+    /// Radius of the ring, the circle in the middle of the tube; greater than 0.
     pub ring: f64,
     /// Radius of the tube, greater than 0, at most `ring`.
     pub tube: f64,
@@ -42,8 +41,8 @@ impl TorusForm {
         self.scene_from_torus * DAffine3::from_scale(DVec3::splat(self.ring))
     }
 
-    /// Returns the distance of `point`, in the space of the torus, from the circle in the middle of
-    /// the tube, and the unit vector from there.
+    /// Returns the distance between `point`, in the space of the torus, and the ring (the circle in
+    /// the middle of the tube), and the unit vector from the ring to `point`.
     fn ring_distance(&self, point: DVec3) -> (f64, DVec3) {
         let outward = DVec3::new(point.x, 0.0, point.z).normalize_or(DVec3::X);
         let across = point - outward * self.ring;
@@ -62,7 +61,8 @@ impl CanonicalShape for TorusForm {
         1
     }
 
-    /// The solid is the sum of a circle and a ball: their half-widths add.
+    /// Returns the sum of the half-widths of a circle and of a ball, because the torus is the sum
+    /// of the two.
     fn bounds(&self) -> Option<Bounds> {
         let m = &self.scene_from_torus;
         let rows = m.matrix3.transpose();
@@ -103,8 +103,8 @@ impl CanonicalShape for TorusForm {
         2.0 * self.tube / rows.map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
-    /// Exact for similarities; for other maps the distance in the space of the torus times the
-    /// least factor by which the map scales lengths.
+    /// Returns the exact distance for similarities. For other maps it is the distance in the space
+    /// of the torus times the smallest factor by which the map scales lengths.
     fn clearance(&self, point: DVec3) -> Option<f64> {
         let inverse = self.scene_from_torus.inverse();
         let (distance, _) = self.ring_distance(inverse.transform_point3(point));
@@ -129,8 +129,8 @@ impl CanonicalShape for TorusForm {
         cast_compiled((*self).into(), origin, direction)
     }
 
-    /// Texture coordinates: u is the angle around the ring, v the angle around the tube, both from
-    /// 0 to 1.
+    /// Returns the form's own texture coordinates: u is the angle around the ring, v the angle
+    /// around the tube, both from 0 to 1.
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Uv
     }
@@ -159,15 +159,15 @@ pub struct Torus<S> {
     /// Map to the space in which the ring has radius 1.
     unit_from_scene: [[S; 3]; 3],
     scene_from_unit: [[S; 3]; 3],
-    /// Radius of the tube in that space.
+    /// Radius of the tube in the space in which the ring has radius 1.
     tube: S,
-    /// 1 over the radius of the ring.
+    /// Reciprocal of the radius of the ring.
     inverse_ring: S,
     reach: S,
 }
 
 impl<S: Float> Torus<S> {
-    /// Compiles a torus; `None` if the form is another.
+    /// Compiles a torus; `None` for any other form.
     pub fn new(form: &Form) -> Option<Self> {
         let Form::Torus(torus) = form else { return None };
         let DAffine3 { matrix3, translation } = torus.scene_from_unit();
@@ -182,7 +182,7 @@ impl<S: Float> Torus<S> {
     }
 }
 
-/// Roundings of 1 by which the bounds of the roots exceed the torus.
+/// Margin by which the bounds of the roots exceed the torus, in rounding errors of 1.
 const ROOM: f64 = 64.0;
 
 /// Largest number of steps of a root search: bisection alone needs 54 in double precision.
@@ -191,33 +191,33 @@ const MAX_STEPS: usize = 64;
 /// Line in the space of the torus.
 #[derive(Clone, Copy)]
 struct UnitLine<L: SimdFloat> {
-    /// Point nearest to the centre.
+    /// Point of the line closest to the centre.
     point: Vec3<L>,
     /// Unit direction.
     direction: Vec3<L>,
-    /// Squared length of the direction across the axis.
+    /// Squared length of the part of the direction that is perpendicular to the axis.
     across2: L,
-    /// Position of the ray's origin on the line.
+    /// Position of the ray's origin on the line, relative to `point`.
     origin: L,
     /// Length in the scene of a step of length 1.
     scale: L,
     tube: L,
-    /// Positions between which the line is close to the torus.
+    /// Smallest position at which the line may be close to the torus.
     low: L,
     high: L,
-    /// Lanes with a line close to the torus.
+    /// Lanes whose line comes close to the torus.
     near: L::Mask,
 }
 
-/// Positions that separate the roots, in ascending order, and the lanes with the position inside
-/// the torus.
+/// Positions that separate the roots from each other, in ascending order, and the lanes in which
+/// each of them is inside of the torus.
 struct Separators<L: SimdFloat> {
     places: [L; 5],
     inside: [L::Mask; 5],
 }
 
 impl<L: SimdFloat> UnitLine<L> {
-    /// Creates the line of a ray; `None` if no line of the packet is close to the torus.
+    /// Transforms the lines of rays; `None` if no line of the packet comes close to the torus.
     #[inline(always)]
     fn new(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<Self> {
         let f = times(&torus.unit_from_scene, ray.origin - Vec3::splat(torus.center));
@@ -260,8 +260,8 @@ impl<L: SimdFloat> UnitLine<L> {
         })
     }
 
-    /// Returns the distance from the axis less 1, the height, the derivative of that distance at
-    /// `s`, and the reciprocal of the distance.
+    /// Returns four values at the position `s`: the distance from the axis minus 1, the height, the
+    /// derivative of the distance, and the reciprocal of the distance.
     #[inline(always)]
     fn place(&self, s: L) -> (L, L, L, L) {
         let p = self.direction.mul_add(s, self.point);
@@ -272,7 +272,7 @@ impl<L: SimdFloat> UnitLine<L> {
         (rho - L::one(), p.y, speed.max(-limit).min(limit), inward)
     }
 
-    /// Returns the squared distance from the ring less that of the surface, and its derivative.
+    /// Returns the squared distance from the ring minus that of the surface, and its derivative.
     #[inline(always)]
     fn height(&self, s: L) -> (L, L) {
         let (beyond, y, speed, _) = self.place(s);
@@ -281,7 +281,7 @@ impl<L: SimdFloat> UnitLine<L> {
         (height, slope + slope)
     }
 
-    /// Returns half the derivative of the height, and its own derivative.
+    /// Returns half the derivative of [`UnitLine::height`], and its own derivative.
     #[inline(always)]
     fn slope(&self, s: L) -> (L, L) {
         let (beyond, y, speed, inward) = self.place(s);
@@ -289,14 +289,14 @@ impl<L: SimdFloat> UnitLine<L> {
         (slope, L::one() - (self.across2 - speed * speed) * inward)
     }
 
-    /// Returns the lanes with the position `s` inside or on the surface.
+    /// Returns the lanes in which the position `s` is inside of the torus or on its surface.
     #[inline(always)]
     fn inside(&self, s: L) -> L::Mask {
         self.height(s).0.le(L::zero())
     }
 
-    /// Returns the positions of the extremes of the height: least, largest, least; a single extreme
-    /// is repeated three times.
+    /// Returns the positions of the extremes of the height: minimum, maximum, minimum. A single
+    /// extreme is repeated three times.
     #[inline(always)]
     fn extremes(&self) -> [L; 3] {
         let (zero, one) = (L::zero(), L::one());
@@ -337,9 +337,11 @@ impl<L: SimdFloat> UnitLine<L> {
         [first, L::select(three, second, first), L::select(three, third, first)]
     }
 
-    /// Returns the zero of `function` between `low`, where `sign` times it is negative, and `high`,
-    /// where it is positive, in the lanes of `open`: by Newton's method, or by bisection where
-    /// Newton's step leaves the bracket or is slow. A lane's steps do not depend on the others.
+    /// Returns the zero of `function` in the lanes of `open`. `sign` times the function is negative
+    /// at `low` and positive at `high`.
+    ///
+    /// Newton's method is used, and bisection where Newton's step leaves the bracket or is slow.
+    /// The steps of a lane do not depend on other lanes.
     #[inline(always)]
     fn root(
         &self,
@@ -373,7 +375,7 @@ impl<L: SimdFloat> UnitLine<L> {
         place
     }
 
-    /// Returns the separators of the roots at `start` or beyond.
+    /// Returns the separators of the roots at positions from `start` on.
     #[inline(always)]
     fn separators(&self, start: L) -> Separators<L> {
         let within = |s: L| s.max(self.low).min(self.high).max(start);
@@ -390,7 +392,7 @@ impl<L: SimdFloat> UnitLine<L> {
         Separators { places, inside }
     }
 
-    /// Returns the distance along the ray of a position on the line.
+    /// Returns the distance along the ray of the position `s` on the line.
     #[inline(always)]
     fn distance(&self, s: L) -> L {
         (s - self.origin) * self.scale
@@ -476,7 +478,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for Torus<L::Scalar> {
     }
 }
 
-/// Two spans of each line, of which the second or both may be empty.
+/// Returns two spans of each line. The second one or both may be empty.
 #[inline(never)]
 fn spans<L: SimdFloat>(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<[Span<L>; 2]> {
     let line = UnitLine::new(torus, ray)?;

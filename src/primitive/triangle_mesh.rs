@@ -1,8 +1,8 @@
 //! Intersection of rays with the triangles of one mesh, in the space of the mesh.
 //!
-//! Coherent packets traverse the BVH together; others ray by ray, eight boxes or triangles at a
-//! time. Both compute each triangle by the same operations, so that a ray hits the same triangle at
-//! the same distance either way.
+//! Coherent packets traverse the BVH together. Other packets traverse it ray by ray, eight boxes or
+//! triangles at a time. Both compute each triangle by the same operations, so that a ray hits the
+//! same triangle at the same distance either way.
 
 use crate::asset::{Mesh, TriangleBlock};
 use crate::bvh::BVH_WIDTH;
@@ -13,33 +13,37 @@ use crate::bvh::packet::{
 use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 
-/// Coherence limit: packets traverse together if their directions differ by no more than this for
-/// each lane, over the root of the number of triangles (length of the difference of unit vectors),
-/// and their origins by no more than that share of the mesh's size. Measured by `benches/mesh.rs`,
-/// lines `together or apart`: packets of eight are faster up to differences of 0.3 with 1,000
-/// triangles, 0.1 with 70,000, 0.02 with a million; packets of four up to half of that.
+/// Limit of the differences between rays up to which a packet traverses the BVH together.
+///
+/// It applies to the length of the difference of unit directions, and to the difference of origins
+/// as a fraction of the mesh's size. Each may be up to this limit, times the number of lanes,
+/// divided by the square root of the number of triangles. Measured by `benches/mesh.rs`, lines
+/// `together or apart`: packets of eight are faster up to differences of 0.3 with 1,000 triangles,
+/// 0.1 with 70,000, 0.02 with a million; packets of four up to half of that.
 const TOGETHER: f64 = 2.5;
 
-/// Largest coherence limit for each lane, for any number of triangles.
+/// Largest difference per lane between the rays of a packet that traverses together, for any number
+/// of triangles.
 const TOGETHER_AT_MOST: f64 = 0.04;
 
 /// Closest triangle of each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleHit<L> {
-    /// Distance in lengths of the ray's direction; the limit if there is no nearer hit.
+    /// Distance of the hit in lengths of the ray's direction, or the limit if there is no nearer
+    /// hit.
     pub t: L,
-    /// Tag of the triangle's number; meaningless without a hit.
+    /// Id of the triangle; undefined without a hit.
     pub triangle: L,
 }
 
-/// Rays with a frame for triangle tests: a packet, or one ray in every lane.
+/// Rays, each with a frame for triangle tests: those of a packet, or one ray in every lane.
 #[derive(Clone, Copy)]
 struct ShearedRay<L> {
     origin: Vec3<L>,
     frame: Frame<L>,
 }
 
-/// Returns a packet for box tests. Boxes grow by the rounding of the ray's frame and of the
+/// Returns the packet for box tests. Boxes grow by the rounding errors of the frames and of the
 /// corners' distances, so that a ray that passes an edge within rounding still tests the triangles
 /// there.
 #[inline(always)]
@@ -67,15 +71,15 @@ impl<L: SimdFloat> ShearedRay<L> {
         each
     }
 
-    /// Returns the ray of one lane in every lane.
+    /// Returns rays with the ray of one lane, given as origin and frame, in every lane.
     #[inline(always)]
     fn only(one: &[[L::Scalar; 3]; 4]) -> Self {
         let [origin, t, b, n] = one.map(Vec3::splat);
         Self { origin, frame: Frame { t, b, n } }
     }
 
-    /// Returns distance and mask of the hits with a triangle, at a positive distance, on either
-    /// side.
+    /// Returns the distance of the hits with a triangle, and the lanes that hit it, at a positive
+    /// distance and on either side.
     ///
     /// The corners are projected along the ray onto the plane through its origin. A corner has one
     /// projection in all triangles that share it, and the sign of each edge's area is that of the
@@ -96,7 +100,8 @@ impl<L: SimdFloat> ShearedRay<L> {
         (t, (left | right) & t.gt(zero))
     }
 
-    /// Returns the corners of a leaf's eight triangles, those of the lanes in `part`.
+    /// Returns the corners of the triangles of a leaf: eight triangles, of which `part` selects as
+    /// many as there are lanes.
     #[inline(always)]
     fn corners(leaf: &TriangleBlock, part: usize) -> [Vec3<L>; 3] {
         leaf.corners.each_ref().map(|c| {
@@ -106,13 +111,14 @@ impl<L: SimdFloat> ShearedRay<L> {
     }
 }
 
-/// Traversal of a mesh. With `ANY` the first triangle hit ends the traversal of a ray.
+/// Traversal of a mesh's BVH. If `ANY` is `true`, the first triangle that is hit ends the traversal
+/// of a ray.
 struct MeshTraversal<'a, const ANY: bool> {
     mesh: &'a Mesh,
 }
 
 impl<const ANY: bool> MeshTraversal<'_, ANY> {
-    /// Traverses all lanes together.
+    /// Traverses the BVH with all rays of the packet together.
     #[inline(always)]
     fn together<L: SimdFloat>(
         &self,
@@ -187,7 +193,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         self.apart((ray, &packet), limit)
     }
 
-    /// Traverses each lane by itself.
+    /// Traverses the BVH with each ray of the packet on its own.
     #[inline(always)]
     fn apart<L: SimdFloat>(
         &self,
@@ -239,7 +245,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     }
 }
 
-/// Returns `true` if the wanted rays of a packet are coherent enough to traverse together.
+/// Returns `true` if the lanes `wanted` of a packet are coherent enough to traverse the BVH
+/// together.
 #[inline(always)]
 fn is_together<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     if L::WIDTH == 1 || wanted.count_ones() < 2 {
@@ -252,8 +259,8 @@ fn is_together<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     ray.is_coherent(wanted, turn, turn * size)
 }
 
-/// Returns the closest triangle within `limit`; at equal distances the one with the lowest number.
-/// Directions have unit length. Lanes with a limit that is not positive are inactive.
+/// Returns the closest triangle within `limit`. At equal distances it is the one with the lowest
+/// number. Directions must have unit length. Lanes with a limit of 0 or less are inactive.
 #[inline(never)]
 pub fn closest<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
     MeshTraversal::<false> { mesh }.run(ray, limit)
@@ -265,8 +272,8 @@ pub fn occluded<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
     MeshTraversal::<true> { mesh }.run(ray, limit).t.lt(limit)
 }
 
-/// [`closest`] with all lanes together if `all` is set, otherwise each by itself; for tests and
-/// benches.
+/// Returns the result of [`closest`], with all lanes together if `all` is `true`, otherwise each on
+/// its own. For tests and benches.
 #[inline(never)]
 pub fn closest_with<L: SimdFloat>(
     mesh: &Mesh,
