@@ -21,7 +21,7 @@ impl FileContents {
     /// Reads the file at `path`, which may have at most `limit` bytes.
     ///
     /// # Errors
-    /// If the file cannot be read, is not a regular file, or has more than `limit` bytes.
+    /// Fails if the file cannot be read, is not a regular file, or has more than `limit` bytes.
     pub fn read(path: &Path, limit: u64) -> Result<Self, AssetError> {
         let error = |found: String, expected: &str| {
             Err(AssetError {

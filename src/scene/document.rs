@@ -35,7 +35,7 @@ impl Document {
     /// Reads and validates the scene file at `path`.
     ///
     /// # Errors
-    /// As [`Scene::read`].
+    /// The errors of [`Scene::read`].
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
         Self::read_with(path, Arc::default())
     }
@@ -44,7 +44,7 @@ impl Document {
     /// scene refers to.
     ///
     /// # Errors
-    /// As [`Scene::read`].
+    /// The errors of [`Scene::read`].
     pub fn read_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         Self::read_opened(path, assets, |path| File::open(path))
     }
@@ -68,7 +68,7 @@ impl Document {
     /// Parses and validates a scene from `text`. `name` is the file name in diagnostics.
     ///
     /// # Errors
-    /// As [`Scene::read`].
+    /// The errors of [`Scene::read`].
     pub fn parse(text: String, name: &str) -> Result<Self, SceneErrors> {
         Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }

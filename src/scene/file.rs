@@ -72,7 +72,7 @@ impl SceneFile {
     /// Reads and validates the scene file at `path`, which must be a regular file.
     ///
     /// # Errors
-    /// As [`Scene::read`].
+    /// The errors of [`Scene::read`].
     pub fn open(path: &Path) -> Result<Self, SceneErrors> {
         Self::open_with(path, Arc::default())
     }
@@ -81,7 +81,7 @@ impl SceneFile {
     /// scene refers to.
     ///
     /// # Errors
-    /// As [`Scene::read`].
+    /// The errors of [`Scene::read`].
     pub fn open_with(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         let document = Document::read_regular(path, assets)?;
         let fingerprint = fnv1a64(document.text().as_bytes());
@@ -91,7 +91,7 @@ impl SceneFile {
     /// Creates a scene without a file. `name` is the file name in diagnostics.
     ///
     /// # Errors
-    /// As [`Scene::parse`].
+    /// The errors of [`Scene::parse`].
     pub fn untitled(text: String, name: &str) -> Result<Self, SceneErrors> {
         Ok(Self { path: None, document: Document::parse(text, name)?, fingerprint: 0 })
     }
@@ -100,7 +100,7 @@ impl SceneFile {
     /// content now; saving replaces that content.
     ///
     /// # Errors
-    /// As [`Scene::parse`].
+    /// The errors of [`Scene::parse`].
     pub fn recovered(path: &Path, text: String) -> Result<Self, SceneErrors> {
         let document = Document::parse(text, &path.display().to_string())?;
         let fingerprint = content(path).ok().flatten().unwrap_or_default();
@@ -111,7 +111,7 @@ impl SceneFile {
     /// `name` is the file name in diagnostics.
     ///
     /// # Errors
-    /// As [`Scene::parse`].
+    /// The errors of [`Scene::parse`].
     pub fn parse(&self, text: &str, name: &str) -> Result<Scene, SceneErrors> {
         Scene::parse_in(text, name, self.document.scene().resolver.clone())
     }
@@ -164,7 +164,7 @@ impl SceneFile {
     /// Reads the file again.
     ///
     /// # Errors
-    /// As [`Scene::read`]; the document stays unchanged. The fingerprint is updated all the same,
+    /// The errors of [`Scene::read`]; the document stays unchanged. The fingerprint is updated all the same,
     /// so that a broken file is reported once and not at every check.
     pub fn reload(&mut self) -> Result<(), SceneErrors> {
         let Some(path) = self.path.clone() else { return Ok(()) };
@@ -179,7 +179,7 @@ impl SceneFile {
     /// The file is replaced atomically; a symbolic link stays a link, and permissions stay.
     ///
     /// # Errors
-    /// If there is no file yet, if another program has written the file (unless `overwrite` is
+    /// Fails if there is no file yet, if another program has written the file (unless `overwrite` is
     /// `true`), if the path leads to something other than a regular file, or if the file cannot be
     /// written.
     pub fn save(&mut self, scene: &Scene, overwrite: bool) -> Result<(), SaveError> {
@@ -205,7 +205,7 @@ impl SceneFile {
     /// Writes the valid `scene` to another file, which becomes the scene's file.
     ///
     /// # Errors
-    /// If the file exists (unless `overwrite` is `true`), or if the file cannot be written.
+    /// Fails if the file exists (unless `overwrite` is `true`), or if the file cannot be written.
     pub fn save_as(
         &mut self,
         path: &Path,

@@ -126,7 +126,7 @@ impl Recovery {
     /// fingerprint of the scene file that saving would replace.
     ///
     /// # Errors
-    /// If no candidate folder is writable; the previous recovery file stays.
+    /// Fails if no candidate folder is writable; the previous recovery file stays.
     pub fn keep(&mut self, text: &str, base: Option<u64>) -> io::Result<()> {
         let base = base.map_or(NO_FILE.to_string(), |base| format!("{base:016x}"));
         let text = format!("{HEAD}{base}.\n{text}");

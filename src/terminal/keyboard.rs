@@ -45,7 +45,7 @@ impl Keyboard {
     /// no event has come by then.
     ///
     /// # Errors
-    /// If the terminal is gone.
+    /// Fails if the terminal is gone.
     pub fn wait(&mut self, deadline: Option<Instant>) -> io::Result<Vec<Timed>> {
         if !self.early.is_empty() {
             return Ok(std::mem::take(&mut self.early));

@@ -56,7 +56,7 @@ pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
 /// to [`Capabilities::learn`]. `is_ending` returns `true` if the probe is to stop.
 ///
 /// # Errors
-/// If the terminal is gone.
+/// Fails if the terminal is gone.
 pub fn probe(
     tty: &Tty,
     keyboard: &mut Keyboard,

@@ -29,7 +29,7 @@ impl Restorer {
     /// Starts the shell, which will restore `modes_before`.
     ///
     /// # Errors
-    /// If there is no shell.
+    /// Fails if there is no shell.
     pub fn start(modes_before: &Termios) -> io::Result<Self> {
         let mut shell = Command::new("/bin/sh")
             .args(["-c", PROGRAM, LEAVE.as_str()])

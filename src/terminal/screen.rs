@@ -86,7 +86,7 @@ pub struct Tty {
 /// Returns the columns and rows of the terminal, or 80 and 24 if the terminal does not report them.
 ///
 /// # Errors
-/// If neither the process nor stdout has a terminal.
+/// Fails if neither the process nor stdout has a terminal.
 pub fn size() -> io::Result<[u16; 2]> {
     let size = terminal::window_size()?;
     let is_known = size.columns > 0 && size.rows > 0;
@@ -123,7 +123,7 @@ impl Screen {
     /// Starts full-screen use of the terminal at stdin and stdout.
     ///
     /// # Errors
-    /// If stdin is no terminal or stdout cannot be written.
+    /// Fails if stdin is no terminal or stdout cannot be written.
     pub fn enter() -> io::Result<Self> {
         let modes_before = tcgetattr(io::stdin())?;
         let restorer = Restorer::start(&modes_before).ok();
@@ -180,7 +180,7 @@ impl Tty {
     /// Writes `bytes` in one call. Does nothing while the terminal is restored.
     ///
     /// # Errors
-    /// If the terminal is gone.
+    /// Fails if the terminal is gone.
     pub fn write(&self, bytes: &[u8]) -> io::Result<()> {
         let mut out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
         if self.entered.load(Ordering::Acquire) {
@@ -233,7 +233,7 @@ impl Tty {
     /// Resumes full-screen use of the terminal, whatever modes other programs have set.
     ///
     /// # Errors
-    /// If the terminal is gone.
+    /// Fails if the terminal is gone.
     pub fn resume(&self) -> io::Result<()> {
         if let Some(modes_before) = &self.modes_before {
             set_raw_mode(modes_before)?;

@@ -56,7 +56,7 @@ impl<'a> Builder<'a> {
     /// numbers with the length of the file.
     ///
     /// # Errors
-    /// If the mesh would exceed a limit, or there is not enough memory.
+    /// Fails if the mesh would exceed a limit, or there is not enough memory.
     pub fn reserve(&mut self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         self.check_limits(vertices, triangles)?;
         let reserved = self.positions.try_reserve(vertices);
@@ -69,7 +69,7 @@ impl<'a> Builder<'a> {
     /// Checks that the mesh may have this many more vertices and triangles.
     ///
     /// # Errors
-    /// If the mesh would exceed a limit.
+    /// Fails if the mesh would exceed a limit.
     pub fn check_limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         let checks = [
             (self.positions.len().saturating_add(vertices), MAX_VERTICES, "vertices"),
@@ -128,7 +128,7 @@ impl<'a> Builder<'a> {
     /// are white.
     ///
     /// # Errors
-    /// If there are more than 65536 colours.
+    /// Fails if there are more than 65536 colours.
     pub fn color(&mut self, color: [f32; 3]) -> Result<(), AssetError> {
         if self.colors.is_empty() && !self.triangles.is_empty() {
             self.colors.push([1.0; 3]);
@@ -148,7 +148,7 @@ impl<'a> Builder<'a> {
     /// Adds a triangle. `place` returns the location of the triangle in the file.
     ///
     /// # Errors
-    /// If the triangle names a vertex that does not exist, or the mesh exceeds a limit.
+    /// Fails if the triangle names a vertex that does not exist, or the mesh exceeds a limit.
     pub fn triangle(
         &mut self,
         corners: [u32; 3],
@@ -188,7 +188,7 @@ impl<'a> Builder<'a> {
     /// Checks the mesh and converts it to its compact form.
     ///
     /// # Errors
-    /// If no triangle has an area, or a coordinate is not finite or out of range.
+    /// Fails if no triangle has an area, or a coordinate is not finite or out of range.
     pub fn finish(mut self) -> Result<TriangleMesh, AssetError> {
         self.check_limits(0, 0)?;
         let source = self.source;
@@ -277,7 +277,7 @@ impl<'a> Builder<'a> {
     /// Removes triangles without area. Adds a note with their number.
     ///
     /// # Errors
-    /// If no triangle is left.
+    /// Fails if no triangle is left.
     fn drop_flat(&mut self, positions: &[[f32; 3]]) -> Result<(), AssetError> {
         let before = self.triangles.len();
         let has_area = |t: &[u32; 3]| {
@@ -342,7 +342,7 @@ impl<'a> Builder<'a> {
     /// has none at all.
     ///
     /// # Errors
-    /// If a texture coordinate is not finite.
+    /// Fails if a texture coordinate is not finite.
     fn checked_uvs(&mut self, vertices: usize) -> Result<Option<Vec<[f32; 2]>>, AssetError> {
         let mut uvs = std::mem::take(&mut self.uvs);
         if uvs.is_empty() {

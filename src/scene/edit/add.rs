@@ -58,7 +58,7 @@ fn fresh_material(scene: &Scene) -> Material {
 /// material for the object; `None` creates a new material.
 ///
 /// # Errors
-/// If there is no such kind of object, or the scene has no such material.
+/// Fails if there is no such kind of object, or the scene has no such material.
 pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<Edit, EditError> {
     let size = usual_size(scene);
     let room = DVec3::splat(size);
@@ -152,7 +152,7 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
 /// light is on.
 ///
 /// # Errors
-/// If there is no such kind.
+/// Fails if there is no such kind.
 pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let BoundingSphere { center, radius } = scene_bounds(scene);
     let center = DVec3::from_array(center);

@@ -16,7 +16,7 @@ use glam::DVec3;
 /// light.
 ///
 /// # Errors
-/// For targets that every scene has exactly once.
+/// Fails for targets that every scene has exactly once.
 pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -80,7 +80,7 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
 /// these objects and parts.
 ///
 /// # Errors
-/// For targets that every scene has.
+/// Fails for targets that every scene has.
 pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -166,7 +166,7 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
 /// of an object or a light may be empty.
 ///
 /// # Errors
-/// For targets without a name, and for a name that is taken or not printable.
+/// Fails for targets without a name, and for a name that is taken or not printable.
 pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -213,7 +213,7 @@ pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditEr
 /// Gives an object its own copy of its material, which no other object uses.
 ///
 /// # Errors
-/// For targets other than objects.
+/// Fails for targets other than objects.
 pub fn own_material(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {
         return Err(EditError::new("only objects have a material", "Select an object."));

@@ -25,7 +25,7 @@ use toml::Value;
 /// the new value; the note of the edit then states the reason.
 ///
 /// # Errors
-/// If there is no such key or number, or no value to start from.
+/// Fails if there is no such key or number, or no value to start from.
 pub fn step(
     scene: &Scene,
     subject: &Target,
@@ -80,7 +80,7 @@ pub fn step(
 /// more choice.
 ///
 /// # Errors
-/// If there is no such key, or it has no choices.
+/// Fails if there is no such key, or it has no choices.
 pub fn toggle(
     scene: &Scene,
     subject: &Target,

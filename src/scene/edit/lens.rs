@@ -19,7 +19,7 @@ const F_NUMBERS: [f64; 2] = [0.1, 1000.0];
 /// Sets the focus of the camera to `point`. A camera that is focused by distance keeps doing so.
 ///
 /// # Errors
-/// If `point` is the eye, or out of range.
+/// Fails if `point` is the eye, or out of range.
 pub fn focus_on(scene: &Scene, point: [f64; 3]) -> Result<Edit, EditError> {
     let mut camera = scene.camera.clone();
     let to = DVec3::from_array(point) - DVec3::from_array(camera.eye);
@@ -38,7 +38,7 @@ pub fn focus_on(scene: &Scene, point: [f64; 3]) -> Result<Edit, EditError> {
 /// closed far enough becomes a pinhole. A camera without a plane in focus gets one.
 ///
 /// # Errors
-/// If the edited scene would be invalid.
+/// Fails if the edited scene would be invalid.
 pub fn change_aperture(scene: &Scene, stops: f64) -> Result<Edit, EditError> {
     let mut camera = scene.camera.clone();
     if camera.focus.is_none() && camera.target.is_none() {

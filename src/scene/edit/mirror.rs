@@ -57,7 +57,7 @@ fn find_mirror(scene: &Scene, selected: Option<&Target>) -> Result<Target, EditE
 /// Changes the mirror's roughness by `steps`, as [`step`] counts them.
 ///
 /// # Errors
-/// If nothing in the scene reflects.
+/// Fails if nothing in the scene reflects.
 pub fn adjust_roughness(
     scene: &Scene,
     selected: Option<&Target>,
@@ -69,7 +69,7 @@ pub fn adjust_roughness(
 /// Changes the mirror's reflection coefficient by `steps`, as [`step`] counts them.
 ///
 /// # Errors
-/// If no material can be the mirror.
+/// Fails if no material can be the mirror.
 pub fn reflect(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<Edit, EditError> {
     step(scene, &find_mirror(scene, selected)?, "reflection", None, steps)
 }
@@ -77,7 +77,7 @@ pub fn reflect(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<E
 /// Gives the mirror the next (or previous) lobe, cyclically.
 ///
 /// # Errors
-/// If nothing in the scene reflects.
+/// Fails if nothing in the scene reflects.
 pub fn next_lobe(
     scene: &Scene,
     selected: Option<&Target>,

@@ -13,7 +13,7 @@ use glam::{DVec2, DVec3};
 /// vertical lines through the centre and the lowest corners of the object.
 ///
 /// # Errors
-/// For targets other than objects, for a plane, which has no lowest point, and if there is no
+/// Fails for targets other than objects, for a plane, which has no lowest point, and if there is no
 /// surface below or above the object.
 pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {

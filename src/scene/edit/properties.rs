@@ -73,7 +73,7 @@ pub struct Property {
 /// are those of another target, [`Target::material`].
 ///
 /// # Errors
-/// If the scene has no such target.
+/// Fails if the scene has no such target.
 pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError> {
     let values = read(scene, subject)?;
     let mut walk = PropertyWalker { scene, subject, rows: Vec::new() };

@@ -14,7 +14,7 @@ use glam::DVec3;
 /// rotations change these two steps.
 ///
 /// # Errors
-/// For targets that cannot be rotated.
+/// Fails for targets that cannot be rotated.
 pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditError> {
     if !degrees.is_finite() {
         return Err(EditError::new("the angle is not a finite number", ""));

@@ -63,7 +63,7 @@ pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edi
 /// Sets one number of the value of `key`; `component` counts from 0.
 ///
 /// # Errors
-/// As [`set`].
+/// The errors of [`set`].
 pub fn set_component(
     scene: &Scene,
     subject: &Target,

@@ -13,7 +13,7 @@ use glam::DVec3;
 /// were a lamp that moves by `by` and stays aimed at the centre of the scene.
 ///
 /// # Errors
-/// For targets that cannot be moved, and for new coordinates beyond the largest valid one.
+/// Fails for targets that cannot be moved, and for new coordinates beyond the largest valid one.
 pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, EditError> {
     if by.iter().any(|x| !x.is_finite()) {
         return Err(EditError::new("the distance is not a finite number", ""));

@@ -9,7 +9,7 @@ use crate::scene::edit::{Edit, EditError, Target};
 /// name. `None` means the first free name of `view`, `view 2` and so on.
 ///
 /// # Errors
-/// If the name is not printable.
+/// Fails if the name is not printable.
 pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError> {
     let name = match given {
         Some(given) => name("name", given)?,
@@ -29,7 +29,7 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
 /// Makes the stored camera `name` the camera of the picture.
 ///
 /// # Errors
-/// If there is no stored camera of that name.
+/// Fails if there is no stored camera of that name.
 pub fn recall_view(scene: &Scene, name: &str) -> Result<Edit, EditError> {
     let subject = Target::View(name.to_string());
     let view = scene.cameras.get(name).ok_or_else(|| EditError::gone(&subject))?;

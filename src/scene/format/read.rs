@@ -34,7 +34,7 @@ impl Scene {
     /// in the scene are relative to the folder of `name`.
     ///
     /// # Errors
-    /// As [`Scene::read`].
+    /// The errors of [`Scene::read`].
     pub fn parse(text: &str, name: &str) -> Result<Self, SceneErrors> {
         Self::parse_in(text, name, AssetResolver::new(Path::new(name), Arc::default()))
     }
@@ -43,7 +43,7 @@ impl Scene {
     /// scene refers to.
     ///
     /// # Errors
-    /// As [`Scene::read`].
+    /// The errors of [`Scene::read`].
     pub fn parse_in(text: &str, name: &str, resolver: AssetResolver) -> Result<Self, SceneErrors> {
         SourceScene::parse(text, name, resolver).map(|source| source.scene)
     }
@@ -65,7 +65,7 @@ impl<'a> SourceScene<'a> {
     /// Parses and validates a scene from `text`. `name` is the file name in diagnostics.
     ///
     /// # Errors
-    /// As [`Scene::read`].
+    /// The errors of [`Scene::read`].
     pub(crate) fn parse(
         text: &'a str,
         name: &'a str,

@@ -139,7 +139,7 @@ impl ViewerImage {
     /// light of an EXR file to 8-bit levels.
     ///
     /// # Errors
-    /// If the file cannot be read or the screen is too small.
+    /// Fails if the file cannot be read or the screen is too small.
     pub fn read(path: &Path, display: &Display, viewport: &ImageViewport) -> Result<Self, String> {
         let (size, pixels) = if path.extension().is_some_and(|e| e == "exr") {
             let picture = read_exr(path)?;

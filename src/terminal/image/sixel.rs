@@ -14,7 +14,7 @@ const MAX_STRIPS: u16 = 16;
 /// output can be sent between strips.
 ///
 /// # Errors
-/// If the image is empty.
+/// Fails if the image is empty.
 pub fn transfer(
     pixels: &[[u8; 3]],
     width: usize,
