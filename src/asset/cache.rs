@@ -5,7 +5,7 @@ use crate::asset::file::{FileContents, MAX_BYTES, read_error};
 use crate::asset::image::Image;
 use crate::asset::mesh::{Mesh, TriangleMesh};
 use crate::asset::radiance_map::RadianceMap;
-use crate::value::{available_memory, megabytes};
+use crate::value::missing_memory;
 use std::collections::HashMap;
 use std::fmt;
 use std::hash::Hash;
@@ -162,9 +162,12 @@ impl Assets {
     /// Any error in the file.
     pub fn mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetError> {
         let read = |key: &Key| {
+            let needed = key.bytes.saturating_mul(TriangleMesh::parse_bytes(path));
+            check_memory(path, "the file", needed)?;
             let triangles = TriangleMesh::parse(self.read(path, key, MAX_BYTES)?)?;
             let count = triangles.triangles.len();
-            check_build_memory(path, count)?;
+            let tree = format!("the tree over {count} triangles");
+            check_memory(path, &tree, (count as u64).saturating_mul(BUILD_BYTES))?;
             (self.progress)(&LoadProgress::Building { file: path.to_path_buf(), triangles: count });
             Ok(Mesh::new(triangles))
         };
@@ -195,25 +198,20 @@ impl Assets {
     }
 }
 
-/// Checks that there is memory to build the BVH of a mesh of `triangles` triangles.
+/// Checks that there are `needed` bytes of memory for a part of the mesh in the file at `path`, which
+/// `what` names.
 ///
 /// # Errors
 /// States both sums and the remedy.
-fn check_build_memory(path: &Path, triangles: usize) -> Result<(), AssetError> {
-    let needed = (triangles as u64).saturating_mul(BUILD_BYTES);
-    match available_memory() {
-        Some(available) if available.bytes < needed => Err(AssetError {
+fn check_memory(path: &Path, what: &str, needed: u64) -> Result<(), AssetError> {
+    match missing_memory(needed) {
+        Some(missing) => Err(AssetError {
             file: path.to_path_buf(),
             place: FileLocation::Whole,
-            found: format!(
-                "the tree over {triangles} triangles needs {} of memory, and {} are available ({})",
-                megabytes(needed),
-                megabytes(available.bytes),
-                available.limit
-            ),
+            found: format!("{what} {missing}"),
             expected: "a mesh of fewer triangles, or more free memory".to_string(),
         }),
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 

@@ -1,5 +1,6 @@
 //! The command line: parses arguments and runs subcommands.
 
+mod arenas;
 mod args;
 mod check;
 mod checkpoints;
@@ -21,6 +22,7 @@ mod signals;
 mod stats;
 mod watch;
 
+pub use arenas::limit as limit_arenas;
 pub use cpu::require as require_cpu;
 
 use crate::disk;

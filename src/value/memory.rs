@@ -24,6 +24,21 @@ pub fn available_memory() -> Option<Available> {
     known.min_by_key(|available| available.bytes)
 }
 
+/// Memory of the program beside the data that callers of [`missing_memory`] count: stacks of threads,
+/// buffers, fragmentation \[bytes\].
+const RESERVE: u64 = 32 << 20;
+
+/// Compares `needed` bytes, and a reserve for the rest of the program, with the available memory.
+/// Returns both sums as a phrase if the memory does not suffice, such as `needs 210 MB of memory, and
+/// 88 MB are available (the free memory of this machine)`.
+pub fn missing_memory(needed: u64) -> Option<String> {
+    let Available { bytes, limit } = available_memory()?;
+    let needed = needed.saturating_add(RESERVE);
+    let [sum, available] = [needed, bytes].map(megabytes);
+    (bytes < needed)
+        .then(|| format!("needs {sum} of memory, and {available} are available ({limit})"))
+}
+
 /// Physical memory of this process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ResidentMemory {
@@ -47,6 +62,11 @@ pub fn megabytes(bytes: u64) -> String {
         mb if mb < 1e3 => format!("{mb:.0} MB"),
         mb => format!("{:.1} GB", mb * 1e-3),
     }
+}
+
+/// Returns `true` if a resource limit (`ulimit -v`) limits the address space of this process.
+pub fn address_space_is_limited() -> bool {
+    free_address_space().is_some()
 }
 
 /// Address space that the resource limit leaves; `None` without a limit.
@@ -153,6 +173,14 @@ mod tests {
         let available = available_memory().unwrap();
         assert!(available.bytes > 1 << 20, "{available:?}");
         assert!(free_in_machine().unwrap() >= available.bytes);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn missing_memory_states_both_sums() {
+        let missing = missing_memory(1 << 60).unwrap();
+        assert!(missing.starts_with("needs 1152921504.6 GB of memory, and "), "{missing}");
+        assert!(missing_memory(u64::MAX).is_some());
     }
 
     #[test]

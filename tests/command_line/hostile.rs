@@ -1,6 +1,7 @@
 //! Hostile input: control characters in names and texts, and scenes that name files outside of their folder.
 
 use super::*;
+use std::fmt::Write;
 
 /// Sets the clipboard (OSC 52), colours (C0 and C1), and reorders what follows.
 const EVIL: &str =
@@ -242,5 +243,64 @@ fn sizes_are_checked_before_allocation() {
         let run = Run::from(command.current_dir(desk.0.path()).output().unwrap());
         assert_eq!(run.status, 1, "{name}: {}", run.err);
         assert!(run.err.contains(name), "{name}: {}", run.err);
+    }
+}
+
+/// A scene or mesh that does not fit into the address space is refused with its sum, at any limit. It
+/// must not end in a failed allocation.
+#[test]
+#[cfg(target_os = "linux")]
+fn scenes_and_meshes_that_do_not_fit_are_refused() {
+    const COUNT: usize = 20_000;
+    let desk = Desk::new();
+    let corner = |i: usize| [i % 300, i / 300];
+    let mut spheres = SCENE.to_string();
+    let mut obj = String::new();
+    let mut stl = vec![0; 80];
+    stl.extend((COUNT as u32).to_le_bytes());
+    for i in 0..COUNT {
+        let [x, y] = corner(i);
+        write!(
+            spheres,
+            "[[object]]\nmaterial = \"red\"\nshape.sphere = {{ center = [{x}, {y}, 0], radius = 0.4 }}\n"
+        )
+        .unwrap();
+        let face = [3 * i + 1, 3 * i + 2, 3 * i + 3];
+        let [a, b, c] = [[x, y], [x + 1, y], [x, y + 1]];
+        for [x, y] in [a, b, c] {
+            writeln!(obj, "v {x} {y} 0").unwrap();
+        }
+        writeln!(obj, "f {} {} {}", face[0], face[1], face[2]).unwrap();
+        let numbers = [[0; 2], a, b, c].map(|[x, y]| [x as f32, y as f32, 0.0]);
+        stl.extend(numbers.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+        stl.extend([0; 2]);
+    }
+    let equal_faces = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}", "f 1 2 3\n".repeat(COUNT));
+    fs::write(desk.path("spheres.toml"), spheres).unwrap();
+    let files = [("m.obj", obj.into_bytes()), ("m.stl", stl), ("equal.obj", equal_faces.into())];
+    let mut scenes = vec!["spheres.toml".to_string()];
+    for (name, bytes) in files {
+        fs::write(desk.path(name), bytes).unwrap();
+        let object = "\n[[object]]\nmaterial = \"red\"\n";
+        let scene = format!("{SCENE}{object}shape.mesh = {{ file = \"{name}\" }}\n");
+        scenes.push(format!("{name}.toml"));
+        fs::write(desk.path(&scenes[scenes.len() - 1]), scene).unwrap();
+    }
+    for scene in &scenes {
+        let mut fits = false;
+        for megabytes in (30..=150).step_by(20) {
+            let limit = format!("ulimit -v {}", 1000 * megabytes);
+            let command = format!("exec \"$0\" render {scene} -o a.png --spp 2 --threads 2");
+            let mut shell = Command::new("sh");
+            shell.args(["-c", &format!("{limit}; {command}"), env!("CARGO_BIN_EXE_zerkalo")]);
+            let output = shell.current_dir(desk.0.path()).output().unwrap();
+            let errors = String::from_utf8_lossy(&output.stderr);
+            let status = output.status;
+            fits |= status.success();
+            let refused =
+                status.code() == Some(1) && errors.contains("available (the limit on address");
+            assert!(status.success() || refused, "{command}, {limit}: {status} {errors}");
+        }
+        assert!(fits, "{scene} fits into 150 MB");
     }
 }

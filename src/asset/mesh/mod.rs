@@ -13,6 +13,7 @@ pub use bvh::{Mesh, TriangleBlock};
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
 use crate::value::Fnv1a64;
+use std::path::Path;
 
 /// Largest number of triangles of a mesh: 64 Mi.
 pub const MAX_TRIANGLES: usize = 1 << 26;
@@ -72,6 +73,13 @@ impl TriangleMesh {
         let lengths = [positions.len(), triangles.len(), colors.len()];
         lengths.iter().for_each(|n| hash.update(&(*n as u64).to_le_bytes()));
         hash.update(&[u8::from(normals.is_some()), u8::from(uvs.is_some())]);
+    }
+
+    /// Memory for each byte of the file at `path` while it is parsed \[bytes\]. The largest measured
+    /// values are 8.5 for OBJ, whose positions are read as doubles into vectors that grow, and 5 for
+    /// the other formats.
+    pub(super) fn parse_bytes(path: &Path) -> u64 {
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) { 10 } else { 6 }
     }
 
     /// Parses a file in memory. The format is determined by the extension of the file name.

@@ -6,6 +6,7 @@ use crate::scene::format::parts::{PART_BYTES, Part, split};
 use crate::scene::format::schema;
 use crate::scene::format::source_map::{line_column, locate};
 use crate::scene::{AssetResolver, Scene};
+use crate::value::missing_memory;
 use serde::Deserialize;
 use std::fs::File;
 use std::io::{self, Read};
@@ -16,6 +17,10 @@ use toml::de::{DeTable, Deserializer};
 
 /// Largest scene file that is read [bytes]. A file of this size has about a million objects.
 const MAX_BYTES: u64 = 64 << 20;
+
+/// Memory for each byte of a scene file, while it is read and while its world is compiled \[bytes\].
+/// A million spheres in 53 MB take 768 MB; files with shorter objects take more for a byte.
+const SCENE_BYTES: u64 = 20;
 
 impl Scene {
     /// Reads and validates the scene file at `path`.
@@ -218,6 +223,11 @@ pub(crate) fn read_text(
     let metadata = file.metadata().map_err(io)?;
     if metadata.is_dir() {
         return Err(fail("this is a directory", "Expected a scene file (TOML)."));
+    }
+    let needed = metadata.len().min(MAX_BYTES).saturating_mul(SCENE_BYTES);
+    if let Some(missing) = missing_memory(needed) {
+        let help = "Expected fewer objects, or more free memory.";
+        return Err(fail(&format!("the scene {missing}"), help));
     }
     let mut bytes = Vec::new();
     // Reading stops one byte above the limit: this byte shows that a file is too large, and an

@@ -1,0 +1,28 @@
+//! Number of the allocator's arenas under a limit on address space.
+//!
+//! The allocator of glibc reserves an arena of 64 MB of address space for each thread. Under
+//! `ulimit -v` the arenas of a few threads take all of it, and allocations of a few bytes fail while
+//! most of the memory is free. With one arena no address space is lost. The number of arenas is read
+//! from the environment at the start of a process.
+
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+const VARIABLE: &str = "MALLOC_ARENA_MAX";
+
+/// Starts the program again with one arena, in the same process, if its address space is limited and
+/// the environment does not set the number of arenas. Returns otherwise, and if that fails.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+pub fn limit() {
+    use std::os::unix::process::CommandExt;
+    use std::process::Command;
+    if !crate::value::address_space_is_limited() || std::env::var_os(VARIABLE).is_some() {
+        return;
+    }
+    let mut arguments = std::env::args_os();
+    let (Ok(program), Some(name)) = (std::env::current_exe(), arguments.next()) else { return };
+    // `exec` returns only if it fails. The program then runs with the arenas that it has.
+    let _ = Command::new(program).arg0(name).args(arguments).env(VARIABLE, "1").exec();
+}
+
+/// Does nothing: other allocators have no arenas of this kind.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub fn limit() {}
