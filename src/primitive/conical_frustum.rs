@@ -258,10 +258,10 @@ impl<L: SimdFloat> Chord<L> {
 ///
 /// Steps are counted from the line's point closest to the solid's middle, so that a distant origin
 /// costs no precision. With p the point, d the direction, r the radius at p and k the slope, the
-/// side is crossed where a t^2 + 2 b t + c = 0. The discriminant is computed as |r d' - k d_z p'|^2
-/// - (p' x d')^2 (primes: without z), which does not cancel as b^2 - a c does; for a cylinder it
-/// compares the radius with the line's distance from the axis. The roots are computed as q / a and
-/// c / q, so that for a = 0, a line parallel to a generator, one of them stays finite.
+/// side is crossed where a t^2 + 2 b t + c = 0. The discriminant is computed as
+/// |r d' - k d_z p'|^2 - (p' x d')^2 (primes: without z), which does not cancel as b^2 - a c does; for
+/// a cylinder it compares the radius with the line's distance from the axis. The roots are computed
+/// as q / a and c / q, so that for a = 0, a line parallel to a generator, one of them stays finite.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let (zero, half) = (L::zero(), L::from_f64(0.5));
