@@ -207,6 +207,16 @@ fn diffuse_bounces_agree_with_reference_tracer() {
         ("environment.toml", 1, 16, true),
         ("environment.toml", 3, 4, false),
         ("open box in an environment", 3, 4, true),
+        ("rectangle-light.toml", 4, 16, true),
+        ("rectangle-light.toml", 2, 4, false),
+        ("lamp-and-mirror.toml", 4, 8, true),
+        ("sphere-light.toml", 1, 16, true),
+        ("disk-light.toml", 2, 3, false),
+        ("spot-light.toml", 3, 4, true),
+        ("emissive-objects.toml", 4, 4, false),
+        ("rough-glass.toml", 2, 5, true),
+        ("absorbing-glass.toml", 2, 5, true),
+        ("depth-of-field.toml", 3, 4, true),
     ] {
         let mut scene =
             if name.contains(' ') { small(parsed(OPEN_BOX)) } else { small(shipped(name)) };
