@@ -189,11 +189,15 @@ mod tests {
             let write = |bands: &mut dyn Bands| {
                 let path = folder.path().join(name);
                 ImageOutput::from_path(&path).unwrap().write(&picture, bands).unwrap();
-                assert_eq!(FileMetadata::read(&path).unwrap().get("Noise"), Some("0.5 8-bit levels"));
+                assert_eq!(
+                    FileMetadata::read(&path).unwrap().get("Noise"),
+                    Some("0.5 8-bit levels")
+                );
                 fs::read(path).unwrap()
             };
             let late = write(&mut Late { film: &film, rows: 0 });
-            let known = write(&mut WholeFilm { film: &film, metadata: &entries("0.5 8-bit levels") });
+            let known =
+                write(&mut WholeFilm { film: &film, metadata: &entries("0.5 8-bit levels") });
             assert!(late == known, "{name}");
         }
     }

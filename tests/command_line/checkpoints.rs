@@ -188,7 +188,7 @@ fn info_prints_the_origin_of_pictures_and_checkpoints() {
             "fnv1a64:",
             "42\n",
             "8.00 (8-8)",
-            "codes",
+            "8-bit levels",
             "single precision",
             "scene: scene.toml and the files that it names are those of",
         ] {
