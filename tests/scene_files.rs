@@ -160,7 +160,7 @@ fn unreadable_scene_files_are_reported() {
 #[test]
 fn endless_device_is_read_up_to_the_size_limit() {
     let error = Scene::read("/dev/zero".as_ref()).unwrap_err().to_string();
-    assert!(error.contains("larger than 64 MiB"), "{error}");
+    assert!(error.contains("larger than 256 MiB"), "{error}");
 }
 
 #[test]

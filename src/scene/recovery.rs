@@ -7,6 +7,7 @@
 //! other processes never see the file of a running process unlocked.
 
 use crate::disk::{TEMPORARY, is_own, lock, open_regular_with, user_name};
+use crate::scene::format::read::MAX_BYTES;
 use crate::value::fnv1a64;
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, DirBuilder, File, Metadata, TryLockError};
@@ -19,8 +20,6 @@ use tempfile::NamedTempFile;
 /// Largest number of recovery files of one scene in one folder, from crashed or concurrent
 /// sessions.
 const MAX_FILES: u32 = 9;
-/// Size above which a file is not read [bytes].
-const MAX_BYTES: u64 = 64 << 20;
 /// Start of the first line of a recovery file; the fingerprint of the scene's file follows.
 const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
 /// Word in place of the fingerprint if the scene had no file.

@@ -114,14 +114,14 @@ fn unreadable_recovery_file_is_reported_and_stays() {
     fs::create_dir(hidden("-4")).unwrap();
     fs::write(hidden("-5"), "plain = true").unwrap();
     let large = File::create(hidden("-6")).unwrap();
-    large.set_len((64 << 20) + 1).unwrap();
+    large.set_len((256 << 20) + 1).unwrap();
     let found = of(&path).find();
     assert_eq!(texts(&found), ["plain = true"], "empty ones are nothing");
     assert_eq!(found.orphans[0].base, None);
     let why: Vec<_> = found.unreadable.iter().map(|(_, why)| why.as_str()).collect();
     assert_eq!(
         why,
-        ["it is not UTF-8 text", "it is not a regular file", "it is larger than 64 MiB"]
+        ["it is not UTF-8 text", "it is not a regular file", "it is larger than 256 MiB"]
     );
     assert_eq!(
         names(folder.path()),

@@ -15,8 +15,8 @@ use std::sync::Arc;
 
 use toml::de::{DeTable, Deserializer};
 
-/// Largest scene file that is read [bytes]. A file of this size has about a million objects.
-const MAX_BYTES: u64 = 64 << 20;
+/// Largest scene file that is read [bytes]. A file of this size has about four million objects.
+pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
 /// Memory for each byte of a scene file, while it is read and while its world is compiled \[bytes\].
 /// A million spheres in 53 MB take 768 MB; files with shorter objects take more for a byte.
