@@ -341,8 +341,8 @@ fn a16_demonstrations() {
 }
 
 /// Renders the scene until it is finished, with a checkpoint after the first samples if `path` is
-/// given, and returns its film.
-fn film_of(session: &mut Session, generation: u64, path: Option<&Path>) -> Vec<u8> {
+/// given. Returns its film and its number of rays.
+fn film_of(session: &mut Session, generation: u64, path: Option<&Path>) -> (Vec<u8>, u64) {
     let mut path = path;
     loop {
         let snapshot = session.wait(Duration::from_secs(60)).expect("a report");
@@ -362,7 +362,8 @@ fn film_of(session: &mut Session, generation: u64, path: Option<&Path>) -> Vec<u
             receiver.recv().unwrap().expect("a picture").write(path).unwrap();
         }
         if let State::Finished(_) = report.state {
-            return session.with(|state, _| state.film.bytes()).expect("a film");
+            let film = session.with(|state, _| state.film.bytes()).expect("a film");
+            return (film, report.rays);
         }
     }
 }
@@ -383,7 +384,9 @@ fn a19_checkpoints() {
     let samples = checkpoint.film().samples();
     let mut second = start();
     let generation = second.continue_from(Arc::clone(&scene), checkpoint);
-    assert!(film_of(&mut second, generation, None) == whole, "other samples after {samples}");
+    let (film, rays) = film_of(&mut second, generation, None);
+    assert!(film == whole.0, "other samples after {samples}");
+    assert_eq!(rays, whole.1, "rays after {samples} samples");
     // The checkpoint was taken before the end.
     let end = second.with(|state, _| state.film.samples()).unwrap();
     assert!(samples < end, "{samples} samples of {end}");
