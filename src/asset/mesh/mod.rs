@@ -75,9 +75,9 @@ impl TriangleMesh {
         hash.update(&[u8::from(normals.is_some()), u8::from(uvs.is_some())]);
     }
 
-    /// Memory for each byte of the file at `path` while it is parsed \[bytes\], an upper bound. OBJ
-    /// needs more than other formats, because its positions are read as doubles into vectors that
-    /// grow.
+    /// Memory for each byte of the file at `path` while it is parsed \[bytes\]. OBJ needs more than
+    /// other formats, because its positions are read as doubles into vectors that grow. The value
+    /// does not count buffers of glTF in files of their own.
     pub(super) fn parse_bytes(path: &Path) -> u64 {
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) { 10 } else { 6 }
     }
