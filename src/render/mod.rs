@@ -3,7 +3,7 @@
 
 mod checkpoint;
 pub mod export;
-mod feature_buffer;
+mod first_hit_buffer;
 mod first_pass;
 pub mod memory;
 pub mod pass;
@@ -17,7 +17,7 @@ mod sync_render;
 pub mod wave;
 
 pub use checkpoint::{Checkpoint, EncodedCheckpoint, SampleInputs};
-pub use feature_buffer::FeatureBuffer;
+pub use first_hit_buffer::FirstHitBuffer;
 pub use region_render::RegionRender;
 pub use relighting::Relighting;
 pub use render_state::{Options, RenderState};

@@ -158,7 +158,7 @@ fn light_changes_keep_samples() {
     // The client's relit old snapshot equals the new snapshot.
     assert_eq!(after.mix, mix);
     assert_eq!(before.picture.unwrap().mixed(&mix), after.picture.unwrap().mixed(&after.mix));
-    assert_eq!(after.guide, before.guide);
+    assert_eq!(after.first_hits, before.first_hits);
     // A name, an unused material, a depth limit that no path reaches.
     let mut renamed = newer.clone();
     renamed.lights[0].name = "sun".to_string();
@@ -333,12 +333,12 @@ fn snapshot_picture_features_and_generation_match() {
             let red = picture.mixed(&snapshot.mix)[0][0];
             assert!((red - 0.01 * (number % 50 + 1) as f32).abs() < 1e-5, "{number}: {red}");
             // On a busy machine the first picture may lack them.
-            let Some(guide) = snapshot.guide else { continue };
-            assert_eq!((guide.columns, guide.rows), (picture.cols, picture.rows));
-            let sight = guide.at(guide.columns / 2, 2).unwrap();
+            let Some(hits) = snapshot.first_hits else { continue };
+            assert_eq!((hits.columns, hits.rows), (picture.cols, picture.rows));
+            let hit = hits.at(hits.columns / 2, 2).unwrap();
             let axis = (wall(number).camera.eye[2] + 1.0) as f32;
-            assert!(sight.depth >= axis * 0.999 && sight.depth < axis * 1.1, "{number} {sight:?}");
-            assert_eq!((sight.object, sight.reflects), (Some(0), false));
+            assert!(hit.depth >= axis * 0.999 && hit.depth < axis * 1.1, "{number} {hit:?}");
+            assert_eq!((hit.object, hit.reflects), (Some(0), false));
             seen += 1;
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::stories::desk::Desk;
 use crate::support::{pool, rendered, sized};
-use zerkalo::render::{FeatureBuffer, RenderState};
+use zerkalo::render::{FirstHitBuffer, RenderState};
 use zerkalo::scene::{BUILT_IN, Scene};
 use zerkalo::value::Color;
 use zerkalo::world::{FirstHit, Precision};
@@ -59,7 +59,7 @@ fn roughness_changes_only_pixels_of_the_mirror() {
     let [width, height] = SIZE.map(|n| n as usize);
     let size = [width, height];
     let look = |points: &[[f64; 2]], seen: &mut [FirstHit]| before.world.first_hit(points, seen);
-    let seen = FeatureBuffer::new(size, size, look, &pool(2));
+    let seen = FirstHitBuffer::new(size, size, look, &pool(2));
     let mirror = smooth.objects.iter().position(|o| o.name == "mirror").unwrap() as u32;
     let others = changed(&before, &marked(&smooth, |name| name != "mirror"));
     let shows = |i: &usize| seen.texels()[*i].object == Some(mirror) && others[*i];

@@ -86,8 +86,8 @@ impl PictureView {
                 })
             }
             DisplayChannel::Objects | DisplayChannel::Normals | DisplayChannel::Depth => {
-                let guide = snapshot.guide.as_deref()?;
-                let (columns, rows, texels) = (guide.columns, guide.rows, guide.texels());
+                let buffer = snapshot.first_hits.as_deref()?;
+                let (columns, rows, texels) = (buffer.columns, buffer.rows, buffer.texels());
                 let hit = |i: usize| texels.get(i).filter(|s| s.object.is_some());
                 let all = columns * rows;
                 let raster = match channel {

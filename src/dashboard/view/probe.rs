@@ -86,9 +86,9 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
 /// Returns the label of the object that is visible at a film pixel (column, row). Returns `None` if
 /// there is none, or if the snapshot has no object ids.
 fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
-    let guide = model.snapshot.as_ref()?.guide.as_deref()?;
+    let hits = model.snapshot.as_ref()?.first_hits.as_deref()?;
     let [width, height] = model.scene().film.size.map(|n| n.max(1) as usize);
-    let object = guide.at(x * guide.columns / width, y * guide.rows / height)?.object?;
+    let object = hits.at(x * hits.columns / width, y * hits.rows / height)?.object?;
     let subject = Target::Object(object as usize);
     subject.exists(model.scene()).then(|| subject.label(model.scene()))
 }

@@ -3,7 +3,7 @@
 use crate::film::{Film, IncrementalDownsample, TileNoise};
 use crate::render::checkpoint::{Checkpoint, EncodedCheckpoint};
 use crate::render::export::Provenance;
-use crate::render::feature_buffer::FeatureBuffer;
+use crate::render::first_hit_buffer::FirstHitBuffer;
 use crate::render::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings};
 use crate::render::session::Shared;
 use crate::render::session::report::{QUALITIES, Report, State};
@@ -25,11 +25,11 @@ const PIECE_SECONDS: [f64; 2] = [0.05, 0.25];
 const JOB_SECONDS: f64 = 0.005;
 /// Number of pixels of a tile.
 const TILE_PIXELS: f64 = crate::film::TILE_PIXELS as f64;
-/// Longest expected duration of a feature buffer (first hits) that is traced before the first
+/// Longest expected duration of a first-hit buffer that is traced before the first
 /// picture, in seconds.
-const FIRST_FEATURES_SECONDS: f64 = 0.002;
-/// Assumed seconds per ray of the first feature buffer: the value of a small scene.
-const FEATURE_RAY_SECONDS: f64 = 5e-8;
+const FIRST_HITS_SECONDS: f64 = 0.002;
+/// Assumed seconds per ray of the first first-hit buffer: the value of a small scene.
+const FIRST_HIT_RAY_SECONDS: f64 = 5e-8;
 
 /// Resources of a render, and the destination of its snapshots.
 pub(super) struct WorkContext<'a> {
@@ -73,9 +73,9 @@ pub(super) struct ActiveRender {
     throughput: Throughput,
     inventory: Arc<str>,
     downsample: Option<IncrementalDownsample>,
-    features: Option<Arc<FeatureBuffer>>,
-    /// Measured seconds per ray of the latest feature buffer.
-    feature_ray_seconds: f64,
+    first_hits: Option<Arc<FirstHitBuffer>>,
+    /// Measured seconds per ray of the latest first-hit buffer.
+    first_hit_ray_seconds: f64,
 }
 
 impl ActiveRender {
@@ -90,8 +90,9 @@ impl ActiveRender {
         previous: Option<Self>,
     ) -> Result<Self, String> {
         let started = Instant::now();
-        let feature_ray_seconds =
-            previous.as_ref().map_or(FEATURE_RAY_SECONDS, |previous| previous.feature_ray_seconds);
+        let first_hit_ray_seconds = previous
+            .as_ref()
+            .map_or(FIRST_HIT_RAY_SECONDS, |previous| previous.first_hit_ray_seconds);
         let state = RenderState::checked(scene, options, previous.map(|previous| previous.state))?;
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
         Ok(Self {
@@ -104,8 +105,8 @@ impl ActiveRender {
             throughput: Throughput::default(),
             inventory: Arc::from(state.world.inventory().to_string()),
             downsample: None,
-            features: None,
-            feature_ray_seconds,
+            first_hits: None,
+            first_hit_ray_seconds,
             state,
         })
     }
@@ -134,8 +135,8 @@ impl ActiveRender {
             throughput: Throughput::default(),
             inventory: Arc::from(resumed.state.world.inventory().to_string()),
             downsample: None,
-            features: None,
-            feature_ray_seconds: FEATURE_RAY_SECONDS,
+            first_hits: None,
+            first_hit_ray_seconds: FIRST_HIT_RAY_SECONDS,
             state: resumed.state,
         };
         if resumed.is_relit {
@@ -220,7 +221,7 @@ impl ActiveRender {
             self.throughput.record(self.seconds(), self.schedule.samples());
             return;
         }
-        self.update_features(context, FIRST_FEATURES_SECONDS);
+        self.update_first_hits(context, FIRST_HITS_SECONDS);
         let coarse = self.report(context, State::Tracing);
         let (frame, downsample) = (self.frame(context), &mut self.downsample);
         let start = Instant::now();
@@ -270,25 +271,25 @@ impl ActiveRender {
         (seconds > 0.0).then(|| self.schedule.samples() as f64 / seconds)
     }
 
-    /// Traces the feature buffer for the view, unless there is one already or it would take longer
+    /// Traces the first-hit buffer for the view, unless there is one already or it would take longer
     /// than `limit` seconds.
-    fn update_features(&mut self, context: &WorkContext, limit: f64) {
+    fn update_first_hits(&mut self, context: &WorkContext, limit: f64) {
         let Some([columns, rows]) = context.view.raster else { return };
-        if self.features.as_ref().is_some_and(|f| [f.columns, f.rows] == [columns, rows]) {
+        if self.first_hits.as_ref().is_some_and(|f| [f.columns, f.rows] == [columns, rows]) {
             return;
         }
-        self.features = None;
+        self.first_hits = None;
         let rays = (columns * rows) as f64;
-        if rays * self.feature_ray_seconds > limit {
+        if rays * self.first_hit_ray_seconds > limit {
             return;
         }
         let start = Instant::now();
         let RenderState { world, film, .. } = &self.state;
         let size = [film.width(), film.height()];
-        let first_hits = |points: &[[f64; 2]], hits: &mut [_]| world.first_hit(points, hits);
-        let features = FeatureBuffer::new(size, [columns, rows], first_hits, context.pool);
-        self.features = Some(Arc::new(features));
-        self.feature_ray_seconds = start.elapsed().as_secs_f64() / rays.max(1.0);
+        let trace = |points: &[[f64; 2]], hits: &mut [_]| world.first_hit(points, hits);
+        let first_hits = FirstHitBuffer::new(size, [columns, rows], trace, context.pool);
+        self.first_hits = Some(Arc::new(first_hits));
+        self.first_hit_ray_seconds = start.elapsed().as_secs_f64() / rays.max(1.0);
     }
 
     fn frame(&self, context: &WorkContext) -> Frame {
@@ -297,7 +298,7 @@ impl ActiveRender {
             mix: self.state.mix.clone(),
             display: self.state.display(),
             lighting: Some(Arc::clone(self.state.lighting())),
-            guide: self.features.clone(),
+            first_hits: self.first_hits.clone(),
         }
     }
 
@@ -308,7 +309,7 @@ impl ActiveRender {
         if !context.snapshot_wanted(is_final) || self.first_picture_after.is_none() {
             return;
         }
-        self.update_features(context, f64::INFINITY);
+        self.update_first_hits(context, f64::INFINITY);
         let (frame, report) = (self.frame(context), self.report(context, state));
         let noise = match report.noise {
             Some(_) => self.schedule.tile_noise_codes(),

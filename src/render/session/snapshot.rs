@@ -3,7 +3,7 @@
 use crate::film::{
     DirtyTile, Display, Film, IncrementalDownsample, LightWeights, Probe, Thumbnail,
 };
-use crate::render::feature_buffer::FeatureBuffer;
+use crate::render::first_hit_buffer::FirstHitBuffer;
 use crate::render::relighting::Relighting;
 use crate::render::session::report::Report;
 use crate::scene::Scene;
@@ -13,8 +13,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Contents of snapshots that a client requests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct View {
-    /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::guide`]. `None` requests neither
-    /// picture nor feature buffer nor tile maps.
+    /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::first_hits`]. `None` requests
+    /// neither picture nor first-hit buffer nor tile maps.
     pub raster: Option<[usize; 2]>,
     /// Column and row of the pixel to probe. `None` requests no probe.
     pub probe: Option<[usize; 2]>,
@@ -34,7 +34,7 @@ pub struct Snapshot {
     pub lighting: Option<Arc<Relighting>>,
     /// First hit in each cell of [`View::raster`]. If it takes long to trace, it is part of the
     /// snapshot after the first picture.
-    pub guide: Option<Arc<FeatureBuffer>>,
+    pub first_hits: Option<Arc<FirstHitBuffer>>,
     /// Error and number of samples of each tile.
     pub tiles: Arc<TileMaps>,
     /// Probe of the requested pixel. `None` if the pixel is outside of the film or no probe is
@@ -50,7 +50,7 @@ impl Snapshot {
             picture: None,
             mix: LightWeights { weights: Vec::new() },
             lighting: None,
-            guide: None,
+            first_hits: None,
             tiles: Arc::default(),
             probe: None,
         }
@@ -95,7 +95,7 @@ pub(super) struct Frame {
     pub mix: LightWeights,
     pub display: Display,
     pub lighting: Option<Arc<Relighting>>,
-    pub guide: Option<Arc<FeatureBuffer>>,
+    pub first_hits: Option<Arc<FirstHitBuffer>>,
 }
 
 impl Frame {
@@ -130,7 +130,7 @@ impl Frame {
             picture,
             mix: self.mix.clone(),
             lighting: self.lighting.clone(),
-            guide: self.guide.clone(),
+            first_hits: self.first_hits.clone(),
             tiles,
             probe,
         }

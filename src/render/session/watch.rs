@@ -244,7 +244,7 @@ impl Worker {
             mix: header.weights.clone(),
             display: self.display.unwrap_or(header.display),
             lighting: None,
-            guide: None,
+            first_hits: None,
         };
         let downsample = &mut self.downsample;
         let snapshot =

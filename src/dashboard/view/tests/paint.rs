@@ -30,7 +30,7 @@ fn rendered(model: &Model, spp: u32) -> Snapshot {
     session.set_scene(Arc::clone(model.scene()));
     loop {
         let snapshot = session.wait(Duration::from_secs(60)).expect("a snapshot in time");
-        if matches!(snapshot.report.state, State::Finished(_)) && snapshot.guide.is_some() {
+        if matches!(snapshot.report.state, State::Finished(_)) && snapshot.first_hits.is_some() {
             return snapshot;
         }
     }

@@ -72,7 +72,7 @@ pub fn snapshot(report: Report) -> Snapshot {
         picture: None,
         mix: LightWeights { weights: Vec::new() },
         lighting: None,
-        guide: None,
+        first_hits: None,
         tiles: Arc::new(TileMaps {
             columns: 40,
             rows: 30,

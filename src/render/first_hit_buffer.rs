@@ -1,4 +1,4 @@
-//! Feature buffer: the first hit of a camera ray in each cell of a display raster.
+//! First-hit buffer: the first hit of a camera ray in each cell of a display raster.
 
 use crate::world::FirstHit;
 use rayon::prelude::*;
@@ -9,7 +9,7 @@ const CHUNK: usize = 512;
 /// First hits of the camera rays through the centres of a raster's cells. The raster covers the
 /// whole picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FeatureBuffer {
+pub struct FirstHitBuffer {
     /// Number of cells in a row.
     pub columns: usize,
     /// Number of rows.
@@ -18,7 +18,7 @@ pub struct FeatureBuffer {
     texels: Vec<FirstHit>,
 }
 
-impl FeatureBuffer {
+impl FirstHitBuffer {
     /// Traces one ray through the centre of each cell of a raster of `columns` x `rows` cells over
     /// a film of `width` x `height` pixels. `first_hits` gets points of the film in pixels, and
     /// writes the first hits of their camera rays (see
