@@ -13,14 +13,14 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::SystemTime;
 
-/// Largest memory for files that no scene uses any more, in bytes: 256 MiB. Such files are kept
-/// because an edit may be undone.
+/// Largest memory for cached files that no scene uses any more \[bytes\]. Such files are kept
+/// because an undo may bring them back.
 const UNUSED_BYTES: usize = 256 << 20;
 
 /// Largest size of an image file in bytes: 512 MiB.
 const MAX_IMAGE_BYTES: u64 = 512 << 20;
 
-/// Largest memory for each triangle while the BVH of a mesh is built \[bytes\].
+/// Peak memory per triangle during the build of a mesh's BVH \[bytes\].
 const BUILD_BYTES: u64 = 400;
 
 /// Stage of loading a file that can take a noticeable time.
@@ -57,8 +57,8 @@ impl fmt::Display for LoadProgress {
     }
 }
 
-/// Cache key: identity of the content of a file. A file with another modification time or length
-/// has other content.
+/// Cache key of a file. A file with the same path and another modification time or length has
+/// another key.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Key {
     path: PathBuf,
@@ -70,7 +70,8 @@ struct Key {
 /// read.
 type CacheEntry<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
 
-/// LRU cache of files of one type. The second value of each entry is the number of its last use.
+/// LRU cache of files of one type. The second value of each entry is the use counter at its last
+/// use.
 struct Cache<T> {
     files: HashMap<Key, (CacheEntry<T>, u64)>,
     last_used: u64,
@@ -92,8 +93,8 @@ impl<T> Cache<T> {
         entry.clone()
     }
 
-    /// Evicts unused files, least recently used first, until the remaining unused ones take at most
-    /// [`UNUSED_BYTES`].
+    /// Evicts unused files, the least recently used first, until the remaining unused files take at
+    /// most [`UNUSED_BYTES`].
     fn evict(&mut self, bytes_of: impl Fn(&T) -> usize) {
         let mut unused: Vec<(u64, usize, Key)> = self
             .files
@@ -159,7 +160,7 @@ impl Assets {
     /// Returns the mesh in the file at `path`.
     ///
     /// # Errors
-    /// Any error in the file.
+    /// Fails if the file cannot be read or is not a valid mesh.
     pub fn mesh(&self, path: &Path) -> Result<Arc<Mesh>, AssetError> {
         let read = |key: &Key| {
             let needed = key.bytes.saturating_mul(TriangleMesh::parse_bytes(path));
@@ -177,7 +178,7 @@ impl Assets {
     /// Returns the image in the file at `path`.
     ///
     /// # Errors
-    /// Any error in the file.
+    /// Fails if the file cannot be read or is not a valid image.
     pub fn image(&self, path: &Path) -> Result<Arc<Image>, AssetError> {
         let read = |key: &Key| Image::parse(&self.read(path, key, MAX_IMAGE_BYTES)?);
         load(&self.images, path, read, Image::bytes)
@@ -186,7 +187,7 @@ impl Assets {
     /// Returns the image of radiance in the file at `path`.
     ///
     /// # Errors
-    /// Any error in the file.
+    /// Fails if the file cannot be read or is not a valid image.
     pub fn radiance_map(&self, path: &Path) -> Result<Arc<RadianceMap>, AssetError> {
         let read = |key: &Key| RadianceMap::parse(&self.read(path, key, MAX_IMAGE_BYTES)?);
         load(&self.radiance_maps, path, read, RadianceMap::bytes)
@@ -198,11 +199,11 @@ impl Assets {
     }
 }
 
-/// Checks that there are `needed` bytes of memory for a part of the mesh in the file at `path`, which
-/// `what` names.
+/// Checks that `needed` bytes of memory are available. `path` is the file of the mesh, and `what`
+/// names the data that needs the memory.
 ///
 /// # Errors
-/// States both sums and the remedy.
+/// The error states the needed and the available memory, and a remedy.
 fn check_memory(path: &Path, what: &str, needed: u64) -> Result<(), AssetError> {
     match missing_memory(needed) {
         Some(missing) => Err(AssetError {
@@ -221,8 +222,8 @@ fn locked<T>(cache: &Mutex<Cache<T>>) -> MutexGuard<'_, Cache<T>> {
     cache.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the file at `path` from `cache`. A new file is read by `read`, without holding the lock
-/// of the cache.
+/// Returns the file at `path` from `cache`. If the cache lacks the file, `read` reads it while the
+/// cache is unlocked.
 fn load<T>(
     cache: &Mutex<Cache<T>>,
     path: &Path,

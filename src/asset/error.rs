@@ -24,9 +24,9 @@ pub struct AssetError {
     pub file: PathBuf,
     /// Location of the error in the file.
     pub place: FileLocation,
-    /// Phrase that states what is wrong in the file.
+    /// Phrase that states the error in the file.
     pub found: String,
-    /// Phrase that states the content that would be valid.
+    /// Phrase that states the valid content.
     pub expected: String,
 }
 

@@ -11,12 +11,11 @@ use std::sync::LazyLock;
 pub const MAX_SIDE: u32 = 32_768;
 
 /// Largest number of pixels: 64 Mi. An image of this size takes at most 402 MB when decoded, and
-/// 940 MB while the file is read.
+/// 940 MB during decoding.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// Largest number of pixels per byte of a file. In a PNG a pixel takes at least an eighth of a
-/// byte, which deflate compresses by a factor of at most 1032. A JPEG needs at least one bit for 64
-/// pixels.
+/// Largest number of pixels per byte of a file. A PNG has at most eight pixels per byte, which
+/// deflate compresses by a factor of at most 1032. A JPEG has at most 64 pixels per bit.
 const PIXELS_PER_BYTE: u64 = 8 * 1032;
 
 /// Pixels in the bit depth of the file. A grey pixel is one number, a coloured one three.
@@ -34,7 +33,7 @@ pub struct Image {
     texels: Texels,
 }
 
-/// Returns the linear light, 0..=1, of every sRGB level from 0 to `last`.
+/// Returns a table of the linear light, 0..=1, of the sRGB levels from 0 to `last`.
 fn linear_table(last: u16) -> Vec<f32> {
     let linear = |level| linear_from_srgb(f64::from(level) / f64::from(last)) as f32;
     (0..=last).map(linear).collect()
@@ -57,7 +56,7 @@ impl Image {
     /// Decodes a file in memory. The format is determined by the first bytes of the file.
     ///
     /// # Errors
-    /// Any error in the file.
+    /// Fails if the file is not a valid image.
     pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
         let reader = ImageReader::new(Cursor::new(&source.bytes[..])).with_guessed_format();
         let mut reader = reader.map_err(|e| decode_error(source, &ImageError::IoError(e)))?;
@@ -126,9 +125,9 @@ impl Image {
         if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
     }
 
-    /// Returns the height, 0..=1, that the pixel in column `x` and row `y`, counted from the top,
-    /// has in a height map. It is the number in the file, without sRGB decoding. For a colour image
-    /// it is the mean of the channels.
+    /// Returns the height, 0..=1, of the pixel in column `x` and row `y`, counted from the top, if
+    /// the image is a height map. It is the number in the file, without sRGB decoding. For a colour
+    /// image it is the mean of the channels.
     ///
     /// # Panics
     /// If the image has no such pixel.
@@ -196,8 +195,8 @@ mod tests {
         assert!((r - BYTES[200]).abs() < 0.02 && r > g && g > b);
     }
 
-    /// Returns a PNG file whose header declares `side` x `side` pixels. The checksum of the header
-    /// is valid, but the data has only one pixel.
+    /// Returns a PNG file whose header declares `side` x `side` pixels with a valid checksum. The
+    /// data has only one pixel.
     fn png_declaring(side: u32) -> FileContents {
         let mut source = file(image::GrayImage::new(1, 1).into(), ImageFormat::Png);
         source.bytes[16..20].copy_from_slice(&side.to_be_bytes());

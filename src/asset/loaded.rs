@@ -5,7 +5,7 @@ use crate::value::ValidationError;
 use std::fmt;
 use std::sync::Arc;
 
-/// Content of a file, or the error of reading it; `None` until the file has been looked for.
+/// Content of a file, or the error of reading it. `None` before the first attempt to read it.
 #[derive(Clone)]
 pub struct Loaded<T>(Option<Result<Arc<T>, AssetError>>);
 
@@ -15,7 +15,7 @@ impl<T> Default for Loaded<T> {
     }
 }
 
-/// Compares the pixels only if the contents differ in address.
+/// Two values with the same allocation are equal without a comparison of the pixels.
 impl<T: PartialEq> PartialEq for Loaded<T> {
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
@@ -27,7 +27,7 @@ impl<T: PartialEq> PartialEq for Loaded<T> {
     }
 }
 
-/// Prints the state instead of the pixels.
+/// Prints the state of loading, not the pixels.
 impl<T> fmt::Debug for Loaded<T> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match &self.0 {
@@ -44,7 +44,7 @@ impl<T> Loaded<T> {
         self.0.as_ref()?.as_ref().ok()
     }
 
-    /// Loads the content with `load`, unless content or an error is there already.
+    /// Calls `load` and stores its result. Does nothing if content or an error is stored already.
     pub fn resolve(&mut self, load: impl FnOnce() -> Result<Arc<T>, AssetError>) {
         self.0.get_or_insert_with(load);
     }

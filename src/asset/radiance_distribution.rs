@@ -6,8 +6,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// Radiance that is added to that of all pixels, in multiples of the mean. It limits the variance where
-/// the bright part of the image is occluded: the weight of a sample is at most 17 times the mean.
+/// Radiance added to every pixel of the distribution, in multiples of the mean radiance. It limits
+/// the variance where the bright part of the image is occluded: the weight of a sample is at most
+/// 17 times the mean.
 const FLOOR: f64 = 1.0 / 16.0;
 
 /// Distribution of directions over the pixels of an image.
@@ -16,7 +17,8 @@ pub(super) struct RadianceDistribution {
     columns: usize,
     /// Cosines of the polar angles between the rows, from 1 to -1.
     cosines: Vec<f64>,
-    /// Cumulative distribution of the rows: a number more than there are rows, from 0 to 1.
+    /// Cumulative distribution of the rows, from 0 to 1. It has one number more than there are
+    /// rows.
     rows: Vec<f64>,
     /// Cumulative distribution of the columns of each row: `columns` + 1 numbers, from 0 to 1.
     columns_of_rows: Vec<f32>,
@@ -74,7 +76,7 @@ impl RadianceDistribution {
         out
     }
 
-    /// Mean of the pixels over all directions.
+    /// Mean of `pixels` over all directions.
     pub fn mean(&self, pixels: &[[f32; 3]]) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for (row, pixels) in pixels.chunks(self.columns).enumerate() {
@@ -115,7 +117,7 @@ impl RadianceDistribution {
         self.density_in(row, column)
     }
 
-    /// Density in a pixel: its probability divided by its solid angle.
+    /// Density \[1/sr\] in a pixel: its probability divided by its solid angle.
     fn density_in(&self, row: usize, column: usize) -> f64 {
         let columns = self.columns_of_row(row);
         let share = f64::from(columns[column + 1]) - f64::from(columns[column]);
@@ -129,7 +131,7 @@ impl RadianceDistribution {
     }
 }
 
-/// Returns the partial sums of `weights`, from 0 to 1. `total` is their sum.
+/// Returns the partial sums of `weights`, divided by `total`, their sum: from 0 to 1.
 fn cumulative(weights: &[f64], total: f64) -> impl Iterator<Item = f64> {
     let mut sum = 0.0;
     let last = weights.len() - 1;
@@ -140,7 +142,8 @@ fn cumulative(weights: &[f64], total: f64) -> impl Iterator<Item = f64> {
     std::iter::once(0.0).chain(weights.iter().enumerate().map(partial))
 }
 
-/// Returns the index of the last number of the ascending `numbers`, but one, for which `is_below` holds.
+/// Returns the index of the interval between ascending `numbers` that begins with the last number
+/// for which `is_below` holds.
 fn interval<T>(numbers: &[T], is_below: impl Fn(&T) -> bool) -> usize {
     numbers.partition_point(is_below).clamp(1, numbers.len() - 1) - 1
 }
@@ -181,8 +184,10 @@ mod tests {
         }
     }
 
-    /// A grid of numbers: the count of the samples in each row differs from its expectation by at most
-    /// one row of the grid, that in a pixel by the rows and columns of the grid that its edges cut.
+    /// Checks that a regular grid of random numbers gives stratified directions. The number of
+    /// samples in a row of pixels differs from its expectation by at most one row of the grid. The
+    /// number in one pixel differs by at most the rows and columns of the grid that the edges of
+    /// the pixel cut.
     #[test]
     fn grid_of_numbers_gives_stratified_directions() {
         let n = 256;
@@ -211,8 +216,8 @@ mod tests {
         }
     }
 
-    /// Pearson's statistic of pseudo-random samples, against the 99.9 % quantile of chi-square, by
-    /// Wilson and Hilferty.
+    /// Compares pseudo-random samples with the density by Pearson's chi-square test, against the
+    /// 99.9 % quantile (approximation by Wilson and Hilferty).
     #[test]
     fn samples_follow_the_density() {
         for bright in [1.0, 1e3] {
@@ -246,7 +251,8 @@ mod tests {
         }
     }
 
-    /// The quotient of interpolated luminance and density is bounded, also beside a bright pixel.
+    /// Checks that interpolated luminance divided by density is bounded, also beside a bright
+    /// pixel.
     #[test]
     fn weights_are_bounded_beside_a_bright_pixel() {
         let dark = [0.01f32; 3];

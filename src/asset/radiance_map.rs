@@ -51,12 +51,12 @@ impl RadianceMap {
         Self { size, pixels, distribution, mean }
     }
 
-    /// Decodes a file in memory. The format is determined by the first bytes of the file. Numbers of
-    /// Radiance files are divided by the product of the `EXPOSURE` lines; those of PNG and JPEG files
-    /// are sRGB levels. Negative numbers count as 0.
+    /// Decodes a file in memory. The format is determined by the first bytes of the file. Values of
+    /// Radiance files are divided by the product of the `EXPOSURE` lines; values of PNG and JPEG
+    /// files are sRGB levels. Negative values are replaced by 0.
     ///
     /// # Errors
-    /// Any error in the file.
+    /// Fails if the file is not a valid image.
     pub(super) fn parse(source: &FileContents) -> Result<Self, AssetError> {
         let reader = Cursor::new(&source.bytes[..]);
         match image::guess_format(&source.bytes) {
@@ -110,19 +110,19 @@ impl RadianceMap {
         self.mean
     }
 
-    /// Largest channel of a pixel.
+    /// Largest channel of any pixel.
     pub fn max(&self) -> f64 {
         self.pixels.iter().flatten().copied().fold(0.0, f32::max).into()
     }
 
-    /// Smallest channel above 0 of a pixel; `None` if the image is black.
+    /// Smallest channel of any pixel above 0; `None` if the image is black.
     pub fn min(&self) -> Option<f64> {
         let channels = self.pixels.iter().flatten().copied().filter(|x| *x > 0.0);
         channels.reduce(f32::min).map(f64::from)
     }
 
-    /// Returns the radiance in the direction of the unit vector `direction`. It is interpolated
-    /// between the centres of the pixels.
+    /// Returns the radiance in the direction of the unit vector `direction`, interpolated between
+    /// the centres of the pixels.
     pub fn radiance(&self, direction: [f64; 3]) -> [f64; 3] {
         let [columns, rows] = self.size.map(|n| n as usize);
         let [x, y] = position(direction);
@@ -145,8 +145,8 @@ impl RadianceMap {
         std::array::from_fn(|c| above[c] + t * (below[c] - above[c]))
     }
 
-    /// Samples a direction by luminance. `u` and `v` are uniform in [0, 1). Returns the unit vector and
-    /// its density \[1/sr\].
+    /// Samples a direction in proportion to luminance. `u` and `v` are uniform in [0, 1). Returns
+    /// the unit vector and its density \[1/sr\].
     pub fn sample(&self, u: f64, v: f64) -> ([f64; 3], f64) {
         let (x, cos, density) = self.distribution.sample(u, v);
         let (sin_phi, cos_phi) = (TAU * x).sin_cos();
@@ -170,8 +170,8 @@ fn position([x, y, z]: [f64; 3]) -> [f64; 2] {
 
 const EXPECTED: &str = "a Radiance HDR, OpenEXR, PNG or JPEG image";
 
-/// Decodes an image of floats and multiplies them by `factor`. The size is checked before memory for
-/// the pixels is allocated.
+/// Decodes a floating-point image and multiplies it by `factor`. The size is checked before memory
+/// for the pixels is allocated.
 fn decode(
     source: &FileContents,
     decoder: impl ImageDecoder,
@@ -240,7 +240,7 @@ mod tests {
         FileContents { path: PathBuf::from("sky.hdr"), bytes }
     }
 
-    /// An image of powers of two, which every format stores exactly.
+    /// Returns an image of powers of two, which every format stores exactly.
     fn floats() -> Rgb32FImage {
         Rgb32FImage::from_fn(9, 5, |x, y| Rgb([f32::exp2(x as f32 + 3.0), 0.5, y as f32]))
     }

@@ -56,29 +56,29 @@ pub struct Bvh8 {
     depth: usize,
 }
 
-/// Effort of a build.
+/// Effort of a build: a higher effort takes longer and gives a tree with faster traversal.
 #[derive(Clone, Copy, Debug)]
 pub struct BuildQuality {
-    /// Search for nodes to merge.
+    /// Search window of the clustering.
     pub window: SearchWindow,
     /// Share of the nodes that reinsertion may move before leaves are merged.
     pub reinsertion: f32,
     /// Share of the nodes that reinsertion may move after leaves are merged.
     pub second_reinsertion: f32,
-    /// Cost of visiting a node over that of intersecting a primitive. A higher cost gives larger
-    /// leaves.
+    /// Cost of a node visit divided by the cost of a primitive's intersection test. A higher cost
+    /// gives larger leaves.
     pub traversal_cost: f32,
 }
 
 impl BuildQuality {
-    /// For a million primitives and more.
+    /// Short build, for a million primitives and more.
     pub const FAST: Self = Self {
         window: SearchWindow { narrow_passes: 2, distance: 6 },
         reinsertion: 0.02,
         second_reinsertion: 0.0,
         traversal_cost: 3.0,
     };
-    /// For primitives that take long to intersect.
+    /// Thorough build, for primitives with expensive intersection tests.
     pub const MEDIUM: Self = Self {
         window: SearchWindow { narrow_passes: 3, distance: 14 },
         reinsertion: 0.05,
@@ -98,8 +98,8 @@ pub struct Bvh8Build {
 }
 
 impl Bvh8 {
-    /// Builds the hierarchy of `count` primitives, at least one. `corners` returns the low and the
-    /// high corner of a primitive's bounding box. A leaf holds at most `in_leaf` primitives.
+    /// Builds the hierarchy of `count` primitives, at least one. `corners(i)` is the low and the
+    /// high corner of the bounding box of primitive `i`. A leaf holds at most `in_leaf` primitives.
     pub fn build(
         count: usize,
         corners: impl Fn(usize) -> [[f32; 3]; 2],
@@ -180,11 +180,11 @@ impl Bvh8Build {
 /// Optimal collapse of a binary BVH into wide nodes. It minimises the sum of the surface areas of
 /// the nodes, and thereby the expected number of nodes that a random ray visits (Ylitie, Karras and
 /// Laine 2017, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*). Unlike
-/// there, leaves are those of the binary BVH.
+/// in that paper, the leaves are those of the binary BVH.
 struct CollapsePlan {
-    /// Optimal splits for each binary node. Entry `n - 1` is the split of `n` slots, 1 to
-    /// [`BVH_WIDTH`], between the subtrees of the node's two children; `[0, 0]` means that the node
-    /// itself takes one slot. Entry 0 is the split of all slots of the wide node that the binary
+    /// Optimal distribution of slots for each binary node. Entry `n - 1` is for `n` slots, 1 to
+    /// [`BVH_WIDTH`]: the number of slots for the subtree of each child; `[0, 0]` means that the
+    /// node itself takes one slot. Entry 0 distributes all slots of the wide node that the binary
     /// node becomes.
     splits: Vec<[[u8; 2]; BVH_WIDTH]>,
 }
@@ -273,7 +273,7 @@ mod tests {
         check_family(|i| corners(i, size), count, in_leaf, BuildQuality::FAST);
     }
 
-    /// Checks the hierarchy of `count` boxes as [`check_build`] does.
+    /// Checks the hierarchy of the first `count` boxes of a family, as [`check_build`] does.
     fn check_family(
         corners: impl Fn(usize) -> [[f32; 3]; 2],
         count: usize,
@@ -320,10 +320,11 @@ mod tests {
         }
     }
 
-    /// Corners of the box with a number.
+    /// Family of boxes: function from the index of a box to its low and high corner.
     type Family = fn(usize) -> [[f32; 3]; 2];
 
-    /// Families of boxes in which many distances are equal or grow steadily.
+    /// Families of boxes with equal or steadily growing distances between neighbours, the slow
+    /// cases of the clustering.
     const FAMILIES: [(&str, Family); 8] = [
         ("one box", |_| [[0.0; 3], [1.0; 3]]),
         ("one point", |_| [[0.5; 3]; 2]),
@@ -367,16 +368,17 @@ mod tests {
         }
     }
 
-    /// Seconds of processor time of this thread.
+    /// Returns the processor time of this thread in seconds.
     fn cpu_seconds() -> f64 {
         let times = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
         times.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-9
     }
 
-    /// Twice the boxes take at most 2.3 times the time, up to a million; a million equal boxes take
-    /// less than two seconds. With 100,000 boxes the builder before took over a minute for most families.
+    /// Checks that twice the boxes take at most 2.3 times the time, up to a million, and that a
+    /// million equal boxes take less than two seconds. The previous builder took over a minute for
+    /// 100,000 boxes of most families.
     ///
-    ///     cargo test --release --lib -- --ignored --nocapture builds_of_coincident_boxes
+    /// cargo test --release --lib -- --ignored --nocapture builds_of_coincident_boxes
     #[test]
     #[ignore = "takes a minute, and needs an optimised build"]
     fn builds_of_coincident_boxes_take_linear_time() {

@@ -12,29 +12,31 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
-/// Number of node visits, for each primitive, after which slow passes merge neighbours. Boxes at
-/// random positions need 3 visits altogether.
+/// Number of node visits per primitive after which slow passes pair neighbours in the order of the
+/// curve. Boxes at random positions need 3 visits per primitive altogether.
 const PATIENT_VISITS: usize = 8;
 
-/// A pass is slow if fewer than one pair in this number of nodes would be merged.
+/// Limit of a slow pass: fewer than one pair per this number of nodes would be merged.
 const SLOW: usize = 16;
 
-/// Index of the nearest node, if there is none.
+/// Index in [`Nearest`] of a node without a nearest node.
 const NONE: u32 = u32::MAX;
 
-/// Number of nodes before and after a node on the curve that are compared with it.
+/// Window of the search for the nearest node: nodes before and after a node on the Morton curve.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchWindow {
-    /// Number of first passes with a window of one node.
+    /// Number of first passes with a window of one node on each side.
     pub narrow_passes: usize,
-    /// Window of the other passes.
+    /// Number of nodes on each side in later passes.
     pub distance: usize,
 }
 
-/// Nearest node of a node: the area of the box around both, and its index.
+/// Nearest node of a node: the area of the box that encloses both, and the index of the nearest
+/// node.
 type Nearest = (f32, u32);
 
-/// Builds the binary BVH of primitives with these bounds, at least one. A leaf has one primitive.
+/// Builds the binary BVH of primitives with the bounding boxes `bounds`, at least one. Each leaf
+/// has one primitive.
 pub fn cluster(bounds: &[Aabb], window: SearchWindow) -> Bvh2 {
     let count = bounds.len();
     let mut nodes = sorted_leaves(bounds);
@@ -89,7 +91,8 @@ fn sorted_leaves(bounds: &[Aabb]) -> Vec<Bvh2Node> {
     codes.iter().map(|(_, i)| Bvh2Node::new(bounds[*i as usize], 1, *i as u32)).collect()
 }
 
-/// Writes the nearest of the `distance` nodes before and after each node; the last one of equals.
+/// Writes to `nearest` the nearest node of each node among the `distance` nodes before and after
+/// it. Of equally near nodes the last is taken.
 fn find_nearest(nodes: &[Bvh2Node], distance: usize, nearest: &mut [Nearest]) {
     nearest.fill((f32::INFINITY, NONE));
     for (i, node) in nodes.iter().enumerate() {
@@ -116,8 +119,8 @@ fn mutual_pairs(nearest: &[Nearest]) -> usize {
     nearest.iter().enumerate().filter(ends_pair).count()
 }
 
-/// Makes each two neighbours nearest to each other. The last of an odd number of nodes has no
-/// partner.
+/// Pairs the nodes in order: each two neighbours become nearest to each other. The last of an odd
+/// number of nodes has no partner.
 fn pair_neighbours(nearest: &mut [Nearest]) {
     let paired = nearest.len() & !1;
     for (i, (_, partner)) in nearest.iter_mut().enumerate() {

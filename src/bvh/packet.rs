@@ -10,7 +10,7 @@ use crate::bvh::Ray;
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn};
 
-/// Ray packet in the form that slab tests need.
+/// Ray packet with precomputed values for slab tests.
 #[derive(Clone, Copy)]
 pub struct SlabPacket<L> {
     /// Ray origins plus the padding of the boxes.
@@ -32,7 +32,7 @@ impl<L: SimdFloat> SlabPacket<L> {
         Self { above: ray.origin + pad, below: ray.origin - pad, inverse }
     }
 
-    /// Returns the rays that enter box `i` of a node at a distance of at most `limit`.
+    /// Returns the rays that enter child box `i` of a node at a distance of at most `limit`.
     #[inline(always)]
     fn enters_child(&self, node: &Bvh8Node, i: usize, limit: L) -> L::Mask {
         let corner = |k: usize| {
@@ -71,8 +71,8 @@ pub struct PacketBounds<S> {
 }
 
 impl<S: Float> PacketBounds<S> {
-    /// Computes the bounds of the rays of `lanes`, at least one. Returns `None` if the signs of
-    /// their directions differ.
+    /// Computes the bounds of the rays in the lanes of the bit mask `lanes`, at least one. Returns
+    /// `None` if the signs of their directions differ.
     #[inline(always)]
     pub fn around<L: SimdFloat<Scalar = S>>(packet: &SlabPacket<L>, lanes: u32) -> Option<Self> {
         let d = packet.inverse;
@@ -128,8 +128,8 @@ impl<S: Float> PacketBounds<S> {
     }
 }
 
-/// Returns the smallest and the largest coordinates over the lanes of `mask`. `first` is one of
-/// these lanes.
+/// Returns the smallest and the largest coordinates over the lanes of `mask`. `first` is the index
+/// of one of these lanes.
 #[inline(always)]
 fn min_max<L: SimdFloat>(
     v: Vec3<L>,
@@ -154,8 +154,8 @@ pub fn broadcast<L: SimdFloat>(x: f32) -> L {
     L::splat(L::Scalar::from_f64(f64::from(x)))
 }
 
-/// Loads `WIDTH` of eight numbers, from position `part * WIDTH` on. Lanes beyond the eighth number
-/// repeat the numbers from the start.
+/// Loads `WIDTH` of the eight numbers of a node, from position `part * WIDTH` on. If there are more
+/// lanes than numbers, the numbers are repeated from the start.
 #[inline(always)]
 pub fn load_wide<L: SimdFloat>(numbers: &[f32; BVH_WIDTH], part: usize) -> L {
     L::from_fn(|i| L::Scalar::from_f64(f64::from(numbers[(part * L::WIDTH + i) % BVH_WIDTH])))
@@ -192,7 +192,7 @@ pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     }
 }
 
-/// Inserts an entry into the part of the stack from `base` on, which is sorted by descending
+/// Pushes an entry to the stack. The entries from index `base` on stay sorted by descending
 /// distance.
 #[inline(always)]
 fn push_sorted<S: Float>(
@@ -211,9 +211,9 @@ fn push_sorted<S: Float>(
 }
 
 /// Traverses the hierarchy with a packet. Calls `leaf(index, limit)` for each leaf whose box a ray
-/// may enter at a distance of at most its limit, ordered by the entry distances of the bounds.
-/// `leaf` returns the new limits. `bounds` contains the rays whose limit is at least zero; `None`
-/// if these rays are incoherent.
+/// may enter at a distance of at most the ray's limit, ordered by the smallest possible entry
+/// distance. `leaf` returns the new limits of the rays. A ray with a negative limit is inactive.
+/// `bounds` are the interval bounds of the active rays; `None` if these rays are incoherent.
 #[inline(always)]
 pub fn traverse_packet<L: SimdFloat>(
     bvh: &Bvh8,

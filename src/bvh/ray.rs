@@ -51,8 +51,8 @@ impl<L: SimdFloat> Hit<L> {
         Self::with_t_max(L::from_f64(L::MAX))
     }
 
-    /// Returns misses that later accept only hits at distances below `t`. Inactive lanes have a
-    /// negative `t`.
+    /// Returns misses that accept only hits at distances below `t`, in [`Hit::keep_closer`] and
+    /// [`Hit::merge`]. Inactive lanes have a negative `t`.
     #[inline(always)]
     pub fn with_t_max(t: L) -> Self {
         Self { t, item: L::from_id(0), triangle: L::from_id(0) }

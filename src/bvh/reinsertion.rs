@@ -18,20 +18,21 @@ const MAX_VISITS: usize = 64;
 struct Reinsertion {
     from: u32,
     to: u32,
-    /// Decrease of the sum of all half areas, positive.
+    /// Decrease of the sum of the surface areas of all nodes, halved; positive.
     saved: f32,
 }
 
-/// Searches the places of subtrees.
+/// Search for the best new position of a subtree, with the number of its node visits limited.
 struct Search {
-    /// Number of nodes that may still be visited.
+    /// Number of visits left before the search gives up.
     visits_left: usize,
-    /// Nodes to visit, each with the half area that is saved before the insertion there.
+    /// Stack of nodes to visit, each with the half area that removing the subtree and descending to
+    /// the node saves.
     stack: Vec<(f32, u32)>,
 }
 
 /// Moves subtrees of `tree` in 16 rounds. The first round considers the share `ratio` of the nodes,
-/// those of the largest areas; round n considers 1/(2n - 1) of that.
+/// those of the largest areas. Round n considers 1/(2n - 1) of this share.
 pub fn optimize(tree: &mut Bvh2, ratio: f32) {
     if ratio <= 0.0 || tree.nodes[0].is_leaf() {
         return;
@@ -65,8 +66,8 @@ pub fn optimize(tree: &mut Bvh2, ratio: f32) {
     }
 }
 
-/// Returns the `count` nodes of the largest areas among the first `2 * count + 1` below the root:
-/// the nodes near the root come first in the tree.
+/// Returns the `count` nodes with the largest areas among the first `2 * count + 1` after the root.
+/// The order of the nodes puts those near the root first.
 fn largest_nodes(tree: &Bvh2, count: usize) -> Vec<usize> {
     let end = tree.nodes.len().min(2 * (count + 1));
     let area = |node: usize| tree.nodes[node].aabb().half_area();
@@ -76,14 +77,14 @@ fn largest_nodes(tree: &Bvh2, count: usize) -> Vec<usize> {
 }
 
 impl Search {
-    /// Counts a visit. Returns `false` if the visits are used up.
+    /// Counts a visit. Returns `false` if the limit of visits is reached.
     fn visit(&mut self) -> bool {
         self.visits_left = self.visits_left.saturating_sub(1);
         self.visits_left > 0
     }
 
-    /// Returns the best move of `node`, which is not the root. Returns `None` if no move saves area,
-    /// or if the visits are used up.
+    /// Returns the best move of the subtree `node`, which is not the root. Returns `None` if no
+    /// move saves area, or if the limit of visits is reached.
     fn best_reinsertion(&mut self, tree: &Bvh2, node: usize) -> Option<Reinsertion> {
         let nodes = &tree.nodes;
         let area = |aabb: &Aabb| aabb.half_area();

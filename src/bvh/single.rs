@@ -13,9 +13,9 @@ use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn, prefe
 /// Stack frame: children of a node that the ray enters and has not visited yet.
 #[derive(Clone, Copy, Default)]
 pub struct StackFrame {
-    /// Key of each slot: the bits of the entry distance, rounded down, with the slot number in the
-    /// last three bits. The smallest key belongs to the nearest child. Slots without a child have
-    /// [`NO_KEY`] or a larger key.
+    /// Keys of the slots. A key is the bits of the distance at which the ray enters the child, with
+    /// the slot number in the last three bits. The smallest key belongs to the nearest child. Slots
+    /// without a child to visit have [`NO_KEY`] or a larger key.
     keys: [u32; BVH_WIDTH],
     node: u32,
     /// Number of children that have not been visited.
@@ -39,11 +39,10 @@ struct RayTraversal<S> {
     frames: usize,
 }
 
-/// Traverses the hierarchy with the rays of `lanes`, each separately. Calls
-/// `leaf(lane, index, limit)` for each leaf whose box the ray of a lane enters at a distance of at
-/// most its limit, from near to far. `leaf` returns the new limit of the ray. Calls
-/// `prefetch_leaf(index)` some time before it visits the leaf. `frames` has one entry for each lane
-/// and level.
+/// Traverses the hierarchy with each ray of `lanes` (a bit mask) separately. Calls `leaf(lane,
+/// index, limit)` for each leaf whose box the ray of a lane enters at a distance of at most its
+/// limit, from near to far. `leaf` returns the new limit of the ray. Calls `prefetch_leaf(index)`
+/// some time before it visits the leaf. `frames` has one entry for each lane and level.
 #[inline(never)]
 pub fn traverse_rays<L: SimdFloat>(
     bvh: &Bvh8,
@@ -134,8 +133,8 @@ impl<S: Float> RayTraversal<S> {
         each
     }
 
-    /// Visits the current node. The ray continues with the nearest child that it enters; a frame
-    /// with the other children is pushed. Returns `false` if the ray enters no child.
+    /// Visits the current node. The ray continues with the nearest child that it enters, and a
+    /// frame with its other entered children is pushed. Returns `false` if the ray enters no child.
     #[inline(always)]
     fn expand<L: SimdFloat<Scalar = S>>(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         let node = &bvh.nodes()[self.child as usize];
@@ -166,8 +165,8 @@ impl<S: Float> RayTraversal<S> {
         true
     }
 
-    /// Continues with the nearest child of the topmost frame that has a child within the limit.
-    /// Returns `false` if no frame has one.
+    /// Continues with the nearest unvisited child within the limit, from the topmost frame that has
+    /// one. Returns `false` if no frame has one.
     #[inline(always)]
     fn next(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         while self.frames > 0 {

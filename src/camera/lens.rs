@@ -5,14 +5,14 @@ use crate::value::{Field, FieldValue, NumberRange, ValidationError, Validator, V
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// Opening of a lens. Objects outside of the plane in focus are blurred in proportion to it.
+/// Aperture of the lens. The blur of objects outside of the plane in focus is in proportion to it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Aperture {
     /// Radius of the lens; 0 is a pinhole.
     Radius(f64),
-    /// Focal length divided by the lens diameter, for a picture of 36 x 24 mm and scene units of
-    /// one metre.
+    /// F-number: focal length divided by the diameter of the lens, for film of 36 x 24 mm and scene
+    /// units of one metre.
     FNumber(f64),
 }
 
@@ -66,7 +66,7 @@ const FOCI: &[Field] = &[
     ),
 ];
 
-/// Adds the key `outer` to errors in the value of one of several exclusive keys.
+/// Returns the errors of `inner` with the key `outer` before their keys.
 pub(super) fn inside(outer: &Field, inner: Validator) -> Vec<ValidationError> {
     let mut errors = inner.errors();
     for error in &mut errors {
@@ -162,7 +162,8 @@ impl Camera {
         depth.max(MIN_FOCUS_PER_RADIUS * self.lens_radius()).max(f64::MIN_POSITIVE)
     }
 
-    /// Returns the error of a lens without a plane in focus.
+    /// Returns the error of a point in focus at the eye, or of an aperture without `focus` and
+    /// `target`.
     pub(super) fn focus_error(&self) -> Option<ValidationError> {
         if self.focus == Some(Focus::Point(self.eye)) {
             return Some(ValidationError::new(

@@ -145,8 +145,8 @@ impl Camera {
         self.valid_or_self(aimed.moved_to(center - forward * distance, forward, distance, false))
     }
 
-    /// Returns the distance to the target, or `distance` if the camera has no target. Returns 1 if
-    /// this distance is not positive and finite.
+    /// Returns the distance from the eye to the target, or `distance` if the camera has no target.
+    /// Returns 1 if the result would not be positive and finite.
     fn pivot_distance(&self, distance: f64) -> f64 {
         let to_target = self.target.map(|t| DVec3::from_array(t) - DVec3::from_array(self.eye));
         let distance = to_target.map_or(distance, DVec3::length);
@@ -170,16 +170,16 @@ impl Camera {
         Some((level * pitch.cos() + axis * pitch.sin()).normalize())
     }
 
-    /// Returns the camera at `eye` with the view direction `forward`. A target is put `distance`
-    /// ahead. An unchanged eye keeps its digits. If the result would be invalid, returns this
-    /// camera.
+    /// Returns the camera moved to `eye`, with the view direction `forward`. A target moves to the
+    /// point `distance` ahead. Coordinates of an unchanged eye are not rounded. Returns this camera
+    /// if the result would be invalid.
     fn placed(&self, eye: DVec3, forward: DVec3, distance: f64) -> Self {
         let eye_stays = DVec3::from_array(self.eye) == eye;
         self.valid_or_self(self.moved_to(eye, forward, distance, eye_stays))
     }
 
-    /// Does the work of [`Camera::placed`] without validation. If `eye_stays`, the eye keeps its
-    /// digits and the target moves; otherwise the eye moves and the target stays.
+    /// Returns the camera of [`Camera::placed`] without validation. If `eye_stays` is `true`, the
+    /// eye keeps its digits and the target moves; otherwise the eye moves and the target stays.
     fn moved_to(&self, eye: DVec3, forward: DVec3, distance: f64, eye_stays: bool) -> Self {
         let mut next = self.clone();
         let round = |v: DVec3| v.map(|x| rounded(x, distance)).to_array();
@@ -208,13 +208,13 @@ impl Camera {
         self.valid_or_self(Self { eye: moved(self.eye), target, ..self.clone() })
     }
 
-    /// Returns `next` if it is valid, otherwise this camera.
+    /// Returns `next` if it is a valid camera, otherwise `self`.
     fn valid_or_self(&self, next: Self) -> Self {
         if next.faults().is_empty() { next } else { self.clone() }
     }
 }
 
-/// Rounds `x` to about a millionth of `scale`.
+/// Rounds `x` to a multiple of a power of ten near a millionth of `scale`.
 fn rounded(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 6)
 }

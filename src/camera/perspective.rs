@@ -10,12 +10,12 @@ use glam::DVec3;
 #[derive(Clone, Copy, Debug)]
 pub struct PerspectiveCamera {
     eye: DVec3,
-    /// `u`, `v` and `w`: orthonormal vectors to the right, up and forward.
+    /// Orthonormal vectors to the right (`u`), up (`v`) and forward (`w`).
     u: DVec3,
     v: DVec3,
     w: DVec3,
-    /// `dx_axis` and `dy_axis`: vectors from a pixel to the next one to the right and to the next
-    /// one downward, on the picture plane at unit distance.
+    /// Vectors from a pixel to the next one to the right (`dx_axis`) and to the next one below
+    /// (`dy_axis`), on the picture plane at unit distance.
     dx_axis: DVec3,
     dy_axis: DVec3,
     /// Vector from the eye to the picture plane's corner at pixel (0, 0).
@@ -37,9 +37,9 @@ pub struct ThinLens {
 }
 
 impl ThinLens {
-    /// Returns the largest distance at which rays through the lens and the ray through its centre,
-    /// all of one point of the picture, cross a plane perpendicular to the view direction. The
-    /// planes are at `depth` from the eye. This is the radius of the circle of confusion.
+    /// Returns the radius of the circle of confusion on a plane at `depth` from the eye,
+    /// perpendicular to the view direction: the largest distance there between a ray through the
+    /// lens and the ray of the same picture point through the centre of the lens.
     pub fn blur(&self, depth: f64) -> f64 {
         self.radius * (1.0 - depth / self.focus).abs()
     }
@@ -173,14 +173,14 @@ impl PerspectiveCamera {
         (origin, direction.normalize())
     }
 
-    /// Returns origins and unit directions of rays through points of the lens. `base` and the offset
-    /// are those of [`PerspectiveCamera::rays`]. `(x, y)` is the point of the lens, to the right and
-    /// upward, in the unit disk.
+    /// Returns origins and unit directions of rays through points of the lens. `base` and the
+    /// offset are those of [`PerspectiveCamera::rays`]. `(x, y)` is the point of the lens in the
+    /// unit disk, to the right and upward.
     ///
-    /// With d the direction through the eye, of unit length along w, and o the vector from the eye
-    /// to the point of the lens, the ray leaves eye + o in the direction d - o / f: at the distance
-    /// f of the plane in focus it crosses the ray through the eye (Cook, Porter and Carpenter 1984,
-    /// *Distributed Ray Tracing*, section 4.2).
+    /// The direction d through the eye has the length 1 along w. The vector from the eye to the
+    /// point of the lens is o. The ray starts at eye + o in the direction d - o / f. At the
+    /// distance f, in the plane in focus, it crosses the ray through the eye (Cook, Porter and
+    /// Carpenter 1984, *Distributed Ray Tracing*, section 4.2).
     #[inline(never)]
     pub fn lens_rays<L: SimdFloat>(
         &self,

@@ -8,8 +8,9 @@
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const VARIABLE: &str = "MALLOC_ARENA_MAX";
 
-/// Starts the program again with one arena, in the same process, if its address space is limited and
-/// the environment does not set the number of arenas. Returns otherwise, and if that fails.
+/// Restarts the program in the same process with one arena of the memory allocator, if the address
+/// space is limited and the environment does not set the number of arenas. Returns if no restart is
+/// needed or the restart fails.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 pub fn limit() {
     use std::os::unix::process::CommandExt;
@@ -23,6 +24,6 @@ pub fn limit() {
     let _ = Command::new(program).arg0(name).args(arguments).env(VARIABLE, "1").exec();
 }
 
-/// Does nothing: other allocators have no arenas of this kind.
+/// Does nothing: allocators of other systems have no arenas per thread.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub fn limit() {}

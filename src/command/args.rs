@@ -366,7 +366,7 @@ pub enum SamplerArg {
 /// with 4,096 on two processors, a picture of 64 x 48 pixels takes half a minute.
 const THREADS_PER_PROCESSOR: usize = 4;
 
-/// Number of tracing threads that is allowed on every machine, however few processors it has.
+/// Number of tracing threads that is always allowed, even on machines with few processors.
 const THREADS_ANYWHERE: usize = 16;
 
 /// Returns the number of processors that this process may use.
@@ -401,7 +401,7 @@ impl ComputeArgs {
         self.threads.map_or_else(processors, |given| usize::from(given).min(max_threads()))
     }
 
-    /// Returns a warning if fewer threads are used than `--threads` requests.
+    /// Returns a warning if `--threads` requests more threads than are used.
     fn warning(&self) -> Option<String> {
         let given = self.threads.map(usize::from).filter(|given| *given > self.threads())?;
         let number = match processors() {
@@ -453,11 +453,10 @@ impl PictureArgs {
         Display { exposure_ev: self.exposure, tone: self.tone }
     }
 
-    /// Sets the size of `scene` to that of `--size`, if this option is given. Returns the first
-    /// validation error of the scene with the new size.
+    /// Sets the size of `scene` to that of `--size`, if this option is given.
     ///
     /// # Errors
-    /// Returns the first fault of the scene with the new size.
+    /// Returns the first validation error of the scene with the new size.
     pub fn resize(&self, scene: &mut Scene) -> Result<(), String> {
         let Some(size) = self.size else { return Ok(()) };
         scene.film.size = size;

@@ -10,8 +10,8 @@
 //! compiles the standard library for this processor, including code that runs before `main`, and
 //! that code may already contain the illegal instruction.
 
-/// Ends the program if the processor lacks a feature that the build assumes. Each listed item has
-/// the name of the feature, and the register and bit of CPUID.
+/// Ends the program if the processor lacks a feature for which the program was compiled. The
+/// arguments are the name of each feature, with its register and bit of CPUID.
 #[cfg(target_arch = "x86_64")]
 macro_rules! need {
     ($($name:literal $register:ident $bit:literal)*) => {
@@ -22,7 +22,7 @@ macro_rules! need {
 }
 
 /// Ends the program with exit status 1 and a message on stderr if this processor lacks a feature
-/// for which the program was compiled. `main` calls it first.
+/// for which the program was compiled. `main` calls this function first.
 #[cfg(target_arch = "x86_64")]
 #[inline(never)]
 pub fn require() {

@@ -140,8 +140,8 @@ impl DoctorReport {
         }
     }
 
-    /// Describes the number of colours and where it comes from: NO_COLOR, COLORTERM, TERM or the
-    /// terminal's reply.
+    /// Describes the number of colours and its source: NO_COLOR, COLORTERM, TERM or the terminal's
+    /// reply.
     fn colors(&self) -> String {
         let Environment { term, color_term, no_color, .. } = &self.environment;
         let level = self.level();
@@ -238,7 +238,7 @@ impl DoctorReport {
 }
 
 /// Returns a line of `name` and `value`. `value` is wrapped with a hanging indent, so that no line
-/// is longer than `COLUMNS`.
+/// is longer than [`COLUMNS`].
 fn indented(name: &str, value: &str) -> String {
     let lines = wrapped(value, (COLUMNS - name.len()) as u16);
     name.to_string() + &lines.join(&format!("\n{:1$}", "", name.len()))

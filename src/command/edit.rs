@@ -75,8 +75,8 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
 }
 
 /// Prints the results of a dashboard that has ended: names of written files on `out`, everything
-/// else on stderr. If a signal ended it, the exit status is that of the signal, even if `out`
-/// cannot be written, as after the loss of the terminal.
+/// else on stderr. If a signal ended the dashboard, the exit status is that of the signal. This
+/// holds even if `out` cannot be written because the terminal is lost.
 pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     let mut lines = Vec::new();
     for exported in &ended.exported {
@@ -108,7 +108,7 @@ pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
 }
 
 /// Returns the environment if stdin and stdout are a terminal that can show the dashboard,
-/// otherwise the reason why they are not.
+/// otherwise the reason against it.
 pub fn terminal_environment() -> Result<Environment, &'static str> {
     let environment = Environment::of(|name| env::var(name).ok());
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
@@ -143,8 +143,8 @@ fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, F
         .map_err(|errors| Failure::Failed(errors.to_string()))
 }
 
-/// Opens the scene file. The inner error means that the file is readable but not a valid scene. The
-/// dashboard then shows the errors while the user corrects the file.
+/// Opens the scene file. The inner error lists the errors of a readable file that is not a valid
+/// scene; the dashboard shows them until the user has corrected the file.
 ///
 /// # Errors
 /// Fails if the file cannot be read.
@@ -167,8 +167,8 @@ fn open(
     }
 }
 
-/// Returns a note about unsaved edits of a scene file that no longer exists, and about those of
-/// other users. Returns an empty string if there are none.
+/// Returns a note about unsaved edits: of a scene file that no longer exists, and of other users.
+/// Returns an empty string if there are none.
 fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     let found = Recovery::new(Some(path), "", state).find();
     let hint = |path: &Path, of: String| {
@@ -198,7 +198,7 @@ fn summary(exported: &Exported) -> String {
 mod tests {
     use super::*;
 
-    /// Writer to a closed terminal: every write fails.
+    /// Closed terminal: every write fails.
     struct Gone;
 
     impl Write for Gone {
@@ -228,8 +228,8 @@ mod tests {
         }
     }
 
-    /// Checks that the exit status of a signal is returned even if stdout fails, as when a picture
-    /// is complete only after the connection is lost.
+    /// Checks that the exit status of a signal is returned even if stdout fails, which happens if
+    /// the connection is lost before the picture is complete.
     #[test]
     fn status_of_a_signal_does_not_depend_on_stdout() {
         let status = |signalled, out: &mut dyn Write| match conclude(&ended(signalled), out) {

@@ -6,8 +6,8 @@ use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Smallest loads that are reported: size of a file that is read, in bytes (8 MiB), and number of
-/// triangles of a BVH that is built.
+/// Thresholds of reports: size of a file in bytes (8 MiB), and number of triangles of a BVH.
+/// Smaller loads are not reported.
 const LARGE: (u64, usize) = (8 << 20, 200_000);
 
 /// Asset cache with progress messages for large files on stderr, if stderr is a terminal.

@@ -35,8 +35,8 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Formats the noise of a merged picture without some shards, with its ratio to the predicted noise
-/// of the complete picture.
+/// Formats the noise of a merged picture that lacks some shards, and its ratio to the predicted
+/// noise of the complete picture.
 fn cost(report: &Report, predicted_codes: f64) -> String {
     match report.noise {
         Some(noise) => format!(

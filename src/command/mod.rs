@@ -39,11 +39,11 @@ use std::time::Instant;
 /// Exit status for an invalid command line. clap uses the same status.
 const WRONG_USAGE: u8 = 2;
 
-/// Reason for an exit status other than 0.
+/// Result of a command that did not succeed.
 enum Failure {
-    /// Exit status 1, with the message.
+    /// The command failed (exit status 1). The value is the message.
     Failed(String),
-    /// Exit status 2, with the message.
+    /// The command line is not valid (exit status 2). The value is the message.
     Usage(String),
     /// The command was ended by a signal, after it saved the picture or the edits so far. The value
     /// is the exit status: 129, 130, 131 or 143.
@@ -98,7 +98,7 @@ fn parse_command_line() -> Cli {
     })
 }
 
-/// Prints a usage error, the help text or the version, and ends the program.
+/// Prints the text of `error` (a usage error, the help or the version), and ends the program.
 fn end(error: &clap::Error) -> ! {
     // Control characters in arguments, such as file names matched by a shell pattern, must not
     // reach the terminal.
@@ -115,7 +115,7 @@ fn end(error: &clap::Error) -> ! {
     std::process::exit(if failed { 1 } else { error.exit_code() })
 }
 
-/// Prints a line on stderr. A closed stderr is ignored.
+/// Prints a line on stderr. Errors of writing are ignored.
 fn warn(message: &str) {
     let _ = writeln!(std::io::stderr(), "{}", sanitized_lines(message));
 }
@@ -137,7 +137,7 @@ fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
     }
 }
 
-/// Writes a file of results, such as statistics. An existing file is replaced in one step.
+/// Writes a file of results, such as statistics. An existing file is replaced atomically.
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     disk::write(path, bytes).map_err(|error| Failure::Failed(error.to_string()))
 }
@@ -148,7 +148,7 @@ fn check_file(path: &Path) -> Result<(), Failure> {
     disk::check_writable(path).map_err(|error| Failure::Failed(error.to_string()))
 }
 
-/// Escapes the control characters in each line of `message`, because file names may contain some.
+/// Escapes control characters in each line of `message`; file names in it may contain some.
 fn sanitized_lines(message: &str) -> String {
     message.split('\n').map(sanitized).collect::<Vec<_>>().join("\n")
 }

@@ -10,7 +10,7 @@ use crate::render::plan::{Part, Plan};
 use crate::render::session::Report;
 use std::path::{Path, PathBuf};
 
-/// File to which a film is written.
+/// Output of a film: a film file or a picture.
 pub enum FilmOutput {
     /// Film file.
     Film(PathBuf),
@@ -33,8 +33,8 @@ impl FilmOutput {
         Ok(Self::Picture(output, if bits == 16 { Depth::Sixteen } else { Depth::Eight }))
     }
 
-    /// Writes `film`. A picture has the light weights, the display transform and the metadata of
-    /// `header`.
+    /// Writes `film`. A picture is written with the light weights, the display transform and the
+    /// metadata of `header`.
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), Failure> {
         let written = match self {
             Self::Film(path) => write_film(path, film, header),
@@ -58,8 +58,8 @@ pub fn is_film(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zk"))
 }
 
-/// Creates the header for the film of `state`, which holds the shards listed in `part`. `report` is
-/// the report on this film.
+/// Creates the header of a film file with the film of `state`. `part` lists the shards that the
+/// film holds, and `report` describes the film.
 pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHeader {
     let settings = &part.plan.settings;
     let provenance = Provenance {

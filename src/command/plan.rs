@@ -17,9 +17,8 @@ use crate::world;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 
-/// Noise of the pilot relative to the noise target, if `--pilot` is not given. A pilot at twice the
-/// target noise takes a third to a half of the rays of the whole picture, and predicts the noise
-/// within 10 %.
+/// Noise of the pilot divided by the noise target, if `--pilot` is not given. At 2, the pilot takes
+/// a third to a half of the rays of the whole picture and predicts the noise within 10 %.
 const PILOT: f64 = 2.0;
 
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {
@@ -49,7 +48,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns the hash of the scene of `document` and of the files that it names.
+/// Returns the hash of the scene of `document`, including the files that it names.
 pub fn hash(document: &Document) -> String {
     scene_hash(document.text(), document.scene())
 }
@@ -127,7 +126,8 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     Ok(part.plan)
 }
 
-/// Plans the samples that follow those of the merged film at `path`, until the new noise target.
+/// Plans the samples that are added to those of the merged film at `path` to reach the new noise
+/// target.
 fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let failed =
         |reason: &str| Failure::Failed(format!("cannot plan from {}: {reason}", path.display()));

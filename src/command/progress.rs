@@ -7,8 +7,8 @@ use std::time::Duration;
 
 /// Seconds before the first output. Shorter renders show no progress.
 const QUIET_SECONDS: f64 = 0.25;
-/// Seconds before the first line in a log. Each following interval is twice as long as the previous
-/// one, up to [`LONGEST_INTERVAL_SECONDS`].
+/// Seconds before the first line in a log. Each later interval is twice the previous one, up to
+/// [`LONGEST_INTERVAL_SECONDS`].
 const FIRST_LINE_SECONDS: f64 = 1.0;
 /// Longest interval between lines in a log, in seconds.
 const LONGEST_INTERVAL_SECONDS: f64 = 60.0;
@@ -20,8 +20,7 @@ const STEPS: u64 = 1000;
 pub enum Progress {
     /// A bar in a terminal, created at the first output.
     Bar(Option<ProgressBar>),
-    /// Lines in a log. The value is the time of rendering at which the next line is due, in
-    /// seconds.
+    /// Lines in a log. The value is the rendering time in seconds at which the next line is due.
     Lines(f64),
 }
 

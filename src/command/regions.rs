@@ -17,7 +17,7 @@ use crate::world::{self, AnyWorld};
 use std::io;
 use std::sync::Arc;
 
-/// Name of the limit in messages, if `--memory` is lower than the available memory.
+/// Name of the limit in messages if `--memory` is the tightest limit.
 const OPTION: &str = "--memory";
 
 /// Division of a picture into regions that fit into the given memory.
@@ -30,13 +30,13 @@ pub struct Division {
 }
 
 impl Division {
-    /// Divides the picture of `scene` so that the process stays below `cap` bytes, and prints the
-    /// expected memory. If separate light groups do not fit, lights share one group; if that does
-    /// not fit, the picture is divided.
+    /// Divides the picture of `scene` so that the process uses at most `cap` bytes, and prints the
+    /// expected memory. If separate light groups do not fit, all lights share one group. If that
+    /// does not fit either, the picture is divided.
     ///
     /// # Errors
-    /// Fails if not even the smallest regions fit, and if a checkpoint is requested for a picture
-    /// that does not fit as a whole.
+    /// Fails if the smallest regions do not fit, or if a checkpoint is requested for a picture that
+    /// has to be divided.
     pub fn new(scene: &Scene, args: &RenderArgs, cap: u64) -> Result<Self, Failure> {
         let options =
             world::Options { precision: args.precision.get(), ..world::Options::default() };
@@ -94,8 +94,8 @@ impl Division {
     }
 }
 
-/// Returns the number of bytes that the process may use: `cap`, or less if less is available. The
-/// second value names the limit for messages.
+/// Returns the number of bytes that the process may use, and the name of the limit for messages.
+/// The number is `cap`, or the available memory if that is less.
 fn usable(cap: u64) -> (u64, &'static str) {
     let now = resident_memory().map_or(0, |resident| resident.now);
     match available_memory() {
@@ -106,8 +106,8 @@ fn usable(cap: u64) -> (u64, &'static str) {
     }
 }
 
-/// Returns a function that creates the error for a picture whose least memory in bytes is its
-/// argument.
+/// Returns a function that creates the error message. Its argument is the least memory of the
+/// picture in bytes.
 fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
     move |least| {
         // The resident memory of the program differs by some hundred kilobytes from run to run.
@@ -123,7 +123,7 @@ fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
     }
 }
 
-/// Formats a number of bytes in a unit that suits small numbers.
+/// Formats a number of bytes in kilobytes below 1 MB, otherwise as [`megabytes`] does.
 fn small(bytes: u64) -> String {
     if bytes < 1_000_000 { format!("{} KB", bytes / 1000) } else { megabytes(bytes) }
 }

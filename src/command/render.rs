@@ -142,10 +142,10 @@ struct Rendered {
     precision: &'static str,
     /// One sentence for each limit that ends paths early.
     biased: Vec<String>,
-    /// Time from the start of the program to the start of the scene's compilation.
+    /// Time from the start of the program to the start of compiling the scene.
     set_after: Duration,
     write_seconds: f64,
-    /// Result of writing the last checkpoint; `None` if no checkpoints are written.
+    /// Result of writing the last checkpoint; `None` without `--checkpoint`.
     kept: Option<Result<PathBuf, WriteError>>,
 }
 
@@ -228,11 +228,11 @@ fn watch(
     end
 }
 
-/// Report, name of the precision, sentences about limits that end paths early, and result of
-/// writing the picture.
+/// Result of a finished render: its report, the name of the precision, a sentence for each limit
+/// that ends paths early, and the result of writing the picture.
 type Written = (Report, &'static str, Vec<String>, Result<(), WriteError>);
 
-/// Writes the picture on the rendering thread. Returns `None` if there is no film yet.
+/// Writes the picture, on the thread of the session. Returns `None` if there is no film yet.
 fn write(
     session: &Session,
     args: &RenderArgs,
@@ -283,7 +283,7 @@ fn failed_write(error: WriteError) -> Failure {
     Failure::Failed(error.to_string())
 }
 
-/// Returns `scene` with the acceleration structure and the size of the command line, if these are
+/// Returns `scene` with the acceleration structure and the size from the command line, if they are
 /// given.
 fn sized(mut scene: Scene, args: &RenderArgs) -> Result<Scene, Failure> {
     if let Some(acceleration) = args.acceleration {

@@ -21,7 +21,7 @@ use crate::world::{self, Precision};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Time from the start of a shard to its first checkpoint. Each following interval is twice the
+/// Time from the start of a shard to its first checkpoint. Each later interval is twice the
 /// previous one, up to [`LONGEST_INTERVAL`].
 const FIRST_CHECKPOINT: Duration = Duration::from_secs(5);
 /// Longest interval between checkpoints.
@@ -29,7 +29,7 @@ const LONGEST_INTERVAL: Duration = Duration::from_secs(60);
 /// Smallest interval between two checkpoints, as a multiple of the time to write one.
 const WRITES_PER_INTERVAL: u32 = 50;
 
-/// Traces the plan at `plan_path`, or the shard of it that `--shard` names.
+/// Traces the plan at `plan_path`, or only the shard that `--shard` names.
 pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     let plan = part_file::read_plan(plan_path)?;
     let numbers = match args.shard {
@@ -154,8 +154,8 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
     }
 }
 
-/// Compiles the scene and creates the render of the shards `numbers`. `saved` is the film of an
-/// earlier run, with its number of rays.
+/// Compiles the scene and creates the render of the shards `numbers`. `saved` is the film and the
+/// number of rays of an earlier run.
 fn start(
     args: &RenderArgs,
     document: &Document,

@@ -43,15 +43,14 @@ pub struct Stats {
     /// Estimated RMSE of the displayed picture, in 8-bit levels. Null if the replicates A and B,
     /// from whose difference it is estimated, never had equal numbers of samples.
     pub noise_codes: Option<f64>,
-    /// 95th percentile of the estimated RMSE of tiles, in 8-bit levels.
+    /// 95th percentile over the tiles of their estimated RMSE, in 8-bit levels.
     pub noise_codes_p95: Option<f64>,
     pub rmse_linear: Option<f64>,
-    /// Number of samples left out because they were NaN or negative.
+    /// Number of samples that are not in the picture because they were NaN or negative.
     pub bad_samples: u64,
-    /// Number of samples above the largest value that the film can hold; they are stored as that
-    /// value.
+    /// Number of samples that were clamped to the largest value that the film can hold.
     pub saturated_samples: u64,
-    /// Number of pixels with a sum that reached the largest value of the film.
+    /// Number of pixels whose sum was clamped to the largest value of the film.
     pub saturated_pixels: u64,
     /// One sentence for each limit that ends paths early, as in the picture's metadata. Empty if no
     /// path ends early, so that the picture is unbiased.

@@ -13,7 +13,8 @@ pub struct Point {
     pub noise_codes: f64,
 }
 
-/// Reports about one picture in order of time. Older reports are thinned out to bound their number.
+/// Noise of one picture over time, from its reports. Older reports are thinned out to limit their
+/// number.
 #[derive(Clone, Debug, Default)]
 pub struct Convergence {
     points: Vec<Point>,
@@ -66,8 +67,8 @@ impl Convergence {
         }
     }
 
-    /// Removes every second of the later three quarters of the points, which are the densest on a
-    /// logarithmic axis. Keeps the newest point.
+    /// Removes every second point among the later three quarters, which are the densest on a
+    /// logarithmic axis. The newest point is kept.
     fn thin(&mut self) {
         let (early, newest) = (MOST / 4, self.points.len() - 1);
         let mut index = 0;

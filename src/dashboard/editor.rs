@@ -6,11 +6,11 @@ use tui_input::{Input, InputRequest};
 /// Maximum length of the text in characters. It suffices for a path and keeps editing fast.
 const MOST: usize = 400;
 
-/// A line of text with a cursor, and the reason for which the text was refused, if it was.
+/// Editor of a line of text, with a cursor. It also holds the reason why the text was refused.
 #[derive(Clone, Debug, Default)]
 pub struct Editor {
     input: Input,
-    /// Reason for which the text was refused, in one or two sentences. It is shown until the text
+    /// Reason why the text was refused, in one or two sentences. It is shown until the text
     /// changes.
     pub problem: Option<String>,
 }

@@ -10,7 +10,7 @@ use crate::dashboard::update::commands::{COMMANDS, Chapter, Command, Hint, HintL
 pub enum HelpLine {
     /// The heading of a chapter.
     Heading(&'static str),
-    /// Keys of a command with the contexts of the keys, and the label of the command.
+    /// Keys of a command with their contexts, and the label of the command.
     Keys(String, &'static str),
 }
 

@@ -36,8 +36,8 @@ pub struct Layout {
     /// Cells that show the picture, centred inside the panel.
     pub image: Area,
     /// Columns and rows of the picture in half cells. A half cell is the upper or lower half of a
-    /// cell and counts as square. If the number of rows is odd, the last row of half cells is the
-    /// upper half of a row of cells.
+    /// cell, and is treated as square. If the number of rows is odd, the last row consists of upper
+    /// halves.
     pub raster: [usize; 2],
     /// Panel of the outline, or of the table of watched files.
     pub outline: Option<Area>,

@@ -16,7 +16,7 @@ use std::time::Duration;
 pub enum Message {
     /// A key was pressed.
     Key(Key),
-    /// Mouse event. Several pending drags may be joined to the newest one.
+    /// Mouse event. Pending drags are joined: only the newest position is reported.
     Mouse(Mouse),
     /// Pasted text, which is never interpreted as keys.
     Paste(String),

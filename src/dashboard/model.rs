@@ -62,7 +62,7 @@ pub struct Inspector {
     pub editor: Option<Editor>,
 }
 
-/// Comparison of the live picture with a pinned one, an earlier picture that the user has kept.
+/// Comparison of the live picture with a pinned one: an earlier picture that the user has stored.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
     /// The pinned picture and its mean samples per pixel.
@@ -142,7 +142,7 @@ pub struct Drag {
     pub in_picture: bool,
 }
 
-/// State that the screen is drawn from.
+/// State of the dashboard, from which the screen is drawn.
 #[derive(Debug)]
 pub struct Model {
     /// Columns and rows of the terminal.

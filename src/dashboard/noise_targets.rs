@@ -20,8 +20,8 @@ pub const ABOUT: &str = "Halving the noise takes two to four times as long. Ente
 /// Time to reach a noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cost {
-    /// The target was reached after this number of seconds of tracing. `None` if the noise was that
-    /// low in the first report already.
+    /// The target was reached after this number of seconds of tracing. `None` if the first report
+    /// was below it already.
     Reached(Option<f64>),
     /// The target has not been reached. The numbers are the lower and upper estimate of the
     /// remaining seconds of tracing.

@@ -44,8 +44,8 @@ pub enum Overlay {
 }
 
 impl Overlay {
-    /// Returns the parts of an overlay with a cursor: cursor, first visible line (`None` if it
-    /// never scrolls) and number of entries. Returns `None` for overlays without a cursor.
+    /// Returns the cursor, the first visible line (`None` if the overlay never scrolls) and the
+    /// number of entries. Returns `None` for overlays without a cursor.
     pub fn list(&mut self) -> Option<(&mut usize, Option<&mut usize>, usize)> {
         match self {
             Self::NoiseTargets { cursor } => Some((cursor, None, QUALITIES.len())),
@@ -111,7 +111,7 @@ pub enum PickFor {
     Word(Target, String),
 }
 
-/// A form for a new object or light, which the picture previews while the form is open.
+/// A form for a new object or light. The picture previews the result while the form is open.
 #[derive(Clone, Debug)]
 pub struct Form {
     /// Title, such as `new sphere`.
@@ -130,7 +130,7 @@ pub struct Form {
     pub scroll: usize,
     /// Text editor of the field under the cursor, if one is open.
     pub editor: Option<Editor>,
-    /// Reason for which the last change of a field was refused.
+    /// Reason why the last change of a field was refused.
     pub problem: Option<String>,
 }
 
@@ -165,7 +165,7 @@ pub enum PromptFor {
 /// A question with a few answers, each with a letter.
 #[derive(Clone, Debug)]
 pub struct Question {
-    /// Question, in a sentence or two.
+    /// Text of the question, one or two sentences.
     pub text: String,
     /// Letter, text and effect of each answer. The cursor starts on the first answer.
     pub answers: Vec<(char, String, Answer)>,

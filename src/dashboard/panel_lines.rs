@@ -51,7 +51,7 @@ pub struct FieldLine {
     /// Value in the syntax of the text editor, with control characters escaped; empty if the scene
     /// does not have the key.
     pub value: String,
-    /// Linear colour of the sample beside the value. `None` except in the first line of a colour.
+    /// Linear colour of the swatch beside the value. `None` except in the first line of a colour.
     pub swatch: Option<[f64; 3]>,
     /// Unit of the value; may be empty.
     pub unit: &'static str,
@@ -205,7 +205,8 @@ pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
 }
 
 /// Returns the first visible line of a list of `len` lines in `rows` rows, as close to `scroll` as
-/// possible. Line `cursor` is visible, and the line above it if there are more than two rows.
+/// possible. Line `cursor` must be visible, and also the line above it if there are more than two
+/// rows.
 pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize {
     let lowest = (cursor + 1).saturating_sub(rows);
     let highest = if rows > 2 { cursor.saturating_sub(1) } else { cursor };

@@ -6,8 +6,8 @@ use std::io::{self, ErrorKind};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
 
-/// Opens the regular file at `path` for reading. Never waits, as the opening of a pipe waits for
-/// its other end.
+/// Opens the regular file at `path` for reading. Never blocks; opening a pipe would block until its
+/// other end is open.
 ///
 /// # Errors
 /// Fails if the file cannot be opened, and with the error of [`require_regular`].
@@ -29,7 +29,7 @@ pub(crate) fn open_regular_with(options: &mut OpenOptions, path: &Path) -> io::R
 /// Checks that `file_type` is that of a regular file.
 ///
 /// # Errors
-/// [`ErrorKind::InvalidInput`] with a clause that names the type otherwise.
+/// Returns [`ErrorKind::InvalidInput`] with the name of the type, for other types.
 pub fn require_regular(file_type: FileType) -> io::Result<()> {
     let found = if file_type.is_file() {
         return Ok(());

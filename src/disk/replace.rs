@@ -21,7 +21,7 @@ pub struct WriteError {
     pub path: PathBuf,
     /// Kind of the problem.
     pub kind: ErrorKind,
-    /// Problem, as a clause of a sentence.
+    /// Description of the problem, as a clause of a sentence.
     pub what: String,
     /// Advice to the user, as a clause of a sentence.
     pub remedy: String,
@@ -35,13 +35,13 @@ impl fmt::Display for WriteError {
 
 impl std::error::Error for WriteError {}
 
-/// Treatment of an existing file.
+/// Action if the file exists already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Existing {
-    /// The file is replaced. If its path is a symbolic link, the link stays and its target is
+    /// Replaces the file. If its path is a symbolic link, the link stays and its target is
     /// replaced. The permissions stay.
     Replace,
-    /// Writing fails, also if another program creates the file in the meantime.
+    /// Fails, also if another program creates the file in the meantime.
     Refuse,
 }
 
@@ -154,8 +154,8 @@ pub fn lock(temporary: &NamedTempFile) {
     let _ = temporary.as_file().try_lock();
 }
 
-/// Replaces the content of the file at `path` by `bytes`. A target that is not a regular file, and
-/// an open file of this process such as `/dev/stdout`, gets the bytes appended.
+/// Replaces the content of the file at `path` by `bytes`. If the target is not a regular file, or
+/// is an open file of this process such as `/dev/stdout`, appends `bytes` instead.
 ///
 /// # Errors
 /// Fails if the file cannot be written; an existing regular file is then unchanged.
@@ -183,9 +183,9 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     if is_stream(path) { Ok(()) } else { Replacement::begin(path, Existing::Replace).map(drop) }
 }
 
-/// Returns `true` if `path` leads to a pipe, a device or a socket, or to an open file of a process.
-/// Opening one of the latter through a symbolic link such as `/dev/stdout` reaches the open file
-/// itself, which a replacement would not.
+/// Returns `true` if `path` leads to a pipe, a device, a socket, or an open file of a process. Such
+/// targets are written to directly: a replacement of `/dev/stdout`, for example, would not reach
+/// the open file.
 fn is_stream(path: &Path) -> bool {
     let is_other = |m: Metadata| !m.is_file() && !m.is_dir();
     fs::metadata(path).is_ok_and(is_other)

@@ -3,8 +3,8 @@
 use crate::film::store::Film;
 use std::io;
 
-/// Source of a picture's samples. A picture that does not fit into memory consists of bands of rows,
-/// which are rendered one after another while the file is written.
+/// Source of a picture's samples. A picture that does not fit into memory is rendered in bands of
+/// rows, one after another, while the file is written.
 pub trait Bands {
     /// Returns the film that holds row `y` of the picture. Its first row is the row
     /// [`Film::first_row`] of the picture. Encoders request all rows, in increasing order.
@@ -15,9 +15,9 @@ pub trait Bands {
 
     /// Returns metadata as keys and values.
     ///
-    /// Values that are known only after the last row may change until then, in up to 128 bytes. A
-    /// key has 1 to 79 printable ASCII characters, without leading, trailing or double spaces. It
-    /// starts with a capital letter, because OpenEXR's own keys start with a small one.
+    /// Values that are known only after the last row may change until then, to values of up to 128
+    /// bytes. A key has 1 to 79 printable ASCII characters, without leading, trailing or double
+    /// spaces. It starts with a capital letter, because OpenEXR's own keys start with a small one.
     fn metadata(&self) -> Vec<(String, String)>;
 }
 

@@ -1,7 +1,7 @@
 //! Box filter: means of pixels over cells of any size, weighted by covered area. Cells without
 //! samples get the value of a neighbour.
 
-/// Pixels that a cell covers along one axis, fully or in part.
+/// Pixels that a cell overlaps along one axis, fully or in part.
 pub(super) struct Coverage {
     /// Index of the first covered pixel.
     pub first: usize,
@@ -57,9 +57,9 @@ pub fn box_means(
     means
 }
 
-/// Fills cells without samples: each gets the means of the nearest known cell of its row, and a row
-/// without known cells gets those of the nearest row with some. `stride` is the number of means in
-/// a cell.
+/// Fills cells without samples. Each gets the means of the nearest cell with samples in its row. A
+/// row without samples gets the means of the nearest row with samples. `stride` is the number of
+/// means in a cell.
 pub(super) fn fill_gaps(
     means: &mut [f32],
     known: &mut [bool],
@@ -82,8 +82,8 @@ pub(super) fn fill_gaps(
     }
 }
 
-/// Returns, for each element, the index of the nearest known element; of two equally near ones the
-/// lower. If no element is known, returns each element's own index.
+/// Returns, for each element, the index of the nearest known element, and of two equally near ones
+/// the lower index. If no element is known, returns each element's own index.
 fn nearest(known: &[bool]) -> Vec<usize> {
     let mut below: Vec<Option<usize>> = Vec::with_capacity(known.len());
     for (i, k) in known.iter().enumerate() {

@@ -11,9 +11,9 @@ pub enum Tone {
     /// Clips each channel at 1.
     #[default]
     Clip,
-    /// The Khronos PBR Neutral tone mapper (KHR specification of 2024). It keeps hues, compresses
-    /// the brightest fifth of the range, and shifts the rest by at most a small constant in the
-    /// dark.
+    /// The Khronos PBR Neutral tone mapper (Khronos specification of 2024). It keeps hues,
+    /// compresses the brightest fifth of the range, and darkens the rest by at most a small
+    /// constant.
     Neutral,
 }
 
@@ -62,14 +62,14 @@ impl Display {
         self.to_8()(radiance)
     }
 
-    /// Returns [`Display::codes_8`] as a closure that has the constants precomputed, for many
-    /// pixels.
+    /// Returns [`Display::codes_8`] as a closure with precomputed constants, for many pixels.
     pub fn to_8(&self) -> impl Fn([f64; 3]) -> [u8; 3] + use<> {
         let (tone, factor, curve) = (self.tone, self.exposure_factor(), SrgbTable::shared());
         move |radiance| toned(tone, radiance.map(|c| c * factor)).map(|c| curve.code_8(c))
     }
 
-    /// Converts radiance to linear light of the display, 0..=1, without sRGB encoding.
+    /// Converts radiance to linear light of the display, 0..=1: exposure and tone curve without
+    /// sRGB encoding.
     pub fn shown(&self, radiance: [f64; 3]) -> [f64; 3] {
         toned(self.tone, radiance.map(|c| c * self.exposure_factor()))
     }
@@ -89,7 +89,7 @@ pub(super) fn toned(tone: Tone, color: [f64; 3]) -> [f64; 3] {
     }
 }
 
-/// Applies the Khronos PBR Neutral tone mapper, with the formulas of its publication.
+/// Applies the Khronos PBR Neutral tone mapper, with the formulas of the specification.
 #[inline(always)]
 fn neutral(color: [f64; 3]) -> [f64; 3] {
     const F90: f64 = 0.04;
@@ -108,7 +108,7 @@ fn neutral(color: [f64; 3]) -> [f64; 3] {
     color.map(|c| c * (new_peak / peak)).map(|c| c + (new_peak - c) * to_white)
 }
 
-/// Converts a value from 0 to 255 to 16 bits and rounds it; 255 becomes 65535.
+/// Converts an sRGB value from 0..=255 to 16 bits and rounds it; 255 becomes 65535.
 pub fn quantised_16(code: f64) -> u16 {
     (code * (65535.0 / 255.0)).round() as u16
 }
@@ -151,8 +151,8 @@ mod tests {
         assert_eq!(bright.codes([0.01, 0.1, 2.0]), plain.codes([0.08, 0.8, 1.0]));
     }
 
-    /// Checks the tone mapper against values of the published shader, evaluated by hand in double
-    /// precision.
+    /// Checks the tone mapper against values of the specification's shader, evaluated by hand in
+    /// double precision.
     #[test]
     fn neutral_follows_its_publication() {
         let neutral = Display { exposure_ev: 0.0, tone: Tone::Neutral };

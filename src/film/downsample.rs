@@ -8,7 +8,7 @@ use crate::film::store::Film;
 use crate::film::tile::Tile;
 
 /// Mean of each light group over the cells of a raster. Light weights are applied when the
-/// thumbnail is displayed, so that a change of weights needs no access to the film.
+/// thumbnail is displayed, so that a change of weights does not need the film.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Thumbnail {
     /// Number of cells in a row.
@@ -21,8 +21,9 @@ pub struct Thumbnail {
 }
 
 impl Thumbnail {
-    /// Averages `film` over `cols` x `rows` cells of equal size that together cover the film. Each
-    /// cell holds the mean of its sampled pixels, weighted by their areas inside of the cell.
+    /// Averages `film` over `cols` x `rows` cells of equal size that together cover the film. The
+    /// value of a cell is the mean of its sampled pixels, weighted by their areas inside of the
+    /// cell.
     ///
     /// A cell without samples gets the means of the nearest cell of its row that has samples. A row
     /// without samples gets the means of the nearest row with samples. A film without samples is
@@ -61,30 +62,30 @@ pub struct IncrementalDownsample {
     parts: Vec<TilePart>,
 }
 
-/// Cells of a raster that overlap each column and row of the film's tiles.
+/// Overlap of the film's tiles with the cells of a raster, along each axis.
 struct Layout {
     cols: usize,
     rows: usize,
     size: [usize; 2],
     groups: usize,
-    /// Cells that overlap each column of tiles.
+    /// Cells that each column of tiles overlaps.
     across: Vec<Span>,
-    /// Cells that overlap each row of tiles.
+    /// Cells that each row of tiles overlaps.
     down: Vec<Span>,
 }
 
-/// Cells that overlap one column (or row) of tiles.
+/// Cells that one column (or row) of tiles overlaps.
 struct Span {
     /// Index of the first cell.
     first: usize,
     /// Number of cells.
     len: usize,
-    /// For each pixel of the tiles along the axis, the cells that overlap it: index of the cell,
-    /// counted from `first`, and the fraction of the pixel that the cell covers, 0..=1.
+    /// Cells that overlap each pixel of the tiles along the axis: index of the cell, counted from
+    /// `first`, and the fraction of the pixel that the cell covers, 0..=1.
     pixels: Vec<Vec<(usize, f64)>>,
 }
 
-/// Contribution of a tile to the cells that overlap it.
+/// Contribution of a tile to the cells that it overlaps.
 #[derive(Default)]
 struct TilePart {
     /// Epoch, sample counts and lattice of the tile at its latest refresh. If the tile still has
@@ -106,7 +107,7 @@ pub struct DirtyTile<'a> {
 
 impl IncrementalDownsample {
     /// Creates the cache for `cols` x `rows` cells over a film with the size and the number of
-    /// groups of `film`. Its contributions are those of a film without samples.
+    /// groups of `film`. The contributions are initially those of an empty film.
     pub fn new(film: &Film, cols: usize, rows: usize) -> Self {
         let size = [film.width(), film.height()];
         let spans = |pixels: usize, cells: usize| {
@@ -134,8 +135,8 @@ impl IncrementalDownsample {
             && groups == film.groups()
     }
 
-    /// Returns the tiles that have changed since their latest refresh. Every call must pass the
-    /// same film, which may have been restarted in between.
+    /// Returns the tiles that have changed since their latest refresh. All calls must pass the same
+    /// film, which may be restarted between calls.
     pub fn stale<'a>(&'a mut self, film: &'a Film) -> Vec<DirtyTile<'a>> {
         let layout = &self.layout;
         let stale = |(index, part): (usize, &'a mut TilePart)| {
@@ -177,7 +178,7 @@ impl IncrementalDownsample {
 }
 
 impl Span {
-    /// Finds the cells that overlap a tile, along one axis. The tile begins at pixel `start` and
+    /// Finds the cells that a tile overlaps along one axis. The tile begins at pixel `start` and
     /// has `pixels` pixels.
     fn new(start: usize, pixels: usize, coverage: &[Coverage]) -> Self {
         let end = (start + TILE).min(pixels);
@@ -223,9 +224,8 @@ impl DirtyTile<'_> {
     }
 }
 
-/// Adds every `step`-th pixel of row `y` of a tile to `line`, one row of cells. The height of the
-/// cells is ignored.
-/// 1.
+/// Adds the areas and the values of every `step`-th pixel of row `y` of a tile to `line`, one row
+/// of cells. Pixels and cells count with the height 1.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {
@@ -286,7 +286,7 @@ mod tests {
         assert_eq!(raster.thumbnail().mixed(&white(2)).len(), 63);
     }
 
-    /// Computes the means of the cells by brute force: the overlap of every pixel with every cell.
+    /// Returns the means of the cells by brute force: the overlap of every pixel with every cell.
     fn brute_force(film: &Film, cols: usize, rows: usize, mix: &LightWeights) -> Vec<[f64; 3]> {
         let overlap = |cell: usize, cells: usize, pixel: usize, pixels: usize| {
             let edge = |c: usize| c as f64 * pixels as f64 / cells as f64;

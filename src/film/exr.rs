@@ -44,12 +44,12 @@ pub(super) fn encode(
     })
 }
 
-/// Source of a channel's values.
+/// Value of a channel.
 #[derive(Clone, Copy)]
 enum Source {
-    /// Radiance over all light groups: colour channel `.1` of the replicates `.0`.
+    /// Sum over all light groups: replicates `.0`, colour channel `.1`.
     Mixed(Replicates, usize),
-    /// Contribution of light group `.0` to colour channel `.1`.
+    /// Single light group: group `.0`, colour channel `.1`.
     Group(usize, usize),
     /// Number of samples of a pixel in both replicates.
     Count,
@@ -96,7 +96,7 @@ fn encode_to(
     Ok(())
 }
 
-/// Returns the bytes of a file before the table of chunks.
+/// Returns all bytes of a file before the table of chunks.
 fn header(
     picture: &ImageData,
     channels: &[(String, Source)],
@@ -110,7 +110,7 @@ fn header(
     }
 }
 
-/// Describes the only part of the file.
+/// Returns the header of the file's only part.
 fn headers(
     picture: &ImageData,
     channels: &[(String, Source)],
@@ -186,7 +186,7 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     layers
 }
 
-/// Values of a row of tiles.
+/// Encoded values of a row of tiles.
 struct TileRow<'a> {
     picture: &'a ImageData<'a>,
     sources: Vec<Source>,
@@ -199,7 +199,7 @@ impl<'a> TileRow<'a> {
         Self { picture, bytes: sources.iter().map(|_| Vec::new()).collect(), sources }
     }
 
-    /// Replaces the bytes by those of the given rows of the picture.
+    /// Replaces the values by those of the given rows of the picture.
     fn load(&mut self, rows: Range<usize>, bands: &mut dyn Bands) -> io::Result<()> {
         let Self { picture, sources, bytes } = self;
         bytes.iter_mut().for_each(Vec::clear);

@@ -10,8 +10,8 @@ use std::io::{self, Cursor, Seek, SeekFrom, Write};
 /// Number of bytes before the first attribute: magic number and version.
 const PREAMBLE: usize = 8;
 
-/// Writer that buffers the header until it is complete. It then sorts the attributes by name and
-/// writes them to the sink, followed by all further bytes.
+/// Writer that sorts the attributes of an OpenEXR header by name. It buffers the header until it is
+/// complete, writes it to the sink, and passes on all further bytes.
 pub(super) struct Ordered<W: Write + Seek> {
     sink: W,
     /// Buffered bytes. `None` after the header has been written.

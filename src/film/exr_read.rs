@@ -13,8 +13,8 @@ pub struct ReadPicture {
     pub replicates: Option<[Vec<[f64; 3]>; 2]>,
 }
 
-/// Largest number of pixels that is read, that of 8192 x 8192. The limit bounds memory, because the
-/// whole picture is held in memory.
+/// Largest number of pixels of a file that is read: 8192 x 8192. It limits the memory, because the
+/// whole picture is read into memory.
 const MAX_PIXELS: usize = 1 << 26;
 
 /// Reads the channels `R G B` of an OpenEXR file, and the replicates `A.R ..` and `B.R ..` if they

@@ -4,7 +4,8 @@ use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
 use std::io::{Seek, Write};
 
-/// Size and settings of a picture file. Its samples come from [`Bands`](crate::film::Bands).
+/// Size and settings of a picture file without its samples, which come from
+/// [`Bands`](crate::film::Bands).
 #[derive(Clone, Copy, Debug)]
 pub struct ImageData<'a> {
     /// Width and height in pixels.

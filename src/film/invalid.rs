@@ -1,9 +1,9 @@
 //! Invalid samples: samples that are NaN or negative.
 
-/// Largest number of invalid samples whose positions are stored. Any others are only counted.
+/// Largest number of invalid samples whose positions are stored. Further ones are only counted.
 pub const INVALID_REMEMBERED: usize = 16;
 
-/// Position of a sample: all values that are needed to trace it again.
+/// Position of a sample: the values that are needed to trace it again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct InvalidSample {
     /// Index in the sample sequence of the replicate.
@@ -16,8 +16,8 @@ pub struct InvalidSample {
     pub x: u32,
 }
 
-/// Number of invalid samples, and the positions of the first ones in sorted order. They do not
-/// depend on the order in which threads find the samples.
+/// Number of invalid samples, and the positions of the first ones in sorted order. Both are
+/// independent of the order in which threads find the samples.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InvalidSamples {
     /// Number of invalid samples.

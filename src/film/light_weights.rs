@@ -55,7 +55,7 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns the sum with the index `i`, in `[group][channel]` order, over the chosen replicates.
+    /// Returns sum `i` (in `[group][channel]` order) over the chosen replicates.
     #[inline(always)]
     pub fn value(&self, replicates: Replicates, i: usize) -> f64 {
         match replicates {

@@ -8,11 +8,11 @@ use png::Decoder;
 use std::io::BufReader;
 use std::path::Path;
 
-/// Multiple of bytes to which the values in picture files are padded.
+/// Values in picture files are padded to a multiple of this number of bytes.
 const PADDED: usize = 128;
 
-/// Pads a value with spaces. A picture may be written while it is rendered; its noise and sample
-/// counts are known at the end, and replace placeholders of the same length.
+/// Pads a value with spaces. In a picture that is written while it is rendered, noise and sample
+/// counts are placeholders until the end. Their final values must have the same length.
 pub(super) fn padded(value: &str) -> String {
     let len = value.len().next_multiple_of(PADDED).max(PADDED);
     format!("{value}{}", " ".repeat(len - value.len()))
@@ -37,11 +37,11 @@ pub struct FileMetadata {
 }
 
 impl FileMetadata {
-    /// Reads the metadata of the PNG, OpenEXR or film file at `path`. The checksums of a film file
-    /// are verified.
+    /// Reads the metadata of the PNG, OpenEXR or film file at `path`, and verifies the checksums of
+    /// a film file.
     ///
     /// # Errors
-    /// Fails if the file cannot be read, is none of these, or is damaged.
+    /// Fails if the file cannot be read, has another format, or is damaged.
     pub fn read(path: &Path) -> Result<Self, String> {
         if is_film_file(path) {
             let header = FilmReader::open(path).and_then(FilmReader::verify);

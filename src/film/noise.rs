@@ -47,7 +47,7 @@ pub struct Mse {
 }
 
 impl Mse {
-    /// Value of [`TileNoise::squares`] for an error that is spread over many pixels.
+    /// Value of [`TileNoise::squares`] for an error that is spread over very many effective pixels.
     #[cfg(test)]
     pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
 
@@ -57,15 +57,15 @@ impl Mse {
     }
 }
 
-/// Estimated error of one tile.
+/// Estimated error of one tile. Its pixels alternate between white and black, like a checkerboard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileNoise {
     /// Validation estimate, from the white pixels. It is reported to the user.
     pub reported: Mse,
     /// Allocation estimate, from the black pixels. It selects tiles for further samples.
     pub allocation: Mse,
-    /// Sum over all pixels of the fourth power of the error: for each pixel the squared errors are
-    /// summed over channels, then squared. It determines the number of effective pixels.
+    /// Sum over all pixels of the squared error of the pixel, squared again. The squared error of a
+    /// pixel is summed over channels. The number of effective pixels is computed from this sum.
     pub squares: Mse,
     /// Number of pixels of the tile that are inside the picture.
     pub pixels: u32,
@@ -73,7 +73,7 @@ pub struct TileNoise {
 
 /// Estimator of tile errors under the given light weights and display transform.
 pub struct Estimator {
-    /// Factors from sums to radiance times count, `[group][channel]`.
+    /// Factors from sums to radiance times sample count, `[group][channel]`.
     per_unit: Vec<f64>,
     exposure: f64,
     tone: Tone,
@@ -92,15 +92,15 @@ impl Estimator {
         }
     }
 
-    /// Estimates the error of a tile. Returns `None` if A and B have different numbers of samples,
-    /// or none.
+    /// Estimates the error of a tile. Returns `None` if the replicates A and B have different
+    /// numbers of samples, or none.
     pub fn tile(&self, tile: &Tile) -> Option<TileNoise> {
         let [count, count_b] = tile.counts();
         if count == count_b { self.tile_so_far(tile) } else { None }
     }
 
-    /// Estimates the error of a tile, even if B has fewer samples than A. Returns `None` if A or B
-    /// has no samples.
+    /// Estimates the error of a tile, even if replicate B has fewer samples than A. Returns `None`
+    /// if A or B has no samples.
     ///
     /// With n and m samples of variance v each, (A - B)^2 has the mean v (n + m) / nm. The picture
     /// (nA + mB) / (n + m) has the variance v / (n + m). Hence d = (A - B) sqrt(nm) / (n + m)
@@ -177,7 +177,7 @@ fn weighted(sums: &[i64], per_sum: &[f64]) -> [f64; 3] {
 }
 
 impl TileNoise {
-    /// Estimate from all pixels, black and white.
+    /// Returns the estimate from all pixels, black and white.
     pub fn of_all(&self) -> Mse {
         let [black, white] = [self.pixels.div_ceil(2), self.pixels / 2].map(f64::from);
         let mean = |black_mse: f64, white_mse: f64| {
@@ -190,7 +190,7 @@ impl TileNoise {
     }
 }
 
-/// Estimated error of a whole picture. `rmse` is the root mean square error.
+/// Estimated error of a whole picture as root mean square errors (RMSE).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// Root mean square error in linear radiance.

@@ -39,8 +39,8 @@ impl Pixel {
     }
 }
 
-/// Returns the pixels of a picture of 64x48. The probability `chance` of a sample with light covers
-/// 0 to 1.
+/// Returns the pixels of a picture of 64 x 48 pixels. Their probabilities `chance` of a lit sample
+/// range from 0 to 1.
 fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
     (0..64 * 48).map(|_| Pixel { chance: rng.unit(), normal, dark }).collect()
 }
@@ -48,8 +48,8 @@ fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
 struct Outcome {
     linear: Vec<f64>,
     codes: Vec<f64>,
-    /// Relative standard deviation of the estimated RMSE of a tile over the seeds, averaged over
-    /// all tiles.
+    /// Relative standard deviation over the seeds of a tile's estimated RMSE, averaged over all
+    /// tiles.
     tile_spread: f64,
 }
 
@@ -120,8 +120,8 @@ fn estimates_equal_true_errors_in_the_mean() {
     }
 }
 
-/// Compares the estimate with two simpler ones, for dark pixels whose samples are rarely lit. The
-/// tone curve is steep and bent at their values.
+/// Compares the estimate with two simpler ones for dark pixels whose samples are rarely lit. At
+/// their values the tone curve is steep and curved.
 #[test]
 fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
     let (n, mut rng) = (16u32, Rng(5));
@@ -221,8 +221,8 @@ fn unequal_counts_have_no_noise() {
     assert_eq!(noise(&film), None);
 }
 
-/// Checks the estimate between two waves: its mean over many tiles equals the variance of the
-/// picture.
+/// Checks the estimate between two waves of samples, when B has fewer samples than A. Its mean over
+/// many tiles equals the variance of the picture.
 #[test]
 fn replicate_with_fewer_samples_still_has_an_estimate() {
     let display = Display { exposure_ev: -2.0, tone: Tone::Clip };

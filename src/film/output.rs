@@ -58,8 +58,8 @@ impl ImageOutput {
         }
     }
 
-    /// Returns an output whose write fails if the file exists at the start or when the write is
-    /// complete.
+    /// Returns an output that does not replace files: writing fails if the file exists at the start
+    /// or when the write is complete.
     pub fn create_new(self) -> Self {
         Self { existing: Existing::Refuse, ..self }
     }
@@ -150,8 +150,8 @@ mod tests {
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
-    /// Bands whose metadata change after the last row, as those of a render that runs while the
-    /// file is written.
+    /// Bands whose metadata change after the last row, as in a render that runs while the file is
+    /// written.
     struct Late<'a> {
         film: &'a Film,
         rows: usize,
@@ -202,7 +202,7 @@ mod tests {
         }
     }
 
-    /// Bands whose rows cannot be rendered, as after a signal.
+    /// Bands whose rows cannot be rendered, as after a signal that stops the render.
     struct Failing(Film);
 
     impl Bands for Failing {

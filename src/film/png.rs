@@ -56,7 +56,7 @@ fn encode_to(
     Ok(())
 }
 
-/// Returns all bytes of a file up to its image data.
+/// Returns all bytes of a file before its image data.
 fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
     // The writer adds the last chunk when it is dropped.
@@ -65,7 +65,7 @@ fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8
     Ok(bytes)
 }
 
-/// Writes the part of the file before the image data.
+/// Writes the part of the file before the image data, and returns the writer of the rest.
 fn start<W: Write>(
     picture: &ImageData,
     metadata: &[(String, String)],
@@ -101,10 +101,10 @@ fn start<W: Write>(
     encoder.write_header()
 }
 
-/// Encodes an 8-bit sRGB picture as PNG. `rgb` holds red, green and blue of each pixel, row by row.
+/// Encodes an 8-bit sRGB picture as PNG. `rgb` has red, green and blue of each pixel, row by row.
 ///
 /// # Errors
-/// Fails if `rgb` has not 3 bytes for each pixel.
+/// Fails if the length of `rgb` is not 3 bytes per pixel.
 pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, width, height);

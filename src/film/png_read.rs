@@ -5,12 +5,12 @@ use png::{ColorType, Decoder, Transformations};
 use std::io::BufReader;
 use std::path::Path;
 
-/// Largest number of pixels that is read, that of 8192 x 8192. The limit bounds memory, because the
-/// whole picture is held in memory.
+/// Largest number of pixels of a file that is read: 8192 x 8192. It limits the memory, because the
+/// whole picture is read into memory.
 const MAX_PIXELS: u64 = 1 << 26;
 
-/// Reads a PNG file. Returns width and height, and the pixels in 8-bit sRGB, `[row][column]`,
-/// without transparency.
+/// Reads a PNG file. Returns its size (width, height) and its pixels in 8-bit sRGB,
+/// `[row][column]`. Transparency is ignored.
 ///
 /// # Errors
 /// Fails if the file cannot be read or is too large.

@@ -5,9 +5,8 @@ use std::sync::LazyLock;
 
 /// Base-2 logarithm of the number of table entries per octave (factor 2 of linear light).
 const SEGMENTS_LOG2: u32 = 7;
-/// Exponent of the power of two below which one table entry is exact, because the encoding is
-/// linear up to 0.0031308.
-/// 0.0031308.
+/// Exponent of the power of two below which one table entry is exact: the sRGB encoding is linear
+/// up to 0.0031308.
 const FIRST_OCTAVE: i32 = -9;
 const SHIFT: u32 = 52 - SEGMENTS_LOG2;
 /// Upper bits of the double 2^FIRST_OCTAVE, minus one, so that table entry 0 is the linear part of
@@ -21,7 +20,7 @@ const MAX_ERROR_CODES: f64 = 5.5e-4;
 /// Piecewise linear approximation of the sRGB encoding, exact at 128 points per octave of linear
 /// light.
 pub(super) struct SrgbTable {
-    /// Two numbers for each linear piece: its value at 0 and its slope, in 8-bit levels.
+    /// Linear pieces in 8-bit levels: the value of each line at 0, and its slope.
     chords: [[f64; 2]; ENTRIES],
 }
 
@@ -66,7 +65,7 @@ impl SrgbTable {
     }
 }
 
-/// Rounds a value from 0 to 255 to 8 bits.
+/// Rounds an sRGB value from 0..=255 to 8 bits.
 pub fn quantised_8(code: f64) -> u8 {
     code.round() as u8
 }

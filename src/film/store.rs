@@ -48,7 +48,7 @@ pub struct Film {
     tiles: Vec<Tile>,
 }
 
-/// Exclusive access to a tile for one thread. [`TileHandle::prepare`] allocates or clears the tile.
+/// Exclusive access of one thread to a tile. [`TileHandle::prepare`] allocates or clears the tile.
 #[derive(Debug)]
 pub struct TileHandle<'a> {
     /// Number of the tile; tiles are numbered row by row.
@@ -128,8 +128,8 @@ impl Film {
         columns * rows * (Tile::sums_len(groups) * size_of::<i64>()) as u64
     }
 
-    /// Allocates the memory of all tiles of a large film. The tiles of a small film are allocated
-    /// when threads first write them, so that the first picture appears sooner.
+    /// Allocates the memory of all tiles of a large film. Tiles of a small film are allocated when
+    /// they are first written, so that the first picture appears sooner.
     fn reserve(&mut self) -> Result<(), TryReserveError> {
         let size = [self.width(), self.height()].map(|n| n as u32);
         if Self::memory_bytes(size, self.groups()) < RESERVED_FROM {
@@ -161,7 +161,7 @@ impl Film {
         Ok(Self { epoch: 1, tiles, header, first_row: 0 })
     }
 
-    /// Creates a film without samples with the header `header`, which uses the memory of this film.
+    /// Creates a film without samples with the header `header` in the memory of this film.
     ///
     /// # Errors
     /// Fails if the memory cannot be allocated.
@@ -189,7 +189,7 @@ impl Film {
     }
 
     /// Returns this film as a band of rows of a picture: its row 0 is row `first_row` of the
-    /// picture. All functions count columns and rows from the band's upper left pixel.
+    /// picture. All methods count columns and rows from the band's upper left pixel.
     ///
     /// # Panics
     /// Panics if `first_row` is not a multiple of [`TILE`].
@@ -262,7 +262,7 @@ impl Film {
         Some(&self.tiles[index]).filter(|tile| tile.is_of(self.epoch))
     }
 
-    /// Iterates over the tiles that have been prepared since the last restart: number and tile.
+    /// Iterates over the tiles that have been prepared since the last restart, with their numbers.
     pub fn touched(&self) -> impl Iterator<Item = (usize, &Tile)> {
         self.tiles.iter().enumerate().filter(|(_, tile)| tile.is_of(self.epoch))
     }
@@ -376,8 +376,8 @@ impl Film {
         self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
     }
 
-    /// Adds the samples of another film. Films of disjoint sample ranges give, in any order, the
-    /// same sums as one film of all ranges.
+    /// Adds the samples of another film. Films of disjoint sample ranges, added in any order, give
+    /// the same sums as one film of all ranges.
     ///
     /// # Errors
     /// Fails if the headers differ, or if both films hold parts of the first sample of a tile. The
@@ -392,8 +392,8 @@ impl Film {
         Ok(())
     }
 
-    /// Creates an empty tile for the position of the tile `index`. After it is filled,
-    /// [`Film::add_at`] adds it.
+    /// Creates an empty tile at the position of the tile `index`. [`Film::add_at`] adds its samples
+    /// to the film.
     pub(super) fn new_tile(&self, index: usize) -> Tile {
         let mut tile = Tile::cleared(self.groups(), self.tiles[index].extent());
         tile.clear_if_stale(self.epoch);

@@ -17,7 +17,7 @@ pub fn white(groups: usize) -> LightWeights {
     LightWeights { weights: vec![[1.0; 3]; groups] }
 }
 
-/// Calls `f` with every tile and the column and row of its upper left pixel.
+/// Calls `f` with every tile, and with the column and row of its upper left pixel.
 pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
     let all: Vec<_> = (0..film.tile_count()).collect();
     for slot in film.slots(&all) {
@@ -27,7 +27,8 @@ pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
 }
 
 /// Adds `count` samples per pixel to both replicates. `sums(x, y, replicate)` returns the sum of a
-/// pixel's samples, `[group][channel]`; it is multiplied by the scale of the group and rounded.
+/// pixel's samples in radiance, `[group][channel]`. It is multiplied by the scale of the group and
+/// rounded.
 pub fn fill(film: &mut Film, count: u32, mut sums: impl FnMut(usize, usize, usize) -> Vec<f64>) {
     let scales = film.scales().to_vec();
     each_tile(film, |tile, [x0, y0]| {

@@ -17,12 +17,12 @@ const CACHE_LINE: usize = 8;
 /// Sums of a pixel without samples.
 static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 
-/// Sums of 16x16 pixels. A pixel has the number `y * 16 + x` in its tile. In tiles at the right and
-/// lower edge of the picture, pixels outside of the picture stay zero (see [`Tile::extent`]).
+/// Sums of 16 x 16 pixels. A pixel has the number `y * 16 + x` in its tile. In tiles at the right
+/// and lower edge of the picture, pixels outside of the picture stay zero (see [`Tile::extent`]).
 ///
-/// All pixels have the same number of samples; it may differ between the replicates. The exception
-/// is the first pass, which adds the first sample of replicate A in stages. [`Tile::lattice_px`]
-/// determines the pixels that already have this sample.
+/// All pixels have the same number of samples, except during the first pass, which adds the first
+/// sample of replicate A in stages: [`Tile::lattice_px`] determines the pixels that have this
+/// sample already. The number may differ between the replicates.
 #[derive(Debug)]
 pub struct Tile {
     /// Epoch of the film in which the contents were written; 0 for a new tile.
@@ -39,9 +39,8 @@ pub struct Tile {
     /// Sums, `[replicate][pixel][group][channel]`. Empty until the tile is first written.
     sums: Vec<i64>,
     /// Bits of the pixels that have been written in this epoch: bit `p % 64` of `[replicate][p /
-    /// 64]` belongs to pixel p. The sums of other pixels count as zero, whatever the memory
-    /// contains. A restart therefore writes nothing per pixel, and the first samples of a large
-    /// film access few of its memory pages.
+    /// 64]` is for pixel p. The sums of other pixels count as zero, whatever the memory contains. A
+    /// restart therefore does not access the sums.
     written: [[u64; TILE_PIXELS / 64]; 2],
 }
 
@@ -61,7 +60,7 @@ impl Tile {
         }
     }
 
-    /// Returns the tile's memory for use by another film.
+    /// Returns the memory of the sums, for use by another film.
     pub(super) fn into_memory(self) -> Vec<i64> {
         self.sums
     }
@@ -76,7 +75,7 @@ impl Tile {
         2 * TILE_PIXELS * groups * 3
     }
 
-    /// Allocates the memory of the sums, unless the tile has it already. The memory is not written.
+    /// Allocates the memory of the sums if the tile has none. The memory is not written.
     pub(super) fn reserve(&mut self) -> Result<(), TryReserveError> {
         let len = Self::sums_len(self.stride / 3);
         if self.sums.capacity() < len {
@@ -121,9 +120,9 @@ impl Tile {
         self.counts
     }
 
-    /// Step of the lattice in pixels during the first pass. Pixels whose x and y are both multiples
-    /// of it have the first sample of replicate A, in addition to [`Tile::counts`]. 0 if the first
-    /// pass has not started or is complete.
+    /// Step of the pixel lattice during the first pass, in pixels. Pixels whose x and y are
+    /// multiples of it have the first sample of replicate A, in addition to [`Tile::counts`]. 0
+    /// before and after the first pass.
     pub fn lattice_px(&self) -> usize {
         usize::from(self.lattice_px)
     }
@@ -172,7 +171,7 @@ impl Tile {
     }
 
     /// Returns the sums of one pixel in one replicate (0: A, 1: B) for writing, `[group][channel]`.
-    /// Callers may add to them only if no sum can overflow; otherwise use [`Tile::add`].
+    /// Callers must ensure that no sum overflows; [`Tile::add`] works for all values.
     #[inline(always)]
     pub fn pixel_mut(&mut self, replicate: usize, pixel: usize) -> &mut [i64] {
         let start = (replicate * TILE_PIXELS + pixel) * self.stride;
@@ -213,8 +212,8 @@ impl Tile {
     }
 
     /// Adds non-negative `values` (`[group][channel]`, length `groups * 3`) to the sums of a pixel.
-    /// A sum that would exceed `i64::MAX` becomes `i64::MAX` and counts as saturated; because no
-    /// value is negative, this too is independent of the order of addition.
+    /// A sum that would exceed `i64::MAX` is set to `i64::MAX` and counts as saturated. Because no
+    /// value is negative, the result is independent of the order of addition.
     #[inline(always)]
     pub fn add(&mut self, replicate: usize, pixel: usize, values: &[i64]) {
         for (group, values) in values.chunks_exact(3).enumerate() {
@@ -262,14 +261,14 @@ impl Tile {
         self.saturated_samples
     }
 
-    /// Records an invalid sample, which the sums contain as black.
+    /// Records an invalid sample. It contributes black to the sums.
     #[cold]
     pub fn record_bad(&mut self, sample: InvalidSample) {
         self.bad.record(sample);
     }
 
-    /// Sets all values except for the sums to those of a tile in a file. `full` is `true` if a sum
-    /// has reached its limit.
+    /// Sets everything except for the sums to the values of a tile in a file. `full` is `true` if a
+    /// sum has reached its limit.
     pub(super) fn restore(
         &mut self,
         counts: [u32; 2],
@@ -309,7 +308,7 @@ impl Tile {
     }
 }
 
-/// Returns `i64::MAX` if the addition that gave `sum` has overflowed, and `sum` otherwise.
+/// Returns `i64::MAX` if `sum`, the result of a wrapping addition, has overflowed, otherwise `sum`.
 #[cold]
 fn saturated_sum(sum: i64) -> i64 {
     if sum < 0 { i64::MAX } else { sum }

@@ -10,12 +10,12 @@ use std::f64::consts::PI;
 /// A compiled delta light: a light without a size.
 #[derive(Clone, Copy, Debug)]
 pub enum DeltaLight<S> {
-    /// Point light with irradiance 1 / d^2 at the distance d.
+    /// Point light. Its irradiance at normal incidence is 1 / d^2 at the distance d.
     InverseSquare {
         /// Position of the light.
         position: [S; 3],
     },
-    /// Point light with the irradiance pi, at normal incidence, at every distance.
+    /// Point light. Its irradiance at normal incidence is pi at every distance.
     Constant {
         /// Position of the light.
         position: [S; 3],
@@ -48,7 +48,7 @@ const SHARP: f64 = 1e30;
 /// narrow cones.
 #[derive(Clone, Copy, Debug)]
 pub struct SpotCone<S> {
-    /// Unit vector along the axis, towards the light.
+    /// Unit vector from lit points on the cone's axis towards the light.
     axis: [S; 3],
     /// Value of s at the outer cone.
     outer: S,
@@ -160,8 +160,8 @@ impl<S: Float> DeltaLight<S> {
         }
     }
 
-    /// Returns the irradiance, at normal incidence, at the origin of the translated scene.
-    /// Distances less than `radius` are replaced by `radius`.
+    /// Returns the irradiance at normal incidence at the origin of the translated scene. If the
+    /// light is nearer than `radius`, returns the irradiance at the distance `radius`.
     pub fn typical_irradiance(&self, radius: f64) -> f64 {
         match self.position().filter(|_| self.is_inverse_square()) {
             Some(position) => {
@@ -186,9 +186,9 @@ mod tests {
 
     /// Compares the irradiance around a spot light with the smoothstep of the angle's cosine.
     ///
-    /// The direction has an error of about ten rounding errors: those of coordinates below 8,
-    /// divided by distances of at least 0.5, and those of two unit vectors. The slope of the edge
-    /// multiplies it, at most 1.5 times that of the cosine.
+    /// Tolerance: the direction has an error of about ten rounding errors, from coordinates below
+    /// 8, divided by distances of at least 0.5, and from two unit vectors. The slope of the
+    /// smoothstep, at most 1.5 times that of the cosine, multiplies it.
     fn check<L: SimdFloat>(epsilon: f64) {
         let origin = DVec3::new(0.25, 0.0, 0.5);
         for (inner, outer) in [(10.0, 30.0), (0.0, 90.0), (0.0, 0.5), (70.0, 160.0), (180.0, 180.0)]

@@ -7,8 +7,9 @@ use crate::sampling::warp;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
-/// Smallest solid angle at which a rectangle is sampled by solid angle instead of area, in rounding
-/// errors. At this solid angle rounding moves the sampled points by 1e-5 of the rectangle's size.
+/// Smallest solid angle at which a rectangle is sampled by solid angle instead of area, in units of
+/// the rounding error. At this solid angle rounding moves the sampled points by 1e-5 of the
+/// rectangle's size.
 pub(super) const MIN_SOLID_ANGLE: f64 = 2e5;
 
 /// Surface of a compiled emitter.
@@ -223,8 +224,8 @@ impl<S: Float> Emitter<S> {
         }
     }
 
-    /// Creates a sample whose irradiance is radiance divided by `density`, limited to the largest
-    /// finite number: infinity times black would be NaN.
+    /// Creates a sample with the given density. Its irradiance is radiance divided by `density`,
+    /// limited to the largest finite number, because infinity times black would be NaN.
     #[inline(always)]
     fn with_density<L: SimdFloat<Scalar = S>>(
         &self,
@@ -256,7 +257,7 @@ pub(super) fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3
 
 /// Returns the distance at which rays hit the emitter's plane, and the local coordinates of the hit
 /// points. `to_center` is the vector from the rays' origin to the emitter's centre. The distance is
-/// negative for rays that miss the front.
+/// negative for rays that do not hit the front.
 #[inline(always)]
 fn plane_hit<L: SimdFloat>(
     axes: &[[L::Scalar; 3]; 3],
@@ -318,7 +319,7 @@ impl<L: SimdFloat> Cone<L> {
 ///
 /// Ureña, Fajardo, King 2013, *An Area-Preserving Parametrization for Spherical Rectangles*.
 pub(super) struct SphericalRectangle<L: SimdFloat> {
-    /// Smallest and largest coordinate across, relative to the point.
+    /// Interval of the rectangle's coordinates across, relative to the point.
     x: [L; 2],
     y: [L; 2],
     /// Coordinate of the rectangle's plane along the normal, relative to the point; negative if the
@@ -384,9 +385,10 @@ impl<L: SimdFloat> SphericalRectangle<L> {
     }
 }
 
-/// Returns the solid angle of a rectangle: the sum of two triangles, each by an arc tangent that
-/// has no cancellation at small angles (Van Oosterom and Strackee 1983). The sides are local
-/// coordinates relative to the point, `z` that of the plane.
+/// Returns the solid angle of a rectangle: the sum of the solid angles of two triangles, each by an
+/// arc tangent without cancellation at small angles (Van Oosterom and Strackee 1983). `[x0, x1]`
+/// and `[y0, y1]` are the intervals of the rectangle's local coordinates relative to the point, and
+/// `z` is the coordinate of its plane.
 #[inline(always)]
 fn solid_angle<L: SimdFloat>([x0, x1]: [L; 2], [y0, y1]: [L; 2], z: L, area: L) -> L {
     let corner = |x: L, y: L| {

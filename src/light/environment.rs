@@ -12,7 +12,7 @@ use crate::value::{Color, ValidationError, description};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Rows of the image of a gradient.
+/// Number of rows of the image that represents a gradient.
 const GRADIENT_ROWS: u32 = 512;
 
 description! {
@@ -46,7 +46,8 @@ impl Environment {
         self.file().and(self.map.content())
     }
 
-    /// Loads the image with `load`, unless the image or an error of reading it is stored already.
+    /// Calls `load` with the name of the image and stores the result. Does nothing if an image or
+    /// an error is stored already.
     pub fn resolve(&mut self, load: impl FnOnce(&str) -> Result<Arc<RadianceMap>, AssetError>) {
         if !self.file.is_empty() {
             self.map.resolve(|| load(&self.file));

@@ -39,7 +39,7 @@ description! {
         disk: Option<DiskLight>, or "another kind is needed";
         /// Light from all directions.
         environment: Option<Environment>, or "another kind is needed";
-        /// Colour. It multiplies the intensity.
+        /// Colour, by which the intensity is multiplied.
         color: Color = [1.0, 1.0, 1.0], in LIGHT;
         /// Radiance or power of a sphere, rectangle or disk, by `unit`. Factor of the radiance of an
         /// environment. Radiant intensity [W/sr] of
@@ -216,16 +216,16 @@ impl Light {
         sphere.or(rectangle).or(self.disk.map(EmitterSurface::Disk))
     }
 
-    /// Removes the kind of the light, so that another one can be added.
+    /// Removes the kind of the light and its values, so that another kind can be set.
     pub fn clear_kind(&mut self) {
         (self.point, self.directional, self.spot) = (None, None, None);
         (self.sphere, self.rectangle, self.disk) = (None, None, None);
         self.environment = None;
     }
 
-    /// Adds a surface of the kind `name` (`sphere`, `rectangle` or `disk`) with the given radius.
-    /// The sides of a rectangle are twice as long. The numbers are rounded. Other names change
-    /// nothing.
+    /// Gives the light a surface of the kind `name` (`sphere`, `rectangle` or `disk`) with the
+    /// given radius. The sides of a rectangle are twice as long. The numbers are rounded. Other
+    /// names change nothing.
     pub fn set_surface(&mut self, name: &str, center: DVec3, normal: [f64; 3], radius: f64) {
         let center = center.map(|x| round_nice(x, radius)).to_array();
         let radius = round_significant(radius, 2);

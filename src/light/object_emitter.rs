@@ -14,8 +14,8 @@ use crate::sampling::warp;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Largest number of triangles of which one is chosen by solid angle. The solid angles of all of
-/// them are computed for each receiver.
+/// Largest number of triangles for the choice of a triangle by solid angle. This choice computes
+/// the solid angles of all triangles for each receiver.
 const MAX_FACES: usize = 32;
 
 /// Surface of an object from which light can be sampled.
@@ -37,7 +37,7 @@ pub enum ObjectSurface {
         /// Width and height.
         size: [f64; 2],
     },
-    /// Triangles with an area greater than 0, counter-clockwise as seen from the front.
+    /// Triangles with areas greater than 0, counter-clockwise as seen from the front.
     Triangles(Vec<[DVec3; 3]>),
     /// Triangles that enclose a convex solid, counter-clockwise as seen from outside.
     ConvexTriangles(Vec<[DVec3; 3]>),
@@ -69,13 +69,14 @@ enum CompiledSurface<S> {
         axes: [[S; 3]; 3],
         size: [S; 2],
     },
-    /// At most [`MAX_FACES`] triangles, chosen by their solid angles.
+    /// Up to [`MAX_FACES`] triangles, of which one is chosen by its solid angle.
     Faces {
         triangles: Vec<Triangle<S>>,
         /// `true` if the triangles enclose a convex solid.
         convex: bool,
     },
-    /// More than [`MAX_FACES`] triangles, chosen by their areas, in the order of their `end`.
+    /// More than [`MAX_FACES`] triangles, of which one is chosen by its area. They are sorted by
+    /// their `end`.
     Mesh(Vec<Triangle<S>>),
 }
 
@@ -87,8 +88,8 @@ struct Triangle<S> {
     /// Unit normal of the front.
     normal: [S; 3],
     area: S,
-    /// Random numbers from `start` to `end` choose this triangle; the length of the range is its
-    /// share of the area.
+    /// Range of the random numbers that choose this triangle: from `start` to `end`. The length of
+    /// the range is the triangle's share of the total area.
     start: S,
     end: S,
 }
@@ -332,7 +333,7 @@ impl<S: Float> ObjectEmitter<S> {
 
     /// Lifts each lane's triangle to the side of its receiver. Returns the triangle as a solid
     /// angle, its corners relative to the receiver, and the coordinate of its plane along the
-    /// normal; this is negative where light arrives.
+    /// normal. This coordinate is negative where light arrives.
     #[inline(always)]
     fn seen_triangle<L: SimdFloat<Scalar = S>>(
         &self,
@@ -386,7 +387,7 @@ struct PacketTriangle<L> {
     corners: [Vec3<L>; 3],
     /// Unit normal of the front.
     normal: Vec3<L>,
-    /// Smallest random number that chooses the triangle.
+    /// Start of the range of the random numbers that choose the triangle.
     start: L,
     /// Probability with which the triangle is chosen.
     share: L,
@@ -543,7 +544,7 @@ mod tests {
         halves.collect()
     }
 
-    /// Points from which the surfaces are seen.
+    /// Points from which the tests sample the surfaces.
     fn points() -> Vec<DVec3> {
         let points = [[0.1, 0.2, 1.5], [0.3, -0.1, -0.8], [2.0, 0.1, 0.2], [0.25, 0.2, 0.05]];
         [points.map(DVec3::from).into(), vec![DVec3::new(40.0, 30.0, 20.0)]].concat()

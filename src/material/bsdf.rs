@@ -7,11 +7,11 @@ use crate::material::{Fresnel, Highlight, Lobe, Material};
 use crate::sampling::warp;
 use std::f64::consts::FRAC_1_PI;
 
-/// Largest Phong exponent for which a single-precision cosine is accurate enough: the relative error of
-/// the power is the exponent times about 1.5e-7.
+/// Largest Phong exponent for which a single-precision cosine is accurate enough. The relative
+/// error of the power is about the exponent times 1.5e-7.
 pub const SHARP_EXPONENT: f64 = 1024.0;
 
-/// Formula of highlights (reflections of lights).
+/// Model of highlights, which are reflections of lights.
 #[derive(Clone, Copy, Debug)]
 pub enum SpecularModel<S> {
     /// No highlight.
@@ -49,7 +49,7 @@ pub enum ReflectionLobe<S> {
         /// Side of the square.
         side: S,
     },
-    /// Reflection by microfacets.
+    /// Distribution of microfacet normals; rays are reflected at visible microfacets.
     MicrofacetDistribution(MicrofacetDistribution<S>),
 }
 
@@ -64,8 +64,8 @@ pub struct Transmission<S> {
     pub absorption: [S; 3],
     /// Distribution of the transmitted rays about the refracted direction; `Mirror` is clear glass.
     pub lobe: ReflectionLobe<S>,
-    /// `true` if Fresnel's equations split the light between reflection and transmission; otherwise k_r
-    /// and k_t are used unchanged.
+    /// `true` if Fresnel's equations split the light between reflection and transmission; `false`
+    /// if k_r and k_t alone are the weights.
     pub dielectric: bool,
 }
 
@@ -171,8 +171,8 @@ pub struct BsdfSample<L> {
 /// Returns the component of `h` along the unit vector `n`, and the squared tangent of the angle
 /// between `h` and `n`. `h` may have any length.
 ///
-/// The tangent is computed from the part of `h` across `n`, so that small angles keep full precision, and
-/// bounded by 1e15, so that terms computed from it are finite.
+/// The tangent is computed from the part of `h` perpendicular to `n`, which keeps full precision at
+/// small angles. It is limited to 1e15, so that terms computed from it are finite.
 #[inline(always)]
 pub(super) fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     let along = h.dot(n);
@@ -180,10 +180,11 @@ pub(super) fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
     (along, (across.length_squared() / (along * along)).min(L::from_f64(1e15)))
 }
 
-/// Returns `cos`^alpha for a cosine computed from unit vectors; 0 from 90 degrees.
+/// Returns `cos`^alpha for a cosine computed from unit vectors; 0 for angles of 90 degrees and
+/// more.
 ///
-/// The cosine is clamped to 1: the cosine of two rounded vectors may exceed 1 by a few roundings,
-/// and 1.000001^1e6 is 2.7.
+/// The cosine is clamped to 1, because that of two rounded vectors may exceed 1 by a few rounding
+/// errors, and 1.000001^1e6 is 2.7.
 #[inline(always)]
 fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
     let power = (cos.max(L::from_f64(1e-30)).min(L::one()).ln() * alpha).exp();
@@ -191,12 +192,12 @@ fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
 }
 
 /// Returns cos^alpha of the angle between `a` and `b`, of any lengths, for alpha above
-/// [`SHARP_EXPONENT`](crate::material::bsdf::SHARP_EXPONENT); 0 from 90 degrees.
+/// [`SHARP_EXPONENT`](crate::material::bsdf::SHARP_EXPONENT); 0 for angles of 90 degrees and more.
 ///
-/// Near 1 the cosine loses precision, but the tangent t = |a x b| / a.b keeps it: cos^alpha = exp(-alpha / 2
-/// ln(1 + t^2)), and ln(1 + t^2) = 2 artanh(s) with s = t^2 / (2 + t^2). Four terms of its series in s^2 have
-/// a relative error of s^8 / 9: below 1e-9 while alpha s < 88, above which the power is not a normal
-/// single-precision number.
+/// Near 1 the cosine loses precision. The tangent t = |a x b| / a.b does not: cos^alpha =
+/// exp(-alpha / 2 ln(1 + t^2)). The logarithm is ln(1 + t^2) = 2 artanh(s) with s = t^2 / (2 +
+/// t^2). Four terms of its series in s^2 have a relative error of s^8 / 9. This is below 1e-9 while
+/// alpha s < 88; beyond, the power is not a normal single-precision number.
 #[inline(always)]
 fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
     let (along, across2) = (a.dot(b), a.cross(b).length_squared());
@@ -208,8 +209,8 @@ fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
     (-(alpha * s * series)).exp().masked(along.gt(L::zero()))
 }
 
-/// Samples a direction of the lobe `Cone` or `Square` about the direction `axis`, whose length is 1
-/// within rounding. `u` and `v` are uniform in [0, 1). Returns `axis` for other lobes.
+/// Samples a direction of the lobe `Cone` or `Square` about the direction `axis`, a unit vector
+/// within rounding errors. `u` and `v` are uniform in [0, 1). Returns `axis` for other lobes.
 #[inline(always)]
 pub(super) fn spread<L: SimdFloat>(
     lobe: &ReflectionLobe<L::Scalar>,
@@ -237,9 +238,9 @@ impl<S: Float> Bsdf<S> {
         absorption.is_some_and(|absorption| absorption != [0.0; 3])
     }
 
-    /// Returns the highlight of a light, in units of 1/sr: the radiance towards `view` divided by
-    /// the irradiance of a surface that faces the light. The highlight includes the cosine of the
-    /// incident light where the formula has one.
+    /// Returns the highlight of a light [1/sr]: the radiance towards `view` divided by the
+    /// irradiance at normal incidence. It includes the cosine of the incident light if the model
+    /// has one.
     ///
     /// `n`, `view` and `light` are unit vectors away from the surface. `nl` is the cosine between
     /// `n` and `light`, `nv` that between `n` and `view`.
@@ -282,9 +283,9 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Samples a reflected ray. `incident` is the unit direction towards the surface, `n` the
-    /// normal on the viewer's side; `uv` are uniform in [0, 1). If `fold` is `true`,
-    /// directions below the surface are mirrored up; otherwise their weight is 0.
+    /// Samples a reflected ray. `incident` is the unit direction towards the surface, and `n` is
+    /// the normal on the viewer's side. `uv` are uniform in [0, 1). Directions below the surface
+    /// are mirrored up if `fold` is `true`; otherwise their weight is 0.
     #[inline(always)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
@@ -321,8 +322,9 @@ impl<S: Float> Bsdf<S> {
         BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }
     }
 
-    /// Samples the reflection at a visible microfacet. Directions below the surface get the weight
-    /// 0, because G is zero there. Elsewhere the weight f N.L / density = F G / G_1 is at most 1.
+    /// Samples the reflection at a visible microfacet. Directions below the surface have the weight
+    /// 0, because G is zero there. For other directions the weight f N.L / density = F G / G_1 is
+    /// at most 1.
     #[inline(always)]
     fn sample_microfacet<L: SimdFloat<Scalar = S>>(
         &self,
@@ -345,8 +347,8 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction` if directions below
-    /// the surface are not mirrored up. Returns `None` for a mirror. All directions are unit
+    /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction` without mirroring
+    /// directions up (`fold` is `false`). Returns `None` for a mirror. All directions are unit
     /// vectors.
     #[inline(always)]
     pub fn density<L: SimdFloat<Scalar = S>>(
@@ -381,8 +383,8 @@ impl<S: Float> Bsdf<S> {
 
     /// Returns the value [1/sr] of the reflection lobe in `direction`, times the cosine of the
     /// light, and the density [1/sr] with which [`Bsdf::sample`] draws `direction`. The weight of a
-    /// sample is the quotient of the two. Both are zero for a mirror, and for directions below the
-    /// surface. The other parameters are those of [`Bsdf::sample`].
+    /// sample is the first divided by the second. Both are zero for a mirror and for directions
+    /// below the surface. The other parameters are those of [`Bsdf::sample`].
     #[inline(always)]
     pub fn evaluate_lobe<L: SimdFloat<Scalar = S>>(
         &self,

@@ -25,7 +25,8 @@ pub struct Reflectance<S> {
     f0: [S; 3],
     /// Squared index of refraction minus 1, for the modes `Exact` and `Dielectric`.
     index2_less_1: [S; 3],
-    /// Channels with reflectance 1 at every angle (F0 = 1: an infinite index).
+    /// Channels with an infinite index of refraction (F0 = 1), whose reflectance is 1 at every
+    /// angle.
     total: [bool; 3],
 }
 
@@ -54,8 +55,8 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// Returns `value` times the reflectance at the cosine that the closure `c` returns. The
-    /// closure is called only if the reflectance depends on the angle.
+    /// Returns `value` times the reflectance at the cosine that `c` returns. `c` is called only if
+    /// the reflectance depends on the angle.
     #[inline(always)]
     pub fn times<L: SimdFloat<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> Vec3<L> {
         match self.mode {
@@ -117,7 +118,7 @@ mod tests {
         })
     }
 
-    /// Extreme test 24: F is in [0, 1], F(1) = F0 and F is never NaN, for every F0 and cosine.
+    /// Checks for every F0 and cosine that F is in [0, 1] and never NaN, and that F(1) = F0.
     #[test]
     fn extreme_24_fresnel() {
         let mut worst = 0f64;

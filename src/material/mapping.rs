@@ -25,12 +25,12 @@ pub enum Projection {
 }
 
 /// Smallest distance of v from the ends of a cylindrical projection, as a fraction of the height.
-/// The flat ends show the colours of their rims, in spite of rounding errors that would otherwise
-/// wrap v to the opposite rim.
+/// With it, flat ends show the colours of their rims: rounding errors cannot wrap v to the opposite
+/// rim.
 const RIM: f64 = 1.0 / 16_384.0;
 
-/// Factor by which the later of two axes is preferred when the side of a box is chosen. Rounding
-/// errors therefore do not decide between axes that have equal angles with the normal.
+/// Factor in favour of the later of two axes when the side of a box is chosen. With it, rounding
+/// errors do not decide between axes at equal angles to the normal.
 const TIE: f64 = 1.001;
 
 /// Texture coordinates and their gradients in texture space. The unit of the coordinates is one
@@ -47,7 +47,7 @@ pub struct TexCoord<L> {
     pub grad_v: Vec3<L>,
 }
 
-/// Placement of a texture on one part of an object, compiled.
+/// Compiled placement of a texture on one part of an object.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureMapping<S> {
     projection: Projection,
@@ -55,8 +55,8 @@ pub struct TextureMapping<S> {
     texture_from_scene: [[S; 3]; 3],
     /// Columns of the inverse map.
     scene_from_texture: [[S; 3]; 3],
-    /// Centre of the part in the scene. Points are mapped relative to this centre: rounding errors
-    /// scale with the size of the part.
+    /// Centre of the part in the scene. Points are mapped relative to this centre, so that rounding
+    /// errors are in proportion to the size of the part.
     center: [S; 3],
     /// Centre of the part in texture space, relative to the origin of the projection's formula.
     texture_center: [S; 3],
@@ -66,9 +66,9 @@ pub struct TextureMapping<S> {
     offset: [S; 2],
 }
 
-/// Returns the rotation from texture space to the axes of the projection's formula: it projects
+/// Returns the rotation from texture space to the axes of the projection's formula, which projects
 /// along z (planar) or around y (spherical and cylindrical). `axis` is the axis of texture space
-/// that takes this role.
+/// for this; `None` is the default.
 fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     let rows = match (projection, axis) {
@@ -129,16 +129,16 @@ impl<S: Float> TextureMapping<S> {
     }
 
     /// Maps a normal of any length from one space to the other. `columns` are those of the linear
-    /// map in the opposite direction.
+    /// map in the opposite direction, because normals are transformed by its transpose.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(columns: &[[S; 3]; 3], n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = columns.map(Vec3::splat);
         Vec3::new(x.dot(n), y.dot(n), z.dot(n))
     }
 
-    /// Returns the texture coordinates at `point`. `normal` is the outer normal there. Both are in
-    /// scene space. Where [`TextureMapping::wants_uv`] is `true`, the shape's own coordinates must
-    /// be used instead; the result is that of u = v = 0.
+    /// Returns the texture coordinates at `point` with the outer normal `normal`, both in scene
+    /// space. If [`TextureMapping::wants_uv`] is `true`, the caller must use the shape's own
+    /// coordinates instead; the result is then that of u = v = 0.
     pub fn coordinates<L: SimdFloat<Scalar = S>>(
         &self,
         point: Vec3<L>,
@@ -175,8 +175,8 @@ impl<S: Float> TextureMapping<S> {
     }
 
     /// Returns the unit normal perturbed by a bump map. `gradient` is the gradient of the height in
-    /// texture space. Heights rise along the outer normal: `outward` is 1 where `normal` is the
-    /// outer normal, and -1 elsewhere.
+    /// texture space. Heights rise along the outer normal: `outward` is 1 if `normal` is the outer
+    /// normal, and -1 otherwise.
     ///
     /// The heights are added in texture space, so that bumps are transformed with their object.
     pub fn bumped<L: SimdFloat<Scalar = S>>(

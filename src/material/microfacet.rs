@@ -5,11 +5,11 @@ use crate::material::Masking;
 use crate::sampling::warp;
 use std::f64::consts::PI;
 
-/// Smallest alpha of a microfacet distribution. A reflection lobe of smaller alpha is a mirror, and
-/// highlights of lights use this value instead.
+/// Smallest alpha of a microfacet distribution. A reflection lobe of smaller alpha is treated as a
+/// mirror. Highlights of smaller alpha are computed with this value.
 pub const SMOOTH_ALPHA: f64 = 1e-3;
 
-/// A distribution of microfacets.
+/// Distribution of microfacet normals, with its masking model.
 #[derive(Clone, Copy, Debug)]
 pub struct MicrofacetDistribution<S> {
     /// `true` for GGX, `false` for Beckmann.
@@ -33,8 +33,8 @@ impl<S: Float> MicrofacetDistribution<S> {
     }
 
     /// Samples a microfacet normal that is visible from `view`. Both are in the frame of the
-    /// surface normal. `u` and `v` are uniform in [0, 1). The density is G_1 D V.H / N.V, with G_1 of
-    /// `MicrofacetEval::visibility`.
+    /// surface normal. `u` and `v` are uniform in [0, 1). The density is G_1 D V.H / N.V, with G_1
+    /// of [`MicrofacetEval::visibility`].
     #[inline(always)]
     pub fn sample_visible<L: SimdFloat<Scalar = S>>(
         &self,
@@ -75,7 +75,7 @@ pub trait MicrofacetEval<L: SimdFloat> {
     fn lambda(&self, c: L) -> L;
 }
 
-/// Value of a = 1 / (alpha tan) from which masking is neglected, because Beckmann's Lambda is below
+/// Smallest a = 1 / (alpha tan) at which masking is neglected, because Beckmann's Lambda is below
 /// 3e-10.
 const STEEP: f64 = 4.0;
 
@@ -166,7 +166,8 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         }
     }
 
-    /// Returns Lambda, which depends on a = 1 / (alpha tan) of the angle with cosine `c`.
+    /// Returns Lambda. It depends on a = 1 / (alpha tan theta), for the angle theta with cosine
+    /// `c`.
     #[inline(always)]
     fn lambda(&self, c: L) -> L {
         let alpha2 = L::splat(self.alpha2);

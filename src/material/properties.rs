@@ -2,7 +2,7 @@
 
 use crate::material::{Fresnel, Highlight, Lobe};
 
-/// Energy balance of a model at coefficient 1 and reflectance 1.
+/// Energy balance of a reflection model at coefficient 1 and reflectance 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Energy {
     /// The albedo is 1 at every angle, if directions below the horizon are mirrored up.
@@ -23,8 +23,8 @@ pub struct BsdfProperties {
 }
 
 impl BsdfProperties {
-    /// Properties of the diffuse part, Lambert's law f = albedo / pi, which is the only model
-    /// without a name in scene files.
+    /// Properties of the diffuse model, Lambert's law f = albedo / pi. It is the only model without
+    /// a name in scene files.
     pub const LAMBERT: Self = Self { reciprocal: true, energy: Energy::Conserving };
 }
 
@@ -32,8 +32,8 @@ impl Lobe {
     /// Returns the properties of reflection by this lobe.
     ///
     /// The lobes `cone` and `square` are uniform about the mirror direction, so that their density
-    /// is symmetric in light and view. f is the density divided by the cosine of the light, and
-    /// therefore not symmetric.
+    /// is symmetric in light and view. The BSDF is this density divided by the cosine of the light;
+    /// it is therefore not symmetric.
     pub fn properties(self) -> BsdfProperties {
         match self {
             Self::Mirror => BsdfProperties { reciprocal: true, energy: Energy::Conserving },
@@ -48,7 +48,7 @@ impl Lobe {
 }
 
 impl Highlight {
-    /// Returns the properties of reflection by this formula.
+    /// Returns the properties of this highlight model.
     pub fn properties(self) -> BsdfProperties {
         match self {
             Self::Phong => BsdfProperties { reciprocal: false, energy: Energy::Unbounded },

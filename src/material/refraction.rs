@@ -22,14 +22,15 @@ pub struct Interface<L: SimdFloat> {
     n_t: L,
 }
 
-/// Weights of reflected and transmitted rays.
+/// Weights of reflected and transmitted rays at a boundary.
 #[derive(Clone, Copy, Debug)]
 pub struct FresnelSplit<L> {
-    /// Factor of the light that the BSDF's reflection lobe reflects.
+    /// Factor of the BSDF's reflection lobe.
     pub reflected: L,
     /// Factor of the transmitted ray.
     pub transmitted: L,
-    /// Factor of a mirror reflection that replaces the transmitted ray.
+    /// Factor of the mirror reflection that replaces the transmitted ray in total internal
+    /// reflection.
     pub tir: L,
 }
 
@@ -93,8 +94,9 @@ impl<L: SimdFloat> Interface<L> {
     /// Returns the weights of reflected and transmitted rays. `outer` selects the lanes whose rays
     /// come from outside of a solid.
     ///
-    /// Without Fresnel's equations a solid reflects on its outer side only, which prevents endless
-    /// reflections between its inner walls; beyond the critical angle all light is reflected.
+    /// Without Fresnel's equations a solid reflects only on its outer side, which prevents endless
+    /// reflections between its inner walls. Total internal reflection reflects all light in any
+    /// case.
     #[inline(always)]
     pub fn split(&self, transmission: &Transmission<L::Scalar>, outer: L::Mask) -> FresnelSplit<L> {
         let k_t = L::splat(transmission.strength);
@@ -188,7 +190,7 @@ mod tests {
         }
     }
 
-    /// Extreme test 25: R + T = 1 at all angles, also near the critical angle, and R is continuous
+    /// Checks that R + T = 1 at all angles, also near the critical angle, and that R is continuous
     /// there.
     #[test]
     fn extreme_25_total_reflection() {

@@ -15,7 +15,7 @@ use crate::sampling::warp;
 pub struct InterfaceMedia<L: SimdFloat> {
     /// Index of refraction on the side of the incident rays.
     pub n_i: L,
-    /// Index of refraction behind the interface. For thin surfaces, that of their material.
+    /// Index of refraction behind the interface. For a thin surface, that of its material.
     pub n_t: L,
     /// Lanes whose rays arrive from outside of the solid.
     pub outer: L::Mask,
@@ -24,8 +24,8 @@ pub struct InterfaceMedia<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> InterfaceMedia<L> {
-    /// Lanes in which the index of refraction is the same on both sides. Rays are not refracted
-    /// there, even by a rough surface.
+    /// Lanes with equal indices of refraction on both sides. Rays are not refracted there, even by
+    /// a rough surface.
     #[inline(always)]
     fn same(&self) -> L::Mask {
         (self.n_i.le(self.n_t) & self.n_t.le(self.n_i)).and_not(self.thin)
@@ -46,14 +46,15 @@ pub struct InterfaceSample<L> {
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Samples a reflected and a transmitted ray at an interface whose
-    /// [`lobe`](Transmission::lobe) is not a mirror. Both come from the same numbers `uv`, uniform in
-    /// [0, 1). `incident` is the unit direction towards the surface, `n` the normal on the viewer's side.
-    /// `reflecting` selects the lanes in which the BSDF's reflection counts; total internal reflection
-    /// counts in all lanes. If `fold` is `true`, directions of the lobes `cone` and `square` on the wrong
-    /// side of the surface are mirrored to the right one; otherwise their weight is 0.
+    /// Samples a reflected and a transmitted ray at an interface whose [`lobe`](Transmission::lobe)
+    /// is not a mirror. Both use the same numbers `uv`, uniform in [0, 1). `incident` is the unit
+    /// direction towards the surface, and `n` is the normal on the viewer's side. `reflecting`
+    /// selects the lanes in which the BSDF's reflection is included; total internal reflection is
+    /// included in all lanes.
     ///
-    /// Like clear glass, a rough interface does not scale radiance by the squared index.
+    /// Directions of the lobes `cone` and `square` on the wrong side of the surface are mirrored to
+    /// the right one if `fold` is `true`; otherwise their weight is 0. Like clear glass, a rough
+    /// interface does not scale radiance by the squared index.
     #[inline(always)]
     pub fn sample_interface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -117,8 +118,8 @@ impl<S: Float> Bsdf<S> {
     }
 
     /// Returns the density [1/sr] with which [`Bsdf::sample_interface`] draws the transmitted ray
-    /// `direction`, before directions on the wrong side of the surface are mirrored; the largest finite
-    /// number where all rays have one direction. All directions are unit vectors.
+    /// `direction`, before directions on the wrong side are mirrored. The density is the largest
+    /// finite number where all rays have the same direction. All directions are unit vectors.
     #[inline(always)]
     pub fn transmission_density<L: SimdFloat<Scalar = S>>(
         &self,

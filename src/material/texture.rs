@@ -94,34 +94,35 @@ description! {
 choices! {
     /// Source of the coordinates u and v of a texture.
     pub enum Mapping {
-        /// as it suits the shape: `spherical` on spheres, `cylindrical` on all that is round about an
-        /// axis, `box` on solids with flat faces, `planar` on what is flat, `uv` on a mesh whose file has
-        /// texture coordinates, `box` on any other
+        /// chosen by the shape: `spherical` on spheres, `cylindrical` on shapes that are round
+        /// about an axis, `box` on solids with flat faces, `planar` on flat shapes, `uv` on meshes
+        /// whose file has texture coordinates, `box` on other meshes
         Auto = "auto",
-        /// seen along the axis; one repeat a scene unit, from the lower left corner of the box around the
-        /// shape (of a plane, from its `point`)
+        /// projection along the axis; one repeat per scene unit, from the lower left corner of the
+        /// box around the shape (of a plane, from its `point`)
         Planar = "planar",
-        /// u once around the axis, v once from pole to pole, seen from the middle of the box around the
-        /// shape; the middle of the image looks to the front
+        /// u once around the axis, v once from pole to pole, about the middle of the box around the
+        /// shape; the middle of the image faces the front
         Spherical = "spherical",
         /// u once around the axis, v once along the shape; the ends show the colours of their rims
         Cylindrical = "cylindrical",
-        /// each side as it is seen from outside; one repeat a scene unit, from the side's lower left
-        /// corner
+        /// planar projection of each side, seen from outside; one repeat per scene unit, from the
+        /// side's lower left corner
         Box = "box",
-        /// the texture coordinates in a mesh's file; on rectangles and platforms once from edge to edge
+        /// texture coordinates of the mesh file; on rectangles and platforms, from 0 to 1 between
+        /// opposite edges
         Uv = "uv",
     }
 }
 
 choices! {
-    /// Axis of the space that textures lie in.
+    /// Axis of texture space.
     pub enum Axis {
         /// to the right
         X = "x",
         /// up, or along the axis of a cylinder or cone
         Y = "y",
-        /// to the front, or along the normal of what is flat
+        /// to the front, or along the normal of a flat shape
         Z = "z",
     }
 }
@@ -129,24 +130,24 @@ choices! {
 choices! {
     /// Continuation of an image beyond its edges.
     pub enum Wrap {
-        /// the image again and again
+        /// repeats the image
         Repeat = "repeat",
-        /// its outermost pixels
+        /// repeats its outermost pixels
         Clamp = "clamp",
     }
 }
 
 choices! {
-    /// Interpolation between the middles of an image's pixels.
+    /// Interpolation between the centres of an image's pixels.
     pub enum TextureFilter {
-        /// even transitions
+        /// smooth transitions
         Bilinear = "bilinear",
         /// none: every pixel is a square
         Nearest = "nearest",
     }
 }
 
-/// Placement keys of a texture: how its coordinates arise from the shape.
+/// Placement keys of a texture: they determine its coordinates on the shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Source of the coordinates.
@@ -159,7 +160,7 @@ pub struct Placement {
     pub offset: [f64; 2],
 }
 
-/// Implements `placement` for texture kinds that have the placement keys.
+/// Implements `placement` for texture kinds with the placement keys.
 macro_rules! placed {
     ($($kind:ident),+) => {$(
         impl $kind {
@@ -229,7 +230,7 @@ impl Texture {
         })
     }
 
-    /// Returns `true` unless the texture is an image without a readable file.
+    /// Returns `false` for an image without a readable file, otherwise `true`.
     pub fn has_effect(&self) -> bool {
         match self {
             Self::Image(image) => image.image().is_some(),
@@ -332,8 +333,8 @@ impl crate::material::Material {
         [texture, bump].into_iter().flatten()
     }
 
-    /// Loads the files of the texture and the bump map with `load`, unless the content or an error
-    /// of reading it is stored already.
+    /// Calls `load` for the files of the texture and of the bump map and stores the results. Files
+    /// whose content or error is stored already are skipped.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Image>, AssetError>) {
         for (file, content) in self.files_mut() {
             content.resolve(|| load(file));

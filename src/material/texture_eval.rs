@@ -31,9 +31,9 @@ pub struct BumpMap {
     height: f64,
 }
 
-/// Returns the position of the coordinate `x` (in repetitions) among `size` pixels: the index of
-/// the pixel whose centre is at or before `x`, and the fraction, from 0 to 1, of the way to the
-/// next centre. The index may be out of range.
+/// Returns the index of a pixel and a fraction for the coordinate `x` (in repetitions) along an
+/// axis of `size` pixels. The pixel is the one whose centre is at or before `x`. The fraction, from
+/// 0 to 1, is the part of the way to the next centre. The index may be out of range.
 #[inline(always)]
 fn pixel_position(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
     let size = f64::from(size);
@@ -76,7 +76,8 @@ fn color_at(image: &Image, wrap: Wrap, filter: TextureFilter, u: f64, v: f64) ->
     })
 }
 
-/// Gathers `f(lane)` for the lanes whose bits are set in `bits`; other lanes are zero.
+/// Calls `f(lane)` for the lanes whose bits are set in `bits`, and returns the vectors; other lanes
+/// are zero.
 #[inline(always)]
 fn gathered<L: SimdFloat>(bits: u32, mut f: impl FnMut(usize) -> [f64; 3]) -> Vec3<L> {
     let mut all = [[0.0; 3]; MAX_WIDTH];

@@ -50,8 +50,8 @@ mod tests {
         assert_eq!(Slope::fit(&points[..2]), None);
     }
 
-    /// The residuals about a horizontal line are (1, -2, 1) / 10. The standard error of the slope
-    /// is therefore sqrt(0.06 / 1 / 2).
+    /// Checks the standard error of a horizontal line. The residuals are (1, -2, 1) / 10, so that
+    /// it is sqrt(0.06 / 1 / 2).
     #[test]
     fn scatter_determines_the_standard_error() {
         let e = std::f64::consts::E;

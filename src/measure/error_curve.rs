@@ -9,11 +9,11 @@ use std::io;
 /// Point of an error curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Number of steps of the render up to this point.
+    /// Number of steps of the render before this point.
     pub step: usize,
     /// Number of samples over all pixels.
     pub samples: u64,
-    /// Samples per pixel, mean.
+    /// Mean number of samples per pixel.
     pub spp: f64,
     /// Seconds of tracing, one entry for each repetition.
     pub seconds: Vec<f64>,
@@ -24,14 +24,14 @@ pub struct Point {
     pub errors: Errors,
 }
 
-/// Conditions at which an error curve ends.
+/// Conditions that end an error curve.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
     /// Error at which the curve ends, in 8-bit levels.
     pub codes: f64,
     /// Seconds of tracing after which the curve ends in any case.
     pub seconds: f64,
-    /// `true` if the estimated error is compared with `codes`, instead of the true one. Used for
+    /// `true` if `codes` is compared with the estimated error instead of the true one. This is for
     /// biased variants, whose true error does not converge to 0.
     pub use_estimate: bool,
 }
@@ -40,8 +40,8 @@ pub struct End {
 const POINT_RATIO: f64 = 0.84;
 
 /// Returns the share of the processors' time that other programs used while `threads` threads ran
-/// for `seconds` since `before`. Returns `None` if the share is unknown, or if there are more
-/// threads than processors, so that these threads wait for each other.
+/// for `seconds` since `before`. Returns `None` if the share is unknown, and if there are more
+/// threads than processors, because these threads then wait for each other.
 fn stolen_share(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) -> Option<f64> {
     if seconds <= 0.0 || threads > std::thread::available_parallelism().map_or(1, usize::from) {
         return None;
@@ -54,7 +54,7 @@ fn stolen_share(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) ->
 /// processors' time that other programs used meanwhile (`None` if unknown), and the render.
 ///
 /// # Errors
-/// Returns the error of the system that refuses to start a thread.
+/// Returns the error of the system if a thread cannot be started.
 pub fn follow(
     variant: &Variant,
     reference: &Reference,
@@ -95,11 +95,11 @@ pub fn follow(
     Ok((points, stolen, render))
 }
 
-/// Renders `variant` again and adds the seconds of this repetition to each point. Returns the share
-/// of the processors' time that other programs used meanwhile, or `None` if unknown.
+/// Renders `variant` again, and adds the seconds of this repetition to each point. Returns the
+/// share of the processors' time that other programs used meanwhile, or `None` if unknown.
 ///
 /// # Errors
-/// Returns the error of the system that refuses to start a thread.
+/// Returns the error of the system if a thread cannot be started.
 pub fn repeat(variant: &Variant, points: &mut [Point]) -> io::Result<Option<f64>> {
     let mut render = variant.start()?;
     let before = RunQueueDelay::now();

@@ -11,10 +11,10 @@ use std::io;
 use std::str::FromStr;
 use std::sync::Arc;
 
-/// A setting to vary.
+/// Setting that an experiment varies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Experiment {
-    /// Default settings.
+    /// No variation: the default settings.
     Default,
     /// Adaptive sampling against uniform sampling.
     Adaptivity,
@@ -39,7 +39,7 @@ pub enum Experiment {
 }
 
 impl Experiment {
-    /// All settings, each with its name on the command line and its title.
+    /// All experiments, each with its name on the command line and its title.
     pub const ALL: &'static [(Self, &'static str, &'static str)] = &[
         (Self::Default, "default", "Default settings"),
         (Self::Adaptivity, "adaptivity", "Adaptive against uniform sampling"),
@@ -85,8 +85,8 @@ impl Experiment {
         format!("{name}, default")
     }
 
-    /// Returns `true` if the pictures of all variants have the same expectation and differ in noise
-    /// only.
+    /// Returns `true` if the pictures of all variants have the same expectation, so that they
+    /// differ in noise only.
     pub fn unbiased(self) -> bool {
         matches!(
             self,
@@ -137,11 +137,11 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Creates a render of this variant. The render stops by itself only when every tile has
-    /// reached its largest number of samples.
+    /// Creates a render of this variant. It ends by itself only when every tile has reached its
+    /// largest number of samples.
     ///
     /// # Errors
-    /// Returns the error of the system that refuses to start a thread.
+    /// Returns the error of the system if a thread cannot be started.
     pub fn start(&self) -> io::Result<SyncRender> {
         let settings = Settings {
             adaptive: self.adaptive,

@@ -13,7 +13,7 @@ use std::ops::Range;
 
 /// Width and height of a panel, in pixels.
 const PANEL: (i32, i32) = (440, 374);
-/// Height of the head above all panels, in pixels.
+/// Height of the heading above all panels, in pixels.
 const HEAD: i32 = 64;
 
 /// Margins between the edges of a panel and its coordinate area, in pixels: left, right, top,
@@ -112,7 +112,7 @@ fn points(measured: &Measured) -> Vec<(f64, f64)> {
     measured.points.iter().map(coordinates).filter(|(s, e)| *s > 0.0 && *e > 0.0).collect()
 }
 
-/// Logarithmic mapping of numbers to pixel coordinates along one axis.
+/// Logarithmic axis, which maps numbers to pixel coordinates.
 struct Axis {
     numbers: Range<f64>,
     pixels: (i32, i32),
@@ -131,8 +131,8 @@ impl Axis {
         self.pixels.0 + (share * f64::from(self.pixels.1 - self.pixels.0)).round() as i32
     }
 
-    /// Returns the round numbers in the range, with their labels: 1, 2 and 5 times each power of
-    /// ten, or only the powers of ten if there would be more than nine.
+    /// Returns the tick marks: round numbers in the range, with their labels. They are 1, 2 and 5
+    /// times each power of ten, or only the powers of ten if there would be more than nine.
     fn ticks(&self) -> Vec<(f64, String)> {
         let Range { start, end } = self.numbers;
         let powers = start.log10().floor() as i32..=end.log10().ceil() as i32;

@@ -2,8 +2,8 @@
 
 use crate::film::{Display, Film, LightWeights, Replicates};
 
-/// Number that is added to the squared reference, so that relative errors of dark pixels stay
-/// bounded: relMSE = mean((x - r)^2 / (r^2 + 0.01)).
+/// Number that is added to the squared reference in relative errors, so that those of dark pixels
+/// stay bounded: relMSE = mean((x - r)^2 / (r^2 + 0.01)).
 const RELATIVE_FLOOR: f64 = 0.01;
 
 /// Reference picture, with an estimate of its own error.
@@ -11,9 +11,9 @@ pub struct Reference {
     size: [usize; 2],
     pixels: Vec<[f64; 3]>,
     codes: Vec<[f64; 3]>,
-    /// Half the difference of the two replicates of each pixel, in 8-bit levels. It has the same
-    /// standard deviation as the error of the reference and is independent of this error. Empty if
-    /// the reference counts as exact.
+    /// Half the difference of the two replicates of each pixel, in 8-bit levels. It has the
+    /// standard deviation of the reference's error and is independent of this error. Empty if the
+    /// reference counts as exact.
     halves: Vec<[f64; 3]>,
     own: Squares,
     /// Variance of the mean over all pixels and channels of the reference.
@@ -40,7 +40,7 @@ pub struct Errors {
     /// r.
     pub rel_mse: f64,
     /// Relative standard deviation of `rmse_codes` over different references as noisy as this one,
-    /// at most 1. It is the uncertainty that remains after the error of the reference itself was
+    /// at most 1. It is the uncertainty that remains after the reference's own error has been
     /// subtracted.
     pub spread: f64,
 }
@@ -50,24 +50,24 @@ pub struct Errors {
 pub struct Bias {
     /// Difference between the mean brightness of picture and reference, in standard errors.
     pub z: f64,
-    /// Root mean square of the differences of pixels, in 8-bit levels, after the part that noise
-    /// explains was subtracted.
+    /// Root mean square of the differences of pixels, in 8-bit levels, after the part explained by
+    /// noise has been subtracted.
     pub codes: f64,
-    /// Least value of `codes` that can be distinguished from noise, at two standard errors.
+    /// Smallest value of `codes` that differs significantly from noise, by two standard errors.
     pub least_codes: f64,
 }
 
 impl Bias {
-    /// Returns `true` if the difference is larger than noise explains.
+    /// Returns `true` if the difference is larger than noise can explain.
     pub fn is_seen(&self) -> bool {
         self.codes > self.least_codes || self.z.abs() > 4.0
     }
 }
 
 /// Estimates the mean squared error of a picture that is the mean of two replicates, and the
-/// variance of the mean brightness of this picture. The linear error of a pixel is estimated as
-/// half the difference of its replicates. The displayed error is estimated from the distances, in
-/// 8-bit levels, between the displayed mean and each displayed replicate.
+/// variance of its mean brightness. The linear error of a pixel is half the difference of its
+/// replicates. The displayed error is computed from the distances, in 8-bit levels, between the
+/// displayed mean and each displayed replicate.
 fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64) {
     let mut squares = Squares::default();
     let mut mean_variance = 0.0;
@@ -129,7 +129,7 @@ impl Reference {
         Self { halves, ..Self::new(size, pixels, own, mean_variance, *display) }
     }
 
-    /// Creates a reference from a picture that counts as exact.
+    /// Creates a reference from a picture that is taken as exact.
     pub fn of_pixels(size: [usize; 2], pixels: Vec<[f64; 3]>, display: &Display) -> Self {
         Self::new(size, pixels, Squares::default(), 0.0, *display)
     }
@@ -251,7 +251,8 @@ mod tests {
         (0..count).map(pixel).collect()
     }
 
-    /// The mean of two replicates with noise of standard deviation s has an error of s / sqrt 2.
+    /// Checks the estimated error of a reference: the mean of two replicates with noise of standard
+    /// deviation s has the error s / sqrt 2.
     #[test]
     fn own_error_is_that_of_the_mean() {
         let mut rng = Rng(1);
@@ -264,8 +265,8 @@ mod tests {
         assert!((reference.noise_codes() / (slope * expected) - 1.0).abs() < 0.02);
     }
 
-    /// Compares the predicted spread with the standard deviation of the errors of one picture
-    /// against many references of equal noise.
+    /// Compares the predicted spread with the standard deviation of one picture's errors against
+    /// many references of equal noise.
     #[test]
     fn spread_is_that_between_references() {
         let mut rng = Rng(2);

@@ -14,14 +14,14 @@ pub struct TimeToTarget {
     pub seconds: f64,
     /// Relative spread of the repetitions, see [`spread`].
     pub spread: f64,
-    /// Samples per pixel, mean.
+    /// Mean number of samples per pixel.
     pub spp: f64,
     /// `true` if the first point of the curve had reached the target already. `seconds` is then an
     /// upper bound.
     pub at_most: bool,
 }
 
-/// Extrapolated time to a noise target that the default settings did not reach.
+/// Extrapolated time to a noise target that the default settings did not reach in the measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
     /// The noise target, in 8-bit levels.
@@ -68,7 +68,8 @@ pub struct Measurement {
     pub targets: Vec<f64>,
     /// Targets that the default settings did not reach in time, with extrapolated times.
     pub expected: Vec<Expected>,
-    /// Requested experiments without a variant that differs from the default in this scene.
+    /// Requested experiments without a variant that differs from the default settings in this
+    /// scene.
     pub idle: Vec<Experiment>,
     /// Results of all variants, the default first.
     pub measured: Vec<Measured>,
@@ -88,17 +89,17 @@ pub struct Steadiness {
 /// Largest share of the processors' time that other programs may use in a repetition that counts as
 /// undisturbed.
 const MAX_STOLEN: f64 = 0.05;
-/// Least number of repetitions that count. If fewer are undisturbed, the least disturbed ones count
-/// as well.
+/// Smallest number of repetitions that count. If fewer are undisturbed, the least disturbed ones
+/// count as well.
 const MIN_COUNTED: usize = 5;
-/// Largest relative uncertainty of an error, caused by the error of the reference, for which the
-/// error counts.
+/// Largest relative uncertainty of an error due to the error of the reference. More uncertain
+/// errors are ignored.
 const MAX_SPREAD: f64 = 0.05;
 
-/// Parameter of the signs test: half the width of the confidence interval, in units of half the
-/// square root of the number of values, which is the standard deviation of the count of signs. The
-/// value 1.4 contains the count in about four of five cases. The factor of the square root of two
-/// is for the difference of two such counts.
+/// Parameter of the sign test: half the width of the confidence interval, in units of half the
+/// square root of the number of values. This unit is the standard deviation of the count of signs.
+/// The value 1.4 contains the count in about four of five cases. The factor sqrt 2 is for the
+/// difference of two such counts.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
 /// Returns the median. For an even number of values it is the mean of the two in the middle.
@@ -110,11 +111,10 @@ pub fn median(values: &[f64]) -> f64 {
 /// Returns the relative spread of the median of `values`. In about four of five cases the median of
 /// another measurement on the same machine differs from this median by at most this share.
 ///
-/// For fewer than five values the spread is their range divided by the median. For more values it
-/// is half the width of the confidence interval of the median by the signs test (Conover,
-/// *Practical Nonparametric Statistics*, confidence interval for a quantile), divided by the
-/// median. The confidence level is chosen so that two such medians agree. For fewer than two values
-/// the spread is 0.
+/// For five and more values it is half the width of the confidence interval of the median by the
+/// sign test (Conover, *Practical Nonparametric Statistics*, confidence interval for a quantile),
+/// divided by the median. The confidence level is chosen so that two such medians agree. For fewer
+/// than five values it is their range divided by the median; for fewer than two it is 0.
 pub fn spread(values: &[f64]) -> f64 {
     let middle = median(values);
     if values.len() < 2 || middle == 0.0 {
@@ -178,8 +178,8 @@ impl Measured {
     }
 
     /// Returns the time at which the true error fell to `codes`, interpolated between points in
-    /// log-log coordinates. Returns `None` if the error stayed larger. Errors that are uncertain
-    /// because of the reference do not count.
+    /// log-log coordinates. Returns `None` if the error stayed larger. Points with an uncertain
+    /// error are ignored, see [`MAX_SPREAD`].
     pub fn time_to(&self, codes: f64) -> Option<TimeToTarget> {
         self.interpolated_time(codes, |p| {
             let certain = p.errors.spread <= MAX_SPREAD;
@@ -187,8 +187,8 @@ impl Measured {
         })
     }
 
-    /// Returns the time at which the error that the render estimates itself fell to `codes`. Used
-    /// for biased variants. Returns `None` if the estimate stayed larger.
+    /// Returns the time at which the render's own error estimate fell to `codes`, for biased
+    /// variants. Returns `None` if the estimate stayed larger.
     pub fn estimated_time_to(&self, codes: f64) -> Option<TimeToTarget> {
         self.interpolated_time(codes, |p| p.estimated_codes.unwrap_or(f64::INFINITY))
     }
@@ -271,8 +271,7 @@ impl Measurement {
         all
     }
 
-    /// Returns the largest relative change of the reported errors that another reference could
-    /// cause.
+    /// Returns the largest relative change of the reported errors if another reference were used.
     pub fn reference_uncertainty(&self) -> f64 {
         let points = self.measured.iter().flat_map(|m| &m.points);
         let reported = points.map(|p| p.errors.spread).filter(|spread| *spread <= MAX_SPREAD);
@@ -338,7 +337,7 @@ mod tests {
         assert!(median(&[]).is_nan());
     }
 
-    /// The times are normally distributed. The median of a second measurement must be within the
+    /// Checks with normally distributed times that the median of a second measurement is within the
     /// spread of the first in about four of five cases.
     #[test]
     fn spread_predicts_the_median_of_another_measurement() {
@@ -354,8 +353,8 @@ mod tests {
         }
     }
 
-    /// If two of nine repetitions are disturbed, these two do not count. If all nine are disturbed,
-    /// the five least disturbed ones count, and their disturbance is reported.
+    /// Checks that two disturbed repetitions of nine do not count. If all nine are disturbed, the
+    /// five least disturbed ones count, and their disturbance is reported.
     #[test]
     fn disturbed_repetitions_do_not_count() {
         let mut curve = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
@@ -390,7 +389,7 @@ mod tests {
         assert!((steady.spread - 1.0).abs() < 1e-9, "1, 3, 1, 1.1, 1: {steady:?}");
     }
 
-    /// An error that is uncertain because of the error of the reference does not count.
+    /// Checks that an error with a large uncertainty due to the reference reaches no target.
     #[test]
     fn uncertain_error_reaches_no_target() {
         let mut curve = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);

@@ -16,36 +16,35 @@ pub struct Progress<'a> {
     pub step: &'a str,
     /// Number of steps done.
     pub done: usize,
-    /// Expected number of all steps.
+    /// Expected number of steps altogether.
     pub total: usize,
 }
 
-/// Seconds of tracing before the measurement starts. In this time clock rates and caches become
-/// steady.
+/// Seconds of tracing before the measurement starts, after which clock rates and caches are steady.
 const WARM_UP_SECONDS: f64 = 0.3;
-/// Target noise of the reference, as a share of the smallest noise target.
+/// Noise of the reference divided by the smallest noise target.
 const REFERENCE_SHARE: f64 = 0.3;
-/// Largest share of the time of the measurement for the reference.
+/// Largest part of the measurement's time that the reference may take.
 const REFERENCE_TIME: f64 = 0.3;
-/// Largest share of the time of the measurement for the first run of the default settings.
+/// Largest part of the measurement's time that the first run of the default settings may take.
 const DEFAULT_TIME: f64 = 0.12;
-/// Noise at which settings are compared if there is enough time, in 8-bit levels.
+/// Preferred noise at which settings are compared, in 8-bit levels.
 const COMPARED_AT: f64 = 0.5;
 /// Longest duration of a variant, in multiples of the duration of the default.
 const MAX_SLOWDOWN: f64 = 5.0;
-/// Largest relative spread of times that count as steady.
+/// Largest relative spread of times that are considered steady.
 const STEADY: f64 = 0.05;
 /// Largest number of repetitions if all times are steady.
 const MAX_STEADY_ROUNDS: usize = 7;
 /// Largest number of repetitions if some times are unsteady.
 const MAX_ROUNDS: usize = 31;
 
-/// Measures `scene`, which must be valid. `reference` is the reference picture. If it is `None`, a
-/// reference with another seed is rendered. `report` receives the progress. If `report` returns
-/// `false`, the measurement ends early with the results so far.
+/// Measures `scene`, which must be valid. `reference` is the reference picture; if it is `None`, a
+/// reference with another seed is rendered. `report` receives the progress; if it returns `false`,
+/// the measurement ends early with the results so far.
 ///
 /// # Errors
-/// Returns the error of the system that refuses to start a thread.
+/// Returns the error of the system if a thread cannot be started.
 pub fn measure(
     scene: &Arc<Scene>,
     plan: &Plan,
@@ -156,7 +155,7 @@ fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
 }
 
 /// Returns `true` if the repetitions of the time to `codes` agree. If `codes` was not reached, the
-/// time to the end of the curve is examined.
+/// time of the whole curve is compared.
 fn is_steady(measured: &Measured, codes: f64) -> bool {
     let end = || measured.points.last().map_or(0.0, |p| spread(&measured.seconds(p)));
     measured.true_time_to(codes).map_or_else(end, |c| c.spread) <= STEADY
@@ -168,7 +167,7 @@ fn warm_up(variant: &Variant) -> io::Result<()> {
     Ok(())
 }
 
-/// Reference with the cost of rendering it.
+/// Reference picture with the cost of rendering it.
 struct RenderedReference {
     reference: Reference,
     spp: f64,
@@ -200,7 +199,7 @@ mod tests {
     use crate::measure::error_curve::Point;
     use crate::measure::reference::Errors;
 
-    /// Returns results whose points have these seconds and errors.
+    /// Returns results whose error curve has these points (seconds, error).
     fn results(points: &[(f64, f64)]) -> Measured {
         let point = |(seconds, codes): &(f64, f64)| Point {
             step: 1,

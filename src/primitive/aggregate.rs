@@ -15,9 +15,9 @@ use std::ops::Range;
 
 /// Smallest number of primitives with finite bounds for which a BVH is built.
 ///
-/// With rays in a ball of spheres the BVH is faster than a list from about 50 primitives for
-/// coherent packets, and from about 300 for incoherent ones. Whole pictures, whose tiles skip the
-/// primitives that they cannot see, are faster with the list up to 95 (`benches/acceleration.rs`).
+/// For rays in a ball of spheres the BVH is faster than a list from about 50 primitives on for
+/// coherent packets, and from about 300 on for incoherent ones. For whole pictures, whose tiles
+/// have short candidate lists, the list is faster up to 95 (`benches/acceleration.rs`).
 pub const BVH_MIN_PRIMITIVES: usize = 96;
 
 impl PrimitiveSet {
@@ -27,36 +27,36 @@ impl PrimitiveSet {
     }
 }
 
-/// One batch, and the range of its items (primitives) in the numbering of all items.
+/// A batch of primitives of one kind, with the range of their numbers in the aggregate.
 struct BatchRange<L: SimdFloat> {
     batch: PrimitiveBatch<L>,
     base: u32,
     end: u32,
 }
 
-/// All primitives of a scene, compiled for one lane type. A primitive in it is an *item*: it has a
-/// number, by which hits name it.
+/// All primitives of a scene, compiled for one lane type. A primitive of the aggregate is called an
+/// *item*. Items are numbered, and hits have the number of their item.
 pub struct Aggregate<L: SimdFloat> {
     parts: Vec<BatchRange<L>>,
     all: PrimitiveSet,
     tree: Option<SceneBvh>,
-    /// Items of the BVH, as pairs of batch and number in the batch.
+    /// Items of the BVH, each as the index of its batch and its number in the batch.
     tree_items: Vec<(u32, u32)>,
-    /// Bounding box of each item, tested before the item; `None` for an infinite item. The list is
-    /// empty if no boxes are used.
+    /// Bounding box of each item, which rays are tested against before the item itself; `None` for
+    /// an infinite item. The list is empty if no boxes are used.
     extents: Vec<Option<ItemBox<L::Scalar>>>,
-    /// Origin of each item: position of its form (shape in canonical form) in the list given to
-    /// [`Aggregate::new`], and its part.
+    /// Origin of each item: the index of its form in the list given to [`Aggregate::new`], and its
+    /// part.
     source: Vec<PrimitiveId>,
     counts: Vec<String>,
 }
 
-/// Set of items of an [`Aggregate`].
+/// Subset of the items (primitives) of an [`Aggregate`], which queries are restricted to.
 #[derive(Clone, Debug, Default)]
 pub struct PrimitiveSet {
-    /// Items outside of the BVH, as pairs of batch and range of numbers in the batch.
+    /// Items that are tested one by one: index of the batch, and range of numbers in the batch.
     ranges: Vec<(u32, Range<u32>)>,
-    /// `true` if the set includes all items of the BVH.
+    /// `true` if the subset also includes all items of the BVH.
     tree: bool,
 }
 
@@ -66,7 +66,7 @@ impl<L: SimdFloat> Aggregate<L> {
         Self::accelerated(forms, Acceleration::Auto)
     }
 
-    /// Compiles `forms`, with a BVH if `tree` is `true`, whatever their number.
+    /// Compiles `forms`. All bounded items are in a BVH if `tree` is `true`, and none otherwise.
     pub fn with_tree(forms: &[Form], tree: bool) -> Self {
         Self::compiled(forms, if tree { Acceleration::Bvh } else { Acceleration::Auto }, tree)
     }
@@ -134,8 +134,8 @@ impl<L: SimdFloat> Aggregate<L> {
         out
     }
 
-    /// Returns the set of the items for which `wanted` is true, and of all items of the BVH, which
-    /// excludes items by itself.
+    /// Returns the subset of the items outside of the BVH for which `wanted` is true, and of all
+    /// items of the BVH. The BVH needs no selection, because its traversal skips items.
     pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
         let mut ranges: Vec<(u32, Range<u32>)> = Vec::new();
         for (part, range) in &self.all.ranges {
@@ -150,7 +150,8 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, tree: self.all.tree }
     }
 
-    /// Returns the set of those of `items` that are in the BVH, and of all items outside of it.
+    /// Returns the subset of all items outside of the BVH and of `items`, which are in the BVH.
+    /// These items are tested one by one.
     pub fn select_indices(&self, items: &[u32]) -> PrimitiveSet {
         let mut ranges = self.all.ranges.clone();
         for item in items {
@@ -168,7 +169,7 @@ impl<L: SimdFloat> Aggregate<L> {
         self.tree_items.iter().map(item).collect()
     }
 
-    /// Returns `true` if the bounded items are in a BVH.
+    /// Returns `true` if the aggregate has a BVH.
     pub fn has_tree(&self) -> bool {
         self.tree.is_some()
     }
@@ -178,7 +179,7 @@ impl<L: SimdFloat> Aggregate<L> {
         self.tree.is_none() && self.extents.is_empty()
     }
 
-    /// Returns the set of all items.
+    /// Returns the subset of all items.
     pub fn all(&self) -> &PrimitiveSet {
         &self.all
     }
@@ -199,14 +200,14 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     /// Returns the closest hit of each ray with the items of `set`. At equal distances the item
-    /// with the lowest number is hit, so that the result depends neither on the order of the BVH
-    /// nor on the other rays of the packet.
+    /// with the lowest number is hit, so that the result is independent of the order of the BVH and
+    /// of the other rays of the packet.
     #[inline(always)]
     pub fn closest(&self, ray: &Ray<L>, set: &PrimitiveSet) -> Hit<L> {
         self.closest_masked(ray, set, L::mask(true))
     }
 
-    /// Returns the result of [`Aggregate::closest`] in the lanes `wanted`; other lanes are
+    /// Returns the result of [`Aggregate::closest`] in the lanes of `wanted`; other lanes are
     /// undefined.
     #[inline(always)]
     pub fn closest_masked(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
@@ -248,8 +249,8 @@ impl<L: SimdFloat> Aggregate<L> {
         hit
     }
 
-    /// Iterates over the items of `set`: batch of the item, its number in the batch, and its
-    /// bounding box.
+    /// Iterates over the items of `set` that are tested one by one: batch of the item, its number
+    /// in the batch, and its bounding box.
     #[inline(always)]
     fn boxed<'a>(
         &'a self,
@@ -331,8 +332,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Returns the result of [`Aggregate::occluded`] for one item of the BVH. `number` is its
-    /// position in [`Aggregate::in_tree`].
+    /// Returns the result of [`Aggregate::occluded`] for one item of the BVH. `number` is its index
+    /// in [`Aggregate::in_tree`].
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (part, i) = self.tree_items[number as usize];
@@ -358,8 +359,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Returns the hits with the primitive `item` that are nearer than `limit`. For a compound,
-    /// `item` is its first part and stands for all parts.
+    /// Returns the hits with the primitive `item` that are nearer than `limit`. The number of a
+    /// compound's first part means the compound with all parts.
     pub fn closest_to(&self, item: u32, ray: &Ray<L>, limit: L) -> Hit<L> {
         let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
         let (i, mut hit) = ((item - part.base) as usize, Hit::with_t_max(limit));
@@ -368,7 +369,7 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     /// Returns the surface of `item` at `point`, a hit point with rounding errors. `triangle_tag`
-    /// is the id of the triangle that was hit, if the item is a mesh.
+    /// is the id of the hit triangle if the item is a mesh.
     #[inline(always)]
     pub fn surface(&self, item: u32, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         for part in &self.parts {
@@ -379,8 +380,8 @@ impl<L: SimdFloat> Aggregate<L> {
         unreachable!("every item belongs to a part")
     }
 
-    /// Returns the meshes, and the number of the first mesh among all items. Meshes have the
-    /// largest numbers.
+    /// Returns the batch of meshes, and the number of its first item. Meshes have the largest
+    /// numbers.
     fn meshes(&self) -> Option<(&Meshes<L::Scalar>, u32)> {
         match self.parts.last()? {
             BatchRange { batch: PrimitiveBatch::Meshes(meshes), base, .. } => Some((meshes, *base)),
@@ -399,9 +400,9 @@ impl<L: SimdFloat> Aggregate<L> {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
     }
 
-    /// Returns the shading normal of `item` at a hit point. `at` is the hit point and the geometric
-    /// normal on the viewer's side. `direction` is that of the rays. The shading normal is on the
-    /// viewer's side and faces the viewer.
+    /// Returns the shading normal of `item` at a hit point. `at` is the hit point, with the
+    /// geometric normal on the viewer's side. `direction` is the direction of the rays. The shading
+    /// normal is on the viewer's side and faces the viewer.
     pub fn shading_normal(
         &self,
         (item, triangle_tag): (u32, L),
@@ -431,8 +432,8 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 }
 
-/// Returns an empty hit for the lanes `wanted`. The other lanes are inactive: they get a negative
-/// distance limit.
+/// Returns an empty hit with the lanes `wanted` active. Inactive lanes have a negative distance
+/// limit.
 #[inline(always)]
 fn nearest_wanted<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
     Hit::with_t_max(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))

@@ -22,8 +22,8 @@ pub struct SurfacePoint<L> {
     pub point: Vec3<L>,
     /// Unit geometric normal: outward for solids, on the front for flat shapes.
     pub normal: Vec3<L>,
-    /// Largest magnitude of a coordinate from which the point was computed. The rounding error of
-    /// the point is a few units of the last place of this value.
+    /// Largest magnitude of the coordinates from which the point was computed. The rounding error
+    /// of the point is a few units in the last place of this value.
     pub max_coordinate: L,
 }
 
@@ -37,15 +37,15 @@ pub struct UvGradients<L> {
 }
 
 impl<L: SimdFloat> SurfacePoint<L> {
-    /// Returns the distance above the surface at which rays that leave it start: a few rounding
-    /// errors of the largest coordinate involved.
+    /// Returns the offset from the surface at which secondary rays start: a few rounding errors of
+    /// [`SurfacePoint::max_coordinate`].
     #[inline(always)]
     pub fn ray_offset(&self) -> L {
         self.max_coordinate.max(self.point.max_abs()) * L::from_f64(8.0 * L::EPSILON)
     }
 }
 
-/// One primitive, compiled for the lane type.
+/// A primitive compiled for one lane type.
 pub trait Primitive<L: SimdFloat> {
     /// Returns the smallest distance at which each ray hits the primitive, and the lanes that hit
     /// it. Only distances greater than 0 are hits. Returns `None` if no lane hits.
@@ -63,17 +63,17 @@ pub trait Primitive<L: SimdFloat> {
 
 macro_rules! batches {
     ($($(#[$doc:meta])+ $kind:ident($item:ident)),+ $(,)?) => {
-        /// All primitives of one kind.
+        /// All primitives of one kind (a batch), compiled for one lane type.
         pub enum PrimitiveBatch<L: SimdFloat> {
             $($(#[$doc])+ $kind(Vec<$item<L::Scalar>>),)+
-            /// Compounds. Each of their parts is an item.
+            /// Compounds. Each part of a compound is an item.
             Compounds(Compounds<L::Scalar>),
             /// Meshes.
             Meshes(Meshes<L::Scalar>),
         }
 
-        /// Evaluates one expression for a batch of any kind except for compounds and meshes, and
-        /// one each for compounds and meshes.
+        /// Evaluates an expression for a batch of any kind. Compounds and meshes have an expression
+        /// of their own.
         macro_rules! each {
             ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
                 $meshes:ident => $third:expr) => {
@@ -159,7 +159,7 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
     }
 
     /// Returns the surface of `item` at `point`, a hit point with rounding errors. `triangle_tag`
-    /// is the id of the triangle that was hit, if the item is a mesh.
+    /// is the id of the hit triangle if the item is a mesh.
     #[inline(always)]
     pub fn surface(&self, item: usize, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         each!(self,
@@ -205,13 +205,13 @@ fn occluded<L: SimdFloat>(
     occluded
 }
 
-/// Origin of an item: the form (shape) and its part.
+/// Origin of an item: index of its form, and part of the form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PrimitiveId {
-    /// Position of the form in the list given to `compile`.
+    /// Index of the form in the list given to [`compile`].
     pub form: usize,
-    /// Number of the part of a compound; 0 for all other forms. In lists of items part 0 stands for
-    /// the whole compound; the other parts are never intersected on their own.
+    /// Number of the part of a compound; 0 for other forms. In lists of items the first part means
+    /// the whole compound; further parts are never intersected on their own.
     pub part: usize,
 }
 
@@ -221,11 +221,11 @@ pub struct LabelledBatch<L: SimdFloat> {
     pub batch: PrimitiveBatch<L>,
     /// Form and part of each item.
     pub sources: Vec<PrimitiveId>,
-    /// Singular and plural of the noun for the items in the inventory.
+    /// Noun for the items in the scene's inventory, singular and plural.
     pub noun: (&'static str, &'static str),
-    /// Text that follows the noun in the inventory.
+    /// Addition to the noun in the inventory.
     pub detail: String,
-    /// `true` if the items have no finite bounds; a BVH cannot hold them.
+    /// `true` if the items have no finite bounds, so that a BVH cannot hold them.
     pub infinite: bool,
 }
 

@@ -5,8 +5,8 @@
 use crate::primitive::form::Form;
 use glam::DVec3;
 
-/// Relative error of rays in single precision, with a margin. The true error is a few times 2^-24
-/// of the largest coordinate.
+/// Relative error of rays in single precision, with a safety margin. The true error is a few times
+/// 2^-24 of the largest coordinate.
 pub const F32_RAY_ERROR: f64 = 1e-5;
 
 /// A ball.
@@ -18,7 +18,7 @@ pub struct BoundingSphere {
     pub radius: f64,
 }
 
-/// Target of shadow rays.
+/// Target of shadow rays: the position of a light.
 #[derive(Clone, Copy, Debug)]
 pub enum LightTarget {
     /// A point.
@@ -27,12 +27,12 @@ pub enum LightTarget {
     Direction(DVec3),
 }
 
-/// All rays from one point (the apex) through a convex quadrilateral, and, with a lens, all rays
-/// from the lens around the apex.
+/// All rays from one point (the apex) through a convex quadrilateral. With a lens, also the rays
+/// from all points of the lens around the apex.
 ///
 /// A ray from the apex has the direction d, whose component along `forward` is 1. The ray from the
 /// point apex + o of the lens has the direction d - o / f. At the depth z the two are o (1 - z / f)
-/// apart; within an interval of depths this is largest at one end.
+/// apart. Within an interval of depths this distance is largest at one end.
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
     /// Common origin of the rays: the centre of the lens.
@@ -63,8 +63,8 @@ impl Frustum {
         ray_error(self.apex) + F32_RAY_ERROR * self.lens_radius
     }
 
-    /// Returns the ball with a larger radius, which includes the displacement of rays by the lens
-    /// and the rounding errors of rays.
+    /// Returns the ball enlarged by the displacement of rays by the lens and by the rounding errors
+    /// of rays.
     fn blurred(&self, ball: &BoundingSphere) -> BoundingSphere {
         let depth = (ball.center - self.apex).dot(self.forward);
         let radius = ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center);
@@ -101,9 +101,9 @@ pub struct BoundingVolume {
     ball: BoundingSphere,
     /// Unit normal and offset of the plane that contains a flat form; `None` for other forms.
     plane: Option<(DVec3, f64)>,
-    /// `true` if no ray that leaves the outside of the form hits the form again.
+    /// `true` if no ray that leaves the form's outside hits the form again.
     convex: bool,
-    /// Largest distance between the end point of a shadow ray and the light.
+    /// Largest distance between the end of a shadow ray and the light.
     slack: f64,
 }
 
@@ -145,17 +145,17 @@ impl BoundingVolume {
         self.ball
     }
 
-    /// Returns `true` if the form is flat: a ray that leaves it does not hit it again.
+    /// Returns `true` if the form is flat, so that a ray that leaves it cannot hit it again.
     pub fn is_flat(&self) -> bool {
         self.plane.is_some()
     }
 
-    /// Returns `true` if no ray that leaves the outside of the form hits the form again.
+    /// Returns `true` if no ray that leaves the form's outside hits the form again.
     pub fn is_convex(&self) -> bool {
         self.convex
     }
 
-    /// Returns a ball that contains the part of the form that rays of `pencil` can hit; `None` if
+    /// Returns a ball that contains the part of the form that rays of `frustum` can hit; `None` if
     /// they cannot hit the form.
     pub fn clip_to(&self, pencil: &Frustum) -> Option<BoundingSphere> {
         let Frustum { apex, forward, corners, .. } = pencil;
@@ -211,8 +211,8 @@ impl BoundingVolume {
         Self { ball, slack: self.slack + by, ..self }
     }
 
-    /// Returns the largest distance from the plane of a flat form at which rays that lead to
-    /// `point` may still hit the form by rounding.
+    /// Returns the largest distance between a point and the plane of a flat form at which rounding
+    /// errors may let rays towards `point` hit the form.
     fn ray_error(&self, point: DVec3) -> f64 {
         let BoundingSphere { center, radius } = self.ball;
         let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
@@ -312,7 +312,7 @@ fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64
     distance(nearest.clamp(0.0, length)).min(ends)
 }
 
-/// All directions that form an angle below a limit (less than 90 degrees) with an axis.
+/// Cone of all directions whose angle to an axis is below a limit (less than 90 degrees).
 struct Cone {
     apex: DVec3,
     axis: DVec3,
@@ -321,8 +321,8 @@ struct Cone {
 }
 
 impl Cone {
-    /// Returns `true` if a ball may overlap the cone: a part of the ball is in front of the apex,
-    /// and its centre is no farther from the cone's side than its radius.
+    /// Returns `true` if a ball may overlap the cone. A part of the ball is then in front of the
+    /// apex, and its centre is no farther from the cone's side than its radius.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let to = ball.center - self.apex;
         let along = to.dot(self.axis);
@@ -376,8 +376,8 @@ mod tests {
         assert!(floor.radius.is_infinite());
     }
 
-    /// Checks balls that intersect a segment between two points of the hull's balls: they are near
-    /// the hull. The hull ends within the sum of the balls.
+    /// Checks that balls that intersect a segment between two points of the hull's balls are near
+    /// the hull. The distance to the hull is at most the sum of the radii.
     #[test]
     fn hull_of_two_balls_holds_every_segment_between_them() {
         let mut random = 7u64;
@@ -432,8 +432,8 @@ mod tests {
         }
     }
 
-    /// Checks a frustum of 175 degrees with rays in all of its directions. The eye is not in the
-    /// middle of the corners, which are more than 90 degrees from their mean direction.
+    /// Checks a frustum of 175 degrees with rays in all of its directions. The apex is not in front
+    /// of the middle of the corners, which are more than 90 degrees from their mean direction.
     #[test]
     fn a_wide_pencil_meets_what_its_lines_meet() {
         let apex = DVec3::new(1.0, -2.0, 5.0);
@@ -466,7 +466,7 @@ mod tests {
         assert!(!meets(apex + DVec3::Z, 0.5) && meets(apex + DVec3::Z, 2.0));
     }
 
-    /// Checks that a plane through the eye is never excluded. Its height above the eye is lost in
+    /// Checks that a plane through the apex is never excluded. Its height above the apex is lost in
     /// rounding, so that rays may hit either side.
     #[test]
     fn a_plane_through_the_eye_is_not_ruled_out() {
@@ -476,7 +476,7 @@ mod tests {
         }
     }
 
-    /// Checks that no point of a form that is seen through the frustum is outside of the clipped
+    /// Checks that all points of a form that are inside of the frustum are inside of the clipped
     /// ball.
     #[test]
     fn the_part_seen_holds_every_point_met() {

@@ -26,13 +26,13 @@ pub enum DefaultMapping {
     Spherical,
     /// Cylindrical, for forms that are round about an axis.
     Cylindrical,
-    /// Box, for forms with flat sides, or with sides of any kind.
+    /// Box, for forms with flat sides and for forms of any other kind.
     Box,
-    /// Texture coordinates of the form's own.
+    /// The form's own texture coordinates.
     Uv,
 }
 
-/// Face of a proxy: a plane or a sphere that replaces a part of the surface.
+/// Face of a [`Proxy`]: a plane or a sphere in place of a part of the surface.
 #[derive(Clone, Copy, Debug)]
 pub enum ProxyFace {
     /// A plane.
@@ -41,7 +41,7 @@ pub enum ProxyFace {
     Round(BoundingSphere),
 }
 
-/// Simplified form for the search for narrow gaps between objects: some faces, and a bounding box.
+/// Simplified form in the search for narrow gaps between objects: some faces, and a bounding box.
 #[derive(Clone, Debug)]
 pub struct Proxy {
     /// Faces that may be close to the faces of other forms.
@@ -59,8 +59,8 @@ impl Proxy {
         Self { faces, low, high }
     }
 
-    /// Creates the proxy of a round form: the faces of its bounding box, each of which touches the
-    /// form.
+    /// Creates the proxy of a round form. Its faces are those of the form's bounding box, each of
+    /// which touches the form.
     pub fn around((low, high): Bounds) -> Self {
         let faces = DVec3::AXES
             .into_iter()
@@ -73,16 +73,16 @@ impl Proxy {
 
 /// Geometry of one kind of primitive, in double precision and scene coordinates.
 pub trait CanonicalShape {
-    /// Singular and plural of the noun for such primitives in the inventory.
+    /// Noun for such primitives in the scene's inventory, singular and plural.
     const NOUN: (&'static str, &'static str);
 
-    /// Returns the image under the invertible affine map `map`.
+    /// Returns the image of the form under the invertible affine map `map`.
     fn transformed(self, map: &DAffine3) -> Form;
 
     /// Number of parts that can have a material of their own.
     fn parts(&self) -> usize;
 
-    /// Axis-parallel bounding box; `None` if the form has no finite bounds. It is the smallest one
+    /// Axis-parallel bounding box; `None` if the form has no finite bounds. It is the smallest one,
     /// except for compounds.
     fn bounds(&self) -> Option<Bounds>;
 
@@ -93,20 +93,19 @@ pub trait CanonicalShape {
     /// the form has no space of its own.
     fn oriented_box(&self) -> Option<(DAffine3, Bounds)>;
 
-    /// Plane that contains a flat form, with its normal on the front; `None` if the form is not
-    /// flat.
+    /// Plane that contains the form, with its normal on the front; `None` if the form is not flat.
     fn plane(&self) -> Option<HalfSpace>;
 
-    /// Returns `true` if no ray that leaves the outside of the form hits the form again.
+    /// Returns `true` if no ray that leaves the form's outside hits the form again.
     fn is_convex(&self) -> bool;
 
     /// Smallest thickness of a solid, or shorter edge of a flat form. For a compound it is that of
-    /// its thinnest part; thin remains between cuts are found by the search for gaps.
+    /// its thinnest part; thin remains of cuts are found by the search for gaps.
     fn thickness(&self) -> f64;
 
     /// Lower bound of the distance between `point` and the surface; `None` if there is no surface.
-    /// It is exact close to the surface. For points outside of a box around the form it may be the
-    /// distance to the box.
+    /// It is exact for points close to the surface. For points outside of a box around the form it
+    /// may be the distance to the box.
     fn clearance(&self, point: DVec3) -> Option<f64>;
 
     /// Unit normals of the surfaces within the distance `slack` of `point`, one list for each solid
@@ -117,17 +116,17 @@ pub trait CanonicalShape {
     /// The unit of t is the length of `direction`.
     fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64>;
 
-    /// Mapping of textures to the form if a material does not choose one.
+    /// Default mapping of textures to the form, used if a material does not choose one.
     fn default_mapping(&self) -> DefaultMapping;
 
-    /// Proxies for the search for narrow gaps; empty for a form with too many details.
+    /// Proxies in the search for narrow gaps; empty for a form with too many details.
     fn proxies(&self) -> Vec<Proxy>;
 
-    /// Smallest and largest value of `axis . p` over the points p of the form, or bounds of them;
+    /// Smallest and largest value of `axis . p` over the points p of the form, or bounds of both;
     /// `None` if the form is unbounded along the axis. `axis` is a unit vector.
     fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)>;
 
-    /// Corners on which the form can stand, when it is snapped to the ground.
+    /// Corners on which the form can stand when it is snapped to the ground.
     fn corners(&self) -> Vec<DVec3>;
 
     /// Number of triangles; 0 except for meshes.
@@ -166,9 +165,9 @@ pub fn extent_of_box(bounds: Option<Bounds>, axis: DVec3) -> Option<(f64, f64)> 
     Some((center - reach, center + reach))
 }
 
-/// Returns the normals of those sides of a convex solid that are within `slack` of a point. `sides`
-/// holds the height of the point above each side, and the normal of the side. The largest height is
-/// the distance between point and solid.
+/// Returns the normals of the sides of a convex solid that are within `slack` of a point. `sides`
+/// has, for each side, the height of the point above the side, and the normal. The largest height
+/// is the distance between the point and the solid.
 pub fn normals_of_solid(sides: Vec<(f64, DVec3)>, slack: f64) -> Vec<Vec<DVec3>> {
     let near = sides.iter().all(|(height, _)| *height <= slack);
     let on = sides.into_iter().filter(|(height, _)| near && *height >= -slack);
@@ -189,14 +188,14 @@ pub fn segment_distance([a, b]: [DVec3; 2], point: DVec3) -> f64 {
     point.distance(a + along * t)
 }
 
-/// Returns the half-space behind the plane through `point` with a normal along `normal`.
+/// Returns the half-space behind the plane through `point` with the normal `normal`, of any length.
 pub fn half_space(point: DVec3, normal: DVec3) -> HalfSpace {
     let normal = normal.normalize();
     HalfSpace { normal, offset: normal.dot(point) }
 }
 
-/// Returns the factor by which a linear map scales lengths; `None` if it depends on the direction
-/// by more than rounding.
+/// Returns the factor by which a linear map scales lengths. Returns `None` if, beyond rounding
+/// errors, it depends on the direction.
 pub fn similarity(linear: &DMat3) -> Option<f64> {
     let gram = linear.transpose() * *linear;
     let square = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;

@@ -153,9 +153,10 @@ impl CanonicalShape for ConicalFrustumForm {
     }
 }
 
-/// Returns the distance between `point` and the surface of the image of a frustum. For each angle
-/// around the axis the surface has an outline of three segments: from the middle of the base over
-/// both rims to the middle of the cap. `top` is the radius of the cap, that of the base is 1.
+/// Returns the distance between `point` and the surface of the image of a frustum. In each
+/// half-plane through the axis, the surface has an outline of three segments: from the middle of
+/// the base over both rims to the middle of the cap. The radius of the base is 1, and `top` is the
+/// radius of the cap.
 fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
     const ANGLES: usize = 64;
     let place = |x, y, z| scene_from_unit.transform_point3(DVec3::new(x, y, z));
@@ -202,8 +203,8 @@ pub struct ConicalFrustum<S> {
     reach: S,
 }
 
-/// Squared radius of a ball around the middle of the axis that contains the canonical solid, with a
-/// margin for rounding errors.
+/// Squared radius of a ball around the middle of the axis that contains the solid in canonical
+/// space, with a margin for rounding errors.
 const AROUND2: f64 = 1.26;
 
 impl<S: Float> ConicalFrustum<S> {
@@ -234,14 +235,14 @@ struct Chord<L: SimdFloat> {
     /// canonical space. The direction has unit length there.
     point: Vec3<L>,
     direction: Vec3<L>,
-    /// Distance in the scene between the ray's origin and `point`, and length in the scene of a
-    /// step of length 1.
+    /// Distance in the scene from the ray's origin to `point`, and length in the scene of a step of
+    /// length 1 in canonical space.
     start: L,
     scale: L,
     /// Steps from `point` to both ends of the chord.
     enter: L,
     leave: L,
-    /// Lanes in which this end is on the side of the frustum; in the others it is on a flat end.
+    /// Lanes whose entry is on the side of the frustum; in the others it is on a flat end.
     enters_side: L::Mask,
     leaves_side: L::Mask,
     meets: L::Mask,
@@ -256,12 +257,12 @@ impl<L: SimdFloat> Chord<L> {
 
 /// Returns the chord of a line in the frustum.
 ///
-/// Steps are counted from the line's point closest to the solid's middle, so that a distant origin
-/// costs no precision. With p the point, d the direction, r the radius at p and k the slope, the
-/// side is crossed where a t^2 + 2 b t + c = 0. The discriminant is computed as
-/// |r d' - k d_z p'|^2 - (p' x d')^2 (primes: without z), which does not cancel as b^2 - a c does; for
-/// a cylinder it compares the radius with the line's distance from the axis. The roots are computed
-/// as q / a and c / q, so that for a = 0, a line parallel to a generator, one of them stays finite.
+/// Distances are counted from the line's point closest to the solid's middle, so that a distant
+/// origin costs no precision. p is this point, d the direction, r the radius at p and k the slope.
+/// The line crosses the side where a t^2 + 2 b t + c = 0. The discriminant is computed as |r d' - k
+/// d_z p'|^2 - (p' x d')^2 (primes: without z). Unlike b^2 - a c, it does not cancel; for a
+/// cylinder it compares the radius with the line's distance from the axis. The roots are computed
+/// as q / a and c / q. One of them stays finite for a = 0, a line parallel to a generator.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let (zero, half) = (L::zero(), L::from_f64(0.5));
@@ -325,8 +326,8 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     })
 }
 
-/// Returns the outward normal of the side at the canonical point (x, y, z), in the space of the
-/// scene, not normalised.
+/// Returns the outward normal of the side at the canonical point (x, y, z), in scene space and not
+/// normalised, and the distance of the point from the axis in canonical space.
 #[inline(always)]
 fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3<L>, L) {
     let rho = x.mul_add(x, y * y).sqrt();
@@ -346,8 +347,8 @@ impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), chord.meets))
     }
 
-    /// Returns the surface of the closest of side, base and cap: the one with the largest height
-    /// outside, or the smallest depth inside.
+    /// Returns the surface of side, base or cap at `point`: of the face for which the point's
+    /// height is largest, which is the closest one.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let s = self;

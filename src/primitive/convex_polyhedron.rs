@@ -15,7 +15,7 @@ use glam::{DAffine3, DVec3};
 /// A bounded convex solid: intersection of half-spaces, and its corners.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvexPolyhedronForm {
-    /// Half-space behind each face.
+    /// Half-space behind the plane of each face.
     pub faces: Vec<HalfSpace>,
     /// Corners in scene coordinates.
     pub corners: Vec<DVec3>,
@@ -125,13 +125,14 @@ struct Slab<S> {
     high: S,
 }
 
-/// Half-space: the points p with normal . (p - center) <= high.
+/// Half-space of a single face: the points p with normal . (p - center) <= high.
 struct Face<S> {
     normal: [S; 3],
     high: S,
 }
 
-/// Compiled polyhedron: its bounding sphere, slabs and single faces.
+/// Compiled polyhedron: its bounding sphere, its slabs (pairs of parallel faces), and its single
+/// faces.
 pub struct ConvexPolyhedron<S> {
     center: [S; 3],
     radius2: S,
@@ -230,8 +231,8 @@ impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), meets))
     }
 
-    /// Returns the surface of the face whose plane is closest to the point: the one with the
-    /// largest height outside, or the smallest depth inside.
+    /// Returns the surface of the face for which the point's height is largest, which is the
+    /// closest one.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let from_center = point - Vec3::splat(self.center);

@@ -26,12 +26,12 @@ use crate::primitive::sphere::Sphere;
 use crate::primitive::torus::Torus;
 use std::ops::Range;
 
-/// Distance within which surfaces coincide, in rounding errors of the largest coordinate. It
-/// suffices for two faces whose coordinates differ by four units of the last place, each hit with a
-/// few rounding errors.
+/// Distance within which surfaces are taken as coincident, in rounding errors of the largest
+/// coordinate. It suffices for two faces whose coordinates differ by four units in the last place,
+/// each hit with a few rounding errors.
 const TIE: f64 = 16.0;
 
-/// Operation of a stack machine that computes "inside the compound" from "inside each part".
+/// Instruction of a stack machine that computes "inside the compound" from "inside each part".
 #[derive(Clone, Copy, Debug)]
 enum Op {
     /// Pushes the value of the part with this number.
@@ -40,13 +40,13 @@ enum Op {
     Or,
     /// Replaces the top two stack entries by their intersection.
     And,
-    /// Replaces the top two stack entries by the lower one minus the upper one.
+    /// Replaces the top two stack entries by the difference: the lower one minus the upper one.
     Minus,
 }
 
 macro_rules! leaves {
     ($($kind:ident($spans:literal)),+ $(,)?) => {
-        /// Compiled solid of a part.
+        /// Compiled solid of one part.
         enum CsgLeaf<S> {
             $($kind($kind<S>),)+
         }
@@ -66,7 +66,7 @@ macro_rules! leaves {
                 None$(.or_else(|| $kind::new(form).map(Self::$kind)))+
             }
 
-            /// Largest number of spans of one line in this solid.
+            /// Largest number of spans (intervals inside) of one line in this solid.
             fn max_spans(&self) -> usize {
                 match self {
                     $(Self::$kind(_) => $spans,)+
@@ -91,32 +91,32 @@ leaves! {
 /// One part of a compound.
 struct Part<S> {
     solid: CsgLeaf<S>,
-    /// `true` if the inside of the part's solid is outside of the compound, as for a cut.
+    /// `true` if the part is subtracted: the inside of its solid is outside of the compound.
     reversed: bool,
-    /// Indices of its spans among those of the compound.
+    /// Range of the part's spans among those of the compound.
     spans: Range<usize>,
 }
 
-/// One compound: a ball around it, and the ranges of its parts and operations.
+/// One compound: a ball around it, and the ranges of its parts and instructions.
 struct SolidOperand<S> {
     center: [S; 3],
     radius2: S,
     reach: S,
     parts: Range<usize>,
     ops: Range<usize>,
-    /// Largest total number of spans of all parts.
+    /// Total number of spans, at most, of all parts.
     spans: usize,
-    /// Largest number of entries on the stack.
+    /// Number of entries on the stack, at most.
     depth: usize,
 }
 
-/// All compounds of a scene. Every part is an item, so that a hit names the part. The first part
-/// stands for the whole compound in lists of items.
+/// All compounds of a scene. Every part is an item, so that a hit identifies the part. In lists of
+/// items the first part means the whole compound.
 pub struct Compounds<S> {
     compounds: Vec<SolidOperand<S>>,
     parts: Vec<Part<S>>,
     ops: Vec<Op>,
-    /// Number of the compound for each part that is the first of one; `None` for other parts.
+    /// Number of the compound, for parts that are the first of a compound; `None` for other parts.
     first: Vec<Option<u32>>,
 }
 
@@ -157,8 +157,8 @@ impl<S: Float> Compounds<S> {
         });
     }
 
-    /// Appends the operations of `tree` and returns the depth of the stack that they need.
-    /// `reversed` is `true` if the inside of the tree is outside of the compound.
+    /// Appends the instructions of `tree` and returns the depth of the stack that they need.
+    /// `reversed` is `true` if the tree is subtracted from the compound.
     fn build(&mut self, tree: &CsgTree, first_part: usize, reversed: bool) -> usize {
         let (list, op) = match tree {
             CsgTree::Part(i) => {
@@ -223,7 +223,7 @@ impl<S: Float> Compounds<S> {
         })
     }
 
-    /// Returns the change of the compound between the distances `before` and `after`, with the
+    /// Returns the transition of the compound between the distances `before` and `after`, with the
     /// surface that is visible there.
     fn change<L: SimdFloat<Scalar = S>, const SINGLE: bool>(
         &self,
@@ -318,11 +318,12 @@ impl<S: Float> Compounds<S> {
         });
     }
 
-    /// Replaces `hit` by the first surface of the compound in the lanes `open`, by a walk from gap
-    /// to gap along the lines.
+    /// Replaces `hit` by the first surface of the compound in the lanes `open`. The function steps
+    /// along each line from gap to gap between the ends of spans.
     ///
-    /// Coincident faces have the same angle to the line, so ends coincide only within the ties of
-    /// both: the wide tie of a grazing face does not absorb other faces.
+    /// Coincident faces have the same angle to the line. Two ends therefore coincide only if each
+    /// is within the tie of the other, so that the wide tie of a grazing face does not absorb other
+    /// faces.
     #[inline(always)]
     fn sweep_events<L: SimdFloat<Scalar = S>, const SINGLE: bool>(
         &self,
@@ -425,7 +426,7 @@ impl<S: Float> Compounds<S> {
     }
 }
 
-/// Returns the lanes in which the point at the distance `t` is inside of some of `spans`.
+/// Returns the lanes in which the distance `t` is inside of at least one of `spans`.
 #[inline(always)]
 fn inside_any<L: SimdFloat>(spans: &[Interval<L>], t: L) -> L::Mask {
     let [first, others @ ..] = spans else { return L::mask(false) };

@@ -4,18 +4,17 @@
 use crate::lanes::SimdFloat;
 use crate::primitive::solid::Span;
 
-/// Smallest cosine for which a tie is widened. Hits at smaller angles are not distinguished.
+/// Smallest cosine by which ties are divided. At smaller angles the tie does not grow further.
 const FLATTEST: f64 = 1e-9;
 
-/// End of a span: its distance, and the tie, the distance within which another end coincides with
-/// it.
+/// End of a span: its distance, and its tie. Another end within the tie is taken as coincident.
 #[derive(Clone, Copy)]
 pub struct Event<L> {
     pub t: L,
     pub tie: L,
 }
 
-/// Interval in which a line is inside of a part.
+/// Interval of distances in which a line is inside of a part.
 #[derive(Clone, Copy)]
 pub struct Interval<L> {
     pub enter: L,
@@ -29,12 +28,12 @@ impl<L: SimdFloat> Interval<L> {
     }
 }
 
-/// Change of a subtree between inside and outside at a surface, by lane.
+/// Transition of a subtree between inside and outside at a surface, by lane.
 #[derive(Clone, Copy)]
 pub struct Transition<L: SimdFloat> {
     pub before: L::Mask,
     pub after: L::Mask,
-    /// Distance of the visible part; undefined in lanes without a change.
+    /// Distance of the visible part; undefined in lanes without a transition.
     pub t: L,
     pub tag: L,
 }
@@ -44,8 +43,9 @@ impl<L: SimdFloat> Transition<L> {
         Self { before: !self.before, after: !self.after, ..self }
     }
 
-    /// Combines two transitions into one with the given values `before` and `after`. The distance
-    /// is that of `self` if it changes in the same sense, otherwise that of `other`.
+    /// Combines the transitions of two operands. `before` and `after` are the values of the
+    /// combination on both sides. The distance is that of `self` if it changes in the same sense,
+    /// otherwise that of `other`.
     fn joined(self, other: Self, before: L::Mask, after: L::Mask) -> Self {
         let same = (self.after & after) | (!self.after & !after);
         let first = same & ((self.before & !self.after) | (!self.before & self.after));
@@ -66,8 +66,8 @@ impl<L: SimdFloat> Transition<L> {
     }
 }
 
-/// Calls `use_it` with a slice of `n` values `fill`. It is on the stack if `n` is at most `FEW`,
-/// otherwise on the heap.
+/// Calls `use_it` with a slice of `n` values `fill`. The slice is on the stack if `n` is at most
+/// `FEW`, otherwise on the heap.
 #[inline(always)]
 pub fn with_scratch<const FEW: usize, T: Copy, R>(
     n: usize,
@@ -84,7 +84,8 @@ pub fn with_scratch<const FEW: usize, T: Copy, R>(
     })
 }
 
-/// Returns the ends of a span. In lanes that miss the solid they are beyond all other ends.
+/// Returns the two ends of a span. In lanes that miss the solid they are farther than all other
+/// ends.
 #[inline(always)]
 pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     let never = L::from_f64(L::MAX);

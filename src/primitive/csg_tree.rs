@@ -33,11 +33,11 @@ impl CsgTree {
     }
 }
 
-/// Compound solid: a set of solids combined by set operations.
+/// Compound solid: several solids combined by set operations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CsgSolid {
-    /// Solids that are combined: `Sphere`, `Ellipsoid`, `ConvexPolyhedron`, `ConicalFrustum`,
-    /// `Torus`, and `Plane` for the half-space behind it.
+    /// Solids that are combined. Valid kinds are `Sphere`, `Ellipsoid`, `ConvexPolyhedron`,
+    /// `ConicalFrustum`, `Torus`, and `Plane`, which means the half-space behind it.
     pub parts: Vec<Form>,
     /// Tree of operations, in which every part occurs once, in the order of `parts`.
     pub tree: CsgTree,

@@ -109,10 +109,10 @@ impl CanonicalShape for EllipsoidForm {
 
 /// Returns the distance between `point` and the image of the unit sphere.
 ///
-/// With Q = (M M^T)^-1 and p relative to the centre, the closest point q of q^T Q q = 1 is (I + l
-/// Q)^-1 p. l is the only number for which q is on the surface and I + l Q is positive definite;
-/// q^T Q q decreases with l. (Eberly 2013, *Distance from a Point to an Ellipse, an Ellipsoid, or a
-/// Hyperellipsoid*.)
+/// Q is (M M^T)^-1 and p is the point relative to the centre. The closest point q of the surface
+/// q^T Q q = 1 is (I + l Q)^-1 p. There is only one number l for which q is on the surface and `I +
+/// l Q` is positive definite, and q^T Q q decreases with l. (Eberly 2013, *Distance from a Point to
+/// an Ellipse, an Ellipsoid, or a Hyperellipsoid*.)
 fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_unit.matrix3.inverse();
     let q = inverse.transpose() * inverse;

@@ -44,7 +44,7 @@ macro_rules! forms {
         }
 
         impl Form {
-            /// Singular and plural of the noun for such primitives in the inventory.
+            /// Noun for such primitives in the scene's inventory, singular and plural.
             pub(crate) fn noun(&self) -> (&'static str, &'static str) {
                 match self {
                     $(Self::$kind(_) => $form::NOUN,)+
@@ -88,7 +88,7 @@ impl Form {
         dispatch!(self, form => form.parts())
     }
 
-    /// Axis-parallel bounding box; `None` if the form has no finite bounds. It is the smallest one
+    /// Axis-parallel bounding box; `None` if the form has no finite bounds. It is the smallest one,
     /// except for compounds.
     pub fn bounds(&self) -> Option<Bounds> {
         dispatch!(self, form => form.bounds())
@@ -120,7 +120,7 @@ impl Form {
         !self.is_flat()
     }
 
-    /// Returns `true` if no ray that leaves the outside of the form hits the form again.
+    /// Returns `true` if no ray that leaves the form's outside hits the form again.
     pub fn is_convex(&self) -> bool {
         dispatch!(self, form => form.is_convex())
     }
@@ -148,23 +148,23 @@ impl Form {
         dispatch!(self, form => form.cast(origin, direction))
     }
 
-    /// Mapping of textures to the form if a material does not choose one.
+    /// Default mapping of textures to the form, used if a material does not choose one.
     pub fn default_mapping(&self) -> DefaultMapping {
         dispatch!(self, form => form.default_mapping())
     }
 
-    /// Proxies for the search for narrow gaps.
+    /// Proxies in the search for narrow gaps.
     pub fn proxies(&self) -> Vec<Proxy> {
         dispatch!(self, form => form.proxies())
     }
 
-    /// Smallest and largest value of `axis . p` over the points p of the form, or bounds of them;
+    /// Smallest and largest value of `axis . p` over the points p of the form, or bounds of both;
     /// `None` if the form is unbounded along the axis.
     pub fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
         dispatch!(self, form => form.extent_along(axis))
     }
 
-    /// Corners on which the form can stand, when it is snapped to the ground.
+    /// Corners on which the form can stand when it is snapped to the ground.
     pub fn corners(&self) -> Vec<DVec3> {
         dispatch!(self, form => form.corners())
     }
@@ -174,8 +174,8 @@ impl Form {
         dispatch!(self, form => form.triangles())
     }
 
-    /// Largest magnitude of a coordinate from which the surface is computed. For a plane it is its
-    /// distance from the origin.
+    /// Largest magnitude of the coordinates from which the surface is computed. For a plane it is
+    /// the distance from the origin.
     pub fn max_coordinate(&self) -> f64 {
         match self.bounds() {
             Some((low, high)) => low.abs().max(high.abs()).max_element(),

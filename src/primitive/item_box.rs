@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Acceleration {
-    /// The structure that is fastest by measurement: a BVH for many primitives, otherwise candidate
-    /// lists for each tile.
+    /// The fastest structure by measurement: a BVH for many primitives, otherwise candidate lists
+    /// for each tile.
     #[default]
     Auto,
     /// No structure: every ray tests every primitive.
@@ -21,9 +21,9 @@ pub enum Acceleration {
     /// Screen rectangles: camera rays test only the primitives whose rectangle contains their
     /// pixel.
     ScreenBounds,
-    /// A bounding box for each primitive, in the primitive's own space.
+    /// A bounding box for each primitive in the primitive's own space (oriented bounding box).
     Obb,
-    /// A bounding box for each primitive, along the axes of the scene.
+    /// A bounding box for each primitive along the axes of the scene.
     Aabb,
     /// A bounding volume hierarchy over all primitives.
     Bvh,
@@ -78,7 +78,7 @@ pub struct ItemBox<S> {
     space: Option<BoxFrame<S>>,
 }
 
-/// Space of an oriented box: a point p of the scene has the coordinates `rows (p - center)`.
+/// Space of an oriented box. A point p of the scene has the coordinates `rows (p - center)` in it.
 struct BoxFrame<S> {
     center: [S; 3],
     rows: [[S; 3]; 3],
@@ -96,13 +96,13 @@ pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
     [low - pad, high + pad]
 }
 
-/// Largest difference between the faces and the corners of one solid, as a fraction of its extent.
-/// In a scene far from the origin of its file both have been rounded in double precision.
+/// Largest error of the corners of a solid relative to its faces, as a fraction of its extent. In a
+/// scene far from the origin of its file, both have been rounded in double precision.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> ItemBox<S> {
-    /// Creates the box of a form; in the form's own space if `oriented` is `true` and it has one.
-    /// Returns `None` for a form without finite bounds.
+    /// Creates the box of a form. If `oriented` is `true` and the form has a space of its own, the
+    /// box is in that space. Returns `None` for a form without finite bounds.
     pub fn new(form: &Form, oriented: bool) -> Option<Self> {
         let bounds = form.bounds()?;
         let vector = |v: DVec3| v.to_array().map(S::from_f64);

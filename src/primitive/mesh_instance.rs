@@ -21,8 +21,8 @@ use glam::{DAffine3, DVec3};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Assumed ratio of the extent of a mesh to that of its details, for the choice of single or double
-/// precision.
+/// Assumed ratio of a mesh's extent to the size of its details. It determines the choice of single
+/// or double precision.
 const EXTENT_PER_DETAIL: f64 = 64.0;
 
 /// The image of a mesh under an invertible affine map.
@@ -123,7 +123,7 @@ impl CanonicalShape for MeshForm {
         }
     }
 
-    /// Returns no proxies: the faces are triangles, whose corners are in single precision.
+    /// Returns no proxies: a mesh has many faces, and its corners are in single precision.
     fn proxies(&self) -> Vec<Proxy> {
         Vec::new()
     }
@@ -218,9 +218,9 @@ struct MeshInstance<S> {
     mesh: Arc<asset::Mesh>,
     /// Bounding box in the scene. Rays that miss it are not transformed.
     extent: ItemBox<S>,
-    /// Columns of the linear part of the map from scene to mesh.
+    /// Columns of the linear map from scene space to mesh space.
     mesh_from_scene: [[S; 3]; 3],
-    /// Centre of the mesh's bounding box, in the scene and in the mesh. Points are transformed
+    /// Centre of the mesh's bounding box, in scene space and in mesh space. Points are transformed
     /// relative to it, so that their rounding error is in proportion to the mesh's size and
     /// distance.
     center: [S; 3],
@@ -229,7 +229,7 @@ struct MeshInstance<S> {
     smooth: bool,
 }
 
-/// All meshes of a scene. Each mesh is one item; a hit has the id of a triangle in addition.
+/// All meshes of a scene. Each mesh is one item; a hit also has the id of a triangle.
 pub struct Meshes<S> {
     items: Vec<MeshInstance<S>>,
 }
@@ -284,8 +284,8 @@ impl<S: Float> MeshInstance<S> {
         self.vector(p - Vec3::splat(self.center)) + Vec3::splat(self.mesh_center)
     }
 
-    /// Transforms a ray to the space of the mesh. The second value is the length there of the ray's
-    /// unit directions.
+    /// Transforms a ray to the space of the mesh. The second value is the length in this space of
+    /// the ray's unit direction.
     #[inline(always)]
     fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
         let direction = self.vector(ray.direction);
@@ -354,8 +354,8 @@ impl<L: SimdFloat> Triangle<L> {
         [to_c.cross(normal) * inverse, normal.cross(to_b) * inverse]
     }
 
-    /// Returns the barycentric weights of the triangle's point closest to `p`, approximately. They
-    /// are positive, and their sum is 1.
+    /// Returns approximate barycentric weights of the triangle's point closest to `p`. They are
+    /// positive, and their sum is 1.
     #[inline(always)]
     fn weights(&self, p: Vec3<L>) -> [L; 3] {
         let normal = self.normal();
@@ -428,8 +428,8 @@ impl<S: Float> Meshes<S> {
         occluded
     }
 
-    /// Returns the surface of `item` at `point`, a hit point with rounding errors on the triangle
-    /// with the id `triangle_tag`.
+    /// Returns the surface of `item` at `point`, a hit point with rounding errors. `triangle_tag`
+    /// is the id of the hit triangle.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -454,10 +454,10 @@ impl<S: Float> Meshes<S> {
     }
 
     /// Returns the shading normal of `item` at the hit point `point` on the triangle with the id
-    /// `triangle_tag`. `normal` is the geometric normal on the viewer's side; `direction` is that
-    /// of the rays.
+    /// `triangle_tag`. `normal` is the geometric normal on the viewer's side; `direction` is the
+    /// direction of the rays.
     ///
-    /// The shading normal is on the same side. One that would turn away from the viewer is bent
+    /// The shading normal is on the viewer's side. One that would turn away from the viewer is bent
     /// back.
     #[inline(never)]
     pub fn shading_normal<L: SimdFloat<Scalar = S>>(
@@ -479,7 +479,7 @@ impl<S: Float> Meshes<S> {
         keep_visible(smooth, normal, direction)
     }
 
-    /// Returns the texture coordinates of `item` at `point`, a point of the triangle with the id
+    /// Returns the texture coordinates of `item` at `point` in the triangle with the id
     /// `triangle_tag`; `None` if the mesh file has none.
     #[inline(never)]
     pub fn uv<L: SimdFloat<Scalar = S>>(

@@ -11,8 +11,8 @@ use crate::primitive::canonical::{
 use crate::primitive::form::Form;
 use glam::{DAffine3, DVec3};
 
-/// Flat parallelogram of the points `corner + a u + b v`, 0 <= a, b <= 1. Its front is the side of
-/// u x v.
+/// Flat parallelogram of the points `corner + a u + b v`, with a and b in 0..=1. Its front is the
+/// side of u x v.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParallelogramForm {
     /// Corner at which both edges start.
@@ -120,9 +120,8 @@ impl CanonicalShape for ParallelogramForm {
     }
 }
 
-/// Compiled parallelogram. A point p of its plane has the two coordinates (p - corner) . dual,
-/// which are in 0..1 inside.
-/// 0..1 inside.
+/// Compiled parallelogram. A point p of its plane has two coordinates, (p - corner) . dual. Both
+/// are in 0..=1 inside.
 #[derive(Clone, Copy)]
 pub struct Parallelogram<S> {
     corner: [S; 3],

@@ -17,7 +17,7 @@ use glam::{DAffine3, DVec3};
 pub struct PlaneForm {
     /// Unit normal.
     pub normal: DVec3,
-    /// Value of `normal . p` for all its points p.
+    /// Value of `normal . p` for all points p of the plane.
     pub offset: f64,
 }
 

@@ -9,13 +9,15 @@ use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::item_box::padded;
 use glam::DVec3;
 
-/// Limit of the differences between rays up to which a packet traverses the BVH together.
+/// Limit of the differences between rays up to which a packet traverses the BVH as a whole.
 ///
-/// It applies to the length of the difference of unit directions, and to the difference of origins
-/// as a fraction of the items' extent. Each may be up to this limit, times the number of lanes,
-/// divided by the square root of the number of items. Measured with spheres in a ball: with 100
-/// spheres even random rays are as fast together as apart; with 256 such packets of eight that
-/// differ by 0.8, with 1000 by 0.4, with 10,000 by 0.13; packets of four up to half of that.
+/// The differences are the length of the difference of unit directions, and the difference of
+/// origins as a fraction of the items' extent. Each may be up to this limit, times the number of
+/// lanes, divided by the square root of the number of items.
+///
+/// Measured with spheres in a ball and packets of eight: with 100 spheres whole packets of random
+/// rays are as fast as single rays; with 256 the same holds for rays that differ by 0.8, with 1000
+/// by 0.4, with 10,000 by 0.13. For packets of four the differences are up to half of that.
 const COHERENCE_LIMIT: f64 = 1.5;
 
 /// BVH over items (primitives), one item per leaf.
@@ -23,8 +25,8 @@ pub struct SceneBvh {
     boxes: Bvh8,
     /// Number of the item in each leaf.
     items: Vec<u32>,
-    /// Largest difference between the rays of a coherent packet, divided by the number of lanes, in
-    /// direction and in origin.
+    /// Largest difference between the rays of a coherent packet, in direction and in origin,
+    /// divided by the number of lanes.
     turn: f64,
     shift: f64,
 }
@@ -46,9 +48,9 @@ impl SceneBvh {
         Self { boxes, items, turn, shift: turn * (high - low).max_element() }
     }
 
-    /// Calls `leaf(item, limit)` for the items whose boxes rays may enter within `limit`,
-    /// approximately nearest first. `leaf` returns the new limits. Items at exactly the limit are
-    /// still visited. Lanes with a negative limit are inactive.
+    /// Calls `leaf(item, limit)` for the items whose boxes a ray may enter within its limit,
+    /// approximately from near to far. `leaf` returns the new limits. Items at exactly the limit
+    /// are visited, too. Lanes with a negative limit are inactive.
     #[inline(always)]
     pub fn traverse<L: SimdFloat>(
         &self,
@@ -84,8 +86,8 @@ impl SceneBvh {
         });
     }
 
-    /// Returns `true` if the lanes `wanted` of a packet are coherent enough to traverse the BVH
-    /// together.
+    /// Returns `true` if the rays in the lanes `wanted` are coherent enough to traverse the BVH as
+    /// a packet.
     #[inline(always)]
     fn is_together<L: SimdFloat>(&self, ray: &Ray<L>, wanted: u32) -> bool {
         if L::WIDTH == 1 || wanted.count_ones() < 2 {

@@ -5,8 +5,8 @@ use crate::lanes::{SimdFloat, Vec3};
 /// Smallest cosine between a shading normal and the direction to the viewer.
 const LEAST_COSINE: f64 = 0.02;
 
-/// Returns the unit vector of `shading` on the viewer's side of the surface. `normal` is the
-/// geometric normal on the viewer's side, `direction` that in which the viewer looks.
+/// Returns `shading` as a unit vector on the viewer's side of the surface. `normal` is the
+/// geometric normal on the viewer's side, and `direction` is the direction of the rays.
 ///
 /// A shading normal that would turn away from the viewer is bent back. One that is not finite is
 /// replaced by `normal`.

@@ -4,7 +4,7 @@ use crate::bvh::Ray;
 use crate::lanes::SimdFloat;
 use crate::primitive::batch::Primitive;
 
-/// Interval of each lane's line inside of a solid.
+/// Interval in which the line of each lane is inside of a solid.
 #[derive(Clone, Copy, Debug)]
 pub struct Span<L: SimdFloat> {
     /// Distance at which the line enters; `-L::MAX` if the line starts inside.
@@ -19,7 +19,7 @@ pub struct Span<L: SimdFloat> {
     pub meets: L::Mask,
 }
 
-/// Primitive that bounds a solid, so that it can be a part of a compound.
+/// Primitive that bounds a solid, so that a compound can have it as a part.
 pub trait SolidPrimitive<L: SimdFloat>: Primitive<L> {
     /// Spans of one packet of lines, in ascending order and without overlap.
     type Spans: IntoIterator<Item = Span<L>>;

@@ -136,11 +136,11 @@ impl<S: Float> Sphere<S> {
 
 /// Returns the distances at which each line enters and leaves a sphere, and the lanes that hit it.
 ///
-/// `f` is the line's origin relative to the centre, `d` its unit direction. The discriminant is
-/// computed from the vector f - (f.d) d, whose length is the line's distance from the centre. The
-/// root closer to the origin is computed from the product of both. Neither of them cancels for
-/// small or distant spheres (Haines, Günther, Akenine-Möller 2019, *Precision Improvements for
-/// Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
+/// `f` is the line's origin relative to the centre, and `d` is its unit direction. The discriminant
+/// is computed from the vector f - (f.d) d, whose length is the line's distance from the centre.
+/// The root closer to the origin is computed from the product of both roots. Neither computation
+/// cancels for small or distant spheres (Haines, Günther, Akenine-Möller 2019, *Precision
+/// Improvements for Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
 #[inline(always)]
 pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option<(L, L, L::Mask)> {
     let b = -f.dot(d);

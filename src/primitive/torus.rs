@@ -36,13 +36,13 @@ pub struct TorusForm {
 }
 
 impl TorusForm {
-    /// Returns the map from the space in which the ring has radius 1 to the scene.
+    /// Returns the map to the scene from the space in which the ring has radius 1.
     fn scene_from_unit(&self) -> DAffine3 {
         self.scene_from_torus * DAffine3::from_scale(DVec3::splat(self.ring))
     }
 
-    /// Returns the distance between `point`, in the space of the torus, and the ring (the circle in
-    /// the middle of the tube), and the unit vector from the ring to `point`.
+    /// Returns the distance between the ring (the circle in the middle of the tube) and `point`,
+    /// which is in the space of the torus. Also returns the unit vector from the ring to `point`.
     fn ring_distance(&self, point: DVec3) -> (f64, DVec3) {
         let outward = DVec3::new(point.x, 0.0, point.z).normalize_or(DVec3::X);
         let across = point - outward * self.ring;
@@ -61,8 +61,8 @@ impl CanonicalShape for TorusForm {
         1
     }
 
-    /// Returns the sum of the half-widths of a circle and of a ball, because the torus is the sum
-    /// of the two.
+    /// Returns the bounding box: its half-widths are those of the ring plus those of a ball in the
+    /// tube, because the torus is the Minkowski sum of the two.
     fn bounds(&self) -> Option<Bounds> {
         let m = &self.scene_from_torus;
         let rows = m.matrix3.transpose();
@@ -96,15 +96,16 @@ impl CanonicalShape for TorusForm {
         false
     }
 
-    /// Returns the thickness of the box around a ball in the tube.
+    /// Returns the smallest side of the box around a ball in the tube.
     fn thickness(&self) -> f64 {
         let rows = self.scene_from_torus.matrix3.inverse().transpose();
         let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
         2.0 * self.tube / rows.map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
-    /// Returns the exact distance for similarities. For other maps it is the distance in the space
-    /// of the torus times the smallest factor by which the map scales lengths.
+    /// Returns the exact distance if the map is a similarity. Otherwise returns a lower bound: the
+    /// distance in the space of the torus times the smallest factor by which the map scales
+    /// lengths.
     fn clearance(&self, point: DVec3) -> Option<f64> {
         let inverse = self.scene_from_torus.inverse();
         let (distance, _) = self.ring_distance(inverse.transform_point3(point));
@@ -129,8 +130,8 @@ impl CanonicalShape for TorusForm {
         cast_compiled((*self).into(), origin, direction)
     }
 
-    /// Returns the form's own texture coordinates: u is the angle around the ring, v the angle
-    /// around the tube, both from 0 to 1.
+    /// Returns [`DefaultMapping::Uv`]: the form has texture coordinates of its own. u is the angle
+    /// around the ring, v the angle around the tube, both from 0 to 1.
     fn default_mapping(&self) -> DefaultMapping {
         DefaultMapping::Uv
     }
@@ -182,16 +183,17 @@ impl<S: Float> Torus<S> {
     }
 }
 
-/// Margin by which the bounds of the roots exceed the torus, in rounding errors of 1.
+/// Margin around the torus in the bounds of the roots, in rounding errors of 1.
 const ROOM: f64 = 64.0;
 
-/// Largest number of steps of a root search: bisection alone needs 54 in double precision.
+/// Largest number of steps of a root search. Bisection alone needs 54 in double precision.
 const MAX_STEPS: usize = 64;
 
-/// Line in the space of the torus.
+/// Line in the space in which the ring has radius 1. A position on the line is a signed distance
+/// from `point`.
 #[derive(Clone, Copy)]
 struct UnitLine<L: SimdFloat> {
-    /// Point of the line closest to the centre.
+    /// Point of the line closest to the torus's centre.
     point: Vec3<L>,
     /// Unit direction.
     direction: Vec3<L>,
@@ -199,25 +201,26 @@ struct UnitLine<L: SimdFloat> {
     across2: L,
     /// Position of the ray's origin on the line, relative to `point`.
     origin: L,
-    /// Length in the scene of a step of length 1.
+    /// Length in the scene of a step of length 1 in the space of the torus.
     scale: L,
     tube: L,
-    /// Smallest position at which the line may be close to the torus.
+    /// Position before which the line is not close to the torus.
     low: L,
     high: L,
     /// Lanes whose line comes close to the torus.
     near: L::Mask,
 }
 
-/// Positions that separate the roots from each other, in ascending order, and the lanes in which
-/// each of them is inside of the torus.
+/// Positions on a line that separate its roots from each other, in ascending order, and the lanes
+/// in which each position is inside of the torus.
 struct Separators<L: SimdFloat> {
     places: [L; 5],
     inside: [L::Mask; 5],
 }
 
 impl<L: SimdFloat> UnitLine<L> {
-    /// Transforms the lines of rays; `None` if no line of the packet comes close to the torus.
+    /// Transforms the lines of rays to the space of the torus. Returns `None` if no line of the
+    /// packet comes close to the torus.
     #[inline(always)]
     fn new(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<Self> {
         let f = times(&torus.unit_from_scene, ray.origin - Vec3::splat(torus.center));
@@ -260,8 +263,8 @@ impl<L: SimdFloat> UnitLine<L> {
         })
     }
 
-    /// Returns four values at the position `s`: the distance from the axis minus 1, the height, the
-    /// derivative of the distance, and the reciprocal of the distance.
+    /// Returns four values at position `s` of the line: the distance from the axis minus 1, the
+    /// height, the derivative of the distance, and the reciprocal of the distance.
     #[inline(always)]
     fn place(&self, s: L) -> (L, L, L, L) {
         let p = self.direction.mul_add(s, self.point);
@@ -272,7 +275,9 @@ impl<L: SimdFloat> UnitLine<L> {
         (rho - L::one(), p.y, speed.max(-limit).min(limit), inward)
     }
 
-    /// Returns the squared distance from the ring minus that of the surface, and its derivative.
+    /// Returns the height at position `s` of the line, and its derivative. The height is the
+    /// squared distance from the ring minus the squared radius of the tube: negative inside of the
+    /// torus.
     #[inline(always)]
     fn height(&self, s: L) -> (L, L) {
         let (beyond, y, speed, _) = self.place(s);
@@ -340,7 +345,7 @@ impl<L: SimdFloat> UnitLine<L> {
     /// Returns the zero of `function` in the lanes of `open`. `sign` times the function is negative
     /// at `low` and positive at `high`.
     ///
-    /// Newton's method is used, and bisection where Newton's step leaves the bracket or is slow.
+    /// The search takes Newton steps. It bisects where Newton's step leaves the bracket or is slow.
     /// The steps of a lane do not depend on other lanes.
     #[inline(always)]
     fn root(
@@ -392,7 +397,7 @@ impl<L: SimdFloat> UnitLine<L> {
         Separators { places, inside }
     }
 
-    /// Returns the distance along the ray of the position `s` on the line.
+    /// Converts position `s` of the line to the distance along the ray.
     #[inline(always)]
     fn distance(&self, s: L) -> L {
         (s - self.origin) * self.scale
@@ -478,7 +483,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for Torus<L::Scalar> {
     }
 }
 
-/// Returns two spans of each line. The second one or both may be empty.
+/// Returns two spans of each line inside of the torus. The second one or both may be empty.
 #[inline(never)]
 fn spans<L: SimdFloat>(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<[Span<L>; 2]> {
     let line = UnitLine::new(torus, ray)?;

@@ -13,39 +13,41 @@ use crate::bvh::packet::{
 use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 
-/// Limit of the differences between rays up to which a packet traverses the BVH together.
+/// Limit of the differences between rays up to which a packet traverses the BVH as a whole.
 ///
-/// It applies to the length of the difference of unit directions, and to the difference of origins
-/// as a fraction of the mesh's size. Each may be up to this limit, times the number of lanes,
-/// divided by the square root of the number of triangles. Measured by `benches/mesh.rs`, lines
-/// `together or apart`: packets of eight are faster up to differences of 0.3 with 1,000 triangles,
-/// 0.1 with 70,000, 0.02 with a million; packets of four up to half of that.
+/// The differences are the length of the difference of unit directions, and the difference of
+/// origins as a fraction of the mesh's size. Each may be up to this limit, times the number of
+/// lanes, divided by the square root of the number of triangles.
+///
+/// Measured by `benches/mesh.rs` (lines `together or apart`): packets of eight are faster up to
+/// differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million; packets of four
+/// up to half of that.
 const TOGETHER: f64 = 2.5;
 
-/// Largest difference per lane between the rays of a packet that traverses together, for any number
-/// of triangles.
+/// Largest difference, per lane, between the rays of a packet that traverses the BVH as a whole,
+/// for any number of triangles.
 const TOGETHER_AT_MOST: f64 = 0.04;
 
 /// Closest triangle of each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleHit<L> {
-    /// Distance of the hit in lengths of the ray's direction, or the limit if there is no nearer
-    /// hit.
+    /// Distance of the hit in units of the ray direction's length, or the limit if there is no
+    /// nearer hit.
     pub t: L,
     /// Id of the triangle; undefined without a hit.
     pub triangle: L,
 }
 
-/// Rays, each with a frame for triangle tests: those of a packet, or one ray in every lane.
+/// Rays with frames for triangle tests: those of a packet, or one ray in every lane.
 #[derive(Clone, Copy)]
 struct ShearedRay<L> {
     origin: Vec3<L>,
     frame: Frame<L>,
 }
 
-/// Returns the packet for box tests. Boxes grow by the rounding errors of the frames and of the
-/// corners' distances, so that a ray that passes an edge within rounding still tests the triangles
-/// there.
+/// Returns the packet for box tests. The boxes are enlarged by the rounding errors of the frames
+/// and of the corners' distances. A ray that passes an edge within rounding errors therefore tests
+/// the triangles at the edge.
 #[inline(always)]
 fn slab_packet<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
     let [low, high] = mesh.mesh().bounds;
@@ -60,7 +62,7 @@ impl<L: SimdFloat> ShearedRay<L> {
         Self { origin: ray.origin, frame: Frame::around(ray.direction) }
     }
 
-    /// Returns origin and frame of the ray of each lane.
+    /// Returns origin and frame of each lane's ray.
     #[inline(always)]
     fn each(&self) -> [[[L::Scalar; 3]; 4]; MAX_WIDTH] {
         let Frame { t, b, n } = self.frame;
@@ -71,19 +73,19 @@ impl<L: SimdFloat> ShearedRay<L> {
         each
     }
 
-    /// Returns rays with the ray of one lane, given as origin and frame, in every lane.
+    /// Returns one ray, given by its origin and frame, in every lane.
     #[inline(always)]
     fn only(one: &[[L::Scalar; 3]; 4]) -> Self {
         let [origin, t, b, n] = one.map(Vec3::splat);
         Self { origin, frame: Frame { t, b, n } }
     }
 
-    /// Returns the distance of the hits with a triangle, and the lanes that hit it, at a positive
-    /// distance and on either side.
+    /// Returns the distance at which each ray hits a triangle, and the lanes that hit it. Hits have
+    /// a positive distance, and may be on either side.
     ///
-    /// The corners are projected along the ray onto the plane through its origin. A corner has one
-    /// projection in all triangles that share it, and the sign of each edge's area is that of the
-    /// exact value or zero: no ray passes between two triangles that share an edge or a corner
+    /// The corners are projected along the ray onto the plane through its origin. A corner has the
+    /// same projection in all triangles that share it, and the computed sign of each edge's area is
+    /// exact or zero. Hence no ray passes between two triangles that share an edge or a corner
     /// (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an
     /// orthonormal frame for the shear).
     #[inline(always)]
@@ -100,8 +102,8 @@ impl<L: SimdFloat> ShearedRay<L> {
         (t, (left | right) & t.gt(zero))
     }
 
-    /// Returns the corners of the triangles of a leaf: eight triangles, of which `part` selects as
-    /// many as there are lanes.
+    /// Returns the corners of the triangles in part `part` of a leaf. A leaf has eight triangles; a
+    /// part has as many as there are lanes.
     #[inline(always)]
     fn corners(leaf: &TriangleBlock, part: usize) -> [Vec3<L>; 3] {
         leaf.corners.each_ref().map(|c| {
@@ -118,7 +120,7 @@ struct MeshTraversal<'a, const ANY: bool> {
 }
 
 impl<const ANY: bool> MeshTraversal<'_, ANY> {
-    /// Traverses the BVH with all rays of the packet together.
+    /// Traverses the BVH with the packet as a whole.
     #[inline(always)]
     fn together<L: SimdFloat>(
         &self,
@@ -193,7 +195,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         self.apart((ray, &packet), limit)
     }
 
-    /// Traverses the BVH with each ray of the packet on its own.
+    /// Traverses the BVH with each ray of the packet separately.
     #[inline(always)]
     fn apart<L: SimdFloat>(
         &self,
@@ -245,8 +247,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     }
 }
 
-/// Returns `true` if the lanes `wanted` of a packet are coherent enough to traverse the BVH
-/// together.
+/// Returns `true` if the rays in the lanes `wanted` are coherent enough to traverse the BVH as a
+/// packet.
 #[inline(always)]
 fn is_together<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     if L::WIDTH == 1 || wanted.count_ones() < 2 {
@@ -259,7 +261,7 @@ fn is_together<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     ray.is_coherent(wanted, turn, turn * size)
 }
 
-/// Returns the closest triangle within `limit`. At equal distances it is the one with the lowest
+/// Returns the closest triangle within `limit`, and at equal distances the one with the lowest
 /// number. Directions must have unit length. Lanes with a limit of 0 or less are inactive.
 #[inline(never)]
 pub fn closest<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
@@ -272,8 +274,8 @@ pub fn occluded<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
     MeshTraversal::<true> { mesh }.run(ray, limit).t.lt(limit)
 }
 
-/// Returns the result of [`closest`], with all lanes together if `all` is `true`, otherwise each on
-/// its own. For tests and benches.
+/// Returns the result of [`closest`], for tests and benches. The rays traverse the BVH as a packet
+/// if `all` is `true`, otherwise separately.
 #[inline(never)]
 pub fn closest_with<L: SimdFloat>(
     mesh: &Mesh,

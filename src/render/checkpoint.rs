@@ -27,13 +27,13 @@ const SCHEDULE: Tag = *b"SCHD";
 /// Tag of the chunk with the seconds of rendering.
 pub(super) const CLOCK: Tag = *b"TIME";
 
-/// Version of this program. Other versions may trace different samples.
+/// Version of this program. Another version may trace different samples.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
-/// Inputs of a film's samples, apart from size, seed and precision, which the film's header has.
+/// Inputs of a film's samples that are not in the film's header (size, seed and precision).
 ///
 /// Encoding: hash of the contents of meshes and images (u64, 0 for none), then three texts, each
-/// after its length (u32): the program's version, the sampler's name, the scene.
+/// preceded by its length (u32): the program's version, the sampler's name, the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampleInputs {
     /// Hash of the contents of meshes and images, see [`Scene::contents_hash`].
@@ -42,12 +42,12 @@ pub struct SampleInputs {
     pub program: String,
     /// Name of the sampler.
     pub sampler: String,
-    /// Text of a scene file with the scene that was compiled.
+    /// The compiled scene, as text of a scene file.
     pub scene: String,
 }
 
 impl SampleInputs {
-    /// Creates the inputs of samples of `scene` that this version of the program traces.
+    /// Creates the inputs of the samples that this version of the program traces for `scene`.
     pub fn new(scene: &Scene, sampler: SamplerKind) -> Self {
         Self {
             contents_hash: scene.contents_hash(),
@@ -200,7 +200,7 @@ impl Checkpoint {
         Ok(Self { path: path.to_path_buf(), header, inputs, film })
     }
 
-    /// Header of the checkpoint's film file: everything in the file except for the film.
+    /// Header of the checkpoint's film file: all contents except for the film.
     pub fn header(&self) -> &FilmFileHeader {
         &self.header
     }
@@ -280,7 +280,8 @@ impl Checkpoint {
         })
     }
 
-    /// Compares size, seed, sampler and program version with those of a render of `scene`.
+    /// Checks that size, seed, sampler and program version are those of a render of `scene` with
+    /// `options`.
     fn check_options(&self, scene: &Scene, options: &Options) -> Result<(), ReadError> {
         let film = &self.header.film;
         let [width, height] = scene.film.size.map(|n| n as usize);

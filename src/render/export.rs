@@ -9,12 +9,13 @@ use crate::sampling::SamplerKind;
 use crate::scene::Scene;
 use crate::value::Fnv1a64;
 
-/// Origin of a picture: the metadata that cannot be taken from its [`RenderState`].
+/// Origin of a picture: the metadata that its [`RenderState`] does not have.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Provenance {
-    /// Path of the scene file, as the user has given it.
+    /// Path of the scene file as the user gave it.
     pub source: String,
-    /// Hash of the scene file's text, see [`scene_hash`].
+    /// Hash of the scene file's text, followed by that of the contents of meshes and images; see
+    /// [`scene_hash`].
     pub scene_hash: String,
     /// Kind of the sample sequence.
     pub sampler: SamplerKind,
@@ -108,7 +109,7 @@ const SETTINGS: &str = "Settings";
 /// Text before the display transform in the entry [`SETTINGS`].
 const DISPLAY: &str = ", exposure ";
 
-/// Returns the metadata that depend on the film alone.
+/// Returns the metadata entries that depend on the film alone.
 fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     let spp = &report.spp;
     let noise = match report.noise {

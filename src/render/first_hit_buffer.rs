@@ -7,7 +7,7 @@ use rayon::prelude::*;
 const CHUNK: usize = 512;
 
 /// First hits of the camera rays through the centres of a raster's cells. The raster covers the
-/// whole picture.
+/// whole picture. The dashboard shows objects, normals and distances from this buffer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstHitBuffer {
     /// Number of cells in a row.
@@ -20,7 +20,7 @@ pub struct FirstHitBuffer {
 
 impl FirstHitBuffer {
     /// Traces one ray through the centre of each cell of a raster of `columns` x `rows` cells over
-    /// a film of `width` x `height` pixels. `first_hits` gets points of the film in pixels, and
+    /// a film of `width` x `height` pixels. `first_hits` receives points of the film in pixels, and
     /// writes the first hits of their camera rays (see
     /// [`AnyWorld::first_hit`](crate::world::AnyWorld::first_hit)).
     pub fn new(

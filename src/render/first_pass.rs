@@ -9,10 +9,10 @@ use crate::world::{AnyWorld, Counts, TileTracer, World, dispatch};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
-/// Traces the first sample of replicate A. The first stage traces every 8th pixel in x and y; three
+/// Traces the first sample of replicate A. The first stage traces every 8th pixel in x and y. Three
 /// further stages trace the pixels between, with steps of 4, 2 and 1. Each stage covers the whole
 /// picture. Calls `on_stage` with the film after every stage except the last. A cancelled pass
-/// completes its first stage, starts no jobs of the later ones, and returns `None`.
+/// completes its first stage, starts no jobs of later stages, and returns `None`.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
@@ -23,8 +23,8 @@ pub fn run(
     dispatch!(world, world => trace_first_pass(world, film, wave, context, on_stage))
 }
 
-/// Number of adjacent tiles that share packets as long as a stage adds only few pixels to each
-/// tile.
+/// Number of adjacent tiles in a strip. The tiles of a strip share packets in stages that add only
+/// few pixels to each tile.
 const STRIP_TILES: usize = 8;
 
 /// Lattice step \[pixels\] above which adjacent tiles share packets. At smaller steps the pixels of

@@ -6,9 +6,9 @@
 use crate::film::{Film, TILE, TileNoise};
 use crate::value::{Available, ResidentMemory, available_memory, megabytes, resident_memory};
 
-/// Memory for each pixel beside the film: a linear copy of the picture \[bytes\].
+/// Memory for each pixel in addition to the film, for a linear copy of the picture \[bytes\].
 const COPY_BYTES: u64 = 16;
-/// Memory for each tile beside its sums: tile, schedule, noise estimate \[bytes\].
+/// Memory for each tile in addition to its sums, for tile, schedule and noise estimate \[bytes\].
 const TILE_BYTES: u64 = 512;
 
 /// Returns the memory that a render of `size` pixels with `groups` light groups needs \[bytes\].
@@ -19,10 +19,10 @@ pub fn needed(size: [u32; 2], groups: usize) -> u64 {
 }
 
 /// Checks that a render of `size` pixels with `groups` light groups fits into the available memory.
-/// `reusable` is the memory of the film that it replaces \[bytes\].
+/// `reusable` is the memory \[bytes\] of the film that it replaces.
 ///
 /// # Errors
-/// Returns a message with both sums and the remedy.
+/// Returns a message with the needed and the available memory and a remedy.
 pub fn check(size: [u32; 2], groups: usize, reusable: u64) -> Result<(), String> {
     match available_memory() {
         Some(available) => {
@@ -55,7 +55,8 @@ fn compare(size: [u32; 2], groups: usize, available: Available) -> Result<(), St
     ))
 }
 
-/// Returns the message for a film whose memory cannot be allocated, although the sum fits.
+/// Returns the message for a film whose allocation fails, although enough memory is available in
+/// total.
 pub fn refused(size: [u32; 2], groups: usize) -> String {
     let [width, height] = size;
     format!(
@@ -65,25 +66,25 @@ pub fn refused(size: [u32; 2], groups: usize) -> String {
     )
 }
 
-/// Memory for each tile of a region beside its sums: tile, schedule with the latest estimates, jobs
-/// and their reports \[bytes\].
+/// Memory for each tile of a region in addition to its sums, for tile, schedule with the latest
+/// estimates, jobs and their reports \[bytes\].
 const REGION_TILE_BYTES: u64 = 1024;
-/// Memory for each tile of a picture in regions: its error, and a number for the percentiles
+/// Memory for each tile of a picture in regions: its error, and a number to compute percentiles
 /// \[bytes\].
 const PICTURE_TILE_BYTES: u64 = (size_of::<Option<TileNoise>>() + size_of::<f64>()) as u64;
 /// Memory for each column and light group while a row of OpenEXR tiles is encoded \[bytes\].
 const ROW_BYTES: u64 = 256;
-/// Memory of the program beside scene and film: buffers, allocator \[bytes\].
+/// Memory of the program in addition to scene and film, for buffers and the allocator \[bytes\].
 const PROGRAM_BYTES: u64 = 3 << 20;
-/// Memory of a tracing thread: stack and paths \[bytes\].
+/// Memory of a tracing thread for its stack and its paths \[bytes\].
 const THREAD_BYTES: u64 = 1 << 20;
-/// Assumed memory of program and scene on systems that do not report it \[bytes\].
+/// Assumed memory of program and scene on systems that do not report their memory \[bytes\].
 const UNKNOWN_RESIDENT: ResidentMemory = ResidentMemory { now: 64 << 20, peak: 64 << 20 };
 
 /// Regions of a picture: bands of rows that are rendered one after another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Regions {
-    /// Number of rows of each region but the last; a multiple of [`TILE`].
+    /// Number of rows of each region except the last; a multiple of [`TILE`].
     pub rows: u32,
     /// Number of regions.
     pub count: u32,
@@ -91,12 +92,12 @@ pub struct Regions {
     pub bytes: u64,
 }
 
-/// Divides a picture of `size` pixels with `groups` light groups into the fewest regions whose
-/// memory, with that of the program and of the compiled scene, which exists now, is at most `cap`
-/// bytes.
+/// Divides a picture of `size` pixels with `groups` light groups into the fewest regions that fit
+/// into `cap` bytes. The limit includes the memory of the program and of the scene, which is
+/// compiled already.
 ///
 /// # Errors
-/// Returns the least memory in bytes if not even regions of one row of tiles fit.
+/// Returns the least memory in bytes if even regions of one row of tiles do not fit.
 pub fn divide(size: [u32; 2], groups: usize, threads: usize, cap: u64) -> Result<Regions, u64> {
     divide_from(resident_memory().unwrap_or(UNKNOWN_RESIDENT), size, groups, threads, cap)
 }
@@ -128,7 +129,7 @@ fn divide_from(
     })
 }
 
-/// Rounds down to a size that people would write.
+/// Rounds down to a round number for messages.
 fn round_down(side: u32) -> u32 {
     match side {
         0..16 => 1,

@@ -20,7 +20,7 @@ pub struct PassContext<'a> {
     pub sampling: &'a SampleSettings,
     /// Threads that trace the jobs.
     pub pool: &'a rayon::ThreadPool,
-    /// While it is `true`, no further job starts.
+    /// Cancels the pass if `true`: no further job starts.
     pub cancel: &'a AtomicBool,
 }
 
@@ -35,7 +35,7 @@ pub fn run(
     dispatch!(world, world => run_typed(world, film, wave, estimator, context))
 }
 
-/// [`run`] for one lane type.
+/// Traces the jobs as [`run`] does, for one lane type.
 pub fn run_typed<L: SimdFloat>(
     world: &World<L>,
     film: &mut Film,
@@ -92,8 +92,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Traces the samples of a job into its tile. A packet holds `WIDTH` samples of one pixel where
-    /// that many aligned indices remain, and samples of several pixels elsewhere.
+    /// Traces the samples of a job into its tile. Packets hold `WIDTH` samples of one pixel if
+    /// enough aligned indices remain, otherwise samples of several pixels.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
@@ -214,8 +214,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     }
 
     /// Makes samples valid. A sample that is NaN or negative in a channel of a light group becomes
-    /// black in that group. A sample above the film's limit, also an infinite one, is reduced to
-    /// the limit.
+    /// black in that group. A sample above the film's limit, or infinite, is reduced to the limit.
     #[cold]
     fn replace_invalid(
         &self,
@@ -255,8 +254,8 @@ impl RejectedSamples {
     }
 }
 
-/// Returns the number of samples of a pixel that the next packet holds, out of the sample indices
-/// `first..end`: a power of two that divides `first`, at most `width`.
+/// Returns the number of samples of a pixel in the next packet, if the indices `first..end` are to
+/// be traced: a power of two that divides `first`, at most `width`.
 fn samples_per_packet(first: u32, end: u32, width: usize) -> usize {
     let aligned = first | width as u32;
     1 << aligned.trailing_zeros().min((end - first).ilog2())

@@ -23,12 +23,12 @@ use std::time::Instant;
 const PIECE_SECONDS: f64 = 0.25;
 /// Number of samples, over all pixels, of the first piece. It measures the speed of tracing.
 const FIRST_PIECE_SAMPLES: u64 = 1 << 18;
-/// Largest number of samples per pixel of a job. Jobs are short so that all threads have work until
-/// the end of a piece.
+/// Largest number of samples per pixel of a job. Jobs are short, so that all threads have work
+/// until the end of a piece.
 const LONGEST_JOB: u32 = 16 * SAMPLE_ALIGNMENT;
 
-/// Callback that gets a report between two pieces of work and before each row is written. An error
-/// that it returns ends the render.
+/// Callback that receives a report between two pieces of work and before each row is written. If it
+/// returns an error, the render ends with this error.
 pub type Observer<'a> = &'a mut dyn FnMut(&Report) -> io::Result<()>;
 
 /// Render of a picture in regions.
@@ -55,11 +55,11 @@ pub struct RegionRender<'a> {
 impl<'a> RegionRender<'a> {
     /// Compiles `scene`, which has no validation errors, for regions of `rows` rows and for
     /// `threads` threads. `rows` is a multiple of [`TILE`](crate::film::TILE). Each region is
-    /// rendered until the stop criteria of `settings` are reached; a time limit is divided among
+    /// rendered until the stop criteria of `settings` are reached. A time limit is divided among
     /// the regions.
     ///
     /// # Errors
-    /// Returns that a thread cannot be started, or that there is not enough memory for a region.
+    /// Fails if a thread cannot be started, or if there is not enough memory for a region.
     pub fn new(
         scene: &Arc<Scene>,
         options: &Options,
@@ -119,7 +119,7 @@ impl<'a> RegionRender<'a> {
         self.state.as_ref().expect("a region after a failed one is not rendered")
     }
 
-    /// Renders the region that begins with the row `self.finished_rows`.
+    /// Renders the region whose first row is `self.finished_rows`.
     fn render_region(&mut self) -> io::Result<()> {
         let height = self.state().scene().film.size[1];
         let rows = self.finished_rows..height.min(self.finished_rows + self.rows);
@@ -181,7 +181,7 @@ impl<'a> RegionRender<'a> {
 }
 
 /// Returns the report on a picture of `height` rows. `finished` is the report on the rows before
-/// `rows`. `schedule` has rendered the rows `rows` for `seconds` seconds.
+/// `rows`. `schedule` belongs to the rows `rows`, which have been rendered for `seconds` seconds.
 fn progress(
     finished: &Report,
     schedule: &Schedule,

@@ -26,8 +26,8 @@ impl Relighting {
     }
 
     /// Returns the light weights with which the film shows `scene`. Returns `None` if `scene` needs
-    /// samples of its own: it differs from the compiled scene in more than the colours, intensities
-    /// and on/off switches of sources that have light groups of their own.
+    /// new samples, because it differs from the compiled scene in more than the colours,
+    /// intensities and on/off switches of sources that have light groups of their own.
     pub fn mix(&self, scene: &Scene) -> Option<LightWeights> {
         let can_reuse =
             std::ptr::eq(scene, &*self.compiled) || self.groups.can_reuse(&self.compiled, scene);

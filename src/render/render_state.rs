@@ -40,8 +40,8 @@ pub struct RenderState {
 }
 
 impl RenderState {
-    /// Compiles `scene`, which has no validation errors, and creates an empty film. The new film
-    /// uses the memory of the film of `previous`.
+    /// Compiles `scene`, which has no validation errors, and creates an empty film, in the memory
+    /// of the film of `previous`.
     ///
     /// # Panics
     /// Panics if there is not enough memory for the film.
@@ -49,11 +49,11 @@ impl RenderState {
         Self::compile(Arc::new(scene.clone()), options, previous).expect("memory for the film")
     }
 
-    /// Compiles `scene` as [`RenderState::new`] does, if it is valid.
+    /// Compiles `scene` as [`RenderState::new`] does, after validation.
     ///
     /// # Errors
-    /// Returns the first validation error of the scene, or that there is not enough memory for the
-    /// film.
+    /// Returns the first validation error of the scene, or an error if there is not enough memory
+    /// for the film.
     pub fn checked(
         scene: &Arc<Scene>,
         options: &Options,
@@ -69,7 +69,7 @@ impl RenderState {
     /// the picture. The first row is a multiple of [`TILE`].
     ///
     /// # Errors
-    /// Returns that there is not enough memory for the film.
+    /// Fails if there is not enough memory for the film.
     pub(super) fn of_band(
         scene: &Arc<Scene>,
         options: &Options,
@@ -78,11 +78,10 @@ impl RenderState {
         Self::compile_rows(Arc::clone(scene), options, None, rows)
     }
 
-    /// Replaces the film by an empty film for the rows `rows`, which uses the memory of the old
-    /// one.
+    /// Replaces the film by an empty film for the rows `rows`, in the memory of the old one.
     ///
     /// # Errors
-    /// Returns that there is not enough memory for the film. The state has no film then.
+    /// Fails if there is not enough memory for the film. The state then has no film.
     pub(super) fn into_band(self, rows: Range<u32>) -> Result<Self, String> {
         let size = [self.film.width() as u32, rows.len() as u32];
         let header = Header { height: rows.len(), ..self.film.header().clone() };
@@ -146,8 +145,8 @@ impl RenderState {
         })
     }
 
-    /// Makes `scene` the scene that the picture shows, if the samples of the film are valid for it,
-    /// and returns `true`. Otherwise changes nothing and returns `false`.
+    /// Shows `scene` from now on and returns `true`, if the samples of the film are valid for it.
+    /// Otherwise changes nothing and returns `false`.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let Some(mix) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
             return false;
@@ -158,8 +157,8 @@ impl RenderState {
         true
     }
 
-    /// Scene that the picture shows. It may differ from the compiled scene in the colours and
-    /// intensities of its lights.
+    /// Scene that the picture shows. The colours and intensities of its lights may differ from
+    /// those of the compiled scene.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
@@ -205,8 +204,8 @@ impl RenderState {
         Schedule::new(&pixels, settings)
     }
 
-    /// Traces the wave that holds the first sample of every pixel, from coarse to fine. Calls
-    /// `on_refined` with the film after each stage except the last.
+    /// Traces the first sample of every pixel, from coarse to fine. Calls `on_refined` with the
+    /// film after each stage except the last.
     ///
     /// If `cancel_first_pass` becomes `true`, the pass ends after the first call of `on_refined`
     /// and returns `None`. The film may then only be displayed; no further samples may be added to
@@ -222,7 +221,7 @@ impl RenderState {
         first_pass::run(&self.world, &mut self.film, wave, context, on_refined)
     }
 
-    /// Traces a wave. No further job starts after `cancel_wave` has become `true`.
+    /// Traces a wave. If `cancel_wave` becomes `true`, no further job starts.
     pub fn trace_wave(
         &mut self,
         wave: &Wave,

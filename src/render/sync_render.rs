@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// Synchronous progressive render.
+/// Progressive render on the calling thread, without a session.
 pub struct SyncRender {
     rendering: RenderState,
     schedule: Schedule,
@@ -22,8 +22,8 @@ impl SyncRender {
     /// Compiles `scene`, which has no validation errors, for `threads` threads.
     ///
     /// # Errors
-    /// Returns the operating system's error if a thread cannot be started, or that there is not
-    /// enough memory for the film.
+    /// Returns the operating system's error if a thread cannot be started, or an error if there is
+    /// not enough memory for the film.
     pub fn new(
         scene: &Scene,
         options: &Options,
@@ -41,9 +41,8 @@ impl SyncRender {
         Ok(Self { rendering, schedule, pool, seconds: 0.0 })
     }
 
-    /// Traces the next decision of the schedule in both replicates, after which the error of the
-    /// picture is known. Returns the stop criterion that ended the render, or `None` if there is
-    /// more to trace.
+    /// Traces the next decision of the schedule in both replicates and estimates the error of the
+    /// picture. Returns the stop criterion that ended the render, or `None` if it continues.
     pub fn step(&mut self) -> Option<StoppedBy> {
         loop {
             let wave = match self.schedule.next(self.seconds) {
@@ -80,8 +79,8 @@ impl SyncRender {
         self.schedule.noise().map(|noise| noise.rmse_codes)
     }
 
-    /// Lower and upper estimate of the total seconds of tracing at which the displayed RMSE falls
-    /// to `codes` 8-bit levels. `None` before the first estimate.
+    /// Lower and upper estimate of the total seconds of tracing until the displayed RMSE is `codes`
+    /// 8-bit levels. `None` before the first estimate.
     pub fn seconds_to_noise(&self, codes: f64) -> Option<(f64, f64)> {
         let (low, high) = self.schedule.seconds_to_noise(codes, self.seconds)?;
         Some((self.seconds + low, self.seconds + high))

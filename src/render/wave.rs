@@ -21,14 +21,14 @@ pub struct Wave {
     pub replicate: usize,
     /// The jobs, in any order.
     pub jobs: Vec<Job>,
-    /// `true` if each job ends with an estimate of its tile's error. Only waves of replicate B
-    /// estimate: after them both replicates of the tile hold equally many samples.
+    /// `true` if each job ends with an estimate of its tile's error. Only waves of replicate B have
+    /// it: after them both replicates of the tile hold equally many samples.
     pub estimate: bool,
 }
 
 impl Wave {
-    /// Shortens the wave to its first jobs, at least one, of about `pixel_samples` samples over all
-    /// pixels. Shortens each job to at most `longest` samples per pixel.
+    /// Shortens the wave to its first jobs, at least one, with about `pixel_samples` samples over
+    /// all pixels. Shortens each job to at most `longest` samples per pixel.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;
@@ -46,7 +46,7 @@ impl Wave {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JobReport {
     /// Number of rays of every kind (camera, shadow, reflected, transmitted). It is the cost of the
-    /// job, and is equal on every machine.
+    /// job, independent of the machine.
     pub rays: u64,
     /// `true` if a path has sampled a glossy lobe.
     pub glossy: bool,

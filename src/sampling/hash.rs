@@ -11,7 +11,7 @@ pub fn hash<B: SimdU32>(x: B) -> B {
     x ^ (x >> 16)
 }
 
-/// Hash of a single word, equal to [`hash`].
+/// Hash of a single word: [`hash`] for one number.
 pub const fn hash_scalar(mut x: u32) -> u32 {
     x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
     x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
@@ -34,19 +34,21 @@ pub fn owen<B: SimdU32>(x: B, seed: B) -> B {
     owen_scramble_suffix(owen_scramble_prefix(x), seed, owen_factor(seed))
 }
 
-/// First part of [`owen`]. It does not depend on the seed.
+/// First part of [`owen`], which does not depend on the seed. Samples with equal points and
+/// different seeds share its result.
 #[inline(always)]
 pub fn owen_scramble_prefix<B: SimdU32>(x: B) -> B {
     x ^ (x * B::splat(0x3d20_adea))
 }
 
-/// Factor by which [`owen`] multiplies, computed from its seed.
+/// Multiplier of [`owen`], which depends only on the seed.
 #[inline(always)]
 pub fn owen_factor<B: SimdU32>(seed: B) -> B {
     (seed >> 16) | B::splat(1)
 }
 
-/// Second part of [`owen`], after [`owen_scramble_prefix`].
+/// Second part of [`owen`]. `prefix` is the result of [`owen_scramble_prefix`], and `factor` that
+/// of [`owen_factor`].
 #[inline(always)]
 pub fn owen_scramble_suffix<B: SimdU32>(prefix: B, seed: B, factor: B) -> B {
     let x = (prefix + seed) * factor;

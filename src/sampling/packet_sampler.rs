@@ -10,8 +10,8 @@ use crate::sampling::sobol::DIMENSIONS;
 /// Sample sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SamplerKind {
-    /// Owen-scrambled Sobol points in eight dimensions (the joint set). Further dimensions come
-    /// from further such sets with shuffled indices (the padded sets).
+    /// Owen-scrambled Sobol points in eight dimensions (the joint set). Further dimensions are
+    /// taken from further sets of the same points with shuffled indices (the padded sets).
     Sobol,
     /// Independent random numbers.
     Random,
@@ -37,8 +37,8 @@ pub struct SampleSettings {
     pub kind: SamplerKind,
 }
 
-/// Number of dimensions at the end of the joint set that are reserved for the first branch choices
-/// of a path (reflection or transmission).
+/// Number of dimensions of the joint set that are reserved for the first branch choices of a path
+/// (reflection or transmission). They are its last dimensions.
 const CHOICES: u32 = 2;
 
 /// Largest number of lobes in the joint set.
@@ -48,7 +48,7 @@ const MAX_JOINT_LOBES: u32 = 2;
 /// a packet.
 const PACKET_SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
 
-/// Dimensions of the joint set that camera rays use, two each. Lobes use the following ones.
+/// Choice of the camera's random numbers: each takes two dimensions at the start of the joint set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraDimensions {
     /// `true` if samples are distributed over the area of their pixel.
@@ -62,8 +62,8 @@ pub struct Sampler<L: SimdFloat> {
     settings: SampleSettings,
     /// Two words per replicate, hashed from the seed.
     seeds: [[u32; 2]; 2],
-    /// First dimension of the position on the lens. If samples are jittered, the first two
-    /// dimensions are the position in the pixel.
+    /// First dimension of the position on the lens. If samples are distributed over the pixel, the
+    /// two dimensions before it are the position in the pixel.
     lens: usize,
     /// First dimension of the first lobe.
     first_lobe: usize,
@@ -73,11 +73,11 @@ pub struct Sampler<L: SimdFloat> {
     low_bits: [[L::SimdU32; DIMENSIONS]; PACKET_SHAPES],
     /// Lane indices 0, 1, 2 and so on.
     ramp: L::SimdU32,
-    /// Constant for each dimension, which makes its scrambling independent of the other dimensions.
+    /// Constant for each dimension, so that dimensions are scrambled independently.
     dimension_salt: [u32; DIMENSIONS],
 }
 
-/// Part of a packet's random numbers that depends only on the sample indices, not on the pixels.
+/// Part of a packet's random numbers that depends on the sample indices and not on the pixels.
 pub struct SampleBlock<'a, L: SimdFloat> {
     sampler: &'a Sampler<L>,
     /// Sample index in each lane.
@@ -155,11 +155,12 @@ impl<L: SimdFloat> SampleBlock<'_, L> {
     }
 }
 
-/// Number of lobes and of branch choices that each generation of a path with diffuse bounces has for
-/// itself.
+/// Number of lobes, and of branch choices, that are reserved for each generation of a path with
+/// diffuse bounces.
 const PER_GENERATION: u32 = 1 << 16;
 
-/// Number of the first branch choice that chooses the hit of a diffuse bounce.
+/// Number of the first of the branch choices that select the hit of a diffuse bounce (reservoir
+/// sampling).
 const RESERVOIR: u32 = 1 << 31;
 
 /// Random numbers of one packet.
@@ -170,22 +171,23 @@ pub struct PacketSampler<'a, L: SimdFloat> {
     key: L::SimdU32,
     /// Key of the pixel, if all lanes have the same one.
     single_key: Option<u32>,
-    /// Number of the first lobe.
+    /// Number that is added to the numbers of lobes.
     first_lobe: u32,
-    /// Number of the first branch choice.
+    /// Number that is added to the numbers of branch choices.
     first_choice: u32,
 }
 
 impl<L: SimdFloat> PacketSampler<'_, L> {
-    /// Returns the numbers of a generation of paths with diffuse bounces: those after `generation`
-    /// bounces. The direction of the first bounce has the dimensions of the first branch choices.
+    /// Returns the random numbers of one generation of a path with diffuse bounces: the part after
+    /// `generation` diffuse bounces. The direction of the first diffuse bounce uses the dimensions
+    /// of the first branch choices.
     #[inline(always)]
     pub fn generation(&self, generation: u32) -> Self {
         let first_lobe = generation * PER_GENERATION;
         Self { first_lobe, first_choice: first_lobe + CHOICES, ..*self }
     }
 
-    /// Returns two numbers in [0, 1) for the direction of diffuse bounce `number` of a path, counted
+    /// Returns two numbers in [0, 1) for the direction of a path's diffuse bounce `number`, counted
     /// from 0.
     #[inline(always)]
     pub fn diffuse_2d(&self, number: u32) -> (L, L) {
@@ -197,8 +199,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns a number in [0, 1) for offer `number` of a hit for the diffuse bounce of the
-    /// generation.
+    /// Returns a number in [0, 1) for candidate `number` of the reservoir that selects the hit of
+    /// this generation's diffuse bounce.
     #[inline(always)]
     pub fn reservoir_1d(&self, number: u32) -> L {
         self.padded_choice(RESERVOIR + self.first_choice + number)
@@ -225,16 +227,19 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     }
 
     /// Returns two numbers in [0, 1) for emitter `light` at the surface that a path hits after
-    /// `bounce` reflections. They are those of the lobe at this surface under another scrambling:
-    /// the light of an emitter and the light of the lobe are summands of the radiance, never
-    /// factors of one product, so that they may share dimensions. Both are stratified together with
-    /// the position in the pixel and the lobes of earlier surfaces.
+    /// `bounce` reflections.
+    ///
+    /// They are the numbers of the lobe at this surface with another scrambling, so that both are
+    /// stratified together with the position in the pixel and with the lobes of earlier surfaces.
+    /// Light from an emitter and light along the lobe are added, never multiplied, so that they may
+    /// share dimensions.
     #[inline(always)]
     pub fn light_2d(&self, bounce: u32, light: u32) -> (L, L) {
         self.pair_2d(bounce, hash_scalar(light + 1))
     }
 
-    /// Returns the two dimensions of the surface after `bounce` reflections, scrambled with `salt`.
+    /// Returns the lobe's two dimensions at the surface after `bounce` reflections, scrambled with
+    /// `salt`.
     #[inline(always)]
     fn pair_2d(&self, bounce: u32, salt: u32) -> (L, L) {
         let Sampler { first_lobe, joint_lobes, .. } = self.points.sampler;
@@ -258,7 +263,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns dimension `d` of the joint set. Each `salt` is a scrambling of its own.
+    /// Returns dimension `d` of the joint set. Different values of `salt` give independent
+    /// scramblings.
     #[inline(always)]
     fn joint(&self, d: usize, salt: u32) -> L {
         let points = self.points;
@@ -275,8 +281,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns two numbers for lobe `pair` of the padded sets, scrambled with `salt`. Four lobes
-    /// share a set.
+    /// Returns two numbers for lobe number `pair` of the padded sets, scrambled with `salt`. Four
+    /// lobes share a set.
     #[cold]
     fn padded(&self, pair: u32, salt: u32) -> (L, L) {
         let d = 2 * (pair % 4) as usize;

@@ -21,7 +21,7 @@ use crate::sampling::hash::hash_scalar;
 /// Number of dimensions of one set of points.
 pub const DIMENSIONS: usize = 8;
 
-/// First columns of `M_1`, `M_2` and `M_3`, found by search; bit r is row r.
+/// First columns of `M_1`, `M_2` and `M_3`, found by a search. Bit r of a column is its row r.
 const COLUMNS: [&[u32]; 3] = [
     &[1, 3, 4, 13, 22, 46, 65, 179, 390, 573, 1694, 2956, 5907],
     &[1, 2, 6, 15, 22, 33, 100, 158, 457, 810],
@@ -150,9 +150,9 @@ mod tests {
         (0..).zip(rows).for_each(|(i, published)| assert_eq!(row(i), published));
     }
 
-    /// Error of the estimated volume of random half-spaces, relative to independent points. It is
-    /// measured in the plane of one pair (where the usual second pair has 0.30 and 0.23), and over
-    /// the first four dimensions.
+    /// Compares the error of estimated volumes of random half-spaces with that of independent
+    /// points. The error is measured in the plane of one pair (where the usual second pair of Sobol
+    /// dimensions has 0.30 and 0.23), and over the first four dimensions.
     #[test]
     fn scrambled_points_estimate_half_spaces_better_than_random_points() {
         use crate::lanes::{SimdFloat, SimdU32};
@@ -208,9 +208,11 @@ mod tests {
 
     /// Largest gain coefficient of two dimensions: the ratio of the variance of the first 2^m
     /// scrambled points to that of independent points, for the worst integrand of both dimensions
-    /// (Owen 1997, *Monte Carlo Variance of Scrambled Net Quadrature*). It is the maximum over the
-    /// Haar components (j, k) of a mean over the pairs of points p, q. The averaged value is the
-    /// product over both dimensions of 2 [same cell of 2^-(j+1)] - [same cell of 2^-j].
+    /// (Owen 1997, *Monte Carlo Variance of Scrambled Net Quadrature*).
+    ///
+    /// It is the maximum over the Haar components (j, k) of a mean over the pairs of points p, q.
+    /// Each term of the mean is a product over both dimensions of 2 [p and q are in the same cell
+    /// of 2^-(j+1)] - [in the same cell of 2^-j].
     fn gain(a: usize, b: usize, m: u32) -> f64 {
         let count = 1u32 << m;
         let alike = |d: usize| {
@@ -229,8 +231,8 @@ mod tests {
         levels.map(|(j, k)| component(j, k)).fold(0.0, f64::max)
     }
 
-    /// Checks the table in docs/accuracy.md. The worst pairs of dimensions join the second lobe and
-    /// the branch choices: dimensions 4 to 7.
+    /// Checks the table in docs/accuracy.md. The worst pairs are among dimensions 4 to 7, which the
+    /// second lobe and the branch choices use.
     #[test]
     fn worst_pairs_of_dimensions_are_the_documented_ones() {
         for (m, worst, first_lobes) in [
@@ -251,8 +253,8 @@ mod tests {
         assert!((0..4).all(|pair| gain(2 * pair, 2 * pair + 1, 6) <= 2.0));
     }
 
-    /// Sixteen points at aligned indices are one point XOR sixteen constants. [`Sampler::block`]
-    /// relies on this.
+    /// Checks that sixteen points at aligned indices are one point XOR sixteen constants.
+    /// [`Sampler::block`] relies on this.
     #[test]
     fn aligned_points_are_one_point_and_constants() {
         for d in 0..DIMENSIONS {

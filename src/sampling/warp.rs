@@ -8,9 +8,11 @@ use crate::lanes::{Mask, SimdFloat, Vec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI, TAU};
 
 /// Maps the unit square to the unit disk with uniform density. Returns the point and its squared
-/// distance from the centre. Concentric squares become circles, so that neighbouring points stay
-/// neighbours. An integrand with an edge across the disk needs as many samples as one with an edge
-/// across the square, and fewer if the edge is parallel to an axis.
+/// distance from the centre.
+///
+/// Concentric squares become concentric circles, so that neighbouring points stay neighbours. An
+/// integrand with an edge across the disk needs as many samples as one with an edge across the
+/// square, and fewer if the edge is parallel to an axis.
 ///
 /// Shirley and Chiu 1997, *A Low Distortion Map Between Disk and Square*.
 #[inline(always)]
@@ -25,7 +27,7 @@ pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
 }
 
 /// Returns the coefficients of the power series in x^2 of the sine (`first` is 1) or cosine
-/// (`first` is 0) of x eighths of a turn.
+/// (`first` is 0) of x eighths of a full turn.
 const fn series(first: u32) -> [f64; 8] {
     let mut terms = [0.0; 8];
     let (mut k, mut n, mut term) = (0, 0, 1.0);
@@ -40,8 +42,8 @@ const fn series(first: u32) -> [f64; 8] {
     terms
 }
 
-/// Sine and cosine of `x` eighths of a turn, for x in [-1, 1]. The error of the eight terms of the
-/// series is 1e-15.
+/// Sine and cosine of `x` eighths of a full turn, for x in [-1, 1]. The error of the eight terms of
+/// the series is 1e-15.
 #[inline(always)]
 fn sin_cos_eighth<L: SimdFloat>(x: L) -> (L, L) {
     const SINE: [f64; 8] = series(1);
@@ -77,9 +79,9 @@ pub fn cosine_hemisphere<L: SimdFloat>(u: L, v: L) -> Vec3<L> {
     Vec3::new(x, y, (L::one() - r2).max(L::zero()).sqrt())
 }
 
-/// Density of [`cone`] [1/sr] around the unit vector `axis`: constant inside of the cone, 0 outside.
-/// The cosine is compared by the distance between the ends of both unit vectors, which narrow cones
-/// leave more digits.
+/// Density of [`cone`] [1/sr] around the unit vector `axis`: constant inside of the cone, 0
+/// outside. The test compares the squared distance between the ends of both unit vectors with the
+/// limit: in narrow cones it has more digits than the cosine.
 #[inline(always)]
 pub fn cone_pdf<L: SimdFloat>(axis: Vec3<L>, direction: Vec3<L>, one_minus_cos: L) -> L {
     let drop = (direction - axis).length_squared() * L::from_f64(0.5);
@@ -113,14 +115,14 @@ fn azimuth<L: SimdFloat>(view: Vec3<L>) -> (L, L, L) {
 }
 
 /// Samples a microfacet normal h of the Beckmann distribution that is visible from `view` (unit
-/// vector with a positive z), with the density D_v(h) = G_1(view, h) D(h) view.h / view.z. G_1 is that
-/// of V-cavities if `v_cavity` is `true`, otherwise Smith's.
+/// vector with a positive z), with the density D_v(h) = G_1(view, h) D(h) view.h / view.z. G_1 is
+/// that of V-cavities if `v_cavity` is `true`, otherwise Smith's.
 ///
-/// The slopes along x and y, in units of `alpha`, are first independent normal deviates with the
-/// variance 1/2, each computed from one of the two numbers: the slopes of all microfacets. Their component
-/// along the azimuth of the view is then replaced by the slope at the same quantile of the visible
-/// microfacets. At steep views the difference is small, so that reflections of edges along the mirror's
-/// axes depend almost entirely on one number.
+/// First, the slopes of any microfacet along x and y, in units of `alpha`, are sampled: independent
+/// normal deviates with the variance 1/2, one from each random number. Their component along the
+/// azimuth of the view is then replaced by the slope at the same quantile of the visible
+/// microfacets. At views near the normal the difference is small, so that reflections of edges
+/// along the mirror's axes depend almost entirely on one number.
 #[inline(always)]
 pub fn beckmann_visible<L: SimdFloat>(
     u: L,

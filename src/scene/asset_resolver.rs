@@ -5,17 +5,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
 
-/// Resolver of the file names in a scene. It holds the folder to which the names are relative, and
-/// a cache of the files read so far. Scenes derived from one another by edits share the folder and
-/// the cache, so that each file is read once.
+/// Resolver of the file names in a scene: it has the folder to which the names are relative, and a
+/// cache of the files read so far. Scenes that are derived from one another by edits share both, so
+/// that each file is read once.
 #[derive(Clone, Debug, Default)]
 pub struct AssetResolver {
     folder: Arc<RwLock<PathBuf>>,
     assets: Arc<Assets>,
 }
 
-/// Compares all resolvers as equal: two scenes with the same description are equal even if their
-/// files are in different folders.
+/// All resolvers are equal: scenes with the same description are equal even if their files are in
+/// different folders.
 impl PartialEq for AssetResolver {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -31,12 +31,12 @@ impl AssetResolver {
         out
     }
 
-    /// Returns the cache, to be shared with other scenes.
+    /// Returns the cache, for use by other scenes.
     pub fn assets(&self) -> Arc<Assets> {
         self.assets.clone()
     }
 
-    /// Makes names relative to the folder of the file `scene`.
+    /// Sets the folder to which file names are relative: that of the scene file `scene`.
     pub(super) fn move_to(&self, scene: &Path) {
         *self.folder.write().unwrap_or_else(PoisonError::into_inner) = folder_of(scene);
     }
@@ -56,8 +56,8 @@ impl AssetResolver {
         self.assets.radiance_map(&self.folder().join(name))
     }
 
-    /// Returns `true` if `name` is a file relative to the present folder, but not the same file
-    /// relative to the folder of the scene file `scene`.
+    /// Returns `true` if the file `name` exists relative to the current folder, but not relative to
+    /// the folder of the scene file `scene`.
     pub(super) fn breaks_when_moved(&self, name: &str, scene: &Path) -> bool {
         let there = fs::canonicalize(folder_of(scene).join(name));
         fs::canonicalize(self.folder().join(name))

@@ -6,9 +6,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 impl Scene {
-    /// Hash of the meshes and images that were read for the scene, in the order in which the scene
-    /// names them. Returns `None` if there are none. The hash covers the data as they were read, so
-    /// that a file that changes later has no influence.
+    /// Hash of the meshes and images of the scene, in the order in which the scene names them.
+    /// Returns `None` if there are none. It covers the data that were read, so that later changes
+    /// of the files have no influence.
     pub fn contents_hash(&self) -> Option<u64> {
         // A new field that may name files has to be added here.
         let Self {
@@ -44,7 +44,7 @@ impl Scene {
     }
 }
 
-/// Returns the hash of a file's contents. Scenes may name a file many times; it is hashed once.
+/// Returns the hash of a file's contents. A file that the scene names repeatedly is hashed once.
 fn once<T>(
     known: &mut HashMap<*const T, u64>,
     file: *const T,

@@ -7,12 +7,13 @@ use std::fmt;
 /// One error or warning about a scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// The file, as the user named it.
+    /// Name of the file as the user gave it.
     pub file: String,
     /// Line and column, both counted from 1; the column counts characters. `None` if the diagnostic
     /// is about the whole file.
     pub line_column: Option<(usize, usize)>,
-    /// Table that the diagnostic is about: `object "queen"`. Empty for the scene as a whole.
+    /// Table that the diagnostic is about, such as `object "queen"`. Empty for the scene as a
+    /// whole.
     pub subject: String,
     /// Finding, as a phrase.
     pub found: String,
@@ -20,8 +21,8 @@ pub struct Diagnostic {
     pub help: String,
 }
 
-/// Largest indentation of the second line of a printed diagnostic [characters]. A shorter file name
-/// and location indent the second line by their own width.
+/// Largest indentation of the second line of a printed diagnostic [characters]. The second line is
+/// indented by the width of file name and location, up to this limit.
 const MAX_INDENT: usize = 24;
 
 impl fmt::Display for Diagnostic {
@@ -44,7 +45,7 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// Largest number of errors of a file that are reported. The others are counted.
+/// Largest number of errors of a file that are reported. Further ones are only counted.
 pub(crate) const MAX_REPORTED: usize = 100;
 
 /// Errors of one scene file: at least one, sorted by location.
@@ -55,19 +56,18 @@ pub struct SceneErrors {
     more: usize,
 }
 
-/// Collector of diagnostics by byte offset in the file, of which it keeps the first
-/// [`MAX_REPORTED`].
+/// Collector of the first [`MAX_REPORTED`] diagnostics by their byte offset in the file.
 #[derive(Default)]
 pub(super) struct FirstDiagnostics {
     found: Vec<(usize, Diagnostic)>,
     more: usize,
-    /// Offset above which nothing is kept.
+    /// Offset above which no diagnostic is stored.
     last: Option<usize>,
 }
 
 impl FirstDiagnostics {
-    /// Adds the diagnostic of `make` at the offset `at`, without line and column. `make` is not
-    /// called if there are enough diagnostics at smaller offsets.
+    /// Adds a diagnostic at the offset `at`, which `make` creates without line and column. `make`
+    /// is not called if there are enough diagnostics at smaller offsets.
     pub fn add(&mut self, at: usize, make: impl FnOnce() -> Diagnostic) {
         if self.skips(at) {
             return;
@@ -78,15 +78,15 @@ impl FirstDiagnostics {
         }
     }
 
-    /// Counts a diagnostic at the offset `at` and returns `true`, if there are enough diagnostics at
-    /// smaller offsets. Returns `false` otherwise.
+    /// Returns `true`, and counts a diagnostic at the offset `at`, if there are enough diagnostics
+    /// at smaller offsets. Returns `false` otherwise.
     pub fn skips(&mut self, at: usize) -> bool {
         let skips = self.last.is_some_and(|last| at > last);
         self.more += usize::from(skips);
         skips
     }
 
-    /// Adds to the number of diagnostics that are not kept.
+    /// Adds `more` to the number of diagnostics that are not stored.
     pub fn count_more(&mut self, more: usize) {
         self.more += more;
     }
@@ -106,7 +106,7 @@ impl FirstDiagnostics {
     }
 
     /// Returns the diagnostics with lines and columns in `text`, sorted by location, and the number
-    /// of those that were not kept.
+    /// of those that were not stored.
     pub fn located(mut self, text: &str) -> (Vec<Diagnostic>, usize) {
         self.keep_first();
         let mut lines = LineCounter::new(text);

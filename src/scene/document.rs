@@ -14,18 +14,18 @@ use std::sync::Arc;
 use toml_edit::DocumentMut;
 
 /// The text of a scene file and the scene that it describes. Edits of the scene change only the
-/// values that differ; comments, order and layout of the rest of the text stay.
+/// values that differ. Comments, order and layout of the rest of the text are kept.
 #[derive(Clone, Debug)]
 pub struct Document {
     name: String,
     /// Text and scene as read. [`Document::apply`] changes a copy of this text each time, so that
-    /// undone changes come back with their comments.
+    /// an undone removal restores comments.
     origin: (Arc<String>, Arc<Scene>),
-    /// Keys and values in the text as read that have names of earlier versions of the program.
+    /// Former keys and values in the text as read: names from earlier versions of the program.
     former_words: Vec<FormerWord>,
     /// Warnings about the text as read.
     warnings: Vec<Diagnostic>,
-    /// The warning in `warnings` that is about names of earlier versions.
+    /// The warning in `warnings` about names from earlier versions.
     migration_warning: Option<Diagnostic>,
     text: Arc<String>,
     scene: Arc<Scene>,
@@ -49,8 +49,8 @@ impl Document {
         Self::read_opened(path, assets, |path| File::open(path))
     }
 
-    /// Reads and validates the scene in the regular file at `path`. Other files are refused without
-    /// waiting for their content.
+    /// Reads and validates the scene in the regular file at `path`. Other kinds of files are
+    /// refused without blocking.
     pub(super) fn read_regular(path: &Path, assets: Arc<Assets>) -> Result<Self, SceneErrors> {
         Self::read_opened(path, assets, open_regular)
     }
@@ -116,7 +116,7 @@ impl Document {
         self.scene = Arc::new(scene.clone());
     }
 
-    /// Returns the document under another name.
+    /// Returns the document with another name for diagnostics.
     pub(super) fn renamed(mut self, name: &str) -> Self {
         self.name = name.to_string();
         self
@@ -157,8 +157,8 @@ impl Document {
 }
 
 /// Changes `text`, which describes the scene `old`, to describe the scene `new`, and returns the
-/// result. Uniform line ends are kept, as are a byte order mark and a missing line end at the end
-/// of the file. Mixed line ends become LF.
+/// result. Uniform line endings are kept, as are a byte order mark and a missing line ending at the
+/// end of the file. Mixed line endings become LF.
 fn new_text(text: String, former_words: &[FormerWord], old: &Scene, new: &Scene) -> String {
     let (mark, body) = match text.strip_prefix('\u{feff}') {
         Some(body) => ("\u{feff}", body),

@@ -18,10 +18,10 @@ pub struct SceneFile {
     fingerprint: u64,
 }
 
-/// State of the file, compared with the bytes that this program last read or wrote.
+/// State of the file relative to the bytes that this program last read or wrote.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DiskState {
-    /// The file has these bytes, or the scene has no file yet.
+    /// The file has the same bytes, or the scene has no file yet.
     Unchanged,
     /// Another program has written the file, or the file is no longer a readable regular file.
     Changed,
@@ -97,7 +97,7 @@ impl SceneFile {
     }
 
     /// Creates a scene from `text`, the recovered edits of the file at `path`. The file has other
-    /// content now; saving replaces that content.
+    /// content now; saving replaces it.
     ///
     /// # Errors
     /// The errors of [`Scene::parse`].
@@ -123,7 +123,7 @@ impl SceneFile {
     }
 
     /// Returns `true` if `text` is the text that this program last read from or wrote to the file.
-    /// For a scene without a file, the text from which the scene was created counts.
+    /// For a scene without a file, it is the text from which the scene was created.
     pub fn holds(&self, text: &str) -> bool {
         match self.path {
             Some(_) => fnv1a64(text.as_bytes()) == self.fingerprint,
@@ -143,7 +143,7 @@ impl SceneFile {
         self.path.as_deref()
     }
 
-    /// Returns the document as it was last read or saved.
+    /// Returns the document as last read or saved.
     pub fn document(&self) -> &Document {
         &self.document
     }
@@ -164,8 +164,8 @@ impl SceneFile {
     /// Reads the file again.
     ///
     /// # Errors
-    /// The errors of [`Scene::read`]; the document stays unchanged. The fingerprint is updated all the same,
-    /// so that a broken file is reported once and not at every check.
+    /// The errors of [`Scene::read`]; the document then stays unchanged. The fingerprint is updated
+    /// even then, so that a broken file is reported only once.
     pub fn reload(&mut self) -> Result<(), SceneErrors> {
         let Some(path) = self.path.clone() else { return Ok(()) };
         if let Ok(Some(found)) = content(&path) {
@@ -175,13 +175,13 @@ impl SceneFile {
         Ok(())
     }
 
-    /// Writes the valid `scene` to its file. Comments, order and layout of unchanged parts stay.
-    /// The file is replaced atomically; a symbolic link stays a link, and permissions stay.
+    /// Writes the valid `scene` to its file. Comments, order and layout of unchanged parts are
+    /// kept. The file is replaced atomically; a symbolic link and the permissions are kept.
     ///
     /// # Errors
-    /// Fails if there is no file yet, if another program has written the file (unless `overwrite` is
-    /// `true`), if the path leads to something other than a regular file, or if the file cannot be
-    /// written.
+    /// Fails if there is no file yet, if another program has written the file (unless `overwrite`
+    /// is `true`), if the path leads to something other than a regular file, or if the file cannot
+    /// be written.
     pub fn save(&mut self, scene: &Scene, overwrite: bool) -> Result<(), SaveError> {
         let Some(path) = self.path.clone() else { return Err(SaveError::Untitled) };
         let found = content(&path);
@@ -242,7 +242,7 @@ impl SceneFile {
 /// Returns the fingerprint of the file's content; `None` if there is no file.
 ///
 /// # Errors
-/// [`ErrorKind::InvalidInput`] if the path leads to something other than a regular file.
+/// Returns [`ErrorKind::InvalidInput`] if the path leads to something other than a regular file.
 fn content(path: &Path) -> io::Result<Option<u64>> {
     match open_regular(path) {
         Ok(file) => {

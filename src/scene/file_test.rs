@@ -128,7 +128,7 @@ fn saving_keeps_links_and_permissions() {
     assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o640);
 }
 
-/// A pipe without another end would block whoever opens it.
+/// Checks that a pipe is refused. Opening a pipe without another end would block.
 #[test]
 fn pipe_in_place_of_the_file_is_refused_without_blocking() {
     use rustix::fs::{CWD, FileType, Mode, mknodat};

@@ -21,7 +21,7 @@ pub struct History {
     now: Arc<Scene>,
     /// Scenes after each step that can be redone; the step to redo next is the last entry.
     future: Vec<HistoryEntry>,
-    /// `true` while a gesture lasts: its next step is coalesced with its last one.
+    /// `true` while a gesture lasts, so that its next step is coalesced with its previous one.
     open: bool,
     saved: Arc<Scene>,
 }
@@ -76,7 +76,7 @@ impl History {
         true
     }
 
-    /// Ends a gesture: the next step is separate.
+    /// Ends a gesture: the next step is not coalesced with it.
     pub fn end_gesture(&mut self) {
         self.open = false;
     }
@@ -115,7 +115,8 @@ impl History {
         self.open = false;
     }
 
-    /// Returns `true` if the current scene equals the saved one, whatever steps led to it.
+    /// Returns `true` if the current scene equals the saved one, independent of the steps between
+    /// them.
     pub fn is_saved(&self) -> bool {
         Arc::ptr_eq(&self.saved, &self.now) || *self.saved == *self.now
     }
@@ -125,7 +126,7 @@ impl History {
         *self = Self::new(scene);
     }
 
-    /// Drops the oldest steps until the rest keeps the memory limit.
+    /// Drops the oldest steps until the history is within its memory limit.
     fn forget(&mut self) {
         let mut total: usize = self.past.iter().map(|entry| entry.bytes).sum();
         while self.past.len() > 1 && (total > MAX_BYTES || self.past.len() > MAX_STEPS) {

@@ -94,9 +94,9 @@ impl Scene {
     }
 }
 
-/// Finds a material that may reflect more light than it receives: its diffuse, highlight and
-/// reflection parts add up to more than 1. A Cook-Torrance highlight is itself the reflection of a
-/// light, so that the larger of highlight and reflection counts.
+/// Finds a material that may reflect more light than it receives: the sum of its diffuse, highlight
+/// and reflection parts exceeds 1. A Cook-Torrance highlight is the reflection of a light, so that
+/// only the larger of highlight and reflection is included.
 fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     let mirrored = match m.highlight {
         Highlight::Phong => m.specular + m.reflection,

@@ -52,7 +52,7 @@ pub struct Scene {
     pub film: FilmSettings,
     /// Integrator settings.
     pub trace: IntegratorSettings,
-    /// Camera that the picture is taken from.
+    /// The current camera.
     pub camera: Camera,
     /// Stored cameras by name.
     pub cameras: BTreeMap<String, Camera>,

@@ -23,7 +23,7 @@ description! {
 pub const OBJECT_FIELDS: &[Field] = Object::FIELDS;
 
 impl Object {
-    /// Returns the material name of each part of the compiled form; an object that is no compound
+    /// Returns the material name of each part of the compiled form. An object that is no compound
     /// has one part.
     pub fn materials(&self) -> Vec<&str> {
         self.shape.part_materials(&self.material)

@@ -20,19 +20,20 @@ use tempfile::NamedTempFile;
 /// Largest number of recovery files of one scene in one folder, from crashed or concurrent
 /// sessions.
 const MAX_FILES: u32 = 9;
-/// Start of the first line of a recovery file; the fingerprint of the scene's file follows.
+/// Beginning of the first line of a recovery file. The fingerprint of the scene file follows.
 const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
-/// Word in place of the fingerprint if the scene had no file.
+/// Word in place of the fingerprint if the scene has no file.
 const NO_FILE: &str = "none";
-/// Age above which an unlocked temporary file is removed.
+/// Age after which an unlocked temporary file is removed.
 const STALE_AFTER: Duration = Duration::from_secs(60);
 
 /// Writer and finder of the recovery files of one scene.
 #[derive(Debug)]
 pub struct Recovery {
-    /// Folder of the scene and name of the recovery file in it, if the scene has a file.
+    /// Folder of the scene file, and name of the recovery file in it; `None` for a scene without a
+    /// file.
     beside: Option<(PathBuf, OsString)>,
-    /// State folder and name of the recovery file in it. The second choice.
+    /// State folder, and name of the recovery file in it. It is used if `beside` is not possible.
     state: Option<(PathBuf, OsString)>,
     saved: Option<Saved>,
 }
@@ -57,23 +58,23 @@ pub struct RecoveryFile {
     pub elsewhere: bool,
 }
 
-/// Unsaved edits of a process that was killed. The recovery file stays locked as long as this value
-/// exists, so that no other process finds the file.
+/// Unsaved edits of a process that was killed. The recovery file stays locked while this value
+/// exists, so that other processes do not offer it.
 #[derive(Debug)]
 pub struct Orphan {
     kept: Saved,
-    /// Text of the scene file, as saving would have written it.
+    /// Text that saving would have written to the scene file.
     pub text: String,
-    /// [`crate::scene::SceneFile::fingerprint`] of the edited file; `None` if there was no file or
-    /// the fingerprint cannot be read.
+    /// Fingerprint of the edited file (see [`crate::scene::SceneFile::fingerprint`]); `None` if
+    /// there was no file or the fingerprint cannot be read.
     pub base: Option<u64>,
     /// Time of writing.
     pub written: SystemTime,
 }
 
 /// Returns the user's state folder (XDG Base Directory Specification); `None` if the environment
-/// does not define it. `variable` returns the value of an environment variable. The folder holds
-/// the recovery files of scenes that have no file, or whose folder is not writable.
+/// does not define it. `variable` returns the value of an environment variable. The folder is for
+/// the recovery files of scenes without a file, or in a folder that is not writable.
 pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     let absolute = |name| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let folder = absolute("XDG_STATE_HOME");
@@ -82,8 +83,8 @@ pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathB
 }
 
 impl Recovery {
-    /// Creates the recovery of the scene in the file at `path`, or of a scene without a file that
-    /// is called `name`. `state` is the folder from [`state_folder`].
+    /// Creates the recovery of the scene in the file at `path`, or of a scene without a file and
+    /// with the name `name`. `state` is the folder from [`state_folder`].
     pub fn new(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
         let mut beside = None;
         let stem = match path {
@@ -111,7 +112,7 @@ impl Recovery {
         self.beside.iter().chain(&self.state)
     }
 
-    /// Returns a recovery of the same scene that writes to the state folder only.
+    /// Returns a recovery of the same scene that uses only the state folder.
     pub fn elsewhere(&self) -> Self {
         Self { beside: None, state: self.state.clone(), saved: None }
     }
@@ -121,11 +122,11 @@ impl Recovery {
         self.saved.as_ref().map(|saved| saved.path.as_path())
     }
 
-    /// Writes the recovery file. `text` is the scene file as saving would write it; `base` is the
+    /// Writes the recovery file. `text` is the text that saving would write, and `base` is the
     /// fingerprint of the scene file that saving would replace.
     ///
     /// # Errors
-    /// Fails if no candidate folder is writable; the previous recovery file stays.
+    /// Fails if no candidate folder is writable; the previous recovery file then stays.
     pub fn keep(&mut self, text: &str, base: Option<u64>) -> io::Result<()> {
         let base = base.map_or(NO_FILE.to_string(), |base| format!("{base:016x}"));
         let text = format!("{HEAD}{base}.\n{text}");
@@ -157,7 +158,7 @@ impl Recovery {
     }
 
     /// Finds the orphaned edits of the scene. Empty files are removed. Files of other users are not
-    /// read: their content is not this user's work.
+    /// read, because they are not this user's work.
     pub fn find(&self) -> RecoveryFile {
         let mut found = RecoveryFile::default();
         for (folder, name) in self.candidates() {
@@ -180,7 +181,7 @@ impl Recovery {
         found
     }
 
-    /// Takes over the recovery file of `lost` as that of this session.
+    /// Takes over the recovery file of `lost`: this session writes to it from now on.
     pub fn take_up(&mut self, lost: Orphan) {
         self.forget();
         self.saved = Some(lost.kept);
@@ -200,13 +201,14 @@ impl Orphan {
 }
 
 impl Saved {
-    /// Returns `true` if the path still leads to the locked file.
+    /// Returns `true` if the path still leads to the locked file, which another process may have
+    /// replaced.
     fn has_its_name(&self) -> bool {
         let named = fs::symlink_metadata(&self.path);
         self.file.metadata().is_ok_and(|saved| named.is_ok_and(|named| is_same(&saved, &named)))
     }
 
-    /// Removes the file before its lock is released.
+    /// Removes the file, then releases its lock.
     fn remove(self) {
         if self.has_its_name() {
             // A file that cannot be removed is found, and reported, at the next start.
@@ -261,8 +263,8 @@ fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved>
     ))
 }
 
-/// Opens the file at `path` for reading and for writing; some file systems grant a lock only on a
-/// file that is open for writing.
+/// Opens the file at `path` for reading and writing, because some file systems lock only files that
+/// are open for writing.
 fn open(path: &Path) -> io::Result<File> {
     open_regular_with(File::options().read(true).write(true), path)
 }
@@ -341,7 +343,7 @@ pub fn kept_in(folder: &Path) -> Vec<PathBuf> {
     kept
 }
 
-/// Removes the half-written temporary files of killed processes in `folder`.
+/// Removes the incomplete temporary files of killed processes in `folder`.
 pub fn remove_stale(folder: &Path) {
     let [prefix, suffix] = TEMPORARY;
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {

@@ -145,7 +145,7 @@ fn push(out: &mut String, text: &str) {
     out.push_str(text);
 }
 
-/// Appends the details that the row of `field` refers to: the words that it accepts, or the keys of
+/// Appends the details of `field` that its row refers to: the words that it accepts, or the keys of
 /// its table.
 fn nested(out: &mut String, field: &Field) {
     match field.takes {
@@ -207,7 +207,7 @@ fn steps(out: &mut String) {
     }
 }
 
-/// Appends keys of which exactly one is given; they have no defaults.
+/// Appends mutually exclusive keys, of which one must be given. They have no defaults.
 fn kinds(out: &mut String, fields: &[Field]) {
     push(out, "| key | value | unit | meaning |\n|---|---|---|---|\n");
     for field in fields {
@@ -251,7 +251,7 @@ fn row(out: &mut String, cells: &[&str]) {
 mod tests {
     use super::*;
 
-    /// Rows that say "see below" refer to a later part of the same section.
+    /// Checks that rows with "see below" refer to a later part of the same section.
     #[test]
     fn reference_rows_refer_to_later_sections() {
         let text = reference();

@@ -7,7 +7,7 @@ use crate::value::{DefaultValue, Field, ValueType};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Returns the keys that serde lists when it reads an unknown one.
+/// Returns the valid keys of `T`, which serde lists in the error about an unknown key.
 fn keys_of<T: DeserializeOwned>() -> Vec<String> {
     let error = match toml::from_str::<T>("\"no such key\" = 0") {
         Ok(_) => panic!("an unknown key was taken"),
@@ -25,7 +25,7 @@ fn same_keys<T: DeserializeOwned>(what: &str, fields: &[Field]) {
     assert_eq!(serde_keys, documented, "{what}");
 }
 
-/// Asserts that the documented defaults of `fields` are those that serde uses for missing keys.
+/// Checks that the documented defaults of `fields` are those that serde uses for missing keys.
 /// `needed` is a table with only the required keys.
 fn same_defaults<T: DeserializeOwned + Serialize>(what: &str, fields: &[Field], needed: &str) {
     let read: T = toml::from_str(needed).unwrap_or_else(|e| panic!("{what}: {e}"));

@@ -11,10 +11,9 @@ use std::fmt;
 /// An error or a warning about a scene, without file and line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Path to the value, which consists of keys and list indices (from 0): `object`, `3`, `shape`,
-    /// `sphere`.
+    /// Path to the value: keys and list indices (from 0), such as `object`, `3`, `shape`, `sphere`.
     pub path: Vec<String>,
-    /// Table that the problem is about: `object "queen"`. Empty for the scene as a whole.
+    /// Table that the problem is about, such as `object "queen"`. Empty for the scene as a whole.
     pub subject: String,
     /// Finding, as a phrase.
     pub found: String,
@@ -79,13 +78,13 @@ impl Problems<'_> {
         }
     }
 
-    /// Counts a problem and returns `true` if there are enough. Returns `false` otherwise.
+    /// Returns `true`, and counts a problem, if there are enough. Returns `false` otherwise.
     fn is_full(&mut self) -> bool {
         self.is_full_with(0)
     }
 
-    /// Counts a problem and returns `true` if there are enough, together with `others` that are not
-    /// added yet. Returns `false` otherwise.
+    /// Returns `true`, and counts a problem, if there are enough together with `others`, the number
+    /// of problems that are not added yet. Returns `false` otherwise.
     fn is_full_with(&mut self, others: usize) -> bool {
         let is_full = self.found.len() + others >= MAX_REPORTED;
         self.more += usize::from(is_full);
@@ -111,8 +110,8 @@ impl Scene {
         Problem { subject: self.subject(&path), path, found, help }
     }
 
-    /// Loads the files that the scene refers to, unless they are loaded already. The next
-    /// validation reports the files that cannot be read.
+    /// Loads the files that the scene refers to, except for those that are loaded already. Files
+    /// that cannot be read are errors in the next validation.
     pub fn resolve(&mut self) {
         let resolver = &self.resolver;
         for object in &mut self.objects {
@@ -161,8 +160,8 @@ impl Scene {
         (problems.found, problems.more)
     }
 
-    /// Adds a problem for each material whose textures need coordinates that the object's shape
-    /// does not have. The shapes must be valid.
+    /// Adds a problem for each material whose textures need coordinates, on objects whose shape
+    /// does not have them. The shapes must be valid.
     fn missing_coordinates(&self, problems: &mut Problems) {
         let uv_key = |name: &str| {
             let material = self.materials.get(name)?;

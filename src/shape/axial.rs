@@ -6,8 +6,8 @@ use crate::shape::texture_space::around_axis;
 use crate::value::{ValidationError, unit};
 use glam::{DAffine3, DMat3, DVec3};
 
-/// Returns a conical frustum around the axis from `base` to `top`, two different points. The radii
-/// at the ends are at least 0 and not both 0.
+/// Returns a conical frustum around the axis from `base` to `top`, which are different points. The
+/// radii at the ends are at least 0 and not both 0.
 pub(super) fn frustum_between(
     base: [f64; 3],
     top: [f64; 3],
@@ -27,13 +27,13 @@ pub(super) fn frustum_between(
     Form::conical_frustum(DAffine3::from_mat3_translation(linear, start), narrow / wide)
 }
 
-/// Returns the texture axes: y points from `base` to `top`.
+/// Returns texture axes whose y axis points from `base` to `top`.
 pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
     let axis = DVec3::from_array(top) - DVec3::from_array(base);
     around_axis(unit(axis).unwrap_or(DVec3::Y))
 }
 
-/// Returns an error for the key `name`, which is an end of the axis, if the axis has length 0.
+/// Returns an error for the key `name`, which gives one end of the axis, if the axis has length 0.
 pub(super) fn degenerate_axis(
     base: [f64; 3],
     top: [f64; 3],

@@ -44,8 +44,8 @@ impl ShapeDesc for Cone {
         vec![&mut self.base, &mut self.apex]
     }
 
-    /// Returns `true`, without a change, if the cone is upright: it is symmetric about the
-    /// vertical.
+    /// Returns `true` without a change if the cone is upright, because it is then symmetric about
+    /// the vertical. Otherwise returns `false`.
     fn rotate_y(&mut self, _: f64) -> bool {
         is_upright(self.base, self.apex)
     }

@@ -138,8 +138,8 @@ compounds! {
 ]";
 }
 
-/// Returns a block on `base` of nine tenths of `size`, and a ball that protrudes from the block at
-/// its upper right near corner.
+/// Returns the example parts of a new compound: a block on `base` of nine tenths of `size`, and a
+/// ball that protrudes from the block at its upper right near corner.
 fn fitted_to(base: DVec3, size: DVec3) -> [Shape; 2] {
     let block = Cuboid::fitted_to(base, size * 0.9);
     let radius = 0.4 * size.min_element();
@@ -175,8 +175,7 @@ fn parts_of_mut(shape: &mut Shape) -> &mut [CsgOperand] {
     }
 }
 
-/// Compiles `of`, the parts of a compound, to one solid. `join` combines the CSG trees of the
-/// parts.
+/// Compiles the parts of a compound to one solid. `join` combines the CSG trees of the parts.
 fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     let mut parts = Vec::new();
     let mut trees = Vec::new();
@@ -206,7 +205,8 @@ fn unfit_reason(shape: &Shape) -> Option<&'static str> {
     }
 }
 
-/// Returns the validation errors of `of`, the parts of a compound that is nested `depth` deep.
+/// Returns the validation errors of `of`, the parts of a compound. `depth` is the nesting depth of
+/// the compound.
 fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     let mut faults = Vec::new();
     if of.len() < 2 {
@@ -246,14 +246,14 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     faults
 }
 
-/// A reference to a material from inside a compound: the dotted key below that of the shape, and
-/// the name of the material.
+/// A reference to a material from inside a compound: its dotted key, relative to the shape, and the
+/// name of the material.
 pub type Named<'a> = (String, &'a str);
 
 impl Shape {
     /// Returns the material name of each part of the shape's form, in the order of
-    /// [`CsgSolid::parts`]. A part without a material of its own has that of the enclosing part, or
-    /// `whole` if no enclosing part has one. A shape that is no compound has one part.
+    /// [`CsgSolid::parts`]. A part without a material has that of the innermost enclosing part with
+    /// one, or `whole` if there is none. A shape that is no compound has one part.
     pub fn part_materials<'a>(&'a self, whole: &'a str) -> Vec<&'a str> {
         match parts_of(self) {
             None => vec![whole],

@@ -44,8 +44,8 @@ impl ShapeDesc for Cylinder {
         vec![&mut self.base, &mut self.top]
     }
 
-    /// Returns `true`, without a change, if the cylinder is upright: it is symmetric about the
-    /// vertical.
+    /// Returns `true` without a change if the cylinder is upright, because it is then symmetric
+    /// about the vertical. Otherwise returns `false`.
     fn rotate_y(&mut self, _: f64) -> bool {
         is_upright(self.base, self.top)
     }

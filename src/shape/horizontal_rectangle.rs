@@ -33,7 +33,7 @@ impl ShapeDesc for HorizontalRectangle {
         self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).errors()
     }
 
-    /// Creates the upper side of the box to fill.
+    /// Creates the rectangle that is the top of the given box.
     fn fitted_to(base: DVec3, size: DVec3) -> Self {
         Self { center: [base.x, base.y + size.y, base.z], size: [size.x, size.z] }
     }

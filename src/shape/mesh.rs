@@ -110,8 +110,8 @@ impl ShapeDesc for MeshDesc {
         }
     }
 
-    /// Creates a mesh without a file, which is the placeholder at the origin; only a transform
-    /// moves a mesh.
+    /// Creates a mesh without a file: the placeholder at the origin. The box is ignored, because
+    /// only a transform moves a mesh.
     fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self::default()
     }
@@ -126,8 +126,8 @@ impl ShapeDesc for MeshDesc {
 }
 
 impl Shape {
-    /// Loads the file that the shape names with `load`, unless its content or an error is there
-    /// already.
+    /// Calls `load` with the file that the shape names and stores the result. Does nothing if a
+    /// result is stored already, or the shape names no file.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
         if let Self::MeshDesc(mesh) = self
             && !mesh.file.is_empty()
@@ -137,7 +137,7 @@ impl Shape {
         }
     }
 
-    /// Copies the content of the file from `other`, if both shapes name the same file.
+    /// Copies the loaded file from `other`, if both shapes name the same file.
     pub fn resolve_as(&mut self, other: &Self) {
         if let (Self::MeshDesc(new), Self::MeshDesc(old)) = (self, other)
             && new.file == old.file

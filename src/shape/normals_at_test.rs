@@ -4,8 +4,8 @@ use crate::primitive::conical_frustum::AROUND_TIP;
 use crate::shape::{EXAMPLES, Shape};
 use glam::DVec3;
 
-/// At hit points of rays from all sides, `normals_at` returns a normal that is not perpendicular to
-/// the ray. At the origin of the ray it returns none.
+/// Checks `normals_at` for rays from all sides. At a hit point it returns a normal that is not
+/// perpendicular to the ray. At the origin of the ray it returns none.
 #[test]
 fn normals_at_hit_points_face_ray() {
     for (key, _) in EXAMPLES {

@@ -5,8 +5,9 @@ use crate::shape::{EXAMPLES, Shape};
 use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::FRAC_PI_4;
 
-/// A ray from above hits every kind of shape; the opposite ray misses. The ray points to the centre
-/// of the bounding box or, for a shape with a hole, to a point between the centre and a side.
+/// Checks that a ray from above hits every kind of shape, and that the opposite ray misses. The ray
+/// points to the centre of the bounding box or, for a shape with a hole, to a point between the
+/// centre and a side.
 #[test]
 fn ray_from_above_hits_every_kind() {
     for (key, _) in EXAMPLES {

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// Description of one kind of shape.
 pub trait ShapeDesc: Description {
-    /// Example for a scene file.
+    /// Example of the shape as TOML, for help and documentation.
     const EXAMPLE: &'static str;
 
     /// Compiles the geometry in double precision. The description must be valid.
@@ -24,12 +24,12 @@ pub trait ShapeDesc: Description {
         self.validator().errors()
     }
 
-    /// Creates an upright instance that roughly fills a box. `base` is the centre of the box's lower
-    /// side, `size` its lengths along x, y and z, all greater than 0.
+    /// Creates an upright instance that roughly fills a box. `base` is the centre of the box's
+    /// lower side. `size` is its lengths along x, y and z, all greater than 0.
     fn fitted_to(base: DVec3, size: DVec3) -> Self;
 
-    /// Returns the points that place the shape: adding a vector to all of them moves the shape by that
-    /// vector. Empty if only a transform moves it.
+    /// Returns the points that determine the position: adding a vector to all of them moves the
+    /// shape by that vector. Empty if only a transform can move the shape.
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]>;
 
     /// Rotates the shape by `degrees` about the vertical through its centre, counter-clockwise seen
@@ -50,8 +50,8 @@ pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
 }
 
-/// Returns the keys of a kind. A compound passes the name of a static with its keys: a constant
-/// cannot be part of a table that refers to itself.
+/// Converts the keys of a kind to an expression for the table. A compound passes the name of a
+/// static with its keys: a constant cannot be part of a table that refers to itself.
 macro_rules! keys {
     ($kind:ident) => {
         $kind::FIELDS
@@ -101,8 +101,8 @@ macro_rules! kinds {
                 }
             }
 
-            /// Returns the validation errors of the shape; their keys begin with the key of its
-            /// kind.
+            /// Returns the validation errors of the shape. Each key begins with the key of the
+            /// shape's kind.
             pub fn faults(&self) -> Vec<ValidationError> {
                 let faults = match self {
                     $(Self::$kind(kind) => kind.faults(),)+
@@ -126,8 +126,8 @@ macro_rules! kinds {
                 }
             }
 
-            /// Returns the points that place the shape: adding a vector to all of them moves the shape
-            /// by that vector. Empty if only a transform moves it.
+            /// Returns the points that determine the position: adding a vector to all of them moves
+            /// the shape by that vector. Empty if only a transform can move the shape.
             pub fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
                 match self {
                     $(Self::$kind(kind) => kind.anchor_points_mut(),)+
@@ -180,7 +180,7 @@ impl FieldValue for Shape {
 }
 
 impl Shape {
-    /// Returns the first of the points that place the shape; the origin if there is none.
+    /// Returns the first of the points that determine the position; the origin if there is none.
     pub fn position(&self) -> DVec3 {
         self.clone()
             .anchor_points_mut()

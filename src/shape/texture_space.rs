@@ -61,8 +61,8 @@ impl Shape {
     }
 }
 
-/// Returns orthonormal axes whose second one is the unit vector `y`; x points as far to the right
-/// as possible.
+/// Returns orthonormal axes with the unit vector `y` as y axis. The x axis points as far to the
+/// right as possible.
 pub(super) fn around_axis(y: DVec3) -> DMat3 {
     let across = y.cross(DVec3::Z);
     let x = if across.length() > 1e-3 { across.normalize() } else { DVec3::X };
@@ -70,8 +70,8 @@ pub(super) fn around_axis(y: DVec3) -> DMat3 {
     DMat3::from_cols(x, y, x.cross(y))
 }
 
-/// Returns orthonormal axes of a plane with the unit normal `z`; y points up as far as possible. On
-/// a horizontal plane that faces up, y points away from the viewer.
+/// Returns orthonormal axes with the unit normal `z` of a plane as z axis. The y axis points as far
+/// up as possible; on a horizontal plane that faces up, it points away from the viewer.
 pub(super) fn on_plane(z: DVec3) -> DMat3 {
     let up = if z.y.abs() > 0.999 { DVec3::NEG_Z * z.y.signum() } else { DVec3::Y };
     let x = up.cross(z).normalize();

@@ -30,8 +30,8 @@ impl ShapeDesc for Torus {
         TorusForm { scene_from_torus, ring: self.ring, tube: self.tube }.into()
     }
 
-    /// Returns the validation errors. A tube that is wider than the ring is an error: it would
-    /// cross itself, and such a spindle torus has two surfaces.
+    /// Returns the validation errors. A tube wider than the ring is an error: the surface would
+    /// intersect itself (a spindle torus).
     fn faults(&self) -> Vec<ValidationError> {
         let spindle = (self.ring > 0.0 && self.tube > self.ring).then(|| {
             let found = format!("tube ({}) is larger than ring ({})", self.tube, self.ring);
@@ -43,7 +43,7 @@ impl ShapeDesc for Torus {
             .errors()
     }
 
-    /// Creates a torus that lies flat; the radius of its tube is at most a third of that of the
+    /// Creates a torus that lies flat. The radius of its tube is at most a third of that of its
     /// ring.
     fn fitted_to(base: DVec3, size: DVec3) -> Self {
         let across = size.x.min(size.z);

@@ -10,8 +10,8 @@ use glam::{DAffine3, DMat3, DVec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 
-/// One step of a transform. Angles are in degrees, counter-clockwise for a viewer at whom the axis
-/// points.
+/// One step of a transform. Angles are in degrees, counter-clockwise as seen from the tip of the
+/// axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TransformOp {
@@ -165,8 +165,8 @@ fn rotation(axis: DVec3, degrees: f64) -> DAffine3 {
     DAffine3::from_mat3(DMat3::from_cols(rotated(DVec3::X), rotated(DVec3::Y), rotated(DVec3::Z)))
 }
 
-/// Returns `true` if an affine map can be inverted with usable precision: it is finite and stretches
-/// no direction more than 1e12 times as much as another.
+/// Returns `true` if an affine map can be inverted with usable precision. Such a map is finite, and
+/// the ratio of its largest to its smallest stretch is at most 1e12.
 fn is_well_conditioned(map: &DAffine3) -> bool {
     let linear = map.matrix3;
     let largest = linear.to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));
@@ -182,9 +182,9 @@ pub fn compose(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |map, step| step.map() * map)
 }
 
-/// Returns an error if all `steps` together flatten or tear apart `shape`, move it beyond the
-/// largest coordinate, or make it too small for its distance from the origin. Each of the steps
-/// must be valid.
+/// Returns an error if the composition of `steps` flattens `shape` or stretches it out of range,
+/// moves it beyond the largest coordinate, or makes it too small for its distance from the origin.
+/// Each single step must be valid.
 pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<ValidationError> {
     if steps.is_empty() {
         return None;

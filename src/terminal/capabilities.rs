@@ -53,7 +53,7 @@ pub struct Capabilities {
     pub sixel_px: Option<[u16; 2]>,
     /// Width and height of a cell in pixels.
     pub cell_px: Option<[u16; 2]>,
-    /// Time from the first request to its reply, by the multiplexer if there is one.
+    /// Time from the first request to its reply. Inside a multiplexer, the multiplexer replies.
     pub round_trip: Option<Duration>,
     /// Round trip of a request that the multiplexer passes through to the terminal outside it.
     /// `None` if it was not measured or the multiplexer passes no requests through.
@@ -61,8 +61,7 @@ pub struct Capabilities {
 }
 
 impl Environment {
-    /// Reads the environment. `variable` is a function that returns the value of the variable of a
-    /// given name.
+    /// Reads the environment. `variable` returns the value of the variable with a given name.
     pub fn of(variable: impl Fn(&str) -> Option<String>) -> Self {
         let variable = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = variable("TERM").unwrap_or_default();

@@ -3,8 +3,8 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-/// Returns the sequence that copies `text` into the clipboard (OSC 52), if the terminal permits
-/// this. `text` is encoded in base64, so that its control characters cannot end the sequence.
+/// Returns the sequence that copies `text` to the clipboard (OSC 52), if the terminal permits this.
+/// `text` is encoded in base64, so that its control characters cannot end the sequence.
 pub(crate) fn copied(text: &str) -> String {
     format!("\x1b]52;c;{}\x07", STANDARD.encode(text))
 }

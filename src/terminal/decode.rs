@@ -23,13 +23,13 @@ use crate::terminal::sequence::{Interpreter, console_key, single_shift, x10_mous
 use crate::terminal::{Event, Key, Reply};
 use std::time::Duration;
 
-/// Longest pause after an introducer (`ESC [`, `ESC O`, …), which can also be a key pressed with
-/// Alt.
+/// Longest pause after an introducer (`ESC [`, `ESC O`, …). After a longer pause it is a key
+/// pressed with Alt.
 const INTRODUCER_WAIT: Duration = Duration::from_millis(500);
-/// Longest pause inside any other sequence but pasted text.
+/// Longest pause inside of any other sequence except for pasted text.
 const SEQUENCE_WAIT: Duration = Duration::from_secs(2);
-/// Pause inside pasted text after which the text so far is reported. The bytes after the pause are
-/// still pasted text.
+/// Longest pause inside of pasted text. After a longer pause the text so far is reported; later
+/// bytes are still pasted text.
 const PASTE_WAIT: Duration = Duration::from_secs(10);
 /// Largest number of bytes of a string that are kept. Further bytes are skipped.
 const MAX_STRING: usize = 4096;
@@ -47,30 +47,30 @@ const PASTE_END: &[u8] = b"\x1b[201~";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Ground,
-    /// Inside a UTF-8 character.
+    /// Inside of a UTF-8 character.
     Character,
     Escape,
-    /// After ESC and this byte, which start a sequence or are a key pressed with Alt.
+    /// After ESC and this byte, which begin a sequence or are a key pressed with Alt.
     Introducer(u8),
-    /// After `ESC O` and this number for the modifiers.
+    /// After `ESC O` and this number, which gives the modifiers.
     SingleShift(u16),
-    /// Inside a control sequence.
+    /// Inside of a control sequence.
     ControlSequence,
     /// After `ESC [ [`.
     Console,
     /// After `ESC [ M`.
     X10Mouse,
-    /// Inside a string that started with ESC and this byte.
+    /// Inside of a string that began with ESC and this byte.
     String(u8),
-    /// After ESC inside a string that started with ESC and this byte.
+    /// After ESC inside of a string that began with ESC and this byte.
     StringEscape(u8),
     Paste,
-    /// Inside pasted text of which a part was reported after a pause.
+    /// Inside of pasted text whose first part was reported after a pause.
     PausedPaste,
 }
 
-/// Decoder of terminal input. The caller measures time: if no byte comes within
-/// [`Decoder::patience`], the caller calls [`Decoder::give_up`].
+/// Decoder of terminal input. The caller measures time: if no byte arrives within
+/// [`Decoder::patience`], it calls [`Decoder::give_up`].
 pub struct Decoder {
     parser: vte::Parser,
     interpreter: Interpreter,
@@ -86,7 +86,7 @@ pub struct Decoder {
 
 impl Decoder {
     /// Creates a decoder. `escape_wait` is the longest pause between ESC and the next byte of its
-    /// sequence. After a longer pause ESC is the key Escape.
+    /// sequence. After a longer pause, ESC is the key Escape.
     pub fn new(escape_wait: Duration) -> Self {
         Self {
             parser: vte::Parser::new(),
@@ -99,7 +99,7 @@ impl Decoder {
         }
     }
 
-    /// Decodes `bytes`, which were read together. Returns the events that these bytes complete.
+    /// Decodes `bytes`, the result of one read, and returns the events that they complete.
     pub fn take(&mut self, bytes: &[u8]) -> Vec<Event> {
         if std::mem::take(&mut self.escape_given_up) && is_reply_without_escape(bytes) {
             self.state = State::Escape;
@@ -265,7 +265,7 @@ impl Decoder {
         self.restart();
     }
 
-    /// Ends a string. `terminator` makes the parser report the string to the interpreter.
+    /// Ends a string. The parser reports the string to the interpreter when it reads `terminator`.
     fn end_string(&mut self, terminator: &[u8]) {
         self.parse(terminator);
         let reply = std::mem::replace(&mut self.interpreter.reply, Reply::Other);
@@ -308,8 +308,8 @@ impl Decoder {
         }
     }
 
-    /// Reports the key Alt-`[`, Alt-`O` or the like if the incomplete sequence consists of an
-    /// introducer alone.
+    /// Reports the key Alt-`[`, Alt-`O` or a similar one if the incomplete sequence is only an
+    /// introducer.
     fn abandon(&mut self) {
         if let State::Introducer(introducer) = self.state {
             self.interpreter.alt = true;
@@ -318,8 +318,8 @@ impl Decoder {
     }
 }
 
-/// Returns `true` if `bytes`, read together after a lone ESC, can only be the rest of a reply.
-/// Typed bytes would not come together in one read.
+/// Returns `true` if `bytes`, the result of one read after a lone ESC, can only be the rest of a
+/// reply. Typed characters would arrive in several reads.
 fn is_reply_without_escape(bytes: &[u8]) -> bool {
     matches!(
         bytes,

@@ -67,7 +67,7 @@ pub enum MouseKind {
     Drag(Button),
     /// A button was released.
     Release(Button),
-    /// The wheel was turned by this number of ticks: negative towards the user, positive away.
+    /// The wheel was turned by this number of ticks: positive away from the user, negative towards.
     Scroll(i32),
 }
 
@@ -96,7 +96,7 @@ pub struct Mouse {
     pub modified: bool,
 }
 
-/// Names of the keys that are not named by their character.
+/// Names of the keys that do not produce a character.
 const NAMED: &[(&str, Code)] = &[
     ("Enter", Code::Enter),
     ("Esc", Code::Esc),

@@ -6,10 +6,10 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::io::{self, Stdin};
 use std::time::{Duration, Instant};
 
-/// Longest pause between ESC and the next byte of its sequence. After a longer pause ESC is the key
-/// Escape.
+/// Longest pause between ESC and the next byte of its sequence. After a longer pause, ESC is the
+/// key Escape.
 const ESCAPE_WAIT: Duration = Duration::from_millis(40);
-/// The longest pause after ESC over SSH, where a sequence can be split between packets.
+/// The same pause over SSH, where a sequence can be split between packets.
 const ESCAPE_WAIT_OVER_SSH: Duration = Duration::from_millis(120);
 
 /// Event with the time at which it was read.
@@ -41,11 +41,11 @@ impl Keyboard {
         }
     }
 
-    /// Waits for events until `deadline`, without limit if it is `None`. Returns an empty list if
-    /// no event has come by then.
+    /// Waits for events until `deadline`; `None` means without limit. Returns an empty list at the
+    /// deadline.
     ///
     /// # Errors
-    /// Fails if the terminal is gone.
+    /// Fails if the terminal is closed.
     pub fn wait(&mut self, deadline: Option<Instant>) -> io::Result<Vec<Timed>> {
         if !self.early.is_empty() {
             return Ok(std::mem::take(&mut self.early));
@@ -77,12 +77,12 @@ impl Keyboard {
         }
     }
 
-    /// Stores events that the next [`Keyboard::wait`] returns.
+    /// Stores events that arrived early, which the next [`Keyboard::wait`] returns.
     pub fn keep(&mut self, early: Vec<Timed>) {
         self.early.extend(early);
     }
 
-    /// Returns `true` if input comes within `wait`. Returns `None` if a signal interrupted the
+    /// Returns `true` if input arrives within `wait`. Returns `None` if a signal interrupted the
     /// wait.
     fn is_ready(&self, wait: Option<Duration>) -> io::Result<Option<bool>> {
         let wait = wait.map(|wait| Timespec {

@@ -65,7 +65,7 @@ pub enum Reply {
     Background([u8; 3]),
     /// Name and version (XTVERSION).
     Version(String),
-    /// Current value of a setting: a valid reply to DECRQSS, which requests one.
+    /// Current value of a setting, in a valid reply to DECRQSS.
     Setting(String),
     /// Reply of kitty's graphics protocol. `true` means `OK`.
     Graphics(bool),

@@ -12,36 +12,36 @@ use crate::terminal::{Event, Reply};
 use std::io;
 use std::time::{Duration, Instant};
 
-/// Longest wait for the replies.
+/// Longest wait for replies.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// The longest wait for the replies over SSH.
+/// Longest wait for replies over SSH.
 const PATIENCE_OVER_SSH: Duration = Duration::from_secs(2);
 
-/// Interval at which the probe checks whether it is to stop.
+/// Interval at which the probe checks if it should stop.
 const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Request of the device attributes (DA1), to which every terminal replies.
 const ATTRIBUTES: &str = "\x1b[c";
-/// Sequences and requests, in this order: set a 24-bit colour, request the colour that is now set
-/// (DECRQSS), restore default colours; request name and version; background colour; mode 2026; the
-/// validation of an image by kitty's protocol, which is not shown; largest number of colours and
-/// largest size of sixel images; size of a cell.
+/// Sequences and requests, in this order: set a 24-bit colour, request the current colour
+/// (DECRQSS), restore default colours; name and version; background colour; mode 2026; test of
+/// kitty's protocol by an image that is not shown; largest number of colours and largest size of
+/// sixel images; size of a cell.
 const REQUESTS: &str = "\x1b[48;2;1;2;3m\x1bP$qm\x1b\\\x1b[0m\x1b[>q\x1b]11;?\x1b\\\x1b[?2026$p\
                          \x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\\x1b[?1;1;0S\x1b[?2;1;0S\x1b[16t";
-/// Requests to the terminal outside tmux: the validation of an image by kitty's protocol; name and
-/// version.
+/// Requests to the terminal outside of tmux: test of kitty's protocol by an image that is not
+/// shown; name and version.
 const REQUESTS_THROUGH_TMUX: &str = "\x1bPtmux;\x1b\x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\x1b\\\x1b\\\
                                       \x1bPtmux;\x1b\x1b[>q\x1b\\";
-/// First version of kitty with Unicode placeholders.
+/// First version of kitty that supports Unicode placeholders.
 const PLACEHOLDERS_SINCE: [u32; 2] = [0, 28];
-/// Notations of the RGB colour 1, 2, 3 in the DECRQSS replies of terminals with 24-bit colour.
+/// RGB colour 1, 2, 3 in the DECRQSS replies of terminals with 24-bit colour.
 const TRUE_COLOR: [&str; 3] = ["2::1:2:3", "2:1:2:3", "2;1;2;3"];
 /// Private mode of synchronised updates.
 const SYNCHRONISED: u16 = 2026;
 
-/// Returns the request of the cursor position, to which a terminal replies once it has processed
-/// all earlier bytes. For the multiplexer `through` the request is wrapped, so that the terminal
-/// outside the multiplexer replies.
+/// Returns the request of the cursor position. A terminal replies when it has processed all earlier
+/// bytes. For the multiplexer `through`, the request is wrapped so that the terminal outside of the
+/// multiplexer replies.
 pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
     match through {
         None => "\x1b[6n",
@@ -50,13 +50,15 @@ pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
     }
 }
 
-/// Probes the terminal. This takes about one round trip, or two inside a multiplexer over SSH. Keys
-/// that are pressed meanwhile are kept in `keyboard`. Inside a local tmux, replies of the terminal
-/// outside tmux may never come; the probe does not wait for them, and the caller passes late ones
-/// to [`Capabilities::learn`]. `is_ending` returns `true` if the probe is to stop.
+/// Probes the terminal. This takes about one round trip, or two inside of a multiplexer over SSH.
+/// Keys that are pressed meanwhile are kept in `keyboard`. `is_ending` returns `true` if the probe
+/// should stop.
+///
+/// Inside of a local tmux, the terminal outside may never reply. The probe does not wait for these
+/// replies; the caller passes late ones to [`Capabilities::learn`].
 ///
 /// # Errors
-/// Fails if the terminal is gone.
+/// Fails if the terminal is closed.
 pub fn probe(
     tty: &Tty,
     keyboard: &mut Keyboard,
@@ -96,7 +98,7 @@ pub fn probe(
     Ok(capabilities)
 }
 
-/// Passes replies to `take`. Ends when `take` returns `true`, `deadline` has passed, or `is_ending`
+/// Passes replies to `take` until `take` returns `true`, `deadline` has passed, or `is_ending`
 /// returns `true`.
 fn listen(
     keyboard: &mut Keyboard,
@@ -120,7 +122,7 @@ fn listen(
 }
 
 impl Capabilities {
-    /// Updates the capabilities by a reply of the terminal.
+    /// Updates the capabilities after a reply of the terminal.
     pub fn learn(&mut self, reply: &Reply) {
         match reply {
             Reply::Attributes(attributes) => {

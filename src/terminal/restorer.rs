@@ -10,23 +10,24 @@ use std::io::{self, Write};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, ChildStdin, Command, Stdio};
 
-/// Program of the shell; `$0` is [`LEAVE`], the other arguments are those of `stty`. It reads a line
-/// at the regular end of this process. The modes are restored only while those of full-screen use
-/// are set: the shell of the user may have restored its own, which process output.
+/// Shell script that restores the terminal; `$0` is [`LEAVE`], the other arguments are those of
+/// `stty`. At its regular end, this process sends a line to the script, which then exits. The
+/// script restores modes only if they are still those of full-screen use, because the user's shell
+/// may have set its own. In that case output is processed (`opost`).
 const PROGRAM: &str = "\
 trap '' INT QUIT TERM HUP TSTP TTIN TTOU
 read -r _ && exit
 case $(stty -a </dev/tty) in *-opost*) stty \"$@\" </dev/tty ;; esac
 printf %s \"$0\" >/dev/tty";
 
-/// Shell that restores the terminal if this process ends without dropping the value.
+/// Shell process that restores the terminal if this process ends without dropping the value.
 pub struct Restorer {
     shell: Child,
     messages: ChildStdin,
 }
 
 impl Restorer {
-    /// Starts the shell, which will restore `modes_before`.
+    /// Starts the shell. It will restore `modes_before`.
     ///
     /// # Errors
     /// Fails if there is no shell.
@@ -45,7 +46,7 @@ impl Restorer {
     }
 }
 
-/// Returns the modes that raw mode changes, as `stty` of POSIX names them.
+/// Returns the modes that raw mode changes, in the notation of POSIX `stty`.
 fn stty_arguments(modes: &Termios) -> Vec<String> {
     let inputs = [
         ("ignbrk", InputModes::IGNBRK),
@@ -77,7 +78,7 @@ fn stty_arguments(modes: &Termios) -> Vec<String> {
 }
 
 impl Drop for Restorer {
-    /// Ends the shell: the terminal is restored already.
+    /// Ends the shell, because the terminal is restored already.
     fn drop(&mut self) {
         let _ = self.messages.write_all(b"\n");
         let _ = self.shell.try_wait();

@@ -17,9 +17,9 @@ use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Command that turns bracketed paste and mouse reports on or off. Reports cover buttons, the wheel
-/// and drags (mode 1002), with decimal coordinates (mode 1006). `EnableMouseCapture` of crossterm
-/// also sets mode 1003, in which every motion is sent over the connection.
+/// Command that enables or disables bracketed paste and mouse reports. Reports cover buttons, the
+/// wheel and drags (mode 1002), with decimal coordinates (mode 1006). `EnableMouseCapture` of
+/// crossterm would also set mode 1003, which reports every motion.
 struct Input {
     is_on: bool,
 }
@@ -61,11 +61,12 @@ pub(crate) fn append(out: &mut String, command: impl Command) {
     command.write_ansi(out).expect("a `String` takes any text");
 }
 
-/// Longest time for which restoration waits until a slow terminal has read the frame being written.
+/// Longest time that restoration waits for a slow terminal to read the frame being written.
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Full-screen use of the terminal. Dropping this value restores the terminal, as does a panic in
-/// any thread. After any other end of the process a `Restorer` does so, if one could be started.
+/// any thread. After any other end of the process, a [`Restorer`] restores it, if one could be
+/// started.
 pub struct Screen {
     tty: Arc<Tty>,
     left: Receiver<()>,
@@ -101,7 +102,7 @@ pub fn cell_px() -> Option<[u16; 2]> {
     Some([cell(size.width, size.columns)?, cell(size.height, size.rows)?])
 }
 
-/// Calls `change`, which changes terminal modes, until no signal interrupts it.
+/// Calls `change`, which changes terminal modes. Repeats the call if a signal interrupts it.
 fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
     loop {
         match change() {
@@ -111,8 +112,8 @@ fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Sets raw mode. crossterm later restores the modes that it finds here, and a shell may have set
-/// its own in the meantime. `modes_before` is therefore set first.
+/// Sets raw mode. crossterm later restores the modes that it finds here. A shell may have set its
+/// own in the meantime; `modes_before` is therefore set first.
 fn set_raw_mode(modes_before: &Termios) -> io::Result<()> {
     uninterrupted(terminal::disable_raw_mode)?;
     uninterrupted(|| Ok(tcsetattr(io::stdin(), OptionalActions::Now, modes_before)?))?;
@@ -158,8 +159,8 @@ impl Screen {
         Ok(screen)
     }
 
-    /// Channel that receives a message when [`Tty::leave`] has restored the terminal, as after a
-    /// panic in another thread.
+    /// Channel that receives a message when [`Tty::leave`] has restored the terminal, for example
+    /// after a panic in another thread.
     pub fn left(&self) -> &Receiver<()> {
         &self.left
     }
@@ -180,7 +181,7 @@ impl Tty {
     /// Writes `bytes` in one call. Does nothing while the terminal is restored.
     ///
     /// # Errors
-    /// Fails if the terminal is gone.
+    /// Fails if the terminal is closed.
     pub fn write(&self, bytes: &[u8]) -> io::Result<()> {
         let mut out = self.out.lock().unwrap_or_else(PoisonError::into_inner);
         if self.entered.load(Ordering::Acquire) {
@@ -190,8 +191,8 @@ impl Tty {
         Ok(())
     }
 
-    /// Sets the bytes that are sent first when the terminal is restored. They replace those of an
-    /// earlier call.
+    /// Sets the bytes that are sent before [`LEAVE`] when the terminal is restored. They replace
+    /// those of an earlier call.
     pub fn set_exit_sequence(&self, bytes: &[u8]) {
         let mut exit_sequence = self.exit_sequence.lock().unwrap_or_else(PoisonError::into_inner);
         exit_sequence.clear();
@@ -230,10 +231,10 @@ impl Tty {
         true
     }
 
-    /// Resumes full-screen use of the terminal, whatever modes other programs have set.
+    /// Resumes full-screen use of the terminal, even if other programs have changed its modes.
     ///
     /// # Errors
-    /// Fails if the terminal is gone.
+    /// Fails if the terminal is closed.
     pub fn resume(&self) -> io::Result<()> {
         if let Some(modes_before) = &self.modes_before {
             set_raw_mode(modes_before)?;
@@ -261,7 +262,7 @@ impl Tty {
 mod tests {
     use super::*;
 
-    /// Writer whose clones share one buffer, so that a test can read the text written by a screen.
+    /// Writer whose clones share one buffer, so that a test can read the output of a screen.
     #[derive(Clone, Default)]
     struct SharedWriter(Arc<Mutex<Vec<u8>>>);
 
@@ -281,8 +282,8 @@ mod tests {
         }
     }
 
-    /// Returns a screen, its output, and a lock. A test that panics would restore the screens of
-    /// other tests; the lock lets only one test at a time have a screen.
+    /// Returns a screen, its output, and a lock. The lock lets only one test at a time have a
+    /// screen, because a panic in one test restores the screens of all tests.
     fn screen() -> (Screen, SharedWriter, MutexGuard<'static, ()>) {
         static TURN: Mutex<()> = Mutex::new(());
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);

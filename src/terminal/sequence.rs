@@ -5,7 +5,7 @@ use crate::terminal::event::{Button, Code, Key, Mouse, MouseKind};
 use crate::terminal::{Event, Reply};
 use vte::{Params, Perform};
 
-/// Interpreter of the characters and sequences into which [`vte::Parser`] divides the input.
+/// Interpreter of characters and sequences: converts the results of [`vte::Parser`] to events.
 #[derive(Debug)]
 pub struct Interpreter {
     /// Events in the order of input.
@@ -14,9 +14,9 @@ pub struct Interpreter {
     pub alt: bool,
     /// `true` if the last UTF-8 character is complete or invalid.
     pub is_character_complete: bool,
-    /// `true` if the last control sequence starts a bracketed paste.
+    /// `true` if the last control sequence begins a bracketed paste.
     pub is_paste: bool,
-    /// `true` if the device control string being parsed was an APC string in the input.
+    /// `true` if the device control string that is being parsed was an APC string in the input.
     pub is_apc: bool,
     /// Reply decoded from the last string.
     pub reply: Reply,
@@ -42,7 +42,7 @@ impl Default for Interpreter {
 }
 
 impl Interpreter {
-    /// Adds a key press.
+    /// Adds the event of a key press.
     pub fn press(&mut self, key: Key) {
         let alt = std::mem::take(&mut self.alt);
         self.events.push(Event::Key(Key { alt: key.alt | alt, ..key }));
@@ -112,8 +112,8 @@ fn character(c: char) -> Option<Key> {
     })
 }
 
-/// Interprets a control sequence. `params` are its parameters with their subparameters.
-/// `intermediates` are its private marker and intermediate bytes. `last` is its final byte.
+/// Interprets a control sequence. `params` are its parameters with their subparameters,
+/// `intermediates` its private marker and intermediate bytes, and `last` its final byte.
 fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Option<Event> {
     let numbers: Vec<_> = params.iter().map(|param| param[0]).collect();
     let reply = match (intermediates, last, &numbers[..]) {
@@ -193,7 +193,7 @@ pub fn x10_mouse(bytes: &[u8]) -> Option<Event> {
     mouse(button, [column, row], is_release).map(Event::Mouse)
 }
 
-/// Returns the key that the final byte of a sequence denotes without parameters.
+/// Returns the key that the final byte of a control sequence denotes.
 fn named(last: char) -> Option<Code> {
     Some(match last {
         'A' => Code::Up,

@@ -61,8 +61,8 @@ const KEYS: &[(&str, &str)] = &[
     ("\x1b[27;5;97~", "Ctrl-a"),
 ];
 
-/// Replies of terminals, including replies to requests that the program does not send. Other
-/// decoders lose or invent keys on them.
+/// Replies of terminals, also to requests that the program does not send. Other decoders lose or
+/// invent keys on them.
 const REPLIES: &[&str] = &[
     "\x1b[?2026;2$y",
     "\x1b[?2026;0$y",
@@ -378,7 +378,7 @@ fn in_pieces(decoder: &mut Decoder, bytes: &[u8], cuts: &[usize]) -> Vec<Event> 
     cuts.windows(2).flat_map(|piece| decoder.take(&bytes[piece[0]..piece[1]])).collect()
 }
 
-/// `vte` alone would decode these sequences differently (see the module `decode`).
+/// Checks sequences that `vte` alone would decode differently (see the module `decode`).
 #[test]
 fn keyboard_sequences_beyond_vte_are_decoded() {
     for (bytes, expected) in [
@@ -422,7 +422,8 @@ proptest! {
         prop_assert_eq!(decoder.patience(), None);
     }
 
-    /// The input mixes sequences, their beginnings and random bytes.
+    /// Checks that the division of the input into reads has no influence. The input mixes
+    /// sequences, their beginnings and random bytes.
     #[test]
     fn any_split_of_any_bytes_yields_the_same_events(
         input in vec(any_input(), 0..40),
@@ -451,7 +452,7 @@ proptest! {
         prop_assert_eq!(after.last().map(String::as_str), Some("q"));
     }
 
-    /// Long pauses separate the sequences.
+    /// Checks that replies produce no keys. Long pauses separate the sequences.
     #[test]
     fn late_replies_produce_no_keys(input in vec(key_or_reply(), 1..40)) {
         let mut decoder = Decoder::new(WAIT);

@@ -13,44 +13,45 @@ pub trait Description {
     /// Keys of the table, in the order of the declaration.
     const FIELDS: &'static [Field];
 
-    /// Checks each value against its field. Callers can add checks that concern several fields.
+    /// Checks each value against its field. Callers can add checks across several fields.
     fn validator(&self) -> Validator;
 }
 
-/// A Rust type that a key of a scene file can have.
+/// A Rust type that values of keys in scene files are read into.
 pub trait FieldValue {
-    /// Type of a default in a declaration, which is written as in a scene file.
+    /// Type of default values in a declaration, which are written as in a scene file.
     type Written;
 
-    /// Type of the value in the table of fields; numbers have the range `FINITE`.
+    /// Type that the table of fields shows. The range of numbers is [`NumberRange::FINITE`] unless
+    /// the declaration gives another.
     const TYPE: ValueType;
 
-    /// Converts a default from a declaration to the type.
+    /// Converts a default value of a declaration to this type.
     ///
     /// # Panics
-    /// If `written` is no value of the type, which is an error in a declaration.
+    /// If `written` is not valid for the type, which is an error in the declaration.
     fn from_written(written: Self::Written) -> Self;
 
-    /// Returns the validation errors of the value; their keys begin with that of `field`.
+    /// Returns the validation errors of the value. Each key begins with the key of `field`.
     fn errors(&self, field: &Field) -> Vec<ValidationError>;
 
-    /// Returns `true` if the key is left out when the value is written.
+    /// Returns `true` if the key is omitted when the value is written to a file.
     fn is_absent(&self) -> bool {
         false
     }
 }
 
-/// Calls [`FieldValue::is_absent`]; serde attributes can name this function.
+/// Calls [`FieldValue::is_absent`]. This function exists for serde attributes, which need a path.
 pub(crate) fn is_absent(value: &impl FieldValue) -> bool {
     value.is_absent()
 }
 
-/// Returns a doc comment, whose lines are joined, without the space after `///`.
+/// Returns the text of a doc comment from `#[doc]` without its leading space.
 pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
     doc.split_at(1).1
 }
 
-/// Implements [`FieldValue`] for types of numbers, which scene files write like Rust does.
+/// Implements [`FieldValue`] for number types, which scene files write as Rust does.
 macro_rules! numeric {
     ($([$($n:ident)?] $type:ty => $value_type:expr, $numbers:expr;)+) => {$(
         impl $(<const $n: usize>)? FieldValue for $type {

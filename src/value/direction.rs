@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-/// Smallest magnitude of the largest component of a vector at which its square keeps full
-/// precision. The inverse is the largest such magnitude.
+/// Lower limit of the largest component (by magnitude) for which the squared length of a vector has
+/// full precision. The reciprocal is the upper limit.
 const MIN_EXACT: f64 = 1e-100;
 
-/// Factor for vectors outside of that range; small vectors are multiplied by it, large ones
-/// divided. It is 2^600, a power of two and therefore exact.
+/// Scale factor for vectors outside of that range: small vectors are multiplied by it, large ones
+/// divided. It is a power of two, 2^600, so that scaling is exact.
 const RESCALE: f64 = f64::from_bits((1023 + 600) << 52);
 
 /// Returns `direction` scaled to length 1; `None` if its length is 0 or not finite.

@@ -22,18 +22,19 @@ pub struct Field {
 /// Default of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DefaultValue {
-    /// The key is required.
+    /// The key has no default: it is required.
     Required,
-    /// A value, as TOML text.
+    /// The key has a default value, given as TOML text.
     Is(&'static str),
-    /// No default value; the phrase describes the result of leaving the key out.
+    /// The key may be omitted and has no default value. The phrase describes the result of omitting
+    /// it.
     Without(&'static str),
 }
 
-/// One word of a fixed set.
+/// One of the words that a key accepts, such as `"ggx"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Choice {
-    /// The word.
+    /// The word, as scene files write it.
     pub name: &'static str,
     /// Help text, a phrase.
     pub doc: &'static str,
@@ -85,7 +86,8 @@ impl Field {
         Self { name, takes, unit, preset: DefaultValue::Required, doc }
     }
 
-    /// Creates a key without a default value; `instead` describes the result of leaving it out.
+    /// Creates a key that may be omitted and has no default value. `instead` describes the result
+    /// of omitting it.
     pub const fn optional(
         name: &'static str,
         takes: ValueType,
@@ -101,7 +103,8 @@ impl Field {
         Self { preset: DefaultValue::Is(value), ..self }
     }
 
-    /// Returns the key without a default value; `instead` describes the result of leaving it out.
+    /// Returns the key as one that may be omitted and has no default value. `instead` describes the
+    /// result of omitting it.
     pub const fn or(self, instead: &'static str) -> Self {
         Self { preset: DefaultValue::Without(instead), ..self }
     }
@@ -132,7 +135,7 @@ impl Field {
 }
 
 impl ValueType {
-    /// Returns the value type with `range` in place of its own.
+    /// Returns the value type with the number range `range`.
     pub const fn within(self, range: NumberRange) -> Self {
         match self {
             Self::Whole(_) => Self::Whole(range),
@@ -144,7 +147,8 @@ impl ValueType {
         }
     }
 
-    /// Returns `other`, the value type that a declaration gives explicitly.
+    /// Returns `other`. Declarations call it to replace the value type of the Rust type by an
+    /// explicit one.
     pub(crate) const fn replaced(self, other: Self) -> Self {
         other
     }

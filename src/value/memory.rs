@@ -3,12 +3,12 @@
 use std::fs;
 use std::path::Path;
 
-/// Memory that this process can still allocate, under the tightest limit.
+/// Memory that this process can still allocate, by the tightest limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Available {
     /// Number of bytes.
     pub bytes: u64,
-    /// The limit, as a noun.
+    /// Name of the limit, as a noun phrase.
     pub limit: &'static str,
 }
 
@@ -24,13 +24,13 @@ pub fn available_memory() -> Option<Available> {
     known.min_by_key(|available| available.bytes)
 }
 
-/// Memory of the program beside the data that callers of [`missing_memory`] count: stacks of threads,
-/// buffers, fragmentation \[bytes\].
+/// Memory \[bytes\] for everything that the callers of [`missing_memory`] do not count: stacks of
+/// threads, buffers, fragmentation.
 const RESERVE: u64 = 32 << 20;
 
-/// Compares `needed` bytes, and a reserve for the rest of the program, with the available memory.
-/// Returns both sums as a phrase if the memory does not suffice, such as `needs 210 MB of memory, and
-/// 88 MB are available (the free memory of this machine)`.
+/// Checks that `needed` bytes and a reserve for the rest of the program are available. Returns
+/// `None` if they are. Otherwise returns a phrase with the needed and the available memory, such as
+/// `needs 210 MB of memory, and 88 MB are available (the free memory of this machine)`.
 pub fn missing_memory(needed: u64) -> Option<String> {
     let Available { bytes, limit } = available_memory()?;
     let needed = needed.saturating_add(RESERVE);
@@ -39,7 +39,7 @@ pub fn missing_memory(needed: u64) -> Option<String> {
         .then(|| format!("needs {sum} of memory, and {available} are available ({limit})"))
 }
 
-/// Physical memory of this process.
+/// Physical memory (resident set) of this process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ResidentMemory {
     /// Bytes at present.
@@ -69,7 +69,7 @@ pub fn address_space_is_limited() -> bool {
     free_address_space().is_some()
 }
 
-/// Address space that the resource limit leaves; `None` without a limit.
+/// Returns the address space that the resource limit leaves; `None` without a limit.
 #[cfg(target_os = "linux")]
 fn free_address_space() -> Option<u64> {
     use rustix::process::{Resource, getrlimit};
@@ -78,21 +78,21 @@ fn free_address_space() -> Option<u64> {
     Some(limit.saturating_sub(1024 * value_of(&status, "VmSize:")?))
 }
 
-/// Address space that the resource limit leaves: unknown on this system.
+/// Returns `None`: on this system the limit of the address space is unknown.
 #[cfg(not(target_os = "linux"))]
 fn free_address_space() -> Option<u64> {
     None
 }
 
-/// Files of one version of control groups.
+/// File names of one version of Linux control groups.
 struct ControlGroupFiles {
     /// Mount point of the memory controller.
     root: &'static str,
-    /// File of the limit \[bytes\].
+    /// Name of the file with the limit \[bytes\].
     limit: &'static str,
-    /// File of the memory in use \[bytes\].
+    /// Name of the file with the memory in use \[bytes\].
     in_use: &'static str,
-    /// Entry of `memory.stat` for pages of files that are not in use.
+    /// Entry of `memory.stat` for file pages that the kernel can reclaim.
     reclaimable: &'static str,
 }
 
@@ -110,15 +110,15 @@ const VERSION_2: ControlGroupFiles = ControlGroupFiles {
     reclaimable: "inactive_file",
 };
 
-/// Memory that the control groups of this process leave.
+/// Returns the memory that the control groups of this process leave.
 fn free_in_own_control_groups() -> Option<u64> {
     let groups = fs::read_to_string("/proc/self/cgroup").ok()?;
     free_in_control_groups(&groups, |path| fs::read_to_string(path).ok())
 }
 
-/// Memory that the control groups of a process leave, each from the group of the process up to the
-/// mount point. `groups` is the text of `/proc/PID/cgroup`; `read` returns the text of a file. Pages
-/// of files that are not in use count as free.
+/// Returns the memory that the control groups of a process leave: the minimum over its own group
+/// and all groups above, up to the mount point. `groups` is the text of `/proc/PID/cgroup`; `read`
+/// returns the text of a file. File pages that the kernel can reclaim count as free.
 fn free_in_control_groups(groups: &str, read: impl Fn(&Path) -> Option<String>) -> Option<u64> {
     let own = groups.lines().filter_map(|line| {
         let mut fields = line.splitn(3, ':');
@@ -145,19 +145,19 @@ fn free_in_control_groups(groups: &str, read: impl Fn(&Path) -> Option<String>) 
     own.filter_map(free).min()
 }
 
-/// Memory and swap of the machine that programs can get without others being stopped.
+/// Returns the memory and swap of the machine that is available without ending other programs.
 fn free_in_machine() -> Option<u64> {
     let statistics = fs::read_to_string("/proc/meminfo").ok()?;
     let kilobytes = |name| value_of(&statistics, name);
     Some(1024 * (kilobytes("MemAvailable:")? + kilobytes("SwapFree:").unwrap_or(0)))
 }
 
-/// Returns the number that `text` begins with.
+/// Returns the number at the beginning of `text`.
 fn first_number(text: &str) -> Option<u64> {
     text.split_whitespace().next()?.parse().ok()
 }
 
-/// Returns the number after the word `name` at the beginning of a line.
+/// Returns the number after the word `name`, which is at the beginning of a line.
 fn value_of(text: &str, name: &str) -> Option<u64> {
     let line = text.lines().find(|line| line.split_whitespace().next() == Some(name))?;
     line.split_whitespace().nth(1)?.parse().ok()

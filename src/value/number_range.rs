@@ -5,11 +5,11 @@ use std::fmt;
 /// An interval of finite numbers; NaN and the infinities are outside of every interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NumberRange {
-    /// Lower bound; negative infinity if there is none.
+    /// Lower bound; negative infinity for none.
     pub low: f64,
     /// `true` if `low` belongs to the interval.
     pub low_in: bool,
-    /// Upper bound; infinity if there is none.
+    /// Upper bound; infinity for none.
     pub high: f64,
     /// `true` if `high` belongs to the interval.
     pub high_in: bool,
@@ -29,7 +29,7 @@ impl NumberRange {
     /// A fraction: from 0 to 1.
     pub const SHARE: Self = Self::closed(0.0, 1.0);
 
-    /// A coefficient or a channel of a body colour: from 0 to 1e6, because sums above 1 are valid.
+    /// A coefficient or a channel of a surface colour: from 0 to 1e6. Values above 1 are allowed.
     pub const COEFFICIENT: Self = Self::closed(0.0, 1e6);
     /// An amount of light: from 0 to 1e15.
     pub const LIGHT: Self = Self::closed(0.0, 1e15);
@@ -57,7 +57,7 @@ impl NumberRange {
     }
 }
 
-/// Formats the interval as the end of the phrase `a number ...`: `from 0 to 1`.
+/// Formats the interval to complete the phrase `a number ...`: `from 0 to 1`.
 impl fmt::Display for NumberRange {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let (low, high) = (number(self.low), number(self.high));
@@ -79,8 +79,8 @@ impl fmt::Display for NumberRange {
     }
 }
 
-/// Formats a number in short form: `0.5`, `-3`, `1e9`, `NaN`; numbers below 1e-4 and from 1e6 have an
-/// exponent.
+/// Formats a number in short form: `0.5`, `-3`, `1e9`, `NaN`. Numbers below 1e-4 and from 1e6 have
+/// an exponent.
 pub fn number(x: f64) -> String {
     let plain = x == 0.0 || !x.is_finite() || (1e-4..1e6).contains(&x.abs());
     if plain { format!("{x}") } else { format!("{x:e}") }

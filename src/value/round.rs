@@ -1,7 +1,7 @@
 //! Rounding of computed numbers to short decimals.
 
 /// Rounds `x` to a multiple of 10^`exponent`. The result is the floating-point number nearest to
-/// that decimal, never `-0`.
+/// that decimal number. It is never `-0`.
 pub fn rounded_to(x: f64, exponent: i32) -> f64 {
     if !x.is_finite() {
         return x;
@@ -21,7 +21,8 @@ pub fn round_significant(x: f64, digits: usize) -> f64 {
     if x.is_finite() { format!("{x:.*e}", digits.max(1) - 1).parse().unwrap_or(x) } else { x }
 }
 
-/// Returns the exponent of the largest power of ten not above |`x`|; 0 if `x` is 0 or not finite.
+/// Returns the exponent of the largest power of ten that is at most |`x`|; 0 if `x` is 0 or not
+/// finite.
 pub fn floor_log10(x: f64) -> i32 {
     if x == 0.0 || !x.is_finite() {
         return 0;
@@ -30,8 +31,8 @@ pub fn floor_log10(x: f64) -> i32 {
     format!("{:e}", x.abs()).rsplit_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0)
 }
 
-/// Rounds the coordinate `x` of a scene of size `scale` to a ten-thousandth of the power of ten at or
-/// below `scale`.
+/// Rounds the coordinate `x` of a scene of size `scale`. The step is a ten-thousandth of the
+/// largest power of ten that is at most `scale`.
 pub fn round_nice(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 4)
 }

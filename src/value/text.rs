@@ -21,9 +21,9 @@ pub fn sanitized(text: &str) -> String {
     out
 }
 
-/// Returns `true` for format characters (Unicode category Cf, and the line and paragraph separators).
-/// Format characters reorder or hide text, so that a name on screen would differ from that in the
-/// file.
+/// Returns `true` for Unicode format characters (category Cf) and for line and paragraph
+/// separators. They reorder or hide text, so that a displayed name would differ from the name in
+/// the file.
 fn controls_terminal(c: char) -> bool {
     matches!(c,
         '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
@@ -31,7 +31,7 @@ fn controls_terminal(c: char) -> bool {
         | '\u{e0000}'..='\u{e007f}')
 }
 
-/// Returns the first 40 characters of `text`, sanitised, with an ellipsis if there are more.
+/// Returns the first 40 characters of `text`, sanitised. An ellipsis follows if there are more.
 pub fn truncated(text: &str) -> String {
     let mut remaining = text.char_indices().skip(40);
     match remaining.next() {

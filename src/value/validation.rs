@@ -20,8 +20,8 @@ impl ValidationError {
         Self { key: key.to_string(), found: found.into(), expected: expected.into() }
     }
 
-    /// Returns the error with `outer` before its key. `outer` is the key whose value the
-    /// description is.
+    /// Returns the error with `outer` before its key. `outer` is the key that has the description
+    /// as its value.
     pub fn prefixed(mut self, outer: &str) -> Self {
         self.key =
             if self.key.is_empty() { outer.to_string() } else { format!("{outer}.{}", self.key) };

@@ -39,7 +39,7 @@ pub enum AnyWorld {
     Double(World<Double>),
 }
 
-/// Evaluates an expression with `$world` bound to the typed world of an [`AnyWorld`].
+/// Evaluates an expression with `$world` bound to the [`World`] of an [`AnyWorld`].
 macro_rules! dispatch {
     ($any:expr, $world:ident => $value:expr) => {
         match $any {
@@ -107,8 +107,8 @@ impl AnyWorld {
         dispatch!(self, world => world.scales.clone())
     }
 
-    /// Weight of each light group in the picture of `scene`, which may differ from the compiled
-    /// scene in colours, intensities and switches of lights.
+    /// Weight of each light group in the picture of `scene`. The scene may differ from the compiled
+    /// one in colours, intensities and switches of lights.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         dispatch!(self, world => world.groups.mix(scene))
     }

@@ -67,7 +67,7 @@ mod tests {
     /// Checks the clearance of stretched shapes (needles and sheets) against the distance to many
     /// points on their surfaces.
     #[test]
-    fn stretched_things_are_no_nearer_and_no_farther_than_their_points() {
+    fn clearance_of_stretched_shapes_matches_sampled_distance() {
         let shapes = [
             "sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }",
             "cylinder = { base = [0.0, -1.0, 0.0], top = [0.0, 1.0, 0.0], radius = 1.0 }",

@@ -14,17 +14,17 @@ use glam::DVec3;
 /// remaining ones share the last group.
 const MAX_LIGHT_GROUPS: usize = 8;
 
-/// Largest number of light groups: the groups of lights, one for ambient light and one for the
-/// background.
+/// Largest number of light groups: those of lights and emissive materials, one for ambient light,
+/// and one for the background.
 pub const MAX_GROUPS: usize = MAX_LIGHT_GROUPS + 2;
 
-/// Size of the film's sums above which lights share groups \[bytes\].
+/// Size of the film's sums in bytes up to which every light has a group of its own.
 const FILM_BYTES: u64 = 1 << 30;
 
 /// Bytes per pixel and light group: two replicates of three channels.
 const GROUP_BYTES: u64 = 2 * 3 * 8;
 
-/// Origin of the light in one group.
+/// Source of the light in one light group.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LightGroupSource {
     /// Ambient light.
@@ -40,7 +40,7 @@ pub enum LightGroupSource {
 }
 
 impl LightGroupSource {
-    /// Returns the lights and materials of the group; empty for ambient light and background.
+    /// Returns the lights and materials in the group; empty for ambient light and background.
     pub fn emitting(&self) -> &[Self] {
         match self {
             Self::Ambient | Self::Background => &[],
@@ -59,7 +59,7 @@ impl LightGroupSource {
     }
 }
 
-/// Light groups of a scene. Groups that are black in every sample are left out.
+/// Light groups of a scene, except for groups that would be black in every sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightGroups {
     /// Source of each group, in the order of the film.
@@ -74,9 +74,9 @@ impl LightGroups {
     /// Creates the light groups of `scene`. If `merge_lights` is `true`, all lights share one
     /// group.
     ///
-    /// `lit` is `true` if some surface reflects direct light, `ambient` if some surface reflects
-    /// ambient light. A light that no surface reflects has a group only if the light itself is
-    /// visible.
+    /// `lit` is `true` if some surface reflects direct light, and `ambient` if some surface
+    /// reflects ambient light. A light that no surface reflects has a group only if the camera can
+    /// see it.
     pub fn new(scene: &Scene, (lit, ambient): (bool, bool), merge_lights: bool) -> Self {
         let mut members = Vec::new();
         if ambient && scene.ambient.color != Color::BLACK {
@@ -110,7 +110,8 @@ impl LightGroups {
         Self { members, lit, ambient }
     }
 
-    /// Returns the number of groups if all lights and emissive materials share one.
+    /// Returns the number of groups that would remain if all lights and emissive materials shared
+    /// one.
     pub fn merged_count(&self) -> usize {
         let lights = self.members.iter().filter(|member| !member.emitting().is_empty()).count();
         self.members.len() - lights.saturating_sub(1)
@@ -160,10 +161,9 @@ impl LightGroups {
         out
     }
 
-    /// Returns the factor for red, green and blue by which the sums of each group are multiplied in
-    /// the picture of `scene`. Compared with the compiled scene, `scene` may have other colours,
-    /// intensities and on/off switches of lights, emission of materials, ambient light and
-    /// background.
+    /// Returns the red, green and blue factor by which the sums of each group are multiplied in the
+    /// picture of `scene`. It may differ from the compiled scene in colours, intensities and on/off
+    /// switches of lights, emission of materials, ambient light and background.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         let weight = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => scene.ambient.color.0,

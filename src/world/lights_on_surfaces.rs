@@ -11,22 +11,22 @@ use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::Form;
 use glam::DVec3;
 
-/// Largest distance between a light and a surface at which the light is treated as on the surface,
-/// in rounding errors of the largest coordinate.
+/// Largest distance from a surface at which a light is treated as on the surface, in rounding
+/// errors of the largest coordinate.
 const ON: f64 = 8.0;
 
 /// Height above the surface at which shadow rays end, in rounding errors of the largest coordinate.
 const LIFT: f64 = 16.0;
 
-/// Largest factor by which the distance between light and end point exceeds the height above the
-/// surfaces. At a sharp edge the end point is farther from the light, so that it clears both sides
-/// of the edge.
+/// Largest distance between light and end point, as a multiple of the height above the surfaces. At
+/// a sharp edge the end point must be farther from the light to clear both sides of the edge.
 const SHARPEST: f64 = 4.0;
 
 /// A light and the surfaces that contain its position.
 pub(super) struct OnSurface<S> {
     position: [S; 3],
-    /// Unit normals at the light, one list for each convex solid, flat shape or mesh.
+    /// Unit normals of the surfaces at the light, one list for each convex solid, flat shape or
+    /// mesh.
     solids: Vec<Vec<[S; 3]>>,
     lift: S,
 }

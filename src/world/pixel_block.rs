@@ -25,7 +25,7 @@ pub(super) struct PixelBlock<S> {
 }
 
 impl<S: Float> PixelBlock<S> {
-    /// Creates the block of `pixels`, given as column and row, in one replicate.
+    /// Creates the block of `pixels` (column, row) in one replicate.
     pub fn new<L: SimdFloat<Scalar = S>>(
         camera: &PerspectiveCamera,
         sampler: &Sampler<L>,
@@ -60,7 +60,7 @@ impl<S: Float> PixelBlock<S> {
         out
     }
 
-    /// Number of pixels.
+    /// Number of pixels in the block.
     pub fn len(&self) -> usize {
         self.count
     }

@@ -28,8 +28,8 @@ const MAX_EXTENT_PER_GAP: f64 = 131_072.0;
 /// eye. At this ratio the side is 32 ray offsets.
 const MAX_EXTENT_PER_PIXEL: f64 = 32_768.0;
 
-/// Factor by which the eye may be closer to flat objects than to curved ones. Planes allow it
-/// because hit points are projected back to the plane almost exactly and the normal is constant.
+/// Factor by which the eye may be closer to flat objects than to curved ones. On planes, hit points
+/// are projected back almost exactly and the normal is constant.
 const FLAT: f64 = 8.0;
 
 /// Largest ratio of scene extent to the distance of a light from objects. At this ratio the ray
@@ -41,18 +41,18 @@ const MAX_EXTENT_PER_LIGHT_DISTANCE: f64 = 2048.0;
 /// focus.
 const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 
-/// Smallest ratio of a gap to the scene extent, 2^-44, at which two surfaces are separate. Surfaces
-/// with a smaller gap, or with a gap below 16 rounding errors of the scene file's coordinates, are
-/// treated as coincident.
+/// Smallest width of a gap, as a fraction of the scene extent, at which two surfaces are separate:
+/// 2^-44. Surfaces with a narrower gap, or with one below 16 rounding errors of the scene file's
+/// coordinates, are treated as coincident.
 const COINCIDENT_GAP: f64 = 1.0 / 17_592_186_044_416.0;
 
-/// Largest number of pairs of objects that are searched for gaps. The search stops there, to bound
+/// Largest number of pairs of objects that are searched for gaps. The search ends there, to limit
 /// its time, and reports no gap.
 const MOST_PAIRS: usize = 1 << 20;
 
-/// Returns `true` if `scene` renders as well in single precision as in double precision. `forms`
-/// are all objects, in coordinates relative to `origin`. `extent` is the largest magnitude of a
-/// coordinate of the objects and the lens in that frame.
+/// Returns `true` if `scene` renders as accurately in single precision as in double precision.
+/// `forms` are all objects, in coordinates relative to `origin`. `extent` is the largest magnitude
+/// of these coordinates of the objects and the lens.
 pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
     let thinnest = forms.iter().map(Form::thickness).fold(f64::INFINITY, f64::min);
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
@@ -99,15 +99,15 @@ fn are_near(a: &Proxy, b: &Proxy, limit: f64) -> bool {
 /// Gap between two faces of different objects, at the point where they are closest.
 struct Clearance {
     width: f64,
-    /// Closest point, and the radius of a sphere whose distance to a plane grows like the distance
-    /// between the two faces. `None` if the faces are parallel planes.
+    /// Closest point, and the radius of a sphere above a plane whose gap widens like this one.
+    /// `None` if the faces are parallel planes.
     round: Option<(DVec3, f64)>,
 }
 
 impl Clearance {
     /// Returns `true` if the width of the gap is within `narrow` and the narrow region is wider
-    /// than a pixel. `pixel` returns the side of a pixel's footprint at a point. A sphere that
-    /// touches another sphere or a floor is close to it only in a spot that is too small to see.
+    /// than a pixel. `pixel` returns the side of a pixel's footprint at a point. A sphere on a
+    /// floor or on another sphere is close to it only in a spot that is too small to see.
     fn is_seen(&self, narrow: &Range<f64>, pixel: &impl Fn(DVec3) -> f64) -> bool {
         let wide =
             |(place, radius): (DVec3, f64)| (2.0 * radius * narrow.end).sqrt() > 0.5 * pixel(place);

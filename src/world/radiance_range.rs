@@ -32,13 +32,13 @@ use crate::world::compile::RecenteredGeometry;
 use glam::DVec3;
 use std::f64::consts::{FRAC_1_PI, PI};
 
-/// Number of bits of a sample of typical radiance.
+/// Number of bits of a sample with the typical radiance.
 const TYPICAL_BITS: f64 = 28.0;
 
-/// Smallest number of bits of a sample in the brightest spot of the dimmest surface.
+/// Smallest number of bits of a sample at the brightest spot of the dimmest surface.
 const DIM_BITS: f64 = 16.0;
 
-/// Largest number of bits of the radiance that can fill a whole pixel.
+/// Largest number of bits of a sample with a radiance that can fill a whole pixel.
 const BRIGHT_BITS: f64 = 44.0;
 
 /// Largest number of bits of a single sample.
@@ -47,25 +47,25 @@ const SAMPLE_BITS: f64 = 49.0;
 /// Largest number of bits by which the scale is lowered for spots smaller than a pixel.
 const SPOT_BITS: f64 = 12.0;
 
-/// Radiance of a light group's samples at different places of the scene.
+/// Range of the radiance of a light group's samples, by places in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RadianceRange {
     /// Radiance of a white surface in the middle of the scene.
     pub typical: f64,
-    /// Radiance of the brightest spot of the surface that reflects the least light.
+    /// Radiance of the brightest spot on the surface that reflects the least light.
     pub dimmest: f64,
-    /// Radiance of the brightest spot of the surface that reflects the most light. Spots smaller
-    /// than a quarter of a pixel are left out.
+    /// Radiance of the brightest spot on the surface that reflects the most light. Spots smaller
+    /// than a quarter of a pixel are ignored.
     pub brightest: f64,
-    /// Radiance of the brightest spot, however small.
+    /// Radiance of the brightest spot, including the smallest ones.
     pub spots: f64,
     /// Largest radiance of highlights, and of light amplified by mirrors.
     pub extreme: f64,
 }
 
 impl RadianceRange {
-    /// Returns the range for light of another intensity: `least` is its factor in the darkest
-    /// channel, `most` in the brightest channel.
+    /// Returns the range for light with another emission. `least` and `most` are its factors in the
+    /// darkest and in the brightest channel.
     pub fn times(self, least: f64, most: f64) -> Self {
         Self {
             typical: self.typical * most,
@@ -76,7 +76,7 @@ impl RadianceRange {
         }
     }
 
-    /// Returns the range that covers `self` and `other`, two light sources that share a group.
+    /// Returns the range that covers `self` and `other`, the ranges of two sources in one group.
     pub fn or(self, other: Self) -> Self {
         Self {
             typical: self.typical.max(other.typical),
@@ -105,7 +105,7 @@ impl RadianceRange {
 }
 
 /// Returns the smallest integer `n` with 2^n >= `x`, computed from the bits of `x`. If `x` is
-/// multiplied by 2^k, the result grows by exactly k.
+/// multiplied by 2^k, the result is larger by exactly k.
 fn ceil_log2(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return -1022.0;
@@ -115,10 +115,10 @@ fn ceil_log2(x: f64) -> f64 {
     floor + f64::from(u8::from(bits << 12 != 0))
 }
 
-/// Factors by which the materials of an object reflect light, relative to a white matt surface.
+/// Factors by which the materials of an object reflect light, relative to a white diffuse surface.
 #[derive(Clone, Copy, Debug)]
 struct Response {
-    /// Smallest factor of a channel that is not black.
+    /// Smallest factor over all channels that are not black.
     least: f64,
     /// Largest factor outside of highlights, over all channels.
     most: f64,
@@ -155,7 +155,7 @@ fn least_of(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
     numbers.into_iter().filter(|x| *x > 0.0).reduce(f64::min)
 }
 
-/// Properties of a scene, apart from its lights, that determine the range of radiance.
+/// Properties of a scene without its lights that determine the range of radiance.
 pub(super) struct SceneDistances<'a> {
     forms: &'a [Form],
     /// Response of each object to direct light, over all its parts. `None` if it reflects none.
@@ -166,7 +166,7 @@ pub(super) struct SceneDistances<'a> {
     faintest: f64,
     /// Largest product of the factors of all mirrors on a path; at least 1.
     gain: f64,
-    /// Radius around the scene's centre at which the irradiance of a light counts as typical.
+    /// Radius around the scene's centre at which the irradiance of a light is taken as typical.
     radius: f64,
     /// Position of the eye, and the side of a pixel at unit distance from it.
     eye: (DVec3, f64),
@@ -304,8 +304,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Range of the light of a surface that is inside of the given ball. `area` is the area of the
-    /// surface, `emitted` its radiance. `visible` is `true` if the camera and mirrors see it.
+    /// Range of the light of a surface inside of the given ball. `area` is the area of the surface,
+    /// and `emitted` is its radiance. `visible` is `true` if the camera and mirrors see it.
     fn emitting_surface(
         &self,
         (center, radius): (DVec3, f64),
@@ -377,8 +377,8 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the range of light with the typical radiance `light`, at surfaces that multiply it
-    /// by a factor from `least` to `most`, and by `peak` in highlights.
+    /// Returns the range of light with the typical radiance `light`. Surfaces multiply it by
+    /// factors from `least` to `most`, and by `peak` in highlights.
     fn range_of(&self, light: f64, (least, most, peak): (f64, f64, f64)) -> RadianceRange {
         RadianceRange {
             typical: light,

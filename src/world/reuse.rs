@@ -13,10 +13,10 @@ use crate::world::light_groups::{LightGroupSource, LightGroups, contributes};
 use std::borrow::Cow;
 
 impl LightGroups {
-    /// Returns `true` if the samples of the scene `compiled` are valid for `scene` with other group
-    /// weights. `self` has the groups of `compiled`. The scenes may differ in names, in unused
-    /// materials, in the cap on rays per pixel, and in the emission of sources that have a group of
-    /// their own.
+    /// Returns `true` if the samples of the scene `compiled` are valid for `scene`, after a change
+    /// of group weights alone. `self` has the groups of `compiled`. The scenes may differ in names,
+    /// in unused materials, in the cap on rays per pixel, and in the emission of sources that have
+    /// a group of their own.
     pub fn can_reuse(&self, compiled: &Scene, scene: &Scene) -> bool {
         let Scene {
             film,
@@ -83,7 +83,7 @@ impl LightGroups {
     }
 
     /// Returns `true` if two materials are equal except for their emission. The emission may differ
-    /// only if a group with the material's name scales it.
+    /// only if the material has a light group, which scales it.
     fn same_material(
         &self,
         (compiled, name_a): (&Scene, &str),

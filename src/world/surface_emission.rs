@@ -20,7 +20,8 @@ use std::collections::{HashMap, HashSet};
 /// single precision.
 const MAX_TRIANGLES: usize = 1 << 16;
 
-/// Emission of an object, with its light group. `None`: points of the object cannot be sampled.
+/// Emission of an object, with its light group. The emitter is `None` if points of the object
+/// cannot be sampled.
 pub(super) type EmissiveSource<S> = LightSource<Option<ObjectEmitter<S>>, S>;
 
 /// Emission of all objects of a world. Empty if no object emits light.
@@ -84,7 +85,8 @@ impl<S: Float> SurfaceEmission<S> {
         self.sources.is_empty()
     }
 
-    /// Number of emissive objects from which light is sampled, and of the other emissive objects.
+    /// Number of emissive objects from which light is sampled, and number of other emissive
+    /// objects.
     pub fn counts(&self) -> [usize; 2] {
         [self.sampled, self.sources.len() - self.sampled]
     }
@@ -96,8 +98,8 @@ impl<S: Float> SurfaceEmission<S> {
         Some(&self.sources[source? as usize])
     }
 
-    /// Returns the emitter with the given index among those from which light is sampled, and its
-    /// source (light group and emission).
+    /// Returns emitter number `index` among those from which light is sampled, and its source
+    /// (light group and emission).
     #[inline(always)]
     pub fn sampled(&self, index: usize) -> Option<(&ObjectEmitter<S>, &EmissiveSource<S>)> {
         let source = self.sources[..self.sampled].get(index)?;

@@ -10,7 +10,7 @@ use crate::world::pixel_block::PixelBlock;
 use crate::world::world::World;
 use std::ops::Range;
 
-/// A world and the sample sequence of a picture. It creates the [`TileTracer`]s.
+/// A world and the sample sequence of a picture, from which [`TileTracer`]s are created.
 pub struct CameraTracer<'a, L: SimdFloat> {
     world: &'a World<L>,
     sampler: Sampler<L>,
@@ -110,7 +110,7 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         }
     }
 
-    /// Returns the number of rays traced so far, and if reflections were random.
+    /// Returns the number of rays traced so far, and if choices were random.
     pub fn counts(&self) -> Counts {
         self.counts
     }
@@ -139,7 +139,7 @@ impl<L: SimdFloat> TileTracer<'_, L> {
     }
 }
 
-/// Pixels and sample indices of a traced packet.
+/// Pixels and sample indices in the lanes of a traced packet.
 pub struct TracedPacket<'a, S> {
     block: &'a PixelBlock<S>,
     /// Pixels of the packet, as indices into the pixels of the tracer.

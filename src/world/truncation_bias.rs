@@ -38,7 +38,7 @@ fn max_diffuse_albedo(material: &Material, object: &Object) -> f64 {
     if albedo > 0.0 { albedo * factor } else { 0.0 }
 }
 
-/// Properties of an object's geometry that determine the bound of the bias.
+/// Geometric properties of an object that determine the bound of the bias.
 struct ObjectTraits {
     flat: bool,
     /// `true` if a ray that leaves the object outwards may hit it again.
@@ -47,7 +47,7 @@ struct ObjectTraits {
     contains_eye: bool,
 }
 
-/// Largest displacement of the eye by rounding to single precision, as a ratio to the scene's
+/// Largest displacement of the eye by rounding to single precision, as a fraction of the scene's
 /// extent.
 const ROUNDING: f64 = 1e-6;
 
@@ -70,7 +70,7 @@ impl ObjectTraits {
     }
 
     /// Returns `true` if a path may hit the object at two consecutive vertices. A ray that leaves a
-    /// convex form outwards cannot hit it again. Rays inside of the form can, and paths are inside
+    /// convex form outwards cannot hit it again. Rays inside of the form can, but paths are inside
     /// only if they start there or are transmitted. Bump maps make no difference: a reflected
     /// direction that would point into the surface is mirrored out of it, and a transmitted
     /// direction that would point out is mirrored into it.
@@ -81,7 +81,7 @@ impl ObjectTraits {
 }
 
 /// Largest factors by which surfaces of the scene multiply the throughput of a path. They bound the
-/// light that truncation loses.
+/// radiance that truncation loses.
 #[derive(Clone, Copy)]
 struct Reach {
     /// Largest factor of one surface.
@@ -125,14 +125,14 @@ impl Reach {
         Self { first, round_trip_albedo, through }
     }
 
-    /// Returns the largest total throughput of the paths that have hit `n` surfaces.
+    /// Returns the largest possible sum of the throughputs of the paths that have hit `n` surfaces.
     fn weight(&self, n: u32) -> f64 {
         let pairs = self.round_trip_albedo.powi(i32::try_from(n / 2).unwrap_or(i32::MAX));
         if n.is_multiple_of(2) { pairs } else { pairs * self.first }
     }
 
-    /// Returns the largest total throughput of the paths that have hit at least `n` surfaces;
-    /// infinite if there is no bound.
+    /// Returns the largest possible sum of the throughputs of the paths that have hit at least `n`
+    /// surfaces; infinite if there is no bound.
     fn from(&self, n: u32) -> f64 {
         let sum = self.weight(n) + self.weight(n.saturating_add(1));
         if self.round_trip_albedo < 1.0 {
@@ -142,18 +142,18 @@ impl Reach {
         }
     }
 
-    /// Returns the largest total throughput of the paths that end because their throughput is below
-    /// `least`, in a scene with up to `bounces` diffuse bounces and `depth` surfaces per generation
-    /// (the part of a path between two diffuse bounces).
+    /// Returns the largest possible sum of the throughputs of paths that end because their
+    /// throughput is below `least`. The scene has up to `bounces` diffuse bounces, and `depth`
+    /// surfaces per generation (the part of a path between two diffuse bounces).
     fn ended_by_generation(&self, least: f64, depth: u32, bounces: u32) -> f64 {
         let rest = if self.through { 8.0 * least * f64::from(depth) } else { least };
         (least + rest) * (f64::from(bounces) + 1.0)
     }
 
-    /// Returns the largest total throughput of the paths that end because their throughput is below
-    /// `least`, at up to `depth` surfaces after the first. A path that never splits ends once.
-    /// Among split paths, each surface ends at most two branches of each of at most four
-    /// simultaneous paths.
+    /// Returns the largest possible sum of the throughputs of paths that end because their
+    /// throughput is below `least`, at up to `depth` surfaces after the first. A path that never
+    /// splits ends once. If paths split, each surface ends at most two branches of each of at most
+    /// four simultaneous paths.
     fn ended(&self, least: f64, depth: u32) -> f64 {
         if !self.through {
             return least;
@@ -165,24 +165,26 @@ impl Reach {
 /// Returns one sentence for each limit of `scene` that truncates paths, with a bound of the lost
 /// radiance. Returns no sentence if the limits truncate nothing.
 ///
-/// Two consecutive surfaces multiply the throughput by at most r, the `round_trip_albedo`. Let f be
-/// the largest factor of one surface. The paths that have hit n surfaces therefore have a total
-/// throughput of at most w(n) = r^(n/2) for even n, and w(n) = r^((n-1)/2) f for odd n. The total
-/// over n and all larger numbers is at most (w(n) + w(n + 1)) / (1 - r). The lost radiance is at
-/// most this total times the radiance of the brightest surface, light with a size, or background. Nothing is truncated only if no surface reflects or transmits, or if the only one
-/// that does is flat or convex, which a path hits once.
+/// Two consecutive surfaces multiply the throughput by at most r, the `round_trip_albedo`. f is the
+/// largest factor of one surface. The throughputs of the paths that have hit n surfaces therefore
+/// sum up to at most w(n) = r^(n/2) for even n, and w(n) = r^((n-1)/2) f for odd n. The sum over n
+/// and all larger numbers is at most (w(n) + w(n + 1)) / (1 - r). The lost radiance is at most this
+/// sum times the radiance of the brightest surface, light with a size, or background. Nothing is
+/// truncated only if no surface reflects or transmits, or if the only one that does is flat or
+/// convex, which a path hits once.
 ///
-/// The emission of some objects is found only by rays that hit them: matt surfaces lack their light if
-/// there are no diffuse bounces.
+/// The emission of some objects is found only by rays that hit them. Without diffuse bounces,
+/// diffuse surfaces lack their light.
 ///
-/// With diffuse bounces the factor of a surface includes its diffuse albedo. A path is cut off by
-/// `max_depth` after at least as many surfaces, by `max_diffuse_depth` after one surface more than
-/// bounces, and by `caustics = false` after two. Without diffuse bounces, ambient light stands for
-/// all indirect light; that is no truncation.
+/// With diffuse bounces the factor of a surface includes its diffuse albedo. `max_depth` ends a
+/// path after at least as many surfaces, `max_diffuse_depth` after one surface more than bounces,
+/// and `caustics = false` after two surfaces. Without diffuse bounces, ambient light stands for all
+/// indirect light; that is no truncation.
 ///
-/// Total internal reflection in a transparent ball is included in the bound, although the angle of
-/// incidence is the same at every hit and light that entered can also leave. At the rim rounding
-/// decides on which side of the critical angle a ray is, and bump maps change the angle.
+/// Total internal reflection in a transparent ball is included in the bound, although light that
+/// can enter a ball can also leave it, because the angle of incidence is the same at every hit. At
+/// the rim, rounding decides on which side of the critical angle a ray is, and bump maps change the
+/// angle.
 pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
     if scene.trace.ray_types < RayTypes::Full {
         return Vec::new();

@@ -11,23 +11,23 @@ use std::collections::HashMap;
 /// Largest absolute value of a coordinate.
 const MAX_COORDINATE: f64 = 1e9;
 
-/// Smallest extent of a mesh. It is chosen so that products of three single-precision coordinates
-/// are normal numbers, not subnormal ones.
+/// Smallest extent of a mesh. At this extent, products of three single-precision coordinates are
+/// still normal numbers.
 const MIN_EXTENT: f64 = 1e-9;
 
-/// Largest absolute value of a coordinate, in multiples of the extent of the mesh, up to which
-/// positions are stored relative to the origin. Positions of meshes farther away are stored
-/// relative to the centre of the mesh.
+/// Largest absolute value of a coordinate, in multiples of the mesh's extent, for positions
+/// relative to the origin. Positions of meshes farther away are stored relative to the centre of
+/// the mesh.
 const MAX_OFFSET: f64 = 16.0;
 
 /// A mesh under construction.
 pub struct Builder<'a> {
     source: &'a FileContents,
     positions: Vec<[f64; 3]>,
-    /// Normals of the first vertices. The list may be shorter than `positions`. A vertex without a
-    /// normal has the zero vector.
+    /// Normals of the vertices, in order. The list may be shorter than `positions`. The zero vector
+    /// means no normal.
     normals: Vec<[f32; 3]>,
-    /// Texture coordinates of the first vertices. The list may be shorter than `positions`.
+    /// Texture coordinates of the vertices, in order. The list may be shorter than `positions`.
     uvs: Vec<[f32; 2]>,
     triangles: Vec<[u32; 3]>,
     colors: Vec<[f32; 3]>,
@@ -52,8 +52,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Reserves memory for this many more vertices and triangles. The caller has compared the
-    /// numbers with the length of the file.
+    /// Reserves memory for further vertices and triangles. The caller has checked that the file is
+    /// long enough for them.
     ///
     /// # Errors
     /// Fails if the mesh would exceed a limit, or there is not enough memory.
@@ -66,7 +66,7 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// Checks that the mesh may have this many more vertices and triangles.
+    /// Checks that this number of further vertices and triangles is within the limits.
     ///
     /// # Errors
     /// Fails if the mesh would exceed a limit.
@@ -124,8 +124,8 @@ impl<'a> Builder<'a> {
         !self.colors.is_empty()
     }
 
-    /// Sets the linear base colour of the triangles that follow. Triangles before the first call
-    /// are white.
+    /// Sets the linear base colour of the triangles added from now on. Triangles before the first
+    /// call are white.
     ///
     /// # Errors
     /// Fails if there are more than 65536 colours.
@@ -338,8 +338,8 @@ impl<'a> Builder<'a> {
         Some(normals)
     }
 
-    /// Returns the texture coordinates. Vertices without them have zero. Returns `None` if the file
-    /// has none at all.
+    /// Returns the texture coordinates. Vertices without texture coordinates get zero. Returns
+    /// `None` if the file has none.
     ///
     /// # Errors
     /// Fails if a texture coordinate is not finite.

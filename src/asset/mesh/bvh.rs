@@ -28,7 +28,8 @@ pub struct Mesh {
     smooth: OnceLock<Vec<[f32; 3]>>,
 }
 
-/// Compares identity: two meshes that were read from the same file are different.
+/// Two values are equal only if they are the same allocation: meshes that were read twice from one
+/// file differ.
 impl PartialEq for Mesh {
     fn eq(&self, other: &Self) -> bool {
         std::ptr::eq(self, other)
@@ -88,7 +89,7 @@ impl Mesh {
         &self.mesh
     }
 
-    /// Returns the nodes of the BVH.
+    /// Returns the BVH, without its leaves.
     pub fn boxes(&self) -> &Bvh8 {
         &self.boxes
     }

@@ -21,7 +21,7 @@ use std::borrow::Cow;
 /// Parses a glTF or GLB file.
 ///
 /// # Errors
-/// Any error in the file.
+/// Fails if the file is not valid, or has no triangles.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let (document, blob) = description(source)?;
     let buffers = buffers(source, &document, blob.as_deref())?;
@@ -50,7 +50,8 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// Returns the validated JSON document and the binary chunk of a GLB file.
+/// Parses and validates the JSON document of the file. Returns the document and the binary chunk of
+/// a GLB file.
 fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), AssetError> {
     // The library subtracts the size of the header from this length without a check for underflow.
     let length = source.bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
@@ -79,8 +80,8 @@ fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), Ass
     Ok((document, gltf.blob))
 }
 
-/// Returns the root nodes: those of the default scene; if there is none, those of the first scene;
-/// if there are no scenes, all nodes without a parent.
+/// Returns the root nodes of the default scene. Without a default scene, returns those of the first
+/// scene; without scenes, all nodes without a parent.
 fn roots(document: &Document) -> Vec<Node<'_>> {
     if let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) {
         return scene.nodes().collect();
@@ -248,7 +249,7 @@ impl<'a> Part<'a> {
         Ok(())
     }
 
-    /// Returns the items of an accessor for single-precision vectors of `N` components.
+    /// Returns the elements of an accessor of single-precision vectors with `N` components.
     fn floats<const N: usize>(
         &self,
         accessor: Accessor<'a>,
@@ -258,7 +259,7 @@ impl<'a> Part<'a> {
         Ok((0..slice.count).map(move |i| slice.floats(i)))
     }
 
-    /// Returns the texture coordinates of an accessor. They may be stored as normalised integers.
+    /// Returns the texture coordinates of an accessor. Integers are normalised.
     fn pairs(&self, accessor: Accessor<'a>) -> Result<impl Iterator<Item = [f32; 2]>, AssetError> {
         let kind = accessor.data_type();
         let slice = self.slice(&accessor, Dimensions::Vec2, kind)?;
@@ -272,8 +273,8 @@ impl<'a> Part<'a> {
         }))
     }
 
-    /// Returns the items of an accessor. Checks that every item is inside its buffer view, and the
-    /// view inside its buffer.
+    /// Returns the elements of an accessor. Checks that every element is inside its buffer view,
+    /// and the view inside its buffer.
     fn slice(
         &self,
         accessor: &Accessor<'a>,
@@ -322,7 +323,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Items of an accessor.
+/// Elements of an accessor, inside the bytes of its buffer.
 #[derive(Clone, Copy)]
 struct Slice<'a> {
     bytes: &'a [u8],

@@ -27,7 +27,7 @@ pub const MAX_VERTICES: usize = 1 << 27;
 pub struct TriangleMesh {
     /// Vertex positions relative to `center`.
     pub positions: Vec<[f32; 3]>,
-    /// Offset that was subtracted from every vertex. It is zero unless the mesh is so far from the
+    /// Offset that was subtracted from every vertex. It is nonzero only for a mesh so far from the
     /// origin, relative to its size, that single precision would lose its shape.
     pub center: [f64; 3],
     /// Vertex indices, three per triangle, counter-clockwise seen from the front.
@@ -48,7 +48,7 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// Adds all data that pictures depend on to `hash`.
+    /// Adds all data that affects pictures to `hash`.
     pub fn hash_contents(&self, hash: &mut Fnv1a64) {
         let Self {
             positions,
@@ -75,9 +75,9 @@ impl TriangleMesh {
         hash.update(&[u8::from(normals.is_some()), u8::from(uvs.is_some())]);
     }
 
-    /// Memory for each byte of the file at `path` while it is parsed \[bytes\]. OBJ needs more than
-    /// other formats, because its positions are read as doubles into vectors that grow. The value
-    /// does not count buffers of glTF in files of their own.
+    /// Peak memory during parsing, per byte of the file at `path`. OBJ needs more than other
+    /// formats, because its positions are read as doubles into vectors that grow. Separate buffer
+    /// files of glTF are not included.
     pub(super) fn parse_bytes(path: &Path) -> u64 {
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) { 10 } else { 6 }
     }
@@ -85,7 +85,7 @@ impl TriangleMesh {
     /// Parses a file in memory. The format is determined by the extension of the file name.
     ///
     /// # Errors
-    /// Any error in the file.
+    /// Fails if the file is not a valid mesh.
     pub(super) fn parse(source: FileContents) -> Result<Self, AssetError> {
         let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("");
         match extension.to_ascii_lowercase().as_str() {

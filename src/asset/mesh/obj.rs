@@ -20,14 +20,13 @@ const MAX_MTL_BYTES: u64 = 16 << 20;
 /// Largest number of MTL files of one OBJ file. Further ones are ignored.
 const MAX_MTL_FILES: usize = 64;
 
-/// Colour of triangles whose material has no diffuse colour, and of triangles without a material in a
-/// file with materials.
+/// Colour of triangles without a diffuse colour, in a file with materials.
 const UNCOLORED: [f32; 3] = [1.0; 3];
 
 /// Parses an OBJ file.
 ///
 /// # Errors
-/// Any error in the file.
+/// Fails if the file is not valid, or has no triangles.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let mut builder = Builder::new(source);
     let counts = check_faces(source)?;
@@ -82,7 +81,7 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish().map_err(|error| locate_vertex(source, error))
 }
 
-/// Returns a phrase that describes an error of the library.
+/// Returns a phrase that describes an error of the parser library.
 fn describe(error: LoadError) -> &'static str {
     match error {
         LoadError::ReadError => "this is not UTF-8 text",
@@ -112,8 +111,8 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty())
 }
 
-/// Checks that every index of a face is valid and that the number of triangles is within the limit.
-/// Returns the numbers of vertices, texture coordinates and normals.
+/// Checks that every index of a face is valid, and that the number of triangles is within the
+/// limit. Returns the numbers of vertices, texture coordinates and normals in the file.
 fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
     let list = |line: &[u8]| match words(line).next() {
         Some(b"v") => Some(0),
@@ -183,9 +182,9 @@ fn locate_vertex(source: &FileContents, error: AssetError) -> AssetError {
     }
 }
 
-/// Reader that passes one line at a time to the library and counts the lines. Vertex colours at the
-/// end of lines are removed, because the library requires that either all vertices have colours or
-/// none.
+/// Reader that passes one line at a time to the parser library and counts the lines. It removes
+/// vertex colours at the end of lines, because the library requires that either all vertices have
+/// colours or none.
 struct Lines<'a> {
     rest: &'a [u8],
     line: usize,
@@ -250,8 +249,9 @@ impl<'a> Libraries<'a> {
         Self { source, found: RefCell::default() }
     }
 
-    /// Loads the materials of an MTL file. Returns no materials if the file was loaded before. For
-    /// a missing file a note is recorded, for a path that leads out of the folder an error.
+    /// Loads the materials of an MTL file, in the form that the parser library requires. Returns no
+    /// materials for a file that was loaded before. Records a note for a missing file, and an error
+    /// for a path that leads out of the folder.
     fn load(&self, name: &Path) -> MTLLoadResult {
         let nothing = || tobj::load_mtl_buf(&mut &b""[..]);
         let mut found = self.found.borrow_mut();
@@ -280,8 +280,9 @@ impl<'a> Libraries<'a> {
     }
 }
 
-/// Returns an MTL file that is reduced to the names and diffuse colours of materials, with three
-/// finite numbers per colour. The other lines are not used, and the library panics on some of them.
+/// Returns the content of an MTL file reduced to the names and diffuse colours of materials, with
+/// three finite numbers per colour. The parser library panics on some of the other lines, which are
+/// not used.
 fn diffuse_colors(bytes: &[u8]) -> String {
     let mut out = String::new();
     for (_, line) in numbered(bytes) {

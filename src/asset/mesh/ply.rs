@@ -11,7 +11,8 @@ use ply_rs_bw::ply::{
     ScalarType,
 };
 
-/// Number of elements that the library parses at a time. It bounds the memory for parsed elements.
+/// Number of elements that the parser library parses at a time, which limits the memory for parsed
+/// elements.
 const PIECE: usize = 4096;
 
 /// Names of the vertex properties that are used. Programs use different names for the same
@@ -30,7 +31,7 @@ const NUMBERS: [&[&str]; 8] = [
 /// Names of the list property that holds the vertex indices of a face.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
-/// One vertex or face, filled by the library. `numbers` has the properties in the order of
+/// One vertex or face, filled by the parser library. `numbers` has the properties in the order of
 /// [`NUMBERS`].
 struct Record {
     numbers: [f64; 8],
@@ -93,7 +94,7 @@ impl Record {
 /// Parses a PLY file.
 ///
 /// # Errors
-/// Any error in the file.
+/// Fails if the file is not valid, or has no triangles.
 pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let parser = Parser::<Record>::new();
     let mut reader = Reader::new(&source.bytes[..]);
@@ -143,7 +144,8 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// Converts an error of the library. `byte` is the offset in a binary file; `None` for a text file.
+/// Converts an error of the parser library. `byte` is the offset in a binary file; `None` for a
+/// text file.
 fn library_error(source: &FileContents, error: &ParseError, byte: Option<usize>) -> AssetError {
     let place = match (byte, error.line()) {
         (Some(byte), _) => FileLocation::Byte(byte),
@@ -158,8 +160,8 @@ fn library_error(source: &FileContents, error: &ParseError, byte: Option<usize>)
     source.error(place, first.trim_end_matches(['.', ':']), "a PLY file")
 }
 
-/// Checks that the header declares the required elements and properties, and that the `left` bytes
-/// after it can hold the declared numbers of elements.
+/// Checks that the header declares the required elements and properties, and that `left`, the
+/// number of bytes after the header, suffices for the declared elements.
 fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(), AssetError> {
     let missing = |what: &str| {
         Err(source.error(FileLocation::Whole, format!("the header names no {what}"), "a mesh"))

@@ -16,7 +16,7 @@ const TRIANGLE: usize = 50;
 /// Parses an STL file.
 ///
 /// # Errors
-/// Any error in the file.
+/// Fails if the file is not valid, or has no triangles.
 pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     let bytes = &mut source.bytes;
     let announced = bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
@@ -88,7 +88,7 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// Reader that counts lines: for a text file each read returns at most one line.
+/// Reader that counts lines. Each read of a text file returns at most one line.
 struct ByLine<'a> {
     cursor: Cursor<&'a Vec<u8>>,
     line: usize,

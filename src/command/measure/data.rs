@@ -17,7 +17,7 @@ struct Document<'a> {
     reference_linear: f64,
     reference_seconds: f64,
     compared_at_codes: f64,
-    /// Largest relative change of the measured errors that another reference picture could cause.
+    /// Largest relative change of the measured errors if another reference picture were used.
     errors_spread: f64,
     /// Largest relative spread of the repeated times in the table.
     times_spread: f64,

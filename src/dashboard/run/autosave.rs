@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Time without another edit after which edits are written.
+/// Pause in editing after which the edits are written.
 const DEBOUNCE: Duration = Duration::from_millis(400);
 /// Longest time between an edit and its write, even if edits continue.
 const MAX_DELAY: Duration = Duration::from_secs(1);
 
-/// Autosave of a scene, and the orphaned edits. These are the unsaved edits of crashed sessions,
-/// which are found in recovery files at the start.
+/// Autosave of a scene. It also finds orphaned edits at the start: unsaved edits of crashed
+/// sessions, in their recovery files.
 pub struct Autosave {
     /// Recovery file of this session.
     recovery: Recovery,
@@ -22,9 +22,10 @@ pub struct Autosave {
     pending: Option<Pending>,
     /// Scene in the recovery file, if this session has written it.
     kept: Option<Arc<Scene>>,
-    /// Orphaned edits that the user has neither recovered nor discarded. The last is offered next.
+    /// Orphaned edits that the user has neither recovered nor discarded. The last entry is offered
+    /// next.
     found: Vec<Orphan>,
-    /// Cause of the failure of the last write, after it was reported.
+    /// Cause of the last failed write, which was reported already.
     failed: Option<String>,
 }
 
@@ -52,7 +53,7 @@ impl Autosave {
         }
     }
 
-    /// Updates an existing recovery file to `scene` before a save of `scene`. If the program is
+    /// Updates an existing recovery file to `scene` before `scene` is saved. If the program is
     /// killed during the save, the next start then does not offer outdated edits.
     pub fn saving(&mut self, file: &SceneFile, scene: &Arc<Scene>) {
         if self.recovery.path().is_some() {
@@ -136,7 +137,7 @@ impl Autosave {
         }
     }
 
-    /// Returns a recovery of the same scene whose recovery files are in the state folder.
+    /// Returns a recovery of the same scene that writes to the state folder.
     pub fn elsewhere(&self) -> Recovery {
         self.recovery.elsewhere()
     }
@@ -206,9 +207,9 @@ impl Autosave {
         }
     }
 
-    /// Adopts the offered edits as the unsaved edits of this session. `path` is the path of an
-    /// unreadable scene file, or `None` if the scene file is readable. For an unreadable file,
-    /// returns a scene file with the recovered text.
+    /// Adopts the offered edits as the unsaved edits of this session. `path` is `None` if the scene
+    /// file is readable. If it is not, `path` is its path, and the result is a scene file with the
+    /// recovered text.
     pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let orphan = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, orphan.text.clone()).ok());

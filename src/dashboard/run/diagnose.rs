@@ -14,10 +14,9 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Timeout for a reply from a terminal that has replied before.
 const LONG_PATIENCE: Duration = Duration::from_secs(10);
-/// Smallest time that a transfer must take beyond the round trip for a precise rate.
+/// Time that a transfer must take in addition to the round trip for a precise rate.
 const MEASURED: Duration = Duration::from_millis(300);
-/// Largest size of a transfer in bytes. It is used even if the transfer takes less time than
-/// [`MEASURED`].
+/// Size of the largest transfer in bytes. It is used even if it takes less time than [`MEASURED`].
 const MOST_BYTES: usize = 1 << 20;
 
 /// Capabilities of the terminal and its connection.
@@ -82,8 +81,9 @@ pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<Terminal
     Ok(TerminalReport { terminal, mode, cells, pixels, rate })
 }
 
-/// Writes `before` and a request of the cursor position, through `through` if there is a
-/// multiplexer. Returns the time until the reply, or `None` if there is no reply within `patience`.
+/// Writes `before` and a request of the cursor position, wrapped for the multiplexer `through` if
+/// there is one. Returns the time until the reply, or `None` if there is no reply within
+/// `patience`.
 fn answer(
     tty: &Tty,
     keyboard: &mut Keyboard,

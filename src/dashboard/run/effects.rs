@@ -39,7 +39,7 @@ pub struct EffectSetup {
 /// Action that the event loop must take after an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// None. Results of the effect, if any, come as messages.
+    /// No action. Results of the effect, if any, arrive as messages.
     Done,
     /// The renderer has started a new picture with this generation number.
     Rendering(u64),
@@ -49,7 +49,7 @@ pub enum Outcome {
     Quit,
 }
 
-/// Executor of effects. It is also the source of snapshots.
+/// Executor of effects, and source of snapshots.
 pub trait Effects {
     /// Returns the channel that receives a message whenever a new snapshot is published.
     fn wakeup(&self) -> &Receiver<()>;
@@ -65,11 +65,11 @@ pub trait Effects {
     /// [`Effects::observe`] before it updates the model.
     fn done(&self) -> &Receiver<Message>;
 
-    /// Notes the result of an effect.
+    /// Updates the executor by the result of an effect.
     fn observe(&mut self, message: &Message);
 
-    /// Executes `effect`, whose results come as messages. `frames` is the output to the terminal,
-    /// `terminal` its capabilities.
+    /// Executes `effect`. Its results arrive as messages. `frames` is the output to the terminal,
+    /// and `terminal` its capabilities.
     fn run(
         &mut self,
         effect: Effect,
@@ -82,7 +82,8 @@ pub trait Effects {
     fn flush(&self, patience: Duration);
 
     /// Completes pending writes and ends the threads. Returns the remaining results, and the path
-    /// of the recovery file if there are unsaved edits, or the reason for which these are lost.
+    /// of the recovery file if there are unsaved edits. If these are lost, returns the reason.
+    ///
     /// After `deadline` it no longer waits for the renderer and for pictures that are being
     /// written; `None` sets no limit. Unsaved edits never wait for them.
     fn finish(
@@ -190,8 +191,8 @@ impl Effects for EffectRunner {
         &self.done
     }
 
-    /// Bases the names of future exports on the new path if `message` reports that the scene was
-    /// saved at another path.
+    /// Changes the base name of future exports if `message` reports that the scene was saved at
+    /// another path.
     fn observe(&mut self, message: &Message) {
         if let Message::Saved(_, Ok(path)) = message {
             self.exporter.stem = stem(Some(path), "");

@@ -21,14 +21,14 @@ use std::time::Duration;
 /// Polling interval of a render at another size.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Writer of exports, with the properties that all exports of a scene share.
+/// Writer of exports, with the properties that are common to all exports of a scene.
 #[derive(Clone)]
 pub struct Exporter {
     /// Text of the scene file, for the metadata.
     pub file: SharedFile,
     /// Folder that exports are written to.
     pub folder: PathBuf,
-    /// Beginning of the file name, before the counter.
+    /// Beginning of the file names, before the counter.
     pub stem: String,
     /// Sampler, for the metadata.
     pub sampler: SamplerKind,
@@ -62,7 +62,7 @@ impl Exporter {
         })
     }
 
-    /// Returns the origin of pictures of `scene`.
+    /// Returns the provenance of pictures of `scene`.
     pub fn provenance(&self, scene: &Scene) -> Provenance {
         let (source, text) = self.source(scene);
         Provenance {

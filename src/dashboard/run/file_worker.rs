@@ -22,9 +22,9 @@ const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 const PREPARED_WITHIN: Duration = Duration::from_secs(2);
 /// Longest wait for pending saves when the program ends.
 const SAVED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait for the recovery file when the program ends, and as much again for one in the state
-/// folder if the first cannot be written in time. The sum of the three waits is less than the grace
-/// period after a terminating signal.
+/// Longest wait for the recovery file when the program ends. If it cannot be written in time, one
+/// in the state folder gets the same time. The sum of the three waits is less than the grace period
+/// after a terminating signal.
 const KEPT_WITHIN: Duration = Duration::from_secs(1);
 
 pub(super) enum Job {
@@ -32,7 +32,7 @@ pub(super) enum Job {
         scene: Arc<Scene>,
         path: Option<PathBuf>,
         overwrite: bool,
-        /// Disconnected as soon as the recovery file holds `scene`.
+        /// Disconnected when the recovery file has been updated to `scene`.
         prepared: Receiver<()>,
     },
     Load,
@@ -41,7 +41,7 @@ pub(super) enum Job {
     End,
 }
 
-/// Handle of two threads: the one of the scene file, and the one of the recovery file.
+/// Handle of two threads: one for the scene file, and one for the recovery file.
 pub struct Files {
     jobs: Sender<Job>,
     autosaves: Sender<AutosaveJob>,
@@ -183,8 +183,8 @@ impl Drop for Files {
     }
 }
 
-/// Writes `scene` as unsaved edits of `file` with `recovery`, in a thread of its own, because the
-/// disk of the state folder may not respond either.
+/// Writes `scene` as unsaved edits of `file` with `recovery`. It uses a thread of its own, because
+/// the disk of the state folder may not respond either.
 fn keep_elsewhere(
     scene: &Scene,
     file: &SceneFile,
@@ -203,7 +203,8 @@ fn keep_elsewhere(
         .map_err(|why| format!("unsaved edits are lost: they cannot be kept ({why})"))
 }
 
-/// Modification time and length of a file, to detect changes; `None` if the file has no metadata.
+/// Modification time and length of a file, by which changes are detected; `None` if the file has no
+/// metadata.
 type FileStamp = Option<(SystemTime, u64)>;
 
 fn stamp(path: &Path) -> FileStamp {
@@ -327,7 +328,7 @@ mod tests {
     use super::*;
     use crate::scene::starter;
 
-    /// Time limit that every machine meets; reached only if a test fails.
+    /// Time limit of waits. It is so long that only a failing test reaches it.
     const PATIENCE: Duration = Duration::from_secs(60);
 
     fn opened(path: &Path) -> (Files, Receiver<Message>) {

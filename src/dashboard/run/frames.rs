@@ -35,9 +35,9 @@ pub struct FramePipeline {
     writer: Writer,
     /// Time at which the frame that is being written was sent.
     writing_since: Option<Duration>,
-    /// Bytes of frames sent so far.
+    /// Number of bytes of all frames sent so far.
     sent: u64,
-    /// Last frame that was drawn. Parts of it may not have been sent yet.
+    /// Last frame that was drawn. Some of its cells may not have been sent yet.
     target: Buffer,
     /// Position of the text cursor, if visible.
     cursor: Option<Position>,
@@ -53,7 +53,7 @@ pub struct FramePipeline {
     removing: bool,
 }
 
-/// Values of the model at the time when `FramePipeline::target` was drawn.
+/// Values of the model when `FramePipeline::target` was drawn.
 #[derive(Clone, Copy, Debug, Default)]
 struct FrameMeta {
     version: u64,
@@ -66,7 +66,7 @@ struct FrameMeta {
 pub enum DrawOutcome {
     /// The connection has no room for a frame. Nothing was drawn.
     Nothing,
-    /// Only the picture differs visibly from the screen. The differences will be sent later.
+    /// Only the picture differs visibly from the screen. Its differences will be sent later.
     Deferred,
     /// The screen has no visible differences from the model.
     Same,
@@ -109,7 +109,8 @@ impl FramePipeline {
         self.clipboard = copied(text);
     }
 
-    /// Forgets the contents of the screen, so that the next frame redraws the whole screen.
+    /// Marks the contents of the screen as unknown, so that the next frame redraws the whole
+    /// screen.
     pub fn forget(&mut self) {
         self.diff = FrameDiff::new();
         self.give_up();
@@ -178,8 +179,8 @@ impl FramePipeline {
         self.writer.ready()
     }
 
-    /// Returns two values: `true` if the screen differs visibly from the picture, and the number of
-    /// bytes of frames sent so far.
+    /// Returns `true` if the screen differs visibly from the picture, and the number of bytes of
+    /// all frames sent so far.
     pub fn load(&self) -> (bool, u64) {
         (self.diff.pending().visible, self.sent)
     }
@@ -225,8 +226,8 @@ impl FramePipeline {
         self.flow.measures_at(now)
     }
 
-    /// Returns the time at which the connection will count as silent if nothing is received until
-    /// then. Returns `None` if no output is under way.
+    /// Returns the time at which the connection will be treated as silent if no input arrives until
+    /// then. Returns `None` if no bytes are known to be waiting for transmission.
     pub fn silent_at(&self) -> Option<Duration> {
         self.flow.silent_at(self.writing_since)
     }
@@ -265,7 +266,7 @@ impl FramePipeline {
 
     /// Draws the model if it has `changed`, and sends as many of the differences as the connection
     /// has room for. `answers` is `true` if the frame responds to user input. `image_epoch` is a
-    /// counter that increases when the picture is replaced by a different one rather than refined.
+    /// counter that increases when the picture is replaced by a different one instead of refined.
     /// Requires [`FramePipeline::ready`].
     pub fn draw(
         &mut self,

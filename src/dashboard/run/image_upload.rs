@@ -15,15 +15,15 @@ pub struct ImageUpload {
     image: Arc<ViewerImage>,
     /// Number of bytes sent.
     sent: usize,
-    /// `true` if the bytes sent so far end inside an escape sequence. Then only its remainder may
-    /// be sent next.
+    /// `true` if the bytes sent so far end inside of an escape sequence, whose remainder must be
+    /// sent next.
     open: bool,
     /// `true` if the image is already visible as half blocks.
     pub seen: bool,
 }
 
 impl ImageUpload {
-    /// Creates an upload of `image` of which nothing has been sent.
+    /// Creates the upload of `image`; nothing has been sent.
     pub fn new(image: Arc<ViewerImage>) -> Self {
         Self { image, sent: 0, open: false, seen: false }
     }
@@ -33,14 +33,14 @@ impl ImageUpload {
         Arc::ptr_eq(&self.image, image)
     }
 
-    /// Returns `true` if the bytes sent end inside an escape sequence, so that no other output may
-    /// follow.
+    /// Returns `true` if the bytes sent so far end inside of an escape sequence, so that no other
+    /// output may follow.
     pub fn is_open(&self) -> bool {
         self.open
     }
 
-    /// Returns `true` if the upload has started. From then on the half blocks below the image must
-    /// not be sent any more.
+    /// Returns `true` if the upload has begun. The half blocks under the image must not be sent
+    /// from then on.
     pub fn has_begun(&self) -> bool {
         self.sent > 0
     }
@@ -50,7 +50,7 @@ impl ImageUpload {
         self.sent < self.image.transfer.bytes.len()
     }
 
-    /// Returns `true` if the uploaded image covers its half blocks already, or may be sent next.
+    /// Returns `true` if the uploaded image replaces its half blocks already, or may be sent next.
     /// `waits` is `true` if half blocks still differ visibly from the screen.
     pub fn follows(&self, waits: bool) -> bool {
         self.has_begun() || self.is_unfinished() && (self.seen || !waits)

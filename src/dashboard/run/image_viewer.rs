@@ -12,8 +12,8 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-/// Longest time for the transfer of an image. On slow connections the image is made smaller to meet
-/// it.
+/// Longest duration of the transfer of an image. On slow connections the image is downscaled to
+/// meet it.
 const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
 
 /// Returns the limits for an image: protocol, size and bytes. The terminal has `screen` columns and

@@ -9,7 +9,7 @@ use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Time without another resize after which a resize takes effect.
+/// Time without another resize before a resize takes effect.
 const SETTLED: Duration = Duration::from_millis(90);
 /// Maximum time between the first resize of a series and its effect.
 const LONGEST: Duration = Duration::from_millis(400);

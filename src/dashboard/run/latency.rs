@@ -6,7 +6,7 @@ use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Frame that counts as the response to an event.
+/// Frame that is taken as the response to an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Answer {
     /// The next frame of any kind.
@@ -33,9 +33,9 @@ struct Answered {
     after: Duration,
 }
 
-/// Recorder of input latencies. It always tracks events without a response, because frames that
-/// respond to an event are sent without waiting for the frame interval. It stores latencies only on
-/// request.
+/// Recorder of input latencies. Latencies are stored only on request. Events without a response are
+/// always tracked, because frames that respond to an event are sent without waiting for the frame
+/// interval.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,
@@ -178,8 +178,8 @@ impl Awaiting {
     }
 }
 
-/// Returns the smallest element of `sorted` that is at least as large as the fraction `share` (0 to
-/// 1) of all elements. Returns 0 if `sorted` is empty.
+/// Returns a quantile: the smallest element of `sorted` that is at least as large as the fraction
+/// `share` (0 to 1) of all elements. Returns 0 if `sorted` is empty.
 fn quantile(sorted: &[Duration], share: f64) -> Duration {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied().unwrap_or_default()

@@ -50,9 +50,9 @@ pub use diagnose::{TerminalReport, diagnose};
 
 /// Parameters of a dashboard.
 pub struct Setup {
-    /// The scene file. An unreadable file is represented by its path and errors.
+    /// The scene file. An unreadable file is given by its path and errors.
     pub file: Result<SceneFile, (PathBuf, SceneErrors)>,
-    /// Checkpoint of this scene to be continued.
+    /// Checkpoint of this scene to continue.
     pub checkpoint: Option<Checkpoint>,
     /// Folder for recovery files that cannot be written beside their scene file.
     pub state: Option<PathBuf>,
@@ -127,8 +127,8 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     run_on_terminal(Box::new(effects), start, terminal, trace)
 }
 
-/// Shows `films`, which other processes write, until the user quits or a signal arrives. Tracing
-/// nothing, it uses `threads` threads for noise estimates and pictures.
+/// Shows `films`, which other processes write, until the user quits or a signal arrives. `threads`
+/// threads compute noise estimates and pictures; none of them traces.
 pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
     let start = Start {
         path: None,
@@ -240,7 +240,7 @@ struct Dashboard {
     began: Instant,
     /// Generation number of the scene that the visible picture shows.
     shown: u64,
-    /// Counter that increases when the picture is replaced by a different one, and stays when more
+    /// Counter that increases when the picture is replaced by a different one. It stays when more
     /// samples refine the same picture.
     image_epoch: u64,
     /// Debounce of resize signals.

@@ -4,7 +4,7 @@ use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Largest counter in the name of an export. It bounds the time of the search for a free name.
+/// Largest counter in the name of an export. It limits the time of the search for a free name.
 const MOST: u32 = 100_000;
 
 /// Writes to the first free path of `STEM-1.EXTENSION`, `STEM-2.EXTENSION` and so on in `folder`.
@@ -50,7 +50,7 @@ pub fn scp(path: &Path) -> String {
 }
 
 /// Computes [`scp`] from values of the environment. `connection` is the variable `SSH_CONNECTION`
-/// as sshd sets it, "client port server port", or empty.
+/// of sshd, "client port server port", or empty.
 fn scp_from(connection: &str, user: &str, host_name: &str, path: &str) -> String {
     let fields: Vec<_> = connection.split_whitespace().collect();
     let (host, port) = match fields[..] {

@@ -5,7 +5,7 @@ use std::io;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// Thread that may never end, because a disk or the renderer may not respond.
+/// Handle of a thread that may never end, because a disk or the renderer may not respond.
 pub struct Worker {
     thread: JoinHandle<()>,
     /// Receiver that is disconnected at the end of the thread.
@@ -23,8 +23,8 @@ impl Worker {
         Ok(Self { thread, ended })
     }
 
-    /// Waits for the end of the thread, without limit if `patience` is `Duration::MAX`. Returns
-    /// `false` if it has not ended after `patience`.
+    /// Waits for the end of the thread, for at most `patience`; `Duration::MAX` means without
+    /// limit. Returns `false` if it has not ended.
     pub fn join_within(self, patience: Duration) -> bool {
         if self.ended.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {
             return false;

@@ -68,8 +68,8 @@ pub enum HintLine {
     Watching,
 }
 
-/// Short description of a command for the hint line. It may stand for related commands as well,
-/// such as those of all arrow keys.
+/// Short description of a command for the hint line. One hint may describe several related
+/// commands, such as those of all arrow keys.
 #[derive(Clone, Copy, Debug)]
 pub struct Hint {
     /// States in which the hint is shown.
@@ -89,13 +89,14 @@ pub struct Command {
     pub chapter: Chapter,
     /// Description in a few words, for help, palette and docs/keys.md. Unique.
     pub label: &'static str,
-    /// Pairs of a context and the names of keys in it, separated by spaces. A command without keys
-    /// runs only from the palette.
+    /// Contexts of the command, each with the names of its keys there, separated by spaces. A
+    /// command without keys runs only from the palette.
     pub keys: &'static [(KeyContext, &'static str)],
-    /// Hints for the command and related ones.
+    /// Hints in the hint line. They may also describe related commands, which then have no hints of
+    /// their own.
     pub hints: &'static [Hint],
-    /// `true` if the command runs while a value is being typed. Before any other command the value
-    /// is applied.
+    /// `true` if the command runs while a value is being typed, which stays as it is. Other
+    /// commands first apply the value.
     pub(super) while_typing: bool,
     /// `true` if the command also runs in the viewer of exported images. All other keys close the
     /// viewer.
@@ -141,8 +142,8 @@ fn with_scene(model: &Model) -> bool {
     !model.file.unreadable
 }
 
-/// Returns `true` if there is a scene, or if a palette or question is open, whose answers need no
-/// scene.
+/// Returns `true` if there is a scene, or if a palette or question is open, whose answers do not
+/// need a scene.
 fn with_scene_or_choice(model: &Model) -> bool {
     with_scene(model) || matches!(model.overlay, Some(Overlay::Palette(_) | Overlay::Question(_)))
 }

@@ -20,8 +20,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Leaves the innermost state that is active, in this order: overlay, text editor, mode, panel,
-    /// full screen, comparison.
+    /// Leaves the innermost active state. Their order is: overlay, text editor, mode, panel, full
+    /// screen, comparison.
     pub(super) fn leave(&mut self) {
         if self.model.overlay.is_some() {
             self.close_overlay();

@@ -51,7 +51,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Moves the cursor by `pages` pages. A page has one row less than are visible.
+    /// Moves the cursor by `pages` pages. A page is one row less than the visible rows.
     pub(super) fn page(&mut self, pages: isize) {
         let rows = match (self.model.overlay_layout(), self.model.focus) {
             (Some(layout), _) => layout.list.height,

@@ -166,7 +166,7 @@ impl<'a> UpdateContext<'a> {
     }
 
     /// Adds `effect` to the results of the update. It replaces an earlier effect of the same kind,
-    /// unless it saves or exports.
+    /// except for saves and exports.
     fn emit(&mut self, effect: Effect) {
         if !matches!(effect, Effect::Save { .. } | Effect::Export(_) | Effect::ExportSized { .. }) {
             self.effects.retain(|e| discriminant(e) != discriminant(&effect));
@@ -341,8 +341,8 @@ impl<'a> UpdateContext<'a> {
     }
 }
 
-/// Returns the item `by` positions after the current one, cyclically. If no item is current, counts
-/// from the first.
+/// Returns the item `by` positions after the current one, cyclically. Without a current item,
+/// counts from the first.
 fn cycled<T>(items: &[T], is_current: impl Fn(&T) -> bool, by: isize) -> &T {
     let position = items.iter().position(is_current).unwrap_or(0) as isize;
     &items[(position + by).rem_euclid(items.len() as isize) as usize]

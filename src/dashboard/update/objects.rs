@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 const TURN_DEGREES: f64 = 15.0;
 const TURN_DEGREES_FINE: f64 = 1.0;
 /// Largest factor by which the depth component of a drag is lengthened. The exact factor for a
-/// foreshortened ground plane, 1 / sin of the view angle, has no bound at grazing angles.
+/// foreshortened ground plane, 1 / sin of the view angle, is unbounded at grazing angles.
 const MOST_STRETCH: f64 = 4.0;
 
 /// Returns the coordinate axis in the ground plane that is nearest to `v`.
@@ -59,8 +59,8 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    /// Returns the rule for undo steps of the current step: in a mode or drag it is merged with the
-    /// whole gesture, otherwise with recent steps.
+    /// Returns the rule that merges the current step into an undo step: with the whole gesture in a
+    /// mode or drag, otherwise with recent steps.
     fn gesture(&self) -> Coalesce {
         let in_mode = matches!(self.model.mode, Mode::Move | Mode::Rotate);
         if in_mode || self.model.drag.is_some() { Coalesce::Gesture } else { Coalesce::Repeat }

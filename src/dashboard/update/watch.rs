@@ -14,8 +14,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 impl UpdateContext<'_> {
-    /// Stores a report on the watched files. The cursor stays on the same file or shard, whose row
-    /// may change.
+    /// Stores a report on the watched files. The cursor stays on the same file or shard, even if
+    /// its row changes.
     pub(super) fn watched(&mut self, report: WatchReport) {
         let before = self.model.watch.take();
         if let Some(size) = report.size.filter(|size| *size != self.scene().film.size) {

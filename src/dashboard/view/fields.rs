@@ -18,8 +18,8 @@ use ratatui::layout::Position;
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
 
-/// Unit of lengths. Because nearly every number has this unit, it is shown only for the field under
-/// the cursor.
+/// Unit of lengths. Nearly all numbers have this unit; it is therefore shown only for the field
+/// under the cursor.
 const LENGTH: &str = "scene units";
 
 /// A list of fields and the areas that it is drawn in.
@@ -36,8 +36,8 @@ pub struct Fields<'a> {
     pub scroll: usize,
     /// Text editor of the field under the cursor, if one is open.
     pub editor: Option<&'a Editor>,
-    /// Reason for which the last step of a field was refused. It is shown unless the editor has a
-    /// reason of its own.
+    /// Reason why the last step of a field was refused. It is shown unless the editor has a reason
+    /// of its own.
     pub problem: Option<&'a str>,
     /// `true` if the fields receive the keys.
     pub active: bool,
@@ -142,8 +142,8 @@ impl Fields<'_> {
         None
     }
 
-    /// Draws help on the field under the cursor: the problem if there is one, otherwise the field's
-    /// description and valid input.
+    /// Draws help on the field under the cursor: the reason for a refusal if there is one,
+    /// otherwise the field's description and valid input.
     fn say(&self, theme: &Theme, buffer: &mut Buffer) {
         let Some(field) = self.lines.get(self.cursor).and_then(PanelLine::field) else { return };
         let width = self.help.width.saturating_sub(2);
@@ -165,8 +165,8 @@ impl Fields<'_> {
     }
 }
 
-/// Returns a description of a field's valid input, and of its default value if the field has
-/// another one.
+/// Returns a description of a field's valid input and, if the field has another value, of its
+/// default value.
 fn expected(field: &FieldLine) -> String {
     match &field.default {
         Some(default) if !default.is_empty() && !field.is_default => {
@@ -200,8 +200,8 @@ pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     Some(Position { x: x + column, y })
 }
 
-/// Rounds a number with many digits to six significant digits for display. The text editor shows
-/// all digits.
+/// Rounds a number with many digits to six significant digits, for display outside of the text
+/// editor.
 fn brief(value: &str) -> Cow<'_, str> {
     /// Largest length of a number, in characters, that is shown with all its digits.
     const SHORT: usize = 9;

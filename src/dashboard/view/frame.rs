@@ -103,9 +103,9 @@ pub fn draw(
     }
 }
 
-/// Returns short texts about the picture for its border, each with `true` if it is emphasised.
-/// Emphasised texts describe the visible channel or comparison, unless it is the rendered picture.
-/// The others describe exposure and tone curve.
+/// Returns short texts about the picture for its border: the visible channel or comparison, unless
+/// it is the rendered picture, then exposure and tone curve. The second value is `true` for
+/// emphasised texts, those about channel and comparison.
 fn chips(model: &Model) -> Vec<(String, bool)> {
     let mut chips = Vec::new();
     match (model.comparison.shown, model.channel) {

@@ -31,7 +31,7 @@ use ratatui::layout::{Position, Rect};
 use text::{Row, rect};
 use theme::Theme;
 
-/// View of a model, with the cached cells of its picture.
+/// View of a model. It caches the cells of the picture.
 #[derive(Debug, Default)]
 pub struct View {
     imager: PictureView,

@@ -45,8 +45,8 @@ impl Painter<'_> {
         overlay(self.place.frame, title, self.theme, self.buffer);
     }
 
-    /// Draws the scroll bar of a list of `len` lines, of which the line `scroll` is the first
-    /// visible one. Iterates over the visible lines: row of the screen, and index of the line.
+    /// Draws the scroll bar of a list of `len` lines with the first visible line `scroll`. Returns
+    /// the visible lines: row of the screen, and index of the line.
     fn window(&mut self, scroll: usize, len: usize) -> impl Iterator<Item = (u16, usize)> + use<> {
         let rows = usize::from(self.place.list.height);
         let first = scroll.min(len.saturating_sub(rows));

@@ -33,9 +33,8 @@ struct PinnedCache {
     radiance: Vec<[f32; 3]>,
 }
 
-/// Returns `true` if the picture rarely changes except by user input. That is so if rendering has
-/// ended or is paused, if files are watched, or if the pinned picture or an exported image is
-/// visible.
+/// Returns `true` if the picture changes only by user input, or rarely: rendering has ended or is
+/// paused, files are watched, or the pinned picture or an exported image is visible.
 pub fn is_settled(model: &Model) -> bool {
     if let Some(Overlay::ViewerImage(_)) = model.overlay {
         return true;
@@ -47,7 +46,7 @@ pub fn is_settled(model: &Model) -> bool {
 }
 
 impl PictureView {
-    /// Returns the legend of the last raster. Returns `None` if its colours stand for no numbers.
+    /// Returns the legend of the last raster. Returns `None` if the raster has no colour scale.
     pub fn legend(&self) -> Option<&Legend> {
         self.legend.as_ref()
     }
@@ -198,8 +197,8 @@ fn displayed(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 
     Raster::from_fn(width, height, |i| to_8(radiance[i].map(f64::from)))
 }
 
-/// Scales a raster to the given size without interpolation. It shows the old picture after a resize
-/// until the next snapshot.
+/// Scales a raster to the given size without interpolation. After a resize it is applied to the old
+/// picture until the next snapshot.
 fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
     if [raster.width, raster.height] == [width, height] || raster.pixels.is_empty() {
         return raster;
@@ -224,9 +223,8 @@ pub fn paint(cells: &PictureCells, area: Area, buffer: &mut Buffer) {
     }
 }
 
-/// Returns the rectangle of the screen that [`paint`] drew `cells` into, and a row-major mask. The
-/// mask is `true` for cells of the rectangle that still show the picture, because nothing was drawn
-/// over them.
+/// Returns the rectangle of the screen that [`paint`] drew `cells` into, and a row-major mask of
+/// the cells that still show the picture because nothing was drawn over them.
 pub fn visible_mask(cells: &PictureCells, area: Area, buffer: &Buffer) -> (Rect, Vec<bool>) {
     let Area { x, y, width, height } = area;
     let (width, height) = (width.min(cells.columns), height.min(cells.rows));

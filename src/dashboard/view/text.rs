@@ -167,7 +167,7 @@ pub fn durations(from: f64, to: f64) -> String {
     if from == to { format!("{to} {unit}") } else { format!("{from}–{to} {unit}") }
 }
 
-/// Returns the value and the unit of `seconds`, in the unit (s, min, h) that suits a duration of
+/// Returns the value and the unit (s, min, h) of `seconds`, in the unit that suits a duration of
 /// `reference` seconds.
 fn in_unit(seconds: f64, reference: f64) -> (String, &'static str) {
     let (value, unit) = match reference {

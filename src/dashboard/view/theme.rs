@@ -117,7 +117,7 @@ impl Theme {
         self.colors
     }
 
-    /// Returns the style of a sample of the 8-bit colour. Returns `None` if the terminal cannot
+    /// Returns the style of a swatch of the 8-bit colour. Returns `None` if the terminal cannot
     /// show the colour.
     pub fn swatch(&self, [r, g, b]: [u8; 3]) -> Option<Style> {
         match self.colors {

@@ -19,7 +19,7 @@ use std::io::{BufReader, ErrorKind, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Smallest number of bytes of a tile in a film file.
+/// Smallest number of bytes that a tile takes in a film file.
 const RECORD_BYTES: u64 = 8;
 
 /// Error that makes a film file unusable.
@@ -52,17 +52,18 @@ pub fn is_film_file(path: &Path) -> bool {
 pub struct FilmReader<R> {
     input: Input<R>,
     header: FilmFileHeader,
-    /// Next chunk: the first `TILE` chunk, or `DONE` for a film without samples.
+    /// First chunk after the header, which has been read: `TILE`, or `DONE` for a film without
+    /// samples.
     next: Chunk,
     checksums: crc32fast::Hasher,
 }
 
-/// Bytes of a film file that have not been read yet.
+/// Bytes of a film file that remain to be read.
 #[derive(Debug)]
 struct Input<R> {
     path: PathBuf,
     bytes: R,
-    /// Number of bytes that have not been read yet.
+    /// Number of bytes that remain to be read.
     left: u64,
 }
 
@@ -196,8 +197,8 @@ impl<R: Read> FilmReader<R> {
         self.visit_tiles(|_, _| Some(()))
     }
 
-    /// Calls `visit` for each `TILE` chunk with its records and the numbers of its tiles. `visit`
-    /// returns `None` if a record is not valid.
+    /// Calls `visit` for each `TILE` chunk with the numbers of its tiles and the encoded records of
+    /// these tiles. `visit` returns `None` if a record is not valid.
     fn visit_tiles(
         self,
         mut visit: impl FnMut(&mut Fields, Range<usize>) -> Option<()>,
@@ -242,7 +243,7 @@ impl FilmFileHeader {
     }
 }
 
-/// Decodes the `HEAD` chunk of a file with `length` bytes. The metadata and the other chunks of the
+/// Decodes the `HEAD` chunk of a file with `length` bytes. Metadata and further chunks of the
 /// result are empty.
 fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
     let [width, height, groups] = [fields.u32()?, fields.u32()?, fields.u32()?].map(|n| n as usize);
@@ -303,7 +304,7 @@ impl<R: Read> Input<R> {
         )
     }
 
-    /// Reads `length` bytes. `part` describes this part of the file in errors.
+    /// Reads `length` bytes. `part` names this part of the file in error messages.
     fn take(&mut self, length: u64, part: &str) -> Result<Vec<u8>, ReadError> {
         let cut = |input: &Self| {
             let what = format!("it ends in the middle of {part}: it was not copied as a whole");
@@ -348,8 +349,8 @@ impl<R: Read> Input<R> {
     }
 }
 
-/// Reader of fields at the start of a byte string. Each method removes the bytes that it reads, and
-/// returns `None` if there are too few of them or the value is not valid.
+/// Reader of the fields in a byte string, from its start. Each method consumes the bytes that it
+/// reads, and returns `None` if there are too few bytes or the value is not valid.
 pub struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -390,7 +391,7 @@ impl<'a> Fields<'a> {
         self.u64().map(f64::from_bits)
     }
 
-    /// Reads a UTF-8 text after its length (u32).
+    /// Reads a UTF-8 text that is preceded by its length in bytes (u32).
     pub fn text(&mut self) -> Option<String> {
         let length = self.u32()? as usize;
         String::from_utf8(self.take(length)?.to_vec()).ok()

@@ -53,8 +53,8 @@ pub fn tile_chunks(film: &Film) -> usize {
     film.tile_count().div_ceil(TILES_PER_CHUNK)
 }
 
-/// Encodes the `TILE` chunk with the number `index`, which is below [`tile_chunks`]. Samples of a
-/// first pass that is in progress are left out.
+/// Encodes the `TILE` chunk with the number `index`, which is below [`tile_chunks`]. Samples of an
+/// unfinished first pass are left out.
 pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
     let first = index * TILES_PER_CHUNK;
     let count = (film.tile_count() - first).min(TILES_PER_CHUNK);
@@ -65,7 +65,8 @@ pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
     })
 }
 
-/// Encodes the last chunk of a file. `pieces` are the encoded header and all encoded tiles.
+/// Encodes the last chunk of a file, which has a checksum of all `pieces`: the encoded header and
+/// all encoded tiles.
 pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
     let mut checksum = crc32fast::Hasher::new();
     // The header holds several chunks. Its own bytes stand for their checksums.
@@ -89,7 +90,7 @@ pub fn write_film_file(path: &Path, pieces: &[Vec<u8>]) -> Result<(), WriteError
     write_pieces(path, pieces, Existing::Replace)
 }
 
-/// Writes a film file as [`write_film_file`] does, unless there is a file at `path`.
+/// Writes a film file as [`write_film_file`] does, but fails if `path` exists.
 ///
 /// # Errors
 /// Fails if the file exists or cannot be written.

@@ -141,7 +141,7 @@ fn altered_bytes_are_refused() {
     assert!(error.contains("1 bytes follow its end"), "{error}");
 }
 
-/// Checks that a file made of parts of two valid files is refused.
+/// Checks that a file composed of parts of two valid files is refused.
 #[test]
 fn parts_of_different_files_are_refused() {
     let film = sample_film();

@@ -5,7 +5,7 @@ use crate::film::file::decode::Fields;
 use crate::film::invalid::{INVALID_REMEMBERED, InvalidSample, InvalidSamples};
 use crate::film::tile::{TILE_PIXELS, Tile};
 
-/// Largest value of a sample in steps of the film's scale.
+/// Largest value of a sample, in integer steps of the film.
 const LARGEST_SAMPLE: u64 = 1 << 49;
 
 /// Number of bytes of a sum in memory.
@@ -38,7 +38,8 @@ pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     }
 }
 
-/// Appends the plane of sum `i`: the bytes of this sum for all pixels.
+/// Appends the plane of sum `i`: the low bytes of this sum of each pixel, as many as the largest
+/// sum needs.
 fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
     let all = pixels.iter().fold(0, |all, sums| all | sums[i] as u64);
     let bytes = (64 - all.leading_zeros()).div_ceil(8) as usize;

@@ -19,8 +19,8 @@ use crate::render::schedule::SAMPLE_ALIGNMENT;
 use std::ops::Range;
 
 impl PlannedTile {
-    /// Number of blocks of [`SAMPLE_ALIGNMENT`] samples after the base; the first and the last one
-    /// may be shorter.
+    /// Number of blocks of [`SAMPLE_ALIGNMENT`] samples after the base. The first and the last
+    /// block may be shorter.
     fn blocks(&self) -> u32 {
         if self.end > self.base {
             self.end.div_ceil(SAMPLE_ALIGNMENT) - self.base / SAMPLE_ALIGNMENT
@@ -37,8 +37,9 @@ impl PlannedTile {
 }
 
 impl Plan {
-    /// Returns the sample indices that `shard` traces in each tile, the same in both replicates.
-    /// Tiles are in row order. Ranges may be empty. The shard [`BASE`] has the samples of the base.
+    /// Returns the range of sample indices that `shard` traces in each tile, the same in both
+    /// replicates. Tiles are in row order. Ranges may be empty. [`BASE`] stands for the samples of
+    /// the base.
     ///
     /// # Panics
     /// Panics if there is no such shard.

@@ -18,7 +18,8 @@ use std::str::FromStr;
 
 /// First line of a plan file, with the version of the format.
 const TITLE: &str = "zerkalo plan 1";
-/// Largest length of a plan file in bytes. A plan of 16384 x 16384 pixels has about 30 MB.
+/// Largest length of a plan file in bytes. The plan of a picture of 16384 x 16384 pixels has about
+/// 30 MB.
 const MAX_BYTES: u64 = 1 << 26;
 /// Largest width and height of a planned picture in pixels.
 const MAX_SIDE: u32 = 1 << 14;
@@ -41,7 +42,8 @@ pub struct PlanError {
     pub path: PathBuf,
     /// Line of the error, counted from 1; 0 for the file as a whole.
     pub line: usize,
-    /// Description of the error: the text that was found, and the text that was expected.
+    /// Description of the error, as a clause of a sentence with the text that was found and the
+    /// text that was expected.
     pub what: String,
     /// Advice to the user, as a clause of a sentence.
     pub remedy: &'static str,
@@ -128,7 +130,7 @@ impl Plan {
         Self::parse(path, &bytes)
     }
 
-    /// Parses the text of a plan file. `path` is the name of the file in errors.
+    /// Parses the text of a plan file. `path` is the name of the file in error messages.
     ///
     /// # Errors
     /// Fails if the text is no valid plan.
@@ -256,8 +258,8 @@ impl<'a> Lines<'a> {
         Some(line)
     }
 
-    /// Reads the line of the setting `key` and parses its value. `expected` describes a valid value
-    /// in errors.
+    /// Reads the line of the setting `key` and parses its value. `expected` describes valid values
+    /// in error messages.
     fn setting<T>(
         &mut self,
         key: &str,

@@ -24,7 +24,8 @@ pub(super) struct Member {
 pub(super) struct Plans(HashMap<u64, Arc<Plan>>);
 
 impl Plans {
-    /// Creates the member for the film file at `path`, whose plan and shards are `part`.
+    /// Creates the member for the film file at `path`. `part` is the plan and the shards in the
+    /// file.
     pub fn member(&mut self, path: &Path, part: Part) -> Member {
         let Part { plan, shards, rays } = part;
         let checksum = plan.checksum();
@@ -90,7 +91,7 @@ fn common_plan(members: &mut [Member]) -> Result<Arc<Plan>, String> {
     Ok(plan)
 }
 
-/// Name of a shard in messages.
+/// Returns the name of a shard for messages.
 pub(super) fn shard_name(number: u32) -> String {
     match number {
         BASE => "the base (shard 0)".to_string(),

@@ -12,19 +12,20 @@ use std::sync::Arc;
 pub struct Merged {
     /// Sum of the films.
     pub film: Film,
-    /// Header of the film file with the lowest shard, to which the plan and all shards are added.
+    /// Header of the film file with the lowest shard, with the plan and all shards of the sum.
     pub header: FilmFileHeader,
     /// Plan and shards of the film.
     pub part: Part,
 }
 
 impl Merged {
-    /// Adds the films of the files at `paths`, in any order. If `partial` is `true`, shards may be
-    /// missing or unfinished.
+    /// Adds the films of the files at `paths`, in any order. Shards may be missing or unfinished if
+    /// `partial` is `true`.
     ///
     /// # Errors
-    /// Fails if a file cannot be read or is no part, if the files belong to different plans, if two
-    /// files hold the same shard, or if shards are missing or unfinished without `partial`.
+    /// Fails if a file cannot be read or has no shards of a plan, if the files belong to different
+    /// plans, if two files hold the same shard, or if shards are missing or unfinished without
+    /// `partial`.
     pub fn of_files(paths: &[PathBuf], partial: bool) -> Result<Self, String> {
         let (mut plans, mut members, mut readers) = (Plans::default(), Vec::new(), Vec::new());
         for path in paths {

@@ -38,7 +38,7 @@ pub const BASE: u32 = 0;
 /// Settings of a plan: the inputs of its samples, and its noise target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSettings {
-    /// Path of the scene file, as the user has given it.
+    /// Path of the scene file as the user gave it.
     pub source: String,
     /// Hash of the scene and of the files that it names.
     pub scene_hash: String,
@@ -69,8 +69,8 @@ pub struct Plan {
     pub settings: PlanSettings,
     /// Expected RMSE of the merged picture in 8-bit levels.
     pub predicted_codes: f64,
-    /// Exponents with which the error falls in tiles without and with glossy lobes: RMSE ~ n^-slope
-    /// for n samples.
+    /// Exponents of convergence in tiles without and with glossy lobes: RMSE ~ n^-slope for n
+    /// samples.
     pub slopes: [f64; 2],
     /// Tiles in row order.
     pub tiles: Vec<PlannedTile>,
@@ -91,7 +91,7 @@ pub struct PlannedTile {
 
 impl Plan {
     /// Plans the render that continues the samples of `schedule` until its noise target.
-    /// `usual_slopes` (see [`Plan::slopes`]) are used where the schedule has no measured slope.
+    /// `usual_slopes` (see [`Plan::slopes`]) replace slopes that the schedule has not measured.
     /// Returns `None` if the schedule has no noise target, or no estimate of the noise.
     pub fn of_schedule(
         schedule: &Schedule,
@@ -141,7 +141,7 @@ impl Plan {
         self.ranges(shard).into_iter().enumerate().map(samples).sum()
     }
 
-    /// Mean number of samples per pixel in the merged picture, both replicates together.
+    /// Mean number of samples per pixel in the merged picture, over both replicates.
     pub fn spp(&self) -> f64 {
         let size = self.settings.size;
         let samples = |(i, t): (usize, &PlannedTile)| 2 * u64::from(t.end) * pixels_of(size, i);
@@ -150,8 +150,8 @@ impl Plan {
         samples as f64 / (width * height) as f64
     }
 
-    /// Compares the sample counts of `film` with those that the base and `shards` should have.
-    /// Returns the number of the first tile with a difference.
+    /// Compares the sample counts of `film` with those of the base and of `shards`. Returns the
+    /// number of the first tile with a difference.
     pub fn differing_tile(&self, film: &Film, shards: &[u32]) -> Option<usize> {
         let mut expected = vec![0u32; self.tiles.len()];
         for shard in shards {
@@ -185,8 +185,8 @@ impl Plan {
         Some(Schedule::of_samples(&samples?, settings))
     }
 
-    /// Returns the first setting in which two plans differ, with both values, as text for a
-    /// message.
+    /// Returns a phrase for messages: the first setting in which two plans differ, with both
+    /// values.
     fn difference(&self, other: &Self) -> String {
         let [ours, theirs] = [self, other].map(Self::text);
         let different = ours.lines().zip(theirs.lines()).find(|(a, b)| a != b);

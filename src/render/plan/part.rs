@@ -32,8 +32,7 @@ pub struct PartShard {
 }
 
 impl Part {
-    /// Adds the plan and the shards to `header`, and the metadata entry `Shards`, which pictures of
-    /// the film get.
+    /// Adds the plan, the shards and the metadata entry `Shards` to `header`.
     pub fn record(&self, header: &mut FilmFileHeader) {
         let mut text = format!("rays {}\n", self.rays);
         for PartShard { number, complete } in &self.shards {
@@ -110,9 +109,9 @@ impl Part {
         (!missing.is_empty()).then(|| ranges(&missing))
     }
 
-    /// Returns the metadata entry `Shards`: the shards in the film, the number of shards, the
-    /// unfinished and the missing ones, and the plan. Example: `0-2, 4 of 5, unfinished 4, missing
-    /// 3, 5, plan 0123456789abcdef`.
+    /// Returns the metadata entry `Shards`: shards in the film, number of all shards, unfinished
+    /// and missing ones, and the plan. Example: `0-2, 4 of 5, unfinished 4, missing 3, 5, plan
+    /// 0123456789abcdef`.
     fn origin(&self) -> (String, String) {
         let numbers = |wanted: &dyn Fn(&PartShard) -> bool| -> Vec<u32> {
             self.shards.iter().filter(|shard| wanted(shard)).map(|shard| shard.number).collect()

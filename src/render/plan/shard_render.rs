@@ -13,8 +13,8 @@ use std::time::Instant;
 
 /// Target duration of a step, in seconds. The caller can save the film between two steps.
 const STEP_SECONDS: f64 = 0.25;
-/// Target duration of one job, in seconds. Jobs are short so that all threads have work until the
-/// end of a step.
+/// Target duration of one job, in seconds. It is short, so that all threads have work until the end
+/// of a step.
 const JOB_SECONDS: f64 = 0.01;
 /// Largest number of samples per pixel and replicate of a job, even if tracing is so fast that
 /// [`JOB_SECONDS`] allows more.
@@ -22,15 +22,15 @@ const LONGEST_JOB: u32 = 1 << 20;
 /// Number of samples, over all pixels, of the first step. It measures the speed of tracing.
 const FIRST_STEP_SAMPLES: u64 = 1 << 18;
 
-/// Render of the samples of one shard. After each step both replicates of every tile hold the same
-/// number of samples: the first ones of the tile's range. A render can therefore continue from a
-/// film that was saved between two steps.
+/// Render of the samples of one shard. After each step, both replicates of every tile hold the same
+/// number of samples, the first ones of the tile's range. A render can therefore continue a film
+/// that was saved between two steps.
 pub struct ShardRender {
     state: RenderState,
     pool: rayon::ThreadPool,
-    /// Samples that are still to be traced in both replicates.
+    /// Samples that remain to be traced in both replicates.
     remaining: VecDeque<Job>,
-    /// Number of samples of the shard, and number of those that the film holds, over all pixels.
+    /// Number of all samples of the shard, and of those in the film, over all pixels.
     samples: [u64; 2],
     rays: u64,
     /// Number of samples and seconds of all steps so far, for the speed of tracing.
@@ -38,13 +38,13 @@ pub struct ShardRender {
 }
 
 impl ShardRender {
-    /// Continues the render of a shard on `threads` threads. `ranges` holds the shard's sample
-    /// indices of each tile; the film of `state` holds the first samples of some of these ranges.
-    /// `rays` is the number of rays of the film so far.
+    /// Continues the render of a shard on `threads` threads. `ranges` are the shard's sample
+    /// indices in each tile. The film of `state` holds the first samples of some of these ranges,
+    /// which took `rays` rays.
     ///
     /// # Errors
-    /// Fails if a tile has sample counts that no interrupted render of these ranges has, or if the
-    /// threads cannot be started.
+    /// Fails if the sample counts of a tile cannot come from an interrupted render of these ranges,
+    /// or if the threads cannot be started.
     pub fn new(
         state: RenderState,
         ranges: &[Range<u32>],

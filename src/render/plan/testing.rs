@@ -4,8 +4,8 @@ use crate::film::Display;
 use crate::render::plan::{Plan, PlanSettings, PlannedTile};
 use crate::sampling::SamplerKind;
 
-/// Creates a plan for `shards` shards and a picture with one row of tiles. Each entry of `tiles`
-/// holds the samples per replicate in the base and in the merged picture.
+/// Creates a plan for `shards` shards and a picture with one row of tiles. Each entry of `tiles` is
+/// for one tile: the samples per replicate in the base and in the merged picture.
 pub fn plan(shards: u32, tiles: &[[u32; 2]]) -> Plan {
     let tile = |[base, end]: &[u32; 2]| PlannedTile {
         base: *base,

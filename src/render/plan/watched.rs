@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
-/// Time without replacement after which an unfinished file counts as late. `zerkalo render`
-/// replaces its files every minute.
+/// Age at which an unfinished file is considered late. `zerkalo render` replaces its files every
+/// minute.
 const LATE: Duration = Duration::from_secs(180);
 
 /// Film files that other processes write, and the sum of their films.
@@ -31,10 +31,10 @@ pub struct WatchedFilms {
     named: Option<Member>,
     /// Plan that all files share. `None` for a checkpoint, or before the first file is read.
     plan: Option<Arc<Plan>>,
-    /// Sum of the complete files, and the stamp of each by its index in `files`.
+    /// Sum of the complete files, and the stamps of these files by their index in `files`.
     complete: Option<(BTreeMap<usize, FileStamp>, Film)>,
-    /// Sum of all files. `None` if all of them are complete (then `complete` is this sum), or if
-    /// none can be read.
+    /// Sum of all files. `None` if no file can be read, or if all files are complete and `complete`
+    /// is this sum.
     all: Option<Film>,
     header: Option<FilmFileHeader>,
 }
@@ -43,10 +43,10 @@ pub struct WatchedFilms {
 #[derive(Debug)]
 struct WatchedFile {
     path: PathBuf,
-    /// Number of the shard that the file should hold. `None` if film files were named instead of a
-    /// plan.
+    /// Number of the shard that the file should hold. `None` if the user named film files instead
+    /// of a plan.
     shard: Option<u32>,
-    /// State of the file when it was last read. `None` for a missing file.
+    /// Stamp of the file when it was last read. `None` for a missing file.
     stamp: Option<FileStamp>,
     contents: Contents,
     /// Number of samples that the file contributes to the sum, over all pixels.
@@ -55,7 +55,7 @@ struct WatchedFile {
     total: Option<u64>,
 }
 
-/// Properties of a file that change when it is replaced: time of modification, length, inode.
+/// Properties of a file that change when it is replaced: modification time, length, inode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct FileStamp {
     modified: SystemTime,
@@ -66,10 +66,10 @@ struct FileStamp {
 #[derive(Debug)]
 enum Contents {
     Missing,
-    /// The file cannot be used, for this reason.
+    /// The file cannot be used; the text is the reason.
     Refused(String),
     Part(Member),
-    /// Checkpoint of a render without plan. The number is its seconds of rendering.
+    /// Checkpoint of a render without a plan. The number is its seconds of rendering.
     Checkpoint(f64),
 }
 
@@ -84,7 +84,7 @@ pub enum WatchedState {
     Late,
     /// There is no file.
     Missing,
-    /// The file cannot be used, for this reason.
+    /// The file cannot be used; the text is the reason.
     Refused(String),
 }
 
@@ -106,8 +106,8 @@ pub struct WatchedShards {
 }
 
 impl WatchedFilms {
-    /// Reads the film files at `paths`. A path of a plan file stands for the film files of its
-    /// shards: `job.plan` for `job-0.zk`, `job-1.zk` and so on. Files may be missing.
+    /// Reads the film files at `paths`, which may be missing. The path of a plan file means the
+    /// film files of its shards: `job.plan` means `job-0.zk`, `job-1.zk` and so on.
     ///
     /// # Errors
     /// Fails if a plan file cannot be used, or if the films of two files cannot be added.
@@ -207,9 +207,9 @@ impl WatchedFilms {
         Some([shards.filter(|shard| shard.complete).count(), plan.settings.shards as usize + 1])
     }
 
-    /// Returns the state of all files at the time `now`, and the shards without a file. The order
-    /// is: missing and refused files, late, running, complete. Files of equal state are sorted by
-    /// the fraction of their samples, smallest first.
+    /// Returns the state of all files at the time `now`, and the shards without a file. They are
+    /// ordered by urgency: missing and refused files, late, running, complete. Files of equal state
+    /// are ordered by the fraction of their samples, smallest first.
     pub fn shards(&self, now: SystemTime) -> Vec<WatchedShards> {
         let mut rows: Vec<_> = self.files.iter().map(|file| file.row(now)).collect();
         rows.extend(self.unnamed().map(|shards| WatchedShards {
@@ -264,8 +264,8 @@ impl WatchedFilms {
         changed
     }
 
-    /// Refuses each of the `changed` files whose film cannot be added to those of the other files.
-    /// Returns the first reason.
+    /// Refuses each of the `changed` files whose film cannot be added to the films of the other
+    /// files. Returns the first reason.
     fn accept(&mut self, changed: &[usize]) -> Option<String> {
         let mut refused = None;
         let all: Vec<usize> = (0..self.files.len()).collect();
@@ -423,7 +423,7 @@ impl WatchedFile {
         Self { path, shard, stamp: None, contents: Contents::Missing, samples: 0, total: None }
     }
 
-    /// Reads and verifies the file.
+    /// Reads and verifies the file, and updates its state.
     fn read(&mut self, plans: &mut Plans) {
         (self.samples, self.total) = (0, None);
         self.contents = if self.stamp.is_none() {
@@ -473,7 +473,7 @@ impl WatchedFile {
 }
 
 impl WatchedState {
-    /// Position in the order of display; 0 is the most urgent.
+    /// Rank in the order of display; 0 is the most urgent.
     fn rank(&self) -> u8 {
         match self {
             Self::Refused(_) => 0,

@@ -18,20 +18,21 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Target duration of a piece of a wave, in seconds. The first value applies if the client displays
-/// the picture, the second if it does not.
+/// Target duration of a piece of a wave, in seconds: if the client displays the picture, and if it
+/// does not.
 const PIECE_SECONDS: [f64; 2] = [0.05, 0.25];
-/// Target duration of one job, in seconds. It is short because a running job cannot be cancelled.
+/// Target duration of one job, in seconds. It is short, because a running job cannot be cancelled.
 const JOB_SECONDS: f64 = 0.005;
 /// Number of pixels of a tile.
 const TILE_PIXELS: f64 = crate::film::TILE_PIXELS as f64;
-/// Longest expected duration of a first-hit buffer that is traced before the first
-/// picture, in seconds.
+/// Longest expected duration, in seconds, of a first-hit buffer that is traced before the first
+/// picture. A slower one is traced after the picture.
 const FIRST_HITS_SECONDS: f64 = 0.002;
-/// Assumed seconds per ray of the first first-hit buffer: the value of a small scene.
+/// Assumed seconds per ray of a first-hit buffer before one has been measured: the value of a small
+/// scene.
 const FIRST_HIT_RAY_SECONDS: f64 = 5e-8;
 
-/// Resources of a render, and the destination of its snapshots.
+/// Resources of a render, and the receiver of its snapshots.
 pub(super) struct WorkContext<'a> {
     pub pool: &'a rayon::ThreadPool,
     pub shared: &'a Shared,
@@ -41,9 +42,9 @@ pub(super) struct WorkContext<'a> {
 }
 
 impl WorkContext<'_> {
-    /// Returns `true` if a snapshot is to be published. Between waves (`is_final` is `false`) that
-    /// is only the case if the client has taken the previous picture. Otherwise the new snapshot
-    /// would replace it unseen, and it costs time to make.
+    /// Returns `true` if a snapshot should be published. The snapshot after the last wave
+    /// (`is_final`) always is. Earlier ones are published only after the client has taken the
+    /// previous one, because they cost time and would be replaced unseen.
     fn snapshot_wanted(&self, is_final: bool) -> bool {
         is_final || self.view == View::default() || self.shared.slot.is_empty()
     }
@@ -56,19 +57,19 @@ impl WorkContext<'_> {
     }
 }
 
-/// The render of one scene.
+/// Active render of one scene.
 pub(super) struct ActiveRender {
     pub state: RenderState,
     pub schedule: Schedule,
     /// Start of the compilation.
     started: Instant,
     compiled_in: Duration,
-    /// Time spent in waves.
+    /// Total time of all waves.
     traced_for: Duration,
     /// Time from `started` to the first complete picture.
     pub first_picture_after: Option<Duration>,
-    /// `true` if the errors of the tiles have to be estimated again, because light weights or
-    /// display transform have changed.
+    /// `true` if the errors of the tiles must be estimated again, because light weights or display
+    /// transform have changed.
     pub estimates_stale: bool,
     throughput: Throughput,
     inventory: Arc<str>,
@@ -114,7 +115,7 @@ impl ActiveRender {
     /// Continues the render of `checkpoint` and shows `scene`.
     ///
     /// # Errors
-    /// Returns the reason for which the checkpoint is of no use for this scene.
+    /// Returns the reason why the checkpoint cannot be used for this scene.
     pub fn resume(
         scene: &Arc<Scene>,
         options: &Options,
@@ -163,7 +164,7 @@ impl ActiveRender {
         self.traced_for.as_secs_f64()
     }
 
-    /// Shows `scene` from now on and returns `true` if the samples at hand are valid for it.
+    /// Shows `scene` from now on and returns `true` if the samples of the film are valid for it.
     /// Otherwise returns `false`.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let weights = self.state.mix.clone();
@@ -177,7 +178,8 @@ impl ActiveRender {
         true
     }
 
-    /// Discards the noise estimates, because the samples are displayed in another way from now on.
+    /// Discards the noise estimates. They are no longer valid after a change of light weights or
+    /// display transform.
     pub fn invalidate_estimates(&mut self) {
         self.schedule.forget_estimates();
         self.estimates_stale = true;
@@ -188,7 +190,8 @@ impl ActiveRender {
         self.throughput = Throughput::default();
     }
 
-    /// Estimates the errors of all tiles. If it is cancelled, returns `false` and changes nothing.
+    /// Estimates the errors of all tiles. If `cancel_wave` cancels it, returns `false` and changes
+    /// nothing.
     pub fn reestimate(&mut self, pool: &rayon::ThreadPool, cancel_wave: &AtomicBool) -> bool {
         let (film, estimator) = (&self.state.film, self.state.estimator());
         let estimate = |tile: usize| -> Option<(u32, TileNoise)> {
@@ -252,8 +255,7 @@ impl ActiveRender {
         }
     }
 
-    /// Cuts `wave` to a piece that takes about [`PIECE_SECONDS`], with jobs that take about
-    /// [`JOB_SECONDS`].
+    /// Cuts `wave` to a piece of about [`PIECE_SECONDS`], with jobs of about [`JOB_SECONDS`].
     fn piece(&self, wave: Wave, context: &WorkContext) -> Wave {
         let seconds = PIECE_SECONDS[usize::from(context.view == View::default())];
         let Some(speed) = self.throughput.samples_per_second().or_else(|| self.mean_speed()) else {
@@ -271,8 +273,8 @@ impl ActiveRender {
         (seconds > 0.0).then(|| self.schedule.samples() as f64 / seconds)
     }
 
-    /// Traces the first-hit buffer for the view, unless there is one already or it would take longer
-    /// than `limit` seconds.
+    /// Traces the first-hit buffer of the view. Does nothing if there is one, or if it would take
+    /// longer than `limit` seconds.
     fn update_first_hits(&mut self, context: &WorkContext, limit: f64) {
         let Some([columns, rows]) = context.view.raster else { return };
         if self.first_hits.as_ref().is_some_and(|f| [f.columns, f.rows] == [columns, rows]) {

@@ -41,7 +41,7 @@ use std::time::{Duration, Instant};
 pub use watch::{WatchReport, WatchSession, WatchedShards, WatchedState};
 use worker::Worker;
 
-/// Function that runs on the rendering thread. Its argument is `None` if there is no film.
+/// Function that runs on the rendering thread. Its argument is `None` without a film.
 type Task = Box<dyn FnOnce(Option<(&RenderState, &Report)>) + Send>;
 
 /// Function that gets an encoded checkpoint, or `None` if there is no picture yet.
@@ -61,7 +61,7 @@ enum Command {
     Quit,
 }
 
-/// State that session and worker share in addition to the channel.
+/// State that session and worker share in addition to the command channel.
 #[derive(Default)]
 struct Shared {
     /// Cancels the running wave, because commands are waiting.
@@ -69,8 +69,8 @@ struct Shared {
     /// Cancels the first pass, because a newer scene is waiting.
     cancel_first_pass: AtomicBool,
     slot: Slot,
-    /// Number of compilations, for tests: skipped scenes are visible nowhere else outside of the
-    /// worker.
+    /// Number of compilations. Tests read it, because skipped scenes are not visible outside of the
+    /// worker otherwise.
     #[cfg(test)]
     compilations: std::sync::atomic::AtomicUsize,
 }
@@ -101,8 +101,8 @@ impl Session {
     }
 
     /// Renders `scene` from now on. Returns the generation of the scene, a number that its reports
-    /// contain; later scenes have larger generations. Samples at hand are kept if they are valid
-    /// for the new scene (see [`Relighting::mix`]).
+    /// contain; later scenes have larger generations. Samples are kept if they are valid for the
+    /// new scene (see [`Relighting::mix`]).
     ///
     /// [`Relighting::mix`]: crate::render::Relighting::mix
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> u64 {
@@ -113,7 +113,7 @@ impl Session {
     }
 
     /// Continues the render of `checkpoint` and shows `scene`, as [`Session::set_scene`] does. If
-    /// the checkpoint is of no use for this scene, reports have the state [`State::Failed`].
+    /// the checkpoint cannot be used for this scene, reports have the state [`State::Failed`].
     pub fn continue_from(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) -> u64 {
         self.generations += 1;
         self.send(Command::Resume(self.generations, scene, Box::new(checkpoint)));
@@ -150,8 +150,8 @@ impl Session {
         self.send(Command::Display(display));
     }
 
-    /// Sets the number of threads that trace (0: one per processor) and their priority. `niceness`
-    /// 0 is the priority of the calling thread; 1 to 19 are lower priorities (on Linux).
+    /// Sets the number of tracing threads (0: one per processor) and their priority. `niceness` 0
+    /// is the priority of the calling thread; 1 to 19 are lower priorities (on Linux).
     ///
     /// # Errors
     /// Returns the operating system's error if a thread cannot be started. The old threads are then
@@ -178,7 +178,7 @@ impl Session {
 
     /// Queues `task` and returns at once. The task runs on the rendering thread between two pieces
     /// of work. Its argument is `None` if there is no film: no scene has been set yet, or the scene
-    /// cannot be rendered. A task that has not run when the session ends is dropped.
+    /// cannot be rendered. Tasks that are still queued when the session ends are dropped.
     pub fn submit(&self, task: impl FnOnce(Option<(&RenderState, &Report)>) + Send + 'static) {
         self.send(Command::Task(Box::new(task)));
     }
@@ -230,8 +230,8 @@ impl Session {
         self.shared.slot.take()
     }
 
-    /// Sends the command first, then raises the cancel flag. The module's documentation explains
-    /// the order.
+    /// Sends the command, then raises the cancel flag. The module's documentation explains the
+    /// order.
     fn send(&self, command: Command) {
         // The worker ends only by `Quit`, or by a panic, which `drop` propagates.
         let _ = self.commands.send(command);

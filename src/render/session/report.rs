@@ -4,7 +4,7 @@ use crate::film::{Display, Film, LightWeights, Noise};
 use crate::render::schedule::{Spp, StoppedBy};
 use std::sync::Arc;
 
-/// Noise targets among which a user chooses, in 8-bit levels. Each is half of the previous one.
+/// Noise targets that a user can choose, in 8-bit levels. Each is half of the previous one.
 pub const QUALITIES: [f64; 6] = [4.0, 2.0, 1.0, 0.5, 0.25, 0.125];
 
 /// State of a session.
@@ -31,11 +31,11 @@ pub struct Report {
     pub generation: u64,
     /// State of the session.
     pub state: State,
-    /// Numbers of samples per pixel in the picture, A and B together.
+    /// Numbers of samples per pixel in the picture, over both replicates.
     pub spp: Spp,
-    /// Number of samples traced, over all pixels.
+    /// Number of traced samples, over all pixels.
     pub samples: u64,
-    /// Number of rays traced, of every kind.
+    /// Number of traced rays of every kind.
     pub rays: u64,
     /// Seconds spent on tracing this scene. Compilation and pauses are not included.
     pub seconds: f64,
@@ -49,8 +49,8 @@ pub struct Report {
     /// Lower and upper estimate of the seconds left until the render ends. `None` if the time
     /// cannot be estimated.
     pub eta_seconds: Option<(f64, f64)>,
-    /// Lower and upper estimate of the seconds left until the noise falls to each of the
-    /// [`QUALITIES`], whatever the stop criteria are. `None` before the first estimate.
+    /// Lower and upper estimate of the seconds until the noise falls to each of the [`QUALITIES`],
+    /// independent of the stop criteria. `None` before the first estimate.
     pub quality_seconds: [Option<(f64, f64)>; QUALITIES.len()],
     /// Share of the render that is done, 0..=1. `None` if it cannot be estimated.
     pub progress: Option<f64>,

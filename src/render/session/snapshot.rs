@@ -25,15 +25,15 @@ pub struct View {
 pub struct Snapshot {
     /// Progress of the render.
     pub report: Report,
-    /// Mean of each light group over each cell of [`View::raster`]; the client applies the light
+    /// Mean of each light group over each cell of [`View::raster`]. The client applies the light
     /// weights. `None` if no picture is requested, or without a film.
     pub picture: Option<Thumbnail>,
     /// Light weights of the scene in the report; empty without a film.
     pub mix: LightWeights,
     /// Relighting that computes the light weights of other scenes. `None` without a film.
     pub lighting: Option<Arc<Relighting>>,
-    /// First hit in each cell of [`View::raster`]. If it takes long to trace, it is part of the
-    /// snapshot after the first picture.
+    /// First hit in each cell of [`View::raster`]. If tracing it takes long, it is missing in
+    /// snapshots before the first complete picture.
     pub first_hits: Option<Arc<FirstHitBuffer>>,
     /// Error and number of samples of each tile.
     pub tiles: Arc<TileMaps>,
@@ -57,8 +57,8 @@ impl Snapshot {
     }
 
     /// Returns the light weights with which this picture shows `scene`, which may be newer than the
-    /// snapshot. Returns `None` if `scene` needs samples of its own; the picture can then be shown
-    /// only with [`Snapshot::mix`].
+    /// snapshot. Returns `None` if `scene` needs new samples; only [`Snapshot::mix`] then fits the
+    /// picture.
     pub fn mix_for(&self, scene: &Scene) -> Option<LightWeights> {
         self.lighting.as_ref()?.mix(scene)
     }
@@ -74,7 +74,7 @@ pub struct TileMaps {
     pub rows: usize,
     /// Estimated RMSE of each tile in 8-bit levels; empty before the first estimate.
     pub noise_codes: Vec<f32>,
-    /// Samples per pixel of each tile, A and B together.
+    /// Samples per pixel of each tile, over both replicates.
     pub spp: Vec<u32>,
 }
 
@@ -89,7 +89,7 @@ impl TileMaps {
     }
 }
 
-/// Fields with equal values in all snapshots of one film.
+/// Fields whose values are equal in all snapshots of one film.
 pub(super) struct Frame {
     pub view: View,
     pub mix: LightWeights,
@@ -154,8 +154,8 @@ impl Slot {
         self.lock().is_none()
     }
 
-    /// Locks the slot also if it is poisoned: a client that panicked while it held the lock has
-    /// left a complete snapshot.
+    /// Locks the slot. A poisoned lock is used as well, because a client that panicked with the
+    /// lock has left a complete snapshot.
     fn lock(&self) -> std::sync::MutexGuard<'_, Option<Snapshot>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

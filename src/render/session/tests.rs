@@ -9,7 +9,7 @@ use crate::scene::built_in;
 use crate::world;
 use std::time::{Duration, Instant};
 
-/// Time limit that every machine meets; reached only if a test fails.
+/// Time limit of waits. It is so long that only a failing test reaches it.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn endless() -> Stop {
@@ -103,7 +103,8 @@ fn newest_scene_is_never_lost() {
     }
 }
 
-/// The message of a snapshot that was taken without waiting must not end the next wait.
+/// Checks that the wake-up message of a snapshot that was taken without waiting does not end the
+/// next wait.
 #[test]
 fn wait_ignores_messages_of_snapshots_already_taken() {
     let mut session = session(Stop { spp: Some(8), ..Stop::default() });

@@ -3,9 +3,9 @@
 use std::io;
 
 /// Creates a pool of `threads` threads. A `niceness` above 0 lowers their priority; with 19 they
-/// run only when the processor is idle otherwise. The priority takes effect on Linux, where it is
-/// set for each thread, unless the system refuses it (a priority cannot be raised above that of the
-/// process).
+/// run only when the processor is idle otherwise. The priority is set for each thread, and only on
+/// Linux. It is ignored if the system refuses it, because a priority cannot be raised above that of
+/// the process.
 ///
 /// # Errors
 /// Returns the operating system's error if a thread cannot be started.

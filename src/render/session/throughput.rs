@@ -8,12 +8,12 @@ const WINDOW_SECONDS: f64 = 1.0;
 /// Sample counts at several times within the latest [`WINDOW_SECONDS`].
 #[derive(Debug, Default)]
 pub(super) struct Throughput {
-    /// Pairs of time and sample count since the start of the render, oldest first.
+    /// Pairs of tracing time and sample count since the start of the render, oldest first.
     marks: VecDeque<(f64, u64)>,
 }
 
 impl Throughput {
-    /// Records that `samples` samples have been traced in the first `seconds` seconds.
+    /// Records the number of samples that the first `seconds` seconds of tracing have given.
     pub fn record(&mut self, seconds: f64, samples: u64) {
         self.marks.push_back((seconds, samples));
         while self.marks.get(1).is_some_and(|(time, _)| *time <= seconds - WINDOW_SECONDS) {

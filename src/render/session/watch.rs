@@ -15,14 +15,14 @@ use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Interval between two looks at the files.
+/// Interval at which the files are checked.
 const POLL: Duration = Duration::from_secs(1);
-/// Wait after a look at the files, relative to its duration: reading takes at most a third of the
-/// time.
+/// Pause after a check of the files, relative to its duration. Reading thereby takes at most a
+/// third of the time.
 const REST: u32 = 2;
 
-/// Function that runs on the thread of the session. Its argument is `None` if there is no film. The
-/// metadata of the header are those of a picture with its display.
+/// Function that runs on the thread of the session. Its argument is `None` without a film. The
+/// header has the metadata of a picture with its display transform.
 type Task = Box<dyn FnOnce(Option<(&Film, &FilmFileHeader, &Report)>) + Send>;
 
 enum Command {
@@ -98,7 +98,7 @@ impl WatchSession {
         self.send(Command::Display(display));
     }
 
-    /// Queues `task`, which runs on the thread of the session.
+    /// Queues `task` to run on the thread of the session.
     pub fn submit(
         &self,
         task: impl FnOnce(Option<(&Film, &FilmFileHeader, &Report)>) + Send + 'static,
@@ -116,7 +116,7 @@ impl WatchSession {
         self.slot.take()
     }
 
-    /// Returns `true` if the thread has ended, by a panic.
+    /// Returns `true` if the thread has ended by a panic.
     pub fn has_ended(&self) -> bool {
         matches!(self.wakeup.try_recv(), Err(TryRecvError::Disconnected))
     }
@@ -133,7 +133,7 @@ struct Worker {
     slot: Arc<Slot>,
     notify: Sender<()>,
     view: View,
-    /// Display transform instead of that of the films.
+    /// Display transform that replaces that of the films.
     display: Option<Display>,
     /// Estimates of the current film.
     shown: Option<Shown>,
@@ -173,7 +173,8 @@ impl Worker {
         }
     }
 
-    /// Executes `command` and those that follow it, then publishes a snapshot if they changed it.
+    /// Executes `command` and those queued after it. Publishes a snapshot if they changed its
+    /// contents.
     fn apply(&mut self, command: Command, inbox: &Receiver<Command>) {
         let mut changed = false;
         let mut next = Some(command);

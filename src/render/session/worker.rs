@@ -25,9 +25,9 @@ pub(super) struct Worker {
     newest: Option<(u64, Arc<Scene>)>,
     /// `true` if the render of the newest scene has not been started yet.
     pending: bool,
-    /// `true` if the newest scene starts with an empty film, even if samples could be reused.
+    /// `true` if the newest scene must start with an empty film, even if samples could be reused.
     restart: bool,
-    /// Checkpoint to be continued, and the scene that it is to show.
+    /// Checkpoint to continue, and the scene to show with its samples.
     resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
     tasks: Vec<Task>,
     checkpoints: Vec<(Provenance, CheckpointTask)>,
@@ -37,7 +37,7 @@ pub(super) struct Worker {
     work: Result<Option<ActiveRender>, String>,
     /// State of the session after the latest piece of work.
     state: State,
-    /// `true` if nothing is left to do before the next command.
+    /// `true` if there is no work before the next command.
     idle: bool,
 }
 
@@ -81,7 +81,7 @@ impl Worker {
         }
     }
 
-    /// Receives all waiting commands. Waits for one if nothing is left to do.
+    /// Receives all queued commands. Waits for one if there is no work.
     fn listen(&mut self) -> ControlFlow<()> {
         // The flags are lowered before commands are received. The module's documentation explains
         // the order.
@@ -207,7 +207,7 @@ impl Worker {
         }
     }
 
-    /// Does one piece of work, or nothing if nothing is left to do.
+    /// Does one piece of work, if there is any.
     fn advance(&mut self) {
         let generation = self.generation();
         let context = WorkContext {

@@ -33,7 +33,7 @@ pub fn light_kinds() -> Vec<Word> {
     words.map(|(name, doc)| Word { name: name.into(), doc: doc.into() }).to_vec()
 }
 
-/// Body colours of new materials, used in turn.
+/// Colours of new materials, used in turn.
 const PALETTE: [[f64; 3]; 6] = [
     [0.85, 0.16, 0.11],
     [0.13, 0.28, 0.8],
@@ -97,8 +97,8 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     Edit::checked(next, subject, format!("add {kind}"))
 }
 
-/// Returns transform steps for a shape that has no position key of its own. The steps stand the
-/// shape upright on the point `base` and scale its longest side to `size`.
+/// Returns transform steps for a shape without a position key of its own. They place the shape
+/// upright on the point `base` and scale its longest side to `size`.
 fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     // The axis of the canonical cylinder is z; meshes and compounds have y up, as scenes do.
     let mut steps = match shape {
@@ -115,9 +115,9 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     steps
 }
 
-/// Returns the length of a new object, rounded to one digit: 0.6 times the median length of the
-/// solids, which is limited to the scene's bounding radius. Without solids it is 0.15 times that
-/// radius; in an empty scene it is 0.6.
+/// Returns the length of a new object, rounded to one digit. It is 0.6 times the median length of
+/// the solids, limited to the scene's bounding radius. Without solids it is 0.15 times that radius,
+/// and 0.6 in an empty scene.
 fn usual_size(scene: &Scene) -> f64 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let solid = |object: &Object| {
@@ -148,7 +148,7 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
 }
 
 /// Adds a light of the kind `kind` above the scene, to the right or left of the camera: on the side
-/// with fewer lights. The intensity is that of a scene's only light, or half of that if another
+/// with fewer lights. Its intensity is that of a scene's only light, or half of that if another
 /// light is on.
 ///
 /// # Errors
@@ -233,8 +233,7 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
 /// Adds a material that no object uses yet.
 ///
 /// # Errors
-/// None in practice: the edited scene is validated like that of every edit, and the new material is
-/// valid.
+/// Returns the first validation error of the edited scene. The new material itself is valid.
 pub fn add_material(scene: &Scene) -> Result<Edit, EditError> {
     let mut next = scene.clone();
     let name = free_material(scene, "material");

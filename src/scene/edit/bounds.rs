@@ -19,8 +19,8 @@ pub struct BoundingSphere {
 pub(super) type Extent = (DVec3, DVec3);
 
 /// Returns a bounding sphere for `subject`: of an object, of a point light, or of all finite
-/// objects with a material. The sphere of a plane has the scene's radius around the point that
-/// places the plane; that of a point light has a tenth of the scene's radius. Returns `None` for
+/// objects with a material. The sphere of a plane has the scene's radius and is centred on the
+/// plane's position. That of a point light has a tenth of the scene's radius. Returns `None` for
 /// any other target.
 pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     match subject {
@@ -55,7 +55,7 @@ pub fn scene_bounds(scene: &Scene) -> BoundingSphere {
     middle(scene).map_or(BoundingSphere { center: [0.0; 3], radius: 1.0 }, ball)
 }
 
-/// Returns the bounding box of all solids, or without solids that of all finite objects. Returns
+/// Returns the bounding box of all solids. Without solids it is that of all finite objects. Returns
 /// `None` if there are none of either.
 fn middle(scene: &Scene) -> Option<Extent> {
     let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
@@ -74,17 +74,17 @@ fn ball((low, high): Extent) -> BoundingSphere {
     BoundingSphere { center: center.to_array(), radius: radius.max(f64::MIN_POSITIVE) }
 }
 
-/// Returns the coarse step of a coordinate: a power of ten between a hundredth and a tenth of the
-/// diameter of the scene's solids (0.1 in a room with objects a few units apart). A fine step is a
-/// tenth of the coarse one.
+/// Returns the coarse step of a coordinate: the power of ten between a hundredth and a tenth of the
+/// diameter of the scene's solids. It is 0.1 in a room with objects a few units apart. A fine step
+/// is a tenth of it.
 pub fn step_length(scene: &Scene) -> f64 {
     let exponent = floor_log10(2.0 * scene_bounds(scene).radius) - 1;
     format!("1e{}", exponent.clamp(-12, 8)).parse().unwrap_or(0.1)
 }
 
 /// Returns the distance from the eye to the pivot of camera movements, greater than 0. The pivot is
-/// the camera's target. A camera that has only a direction has as pivot the point of the view axis
-/// nearest to the centre of the scene.
+/// the camera's target. For a camera with a direction it is the point of the view axis closest to
+/// the centre of the scene.
 pub fn pivot_distance(scene: &Scene) -> f64 {
     let eye = DVec3::from_array(scene.camera.eye);
     if let Some(target) = scene.camera.target {

@@ -20,8 +20,7 @@ use glam::DVec3;
 use std::f64::consts::PI;
 use toml::{Table, Value};
 
-/// Field for the choice between the kinds of a light. It is a row of the inspector; scene files have
-/// no such key.
+/// Field for the kind of a light. It is a row of the inspector, and no key of scene files.
 pub(super) const KIND: Field = Field::required(
     "kind",
     ValueType::OneOf(&[
@@ -37,8 +36,8 @@ pub(super) const KIND: Field = Field::required(
     "Kind of light source.",
 );
 
-/// Field for the choice between `target` and `direction` of a camera. It is a row of the inspector;
-/// scene files have no such key.
+/// Field for the choice between `target` and `direction` of a camera. It is a row of the inspector,
+/// and no key of scene files.
 pub(super) const AIM: Field = Field::required(
     "aim",
     ValueType::OneOf(&[
@@ -49,8 +48,8 @@ pub(super) const AIM: Field = Field::required(
     "Target point or fixed direction of the camera.",
 );
 
-/// Returns the one of the mutually exclusive keys of `subject` that `values` has. Returns `None` if
-/// it has neither, or if `subject` has no exclusive keys.
+/// Returns the key in `values` that is one of the mutually exclusive keys of `subject`. Returns
+/// `None` if `values` has none of them.
 pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
     crate::scene::edit::toml_view::exclusive_keys(subject)
         .iter()
@@ -58,7 +57,7 @@ pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
         .find(|key| values.contains_key(*key))
 }
 
-/// Converts the value of `key` to the kind `name`. The present kind causes no change.
+/// Converts the value of `key` to the kind `name`. Nothing changes if it has this kind already.
 pub(super) fn switch(
     scene: &Scene,
     subject: &Target,
@@ -100,8 +99,8 @@ pub(super) fn switch(
     })
 }
 
-/// Returns a shape of the kind `name` with position, size and rotation of `shape`; `None` if there
-/// is no such kind.
+/// Returns a shape of the kind `name` with the position, size and rotation of `shape`; `None` if
+/// there is no such kind.
 fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let form = shape.form();
     let (base, size) = match form.bounds() {
@@ -143,8 +142,8 @@ fn rotation(shape: &Shape) -> f64 {
 pub(super) const SPOT_ANGLE: f64 = 30.0;
 
 /// Converts a light. Its brightness and its direction at the centre of the scene are kept. A light
-/// with a position keeps it and is aimed at the centre of the scene, if it has a direction; a light
-/// with a size keeps its size.
+/// with a position keeps it; if it also has a direction, it is aimed at the centre of the scene. A
+/// light with a size keeps its size.
 fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> {
     if light.kinds() == [name] {
         return None;
@@ -189,9 +188,10 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     ((factor - 1.0).abs() > 1e-3 && factor.is_finite()).then(|| refit(light, factor))
 }
 
-/// Returns the irradiance of a light of unit intensity on a surface at `point` that faces it, on the
-/// axis of a spot light; of an environment that of a white one. For lights with a size it is that of a distant light of the same area, at
-/// most that of a hemisphere.
+/// Returns the irradiance of a light of unit intensity on a surface at `point` that faces the
+/// light, on the axis of a spot light. For an environment it is that of a white environment. For
+/// lights with a size it is that of a distant light of the same area, limited to that of a
+/// hemisphere.
 fn irradiance_at(light: &Light, point: DVec3) -> f64 {
     let Some(position) = light.position() else { return PI };
     let squared = (DVec3::from_array(position) - point).length_squared();
@@ -213,7 +213,7 @@ fn irradiance_at(light: &Light, point: DVec3) -> f64 {
     }
 }
 
-/// Changes the falloff of a point or spot light. Its brightness at the centre of the scene is kept.
+/// Changes the falloff of a point or spot light. Its irradiance at the centre of the scene is kept.
 pub(super) fn switch_falloff(
     scene: &Scene,
     index: usize,
@@ -237,7 +237,7 @@ pub(super) fn switch_falloff(
 }
 
 /// Multiplies the intensity of `light` by `factor`, unless the product is out of range. Returns a
-/// note that states the old and the new intensity.
+/// note with the old and the new intensity.
 fn refit(light: &mut Light, factor: f64) -> String {
     let fitted = round_significant(light.intensity * factor, 3);
     let old = light.intensity;
@@ -248,7 +248,7 @@ fn refit(light: &mut Light, factor: f64) -> String {
     format!("Intensity {old} became {new}: as bright as before in the middle of the scene.")
 }
 
-/// Converts a texture and keeps its placement on the shape.
+/// Converts a texture. Its placement on the shape is kept.
 fn switch_texture(material: &mut Material, key: &str, name: &str) {
     match (key, &material.texture, &material.bump) {
         ("texture", None, _) => material.texture = Texture::new(name),
@@ -260,7 +260,7 @@ fn switch_texture(material: &mut Material, key: &str, name: &str) {
     }
 }
 
-/// Converts a camera; the picture stays (almost) the same.
+/// Converts a camera so that the picture stays the same, except for rounding.
 fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     if key == "view_angle" {
         let [width, height] = scene.film.size.map(f64::from);
@@ -307,7 +307,7 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     }
 }
 
-/// Rounds `x` to about a millionth of `scale`: fine enough for a rounded direction to keep its aim.
+/// Rounds `x` to about a millionth of `scale`, so that a rounded direction stays accurate.
 fn rounded(x: f64, scale: f64) -> f64 {
     rounded_to(x, crate::value::floor_log10(scale) - 6)
 }

@@ -10,10 +10,9 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::truncated;
 use glam::DVec3;
 
-/// Duplicates an object, a light, a material or a stored camera. The copy is appended to the list
-/// of the original with a unique name (`cube 2`). The copy of an object is placed beside the
-/// original, where there is room and the camera sees it; the copy of a light is placed beside the
-/// light.
+/// Duplicates an object, a light, a material or a stored camera. The copy is appended to the same
+/// list with a unique name (`cube 2`). The copy of an object is placed beside the original, in a
+/// free place that the camera sees. The copy of a light is placed beside the light.
 ///
 /// # Errors
 /// Fails for targets that every scene has exactly once.
@@ -76,7 +75,7 @@ pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
 }
 
 /// Deletes an object, a light, a stored camera or a material. Objects with a deleted material get
-/// the default material, parts of compounds that of the whole compound. The note of the edit names
+/// the default material, and parts of compounds that of the whole compound. The edit's note names
 /// these objects and parts.
 ///
 /// # Errors
@@ -121,8 +120,8 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     })
 }
 
-/// Returns the first of the sorted `names` after `gone`, else the last name. Returns `None` if
-/// `names` is empty.
+/// Returns the first of the sorted `names` after `gone`, or the last name if there is none. Returns
+/// `None` if `names` is empty.
 fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) -> Option<String> {
     names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
 }
@@ -162,11 +161,11 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     (!notes.is_empty()).then(|| notes.join(" "))
 }
 
-/// Renames a target. A renamed material is renamed in all objects and parts that use it. The name
-/// of an object or a light may be empty.
+/// Renames a target. A renamed material is also renamed in all objects and parts that use it. The
+/// name of an object or a light may be empty.
 ///
 /// # Errors
-/// Fails for targets without a name, and for a name that is taken or not printable.
+/// Fails for targets without a name, and for a name that exists already or is not printable.
 pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -210,7 +209,7 @@ pub fn rename(scene: &Scene, subject: &Target, new: &str) -> Result<Edit, EditEr
     Edit::checked(next, select, format!("rename {}", subject.label(scene)))
 }
 
-/// Gives an object its own copy of its material, which no other object uses.
+/// Gives an object a copy of its material that no other object uses.
 ///
 /// # Errors
 /// Fails for targets other than objects.

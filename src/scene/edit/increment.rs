@@ -12,17 +12,16 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, floor_log10, rounded_to};
 use toml::Value;
 
-/// Changes the numbers of `key` by `steps` arrow steps. A whole number counts coarse steps; any
-/// other number counts fine steps in tenths: 0.1 is one fine step, -0.3 is three fine steps back.
-/// `component` selects one number, counted from 0. `None` changes all numbers together, and of a
-/// colour the brightness.
+/// Changes the numbers of `key` by `steps`. Whole numbers are coarse steps, other numbers are fine
+/// steps in tenths: 0.1 is one fine step, -0.3 is three fine steps back. `component` selects one
+/// number, counted from 0. `None` changes all numbers together, and the brightness of a colour.
 ///
 /// A coarse step changes sizes, intensities and roughness by about a tenth (a fine step by a
 /// hundredth), coordinates by [`step_length`], angles by 5 degrees, shares by 0.05. A key without
 /// numbers changes to the next or previous choice ([`toggle`]).
 ///
 /// The scene stays unchanged at the end of a range. It also stays unchanged if other keys forbid
-/// the new value; the note of the edit then states the reason.
+/// the new value; the edit's note then states the reason.
 ///
 /// # Errors
 /// Fails if there is no such key or number, or no value to start from.
@@ -75,9 +74,9 @@ pub fn step(
     })
 }
 
-/// Changes `key` to the next choice, or to the previous one, cyclically. `key` is an enumeration, a
-/// switch, a kind or the material of an object. For a key that may have no value, no value is one
-/// more choice.
+/// Changes `key` to the next choice, or to the previous one if `forward` is `false`, cyclically.
+/// `key` is an enumeration, a switch, a kind or the material of an object. For an optional key, "no
+/// value" is one of the choices.
 ///
 /// # Errors
 /// Fails if there is no such key, or it has no choices.
@@ -132,7 +131,7 @@ pub fn toggle(
 }
 
 /// Returns the index after `index` (before it, if `forward` is `false`) in a cycle of `n` choices.
-/// If `optional` is `true`, the cycle also contains `None`. Returns `None` if `n` is 0.
+/// If `optional` is `true`, `None` is one more choice. Returns `None` if `n` is 0.
 fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option<usize> {
     match (index, forward) {
         _ if n == 0 => None,
@@ -146,8 +145,8 @@ fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option
     }
 }
 
-/// Returns the number that is in effect for a key that is left out, at which its first step starts:
-/// for `alpha` and `f0` of a material. Returns `None` for any other key.
+/// Returns the effective number of a key without a value, from which its first step starts: for
+/// `alpha` and `f0` of a material. Returns `None` for any other key.
 fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<Value> {
     let material = match subject {
         Target::Material(name) => scene.materials.get(name),
@@ -183,20 +182,20 @@ impl StepCount {
 /// Rule by which a number is incremented.
 #[derive(Clone, Copy)]
 enum StepRule {
-    /// To the next round number (rung), about a tenth larger or smaller. The rung below `floor` is
-    /// 0, and the rung above 0 is `floor`.
+    /// To the next round number (rung), about a tenth larger or smaller. Between 0 and `floor`
+    /// there are no rungs.
     Rungs { floor: f64, range: NumberRange },
-    /// By `unit` (fine: a tenth of `unit`).
+    /// By `unit`, or by a tenth of it in fine steps.
     Units { unit: f64, range: NumberRange },
-    /// By 5 degrees (fine: 0.5).
+    /// By 5 degrees, or by 0.5 in fine steps.
     Degrees { range: NumberRange },
-    /// By a twentieth of the largest number of the direction.
+    /// By a twentieth of the direction's largest component.
     Direction,
-    /// To the next rung of the magnitude; the sign is kept.
+    /// To the next rung by magnitude; the sign is kept.
     Factor,
-    /// By tens (fine: ones).
+    /// By 10, or by 1 in fine steps.
     Tens { range: NumberRange },
-    /// By doubling and halving (fine: by ones). The step up from 0 gives 1.
+    /// By doubling or halving, or by 1 in fine steps. The step up from 0 leads to 1.
     Doubles { range: NumberRange },
 }
 
@@ -248,7 +247,7 @@ impl StepRule {
         })
     }
 
-    /// Returns `x` after `count` steps; `all` holds all numbers of the value, including `x`.
+    /// Returns `x` after `count` steps. `all` are all numbers of the value, including `x`.
     fn stepped(self, x: f64, all: &[f64], count: StepCount) -> f64 {
         let StepCount { steps, fine } = count;
         match self {
@@ -282,14 +281,14 @@ impl StepRule {
     }
 }
 
-/// Returns `x` plus `steps` times `unit` (fine: a tenth of `unit`), rounded to a hundredth of a
-/// fine step.
+/// Returns `x` plus `steps` times `unit` (a tenth of `unit` for fine steps), rounded to a hundredth
+/// of a fine step.
 fn added(x: f64, unit: f64, StepCount { steps, fine }: StepCount) -> f64 {
     let width = if fine { unit / 10.0 } else { unit };
     rounded_to(x + width * steps as f64, floor_log10(unit) - 3)
 }
 
-/// Returns `x` clamped to `range`. Returns `old` if `x` is beyond an end that `range` excludes.
+/// Returns `x` clamped to `range`. Returns `old` if `x` is beyond an excluded end of the range.
 fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     if range.holds(x) {
         x
@@ -312,15 +311,15 @@ fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> 
     within(moved, range, x)
 }
 
-/// Mantissas of the rungs of coarse steps, in hundredths: about a tenth apart, with every digit
-/// from 1.00 to 9.00 among them.
+/// Mantissas of the rungs of coarse steps, in hundredths. They are about a tenth apart and include
+/// every digit from 1.00 to 9.00.
 const RUNGS: [i64; 23] = [
     100, 110, 120, 130, 140, 160, 180, 200, 220, 250, 280, 300, 330, 360, 400, 450, 500, 550, 600,
     650, 700, 800, 900,
 ];
 
 /// Returns the distance between the rungs of fine steps at the mantissa `hundredths`, in
-/// hundredths. The rungs are 1.00, 1.01 ... 2.00, 2.02 ... 5.00, 5.05 ... 9.95.
+/// hundredths. These rungs are 1.00, 1.01 ... 2.00, 2.02 ... 5.00, 5.05 ... 9.95.
 fn fine_width(hundredths: i64) -> i64 {
     match hundredths {
         ..200 => 1,
@@ -329,8 +328,8 @@ fn fine_width(hundredths: i64) -> i64 {
     }
 }
 
-/// Returns the number that is `steps` rungs above `x`, which is at least 0. The result is always a
-/// rung, so that steps up and down are inverse.
+/// Returns the number `steps` rungs above `x`, which is at least 0. The result is always a rung, so
+/// that steps up and down are inverse.
 fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let up = steps > 0;
     let mut x = x;
@@ -379,7 +378,7 @@ fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     format!("{hundredths}e{}", e - 2).parse().unwrap_or(x)
 }
 
-/// Scales the brightness of a colour; black becomes a dark grey.
+/// Scales the brightness of a colour. Black becomes a dark grey.
 fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let largest = channels.iter().fold(0.0f64, |m, x| m.max(*x));
     let rule = StepRule::Units { unit: 0.05, range };
@@ -395,8 +394,8 @@ fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64
     channels.iter().map(|x| rounded_to(x * next / largest, floor_log10(next) - 3)).collect()
 }
 
-/// Scales width and height together and keeps their ratio as far as whole numbers allow; a fine
-/// step is 16 pixels of the width.
+/// Scales width and height together. Their ratio is kept as far as whole numbers allow. A fine step
+/// is 16 pixels of the width.
 fn resized(sides: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let width = sides[0];
     let next = match count.fine {

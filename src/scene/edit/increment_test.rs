@@ -131,7 +131,7 @@ fn arrow_step_of_missing_key_starts_from_default() {
     assert_eq!(after(&scene, &red, "f0", -1.0), "0.95, 0.95, 0.95");
 }
 
-/// Many steps up and down for every number of every row leave the scene valid.
+/// Checks that many steps up and down of every number of every property leave the scene valid.
 #[test]
 fn arrow_steps_stop_at_range_ends() {
     let scene = built_in();

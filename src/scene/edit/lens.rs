@@ -7,16 +7,16 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{floor_log10, round_significant, rounded_to};
 use glam::DVec3;
 
-/// Radius of a lens that is opened first, as a fraction of the distance of the plane in focus. An
-/// object at twice that distance, or at infinity, is blurred visibly.
+/// Radius of a lens when a pinhole is opened, as a fraction of the distance of the plane in focus.
+/// The blur of objects at infinity, or at twice that distance, is visible.
 const FIRST_RADIUS: f64 = 0.02;
-/// Radius as a fraction of the distance of the plane in focus below which the lens becomes a
-/// pinhole.
+/// Radius below which a lens becomes a pinhole, as a fraction of the distance of the plane in
+/// focus.
 const LAST_RADIUS: f64 = 5e-4;
 /// Range of f-numbers of [`change_aperture`].
 const F_NUMBERS: [f64; 2] = [0.1, 1000.0];
 
-/// Sets the focus of the camera to `point`. A camera that is focused by distance keeps doing so.
+/// Sets the focus of the camera to `point`. The kind of the focus, distance or point, is kept.
 ///
 /// # Errors
 /// Fails if `point` is the eye, or out of range.
@@ -38,7 +38,7 @@ pub fn focus_on(scene: &Scene, point: [f64; 3]) -> Result<Edit, EditError> {
 /// closed far enough becomes a pinhole. A camera without a plane in focus gets one.
 ///
 /// # Errors
-/// Fails if the edited scene would be invalid.
+/// Returns the first validation error of the edited scene.
 pub fn change_aperture(scene: &Scene, stops: f64) -> Result<Edit, EditError> {
     let mut camera = scene.camera.clone();
     if camera.focus.is_none() && camera.target.is_none() {
@@ -62,8 +62,8 @@ pub fn change_aperture(scene: &Scene, stops: f64) -> Result<Edit, EditError> {
     edited(scene, camera, "aperture")
 }
 
-/// Returns `x` increased by `stops` factors of √2, on the scale of all powers of √2. The result has
-/// two digits.
+/// Returns `x` multiplied by `stops` factors of √2, rounded to the scale of the powers of √2. The
+/// result has two digits.
 fn stopped(x: f64, stops: f64) -> f64 {
     let position = (2.0 * x.log2()).round() + stops;
     round_significant((0.5 * position).exp2(), 2)
@@ -74,8 +74,8 @@ fn edited(scene: &Scene, camera: Camera, label: &str) -> Result<Edit, EditError>
     Edit::checked(next, Target::Camera, format!("{label} of the camera"))
 }
 
-/// Converts aperture or focus of a camera to the kind `name`; the picture stays (almost) the same.
-/// A pinhole is opened.
+/// Converts aperture or focus of a camera to the kind `name` so that the picture stays the same,
+/// except for rounding. A pinhole is opened.
 pub(super) fn switch(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     let seen = Scene { camera: camera.clone(), ..scene.clone() };
     let distance = camera.focus_depth();

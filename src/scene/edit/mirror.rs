@@ -5,13 +5,13 @@ use crate::scene::Scene;
 use crate::scene::edit::target::mirror_of;
 use crate::scene::edit::{Edit, EditError, Target, step, toggle};
 
-/// Returns the name of the material that the mirror commands change. The first of these that
-/// reflects is chosen: the material of the selected object or the selected material, a material of
-/// a part of the selected object, that of the first reflecting rectangle, the most reflecting
-/// material of all objects and parts. Selected glass counts even if it only transmits.
+/// Returns the name of the material that the mirror commands change. Candidates are, in this order:
+/// the selected material or that of the selected object, materials of parts of the selected object,
+/// that of the first reflecting rectangle, the most reflecting material of all objects and parts.
+/// The first candidate that reflects is chosen; selected glass is accepted if it only transmits.
 ///
-/// If no material reflects, the selected material is chosen, else that of the first rectangle, so
-/// that the reflection can be turned up from 0 again. Returns `None` if there is neither.
+/// If no material reflects, the selected material is chosen, or that of the first rectangle, so
+/// that the reflection can be increased from 0 again. Returns `None` if there is neither.
 pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
     let chosen = selected.and_then(|subject| match subject.material(scene) {
@@ -54,10 +54,10 @@ fn find_mirror(scene: &Scene, selected: Option<&Target>) -> Result<Target, EditE
     })
 }
 
-/// Changes the mirror's roughness by `steps`, as [`step`] counts them.
+/// Changes the mirror's roughness by `steps` as [`step`] does.
 ///
 /// # Errors
-/// Fails if nothing in the scene reflects.
+/// Fails if no material in the scene reflects.
 pub fn adjust_roughness(
     scene: &Scene,
     selected: Option<&Target>,
@@ -66,7 +66,7 @@ pub fn adjust_roughness(
     step(scene, &find_mirror(scene, selected)?, "roughness", None, steps)
 }
 
-/// Changes the mirror's reflection coefficient by `steps`, as [`step`] counts them.
+/// Changes the mirror's reflection coefficient by `steps` as [`step`] does.
 ///
 /// # Errors
 /// Fails if no material can be the mirror.
@@ -74,10 +74,10 @@ pub fn reflect(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<E
     step(scene, &find_mirror(scene, selected)?, "reflection", None, steps)
 }
 
-/// Gives the mirror the next (or previous) lobe, cyclically.
+/// Changes the mirror's lobe to the next (or previous) one, cyclically.
 ///
 /// # Errors
-/// Fails if nothing in the scene reflects.
+/// Fails if no material in the scene reflects.
 pub fn next_lobe(
     scene: &Scene,
     selected: Option<&Target>,

@@ -50,19 +50,19 @@ pub struct Edit {
     /// Target to select after the edit: the edited or added target, or the neighbour of a deleted
     /// one.
     pub subject: Target,
-    /// Short description for the undo history: `move cube`, `radius of ball`. The steps of one
+    /// Short description for the undo history: `move cube`, `radius of ball`. All steps of one
     /// gesture have the same label.
     pub label: String,
-    /// Sentence about a side effect of the edit; `None` if there is nothing to report.
+    /// Sentence about a side effect of the edit; `None` if there is none.
     pub note: Option<String>,
 }
 
 /// Reason why an edit was refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EditError {
-    /// Finding, as a phrase.
+    /// Phrase that states the problem.
     pub found: String,
-    /// Expectation or remedy, in sentences; may be empty.
+    /// Expected value or remedy, in sentences; may be empty.
     pub help: String,
 }
 

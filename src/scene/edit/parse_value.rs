@@ -5,8 +5,8 @@ use crate::scene::format::suggest::nearest;
 use crate::value::{Color, Field, ValueType, number, sanitized, truncated};
 use toml::Value;
 
-/// Parses `text` as a value of `field`. Ranges are checked by the validation of the edited scene,
-/// except where the type of the value cannot hold the number.
+/// Parses `text` as a value of `field`. Ranges are checked by the validation of the edited scene.
+/// Only numbers that the value's type cannot hold are errors here.
 pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
     let text = text.trim();
     let wrong = || {
@@ -64,7 +64,7 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
 }
 
 /// Returns the index in `words` of `text`, or of the only word that starts with `text`. Returns
-/// `None` if no word or more than one matches.
+/// `None` if there is none or more than one.
 pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     let text = text.to_lowercase();
     if let Some(at) = words.iter().position(|word| word.to_lowercase() == text) {
@@ -78,8 +78,7 @@ pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     }
 }
 
-/// Returns the result of [`choose`], or the error that states the accepted words if no word or more
-/// than one matches.
+/// Returns the result of [`choose`], or an error that lists the accepted words.
 pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, EditError> {
     choose(text, words).ok_or_else(|| {
         let quote = |word: &str| format!("\"{}\"", truncated(word));
@@ -93,8 +92,7 @@ pub(super) fn word(field: &Field, text: &str, words: &[&str]) -> Result<usize, E
     })
 }
 
-/// Validates `text` as a name that files, the outline and terminals can show. `what` is the key in
-/// the error.
+/// Validates `text` as a name, which must be printable. `what` is the key in the error.
 pub(super) fn name(what: &str, text: &str) -> Result<String, EditError> {
     let text = text.trim();
     let help = "Expected at most 60 characters, none of them a control character.";
@@ -108,8 +106,8 @@ fn unquoted(text: &str) -> &str {
     text.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(text)
 }
 
-/// Parses numbers between commas, semicolons or spaces (or the `x` of `640x480` and `640 x 480`),
-/// with or without brackets. Returns `None` if one of them is no number.
+/// Parses numbers that are separated by commas, semicolons or spaces (or the `x` of `640x480` and
+/// `640 x 480`), with or without brackets. Returns `None` if one of them is not a number.
 fn numbers(text: &str) -> Option<Vec<f64>> {
     let inner = match text.strip_prefix('[') {
         Some(rest) => rest.strip_suffix(']')?,
@@ -133,8 +131,8 @@ fn digits(part: &str) -> bool {
         && part.bytes().any(|b| b.is_ascii_digit())
 }
 
-/// Prints a value with the shortest digits and lists without brackets. A colour is printed as
-/// `#rrggbb` where that is exact and shorter.
+/// Formats a value with the shortest digits, and lists without brackets. A colour is formatted as
+/// `#rrggbb` if that is exact and shorter.
 pub(super) fn show(takes: ValueType, value: &Value) -> String {
     if let (ValueType::Color(_), Some(color)) = (takes, color(value)) {
         let channels = join(&color.0.map(number));

@@ -8,9 +8,9 @@ use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{floor_log10, round_significant, rounded_to};
 use glam::{DVec2, DVec3};
 
-/// Lowers (or lifts) an object until its lowest point rests on the highest surface below it. If
-/// there is none below, the object rests on the lowest surface above. Surfaces are searched on
-/// vertical lines through the centre and the lowest corners of the object.
+/// Lowers an object until its lowest point rests on the highest surface below it. If there is none
+/// below, raises the object to the lowest surface above. Surfaces are searched on vertical lines
+/// through the centre and the lowest corners of the object.
 ///
 /// # Errors
 /// Fails for targets other than objects, for a plane, which has no lowest point, and if there is no
@@ -63,7 +63,7 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Moves an object up by `by`, without rounding the new coordinate to a short decimal.
+/// Moves an object up by `by`. The new coordinate is not rounded to a short decimal number.
 fn lift(object: &mut Object, by: f64) {
     if by == 0.0 {
         return;
@@ -93,7 +93,7 @@ fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
 }
 
 /// Returns a position for a new object with the lengths `size`, as the centre of its underside. The
-/// position is near the middle of the camera's view, on a surface, and clear of other objects.
+/// position is near the middle of the camera's view, on a surface, and free of other objects.
 pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let eye = DVec3::from_array(scene.camera.eye);
@@ -139,14 +139,14 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     hidden.or(outside).unwrap_or_else(|| candidate(DVec2::ZERO))
 }
 
-/// Returns `true` if `form` is flat and its slope is less than 60 degrees, so that it can carry
-/// objects.
+/// Returns `true` if `form` is flat and its slope is less than 60 degrees, so that objects can rest
+/// on it.
 fn is_level(form: &Form) -> bool {
     form.plane().is_some_and(|plane| plane.normal.y.abs() > 0.5)
 }
 
-/// Returns the height of the highest of `floors` below the point `at`, else of the lowest above
-/// `at`. Returns `None` if there is neither.
+/// Returns the height of the highest of `floors` below the point `at`, or of the lowest above it if
+/// there is none below. Returns `None` if there is neither.
 fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     let heights = |direction: DVec3| {
         floors.iter().filter_map(move |form| Some(at.y + direction.y * form.cast(at, direction)?))

@@ -8,16 +8,16 @@ use crate::scene::edit::{EditError, Target};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, number};
 use toml::{Table, Value};
 
-/// One of the values that a property can have.
+/// One of the words that a property accepts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// Name; a material's name may contain any character that files allow.
+    /// The word. The name of a material may contain any character that files allow.
     pub name: String,
-    /// Meaning; may be empty.
+    /// Description of the word; may be empty.
     pub doc: String,
 }
 
-/// Kind of value of a property, from which an inspector chooses the input element.
+/// Kind of a property's value, by which an inspector chooses the input element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Widget {
     /// Any text: a name.
@@ -26,7 +26,7 @@ pub enum Widget {
     Switch,
     /// One of [`Property::words`].
     Choice,
-    /// One of [`Property::words`], the kind of a shape or a light. The kind determines other rows.
+    /// One of [`Property::words`], the kind of a shape or a light. It determines other properties.
     Kind,
     /// A list of transform steps. Typing one of [`Property::words`] appends a step of that kind.
     List,
@@ -36,22 +36,22 @@ pub enum Widget {
     Color,
 }
 
-/// One row of an inspector.
+/// A property of a target: one row of an inspector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Property {
-    /// Dotted key for [`set`](crate::scene::edit::set): `shape.sphere.radius`,
+    /// Dotted key, as [`set`](crate::scene::edit::set) requires it: `shape.sphere.radius`,
     /// `transform.0.rotate_y`.
     pub key: String,
     /// Last part of the key, with spaces.
     pub label: String,
     /// Nesting depth: 0, 1, 2.
     pub depth: usize,
-    /// Kind of value.
+    /// Kind of the value.
     pub entry: Widget,
-    /// Value as text that can be typed and printed; empty if the key has no value.
+    /// Value as text, in the form in which it can be typed; empty if the key has no value.
     pub value: String,
-    /// Each number of the value as text. Empty unless the value consists of numbers or is a colour;
-    /// a colour always has three.
+    /// Each number of the value as text: the numbers of a list, or the three channels of a colour.
+    /// Empty for other values.
     pub components: Vec<String>,
     /// Value of a colour: linear red, green, blue.
     pub color: Option<[f64; 3]>,
@@ -59,18 +59,18 @@ pub struct Property {
     pub unit: &'static str,
     /// Accepted values, as a phrase: `a number from 0 to 1`.
     pub expected: String,
-    /// Accepted words of a choice, a kind or a list; otherwise empty.
+    /// Accepted words of a choice, a kind or a list; empty for other properties.
     pub words: Vec<Word>,
     /// Description, as a sentence.
     pub doc: &'static str,
-    /// `true` if the value equals the default or is left out.
+    /// `true` if the value equals the default or the key is omitted.
     pub is_default: bool,
     /// Default as text; `None` if the key is required.
     pub default: Option<String>,
 }
 
-/// Returns the rows of `subject` in the order of its field table. The rows of an object's material
-/// are those of another target, [`Target::material`].
+/// Returns the properties of `subject` in the order of its field table. Those of an object's
+/// material belong to another target, [`Target::material`].
 ///
 /// # Errors
 /// Fails if the scene has no such target.
@@ -248,8 +248,8 @@ fn words(kinds: &[Field]) -> Vec<Word> {
     kinds.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
 }
 
-/// Returns a phrase for the accepted values as in the reference of the scene format, without the
-/// notation of files.
+/// Returns a phrase for the accepted values, as in the reference of the scene format but without
+/// the notation of files.
 fn expected(takes: ValueType) -> String {
     match takes {
         ValueType::Text => "text".to_string(),
@@ -320,7 +320,7 @@ mod tests {
         assert_eq!((material.entry, material.words.len()), (Widget::Choice, 6));
     }
 
-    /// Every shown value can be typed back without a change.
+    /// Checks that every value can be typed in its displayed form without a change.
     #[test]
     fn every_row_value_can_be_typed_back() {
         let mut scene = built_in();

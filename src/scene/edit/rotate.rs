@@ -53,9 +53,9 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Rotates the object about the vertical through its centre by the steps `rotate_y` and `translate`
-/// at the end of its transform. Steps of these kinds at the end are replaced; a step without effect
-/// is left out.
+/// Rotates the object about the vertical through its centre, by the steps `rotate_y` and
+/// `translate` at the end of its transform. Steps of these kinds at the end are replaced. Steps
+/// without effect are removed.
 fn turn_by_steps(object: &mut Object, degrees: f64) {
     let (angle, shift, own_len) = match object.transform[..] {
         [.., TransformOp::RotateY(angle), TransformOp::Translate(shift)] => (angle, shift, 2),
@@ -112,8 +112,8 @@ mod tests {
         assert_eq!(mirror.normal, [1.0, 0.0, 0.0]);
     }
 
-    /// Rotations keep the position of objects of every kind, with and without a transform. Small
-    /// rotations that add up to a full turn are the identity.
+    /// Checks that rotations keep the position of objects of every kind, with and without a
+    /// transform. Small rotations that add up to a full turn are the identity.
     #[test]
     fn turn_keeps_the_middle_and_full_turn_is_identity() {
         for kind in KINDS {

@@ -16,8 +16,8 @@ use toml::{Table, Value};
 /// removes `key`: an optional key then has its default, and a transform loses the step.
 ///
 /// # Errors
-/// The reason and the accepted values, if `text` cannot be parsed or the edited scene would be
-/// invalid.
+/// Returns the reason and the accepted values, if `text` cannot be parsed or the edited scene would
+/// be invalid.
 pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edit, EditError> {
     let text = text.trim();
     let values = read(scene, subject)?;
@@ -90,8 +90,8 @@ pub fn set_component(
     set(scene, subject, key, &parts.join(" "))
 }
 
-/// Returns the field of `key`, also for `kind` of a light and `aim` of a camera, which only the
-/// inspector has. Returns `None` if `subject` has no such key.
+/// Returns the field of `key`, including `kind` of a light and `aim` of a camera, which are no keys
+/// of scene files. Returns `None` if `subject` has no such key.
 pub(super) fn lookup(subject: &Target, key: &str) -> Option<&'static Field> {
     match (subject, key) {
         (Target::Light(_), "kind") => Some(&KIND),
@@ -100,7 +100,7 @@ pub(super) fn lookup(subject: &Target, key: &str) -> Option<&'static Field> {
     }
 }
 
-/// Sets `key` to `value`, removes the keys that exclude `key`, and validates the edited scene.
+/// Sets `key` to `value`, removes mutually exclusive keys, and validates the edited scene.
 pub(super) fn replace(
     scene: &Scene,
     subject: &Target,
@@ -149,8 +149,8 @@ fn clear(
     finish(scene, subject, key, values)
 }
 
-/// Creates the edit that replaces the values of `subject` by `values`, and validates the edited
-/// scene.
+/// Creates the edit that replaces the values of `subject` by `values`, after validation of the
+/// edited scene.
 pub(super) fn finish(
     scene: &Scene,
     subject: &Target,

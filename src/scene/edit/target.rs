@@ -3,10 +3,10 @@
 use crate::scene::{Diagnostic, Object, Problem, Scene};
 use crate::value::truncated;
 
-/// A part of a scene that can be selected and edited.
+/// Selectable and editable part of a scene.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Target {
-    /// The camera that the picture is taken from.
+    /// The current camera.
     Camera,
     /// A stored camera, by name.
     View(String),
@@ -29,13 +29,13 @@ pub enum Target {
 /// A section of the outline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Section {
-    /// The camera of the picture and the stored cameras.
+    /// The current camera and the stored cameras.
     Camera,
     /// Ambient light and background.
     Surroundings,
     /// Lights.
     Lights,
-    /// Objects with a reflecting material, also if only a part has one.
+    /// Objects of which a part or the whole has a reflecting material.
     Mirrors,
     /// All other objects.
     Objects,
@@ -60,7 +60,7 @@ impl Section {
     }
 }
 
-/// Returns every target of the scene once, in the order of the outline.
+/// Returns all targets of the scene, each once, in the order of the outline.
 pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     let mut list = vec![(Section::Camera, Target::Camera)];
     list.extend(scene.cameras.keys().map(|name| (Section::Camera, Target::View(name.clone()))));
@@ -83,8 +83,8 @@ pub(super) fn reflects(scene: &Scene, index: usize) -> bool {
     mirror_of(scene, index).is_some()
 }
 
-/// Returns the most reflecting material of the object at `index` and its parts, with the reflection
-/// coefficient of that material. Returns `None` if none of its materials reflects.
+/// Returns the most reflecting material of the object at `index` and its parts, and the reflection
+/// coefficient of that material. Returns `None` if no material reflects.
 pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
     let names = scene.objects.get(index).map(Object::materials).unwrap_or_default();
     let known =
@@ -125,7 +125,7 @@ impl Target {
     }
 
     /// Returns the target at `path`, which is the path of a [`Problem`]. Returns `None` if the path
-    /// leads to no target, as that of the whole scene.
+    /// does not lead to a target, for example that of the whole scene.
     pub fn of_path(path: &[String]) -> Option<Self> {
         let index = || path.get(1)?.parse().ok();
         match path.first()?.as_str() {
@@ -157,8 +157,8 @@ impl Target {
     }
 
     /// Returns the name of the target in the outline: `lamp`, `light 2`. An object without a name
-    /// is called after its kind and index: `sphere 3` is the third object. Names from a file are
-    /// made printable and cut after 40 characters.
+    /// is named by its kind and index: `sphere 3` is the third object. Names from files are
+    /// sanitised and truncated to 40 characters.
     pub fn label(&self, scene: &Scene) -> String {
         let named = |name: Option<&String>| name.filter(|n| !n.is_empty()).map(|n| truncated(n));
         match self {
@@ -183,8 +183,8 @@ impl Target {
         scene.subject(&self.path())
     }
 
-    /// Returns the target that is the material of an object. A material is its own material; any
-    /// other target has none.
+    /// Returns the target that is the material of an object. A material is its own material. Other
+    /// targets have none.
     pub fn material(&self, scene: &Scene) -> Option<Self> {
         match self {
             Self::Material(_) => self.exists(scene).then(|| self.clone()),

@@ -24,8 +24,8 @@ pub(super) fn fields(subject: &Target) -> &'static [Field] {
     }
 }
 
-/// Returns the mutually exclusive keys of `subject`, of which at most one is given; empty if it has
-/// none.
+/// Returns the mutually exclusive keys of `subject`, of which at most one may be given; empty if it
+/// has none.
 pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     match subject {
         Target::Camera | Target::View(_) => &["target", "direction"],

@@ -7,10 +7,10 @@ use crate::scene::{Object, Scene, TransformOp};
 use crate::value::{floor_log10, rounded_to, unit};
 use glam::DVec3;
 
-/// Moves an object, a light, the camera or a stored camera by the vector `by`, in scene units. An
-/// object without a transform is moved by the position keys of its shape, any other object by a
-/// translation after its last step. The direction of a directional light changes as if the light
-/// were a lamp that moves by `by` and stays aimed at the centre of the scene.
+/// Moves an object, a light, the current camera or a stored camera by the vector `by`, in scene
+/// units. An object without a transform is moved by the position keys of its shape, any other
+/// object by a translation after its last step. The direction of a directional light changes as if
+/// the light were a lamp that moves by `by` and stays aimed at the centre of the scene.
 ///
 /// # Errors
 /// Fails for targets that cannot be moved, and for new coordinates beyond the largest valid one.
@@ -46,8 +46,8 @@ pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, Ed
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Returns `at + by`. A changed coordinate is rounded to a thousandth of the power of ten at or
-/// below the change.
+/// Returns `at + by`. Each changed coordinate is rounded to a thousandth of a power of ten, the
+/// largest that is at most the change.
 pub(super) fn moved(at: [f64; 3], by: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| match by[i] {
         0.0 => at[i],

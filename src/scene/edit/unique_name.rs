@@ -2,8 +2,8 @@
 
 use crate::scene::Scene;
 
-/// Returns `wanted`, or `wanted` with the smallest free number from 2: `cube`, `cube 2`, `cube 3`.
-/// A number at the end of `wanted` is replaced.
+/// Returns `wanted` if it is free, otherwise `wanted` with the smallest free number from 2: `cube`,
+/// `cube 2`, `cube 3`. A number at the end of `wanted` is replaced.
 pub(super) fn free_name(wanted: &str, taken: impl Fn(&str) -> bool) -> String {
     if !wanted.is_empty() && !taken(wanted) {
         return wanted.to_string();

@@ -5,8 +5,8 @@ use crate::scene::edit::parse_value::name;
 use crate::scene::edit::unique_name::free_view;
 use crate::scene::edit::{Edit, EditError, Target};
 
-/// Stores the camera of the picture under the name `given` and replaces a stored camera of that
-/// name. `None` means the first free name of `view`, `view 2` and so on.
+/// Stores the current camera under the name `given`. A stored camera of that name is replaced.
+/// `None` means the first free name of `view`, `view 2` and so on.
 ///
 /// # Errors
 /// Fails if the name is not printable.
@@ -26,7 +26,7 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
     Ok(if replaced { edit.with_note(format!("View {name} was replaced.")) } else { edit })
 }
 
-/// Makes the stored camera `name` the camera of the picture.
+/// Makes the stored camera `name` the current camera.
 ///
 /// # Errors
 /// Fails if there is no stored camera of that name.

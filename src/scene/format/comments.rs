@@ -3,7 +3,7 @@
 use toml_edit::{DocumentMut, Item, Table};
 
 /// Keeper of the comments above removed tables. A comment that an empty line separates from its
-/// table belongs to the file, and stays when the table is removed.
+/// table belongs to the file, and is kept when the table is removed.
 #[derive(Default)]
 pub(crate) struct CommentKeeper {
     /// Position of each removed table in the file, and the separate comment above it.
@@ -11,8 +11,7 @@ pub(crate) struct CommentKeeper {
 }
 
 impl CommentKeeper {
-    /// Records the comments above the tables of the removed `item` that an empty line separates
-    /// from their table.
+    /// Records the separate comments above the tables of the removed `item`.
     pub(crate) fn removed(&mut self, item: &Item) {
         match item {
             Item::Table(table) => {
@@ -62,7 +61,7 @@ impl CommentKeeper {
     }
 }
 
-/// Calls `act` for every table with a header and a position in the file.
+/// Calls `act` for every table that has a header and a position in the file.
 fn for_each_table(table: &mut Table, act: &mut dyn FnMut(&mut Table)) {
     for (_, item) in table.iter_mut() {
         match item {
@@ -88,7 +87,7 @@ fn prefix(table: &Table) -> &str {
 }
 
 /// Splits `above`, the text above a table, after its last empty line. The first part is the
-/// separate comment, which belongs to the file; the second is the comment of the table.
+/// separate comment, which belongs to the file. The second part is the comment of the table.
 fn split(above: &str) -> (&str, &str) {
     let mut cut = 0;
     let mut end = 0;
@@ -108,9 +107,9 @@ fn put_above(table: &mut Table, comment: &str) {
     table.decor_mut().set_prefix(joined);
 }
 
-/// Gives `tables` positions in the file that follow their order in the slice. `from` has the index
-/// of the old entry from which each table comes; `None` for a new table. Nothing changes if the old
-/// tables keep their order and the new tables come last.
+/// Sets the positions of `tables` in the file so that they are written in the order of the slice.
+/// `from` has the index of the old entry that each table was; `None` for a new table. Nothing
+/// changes if the old tables keep their order and new tables come last.
 pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     let old: Vec<usize> = from.iter().flatten().copied().collect();
     let tail_only = from.iter().skip_while(|i| i.is_some()).all(Option::is_none);
@@ -134,8 +133,8 @@ pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     tables[0].set_position(first);
 }
 
-/// Removes the positions of `table` and its inner tables in the file. A table without a position is
-/// written after the table before it.
+/// Removes the positions of `table` and of its inner tables in the file. A table without a position
+/// is written after the previous table.
 fn forget_place(table: &mut Table) {
     table.set_position(None);
     for_each_table(table, &mut |inner| inner.set_position(None));

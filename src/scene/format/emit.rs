@@ -5,8 +5,8 @@ use crate::value::{Color, DefaultValue, Field, ValueType};
 use toml::Value;
 use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table};
 
-/// Returns the TOML item for `value`. `headers` is `true` if tables may be written with `[headers]`
-/// instead of inline.
+/// Returns the TOML item for `value`. `headers` is `true` if tables may have `[headers]`; otherwise
+/// they are inline.
 pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
     match (takes, value) {
         (ValueType::Table(fields), Value::Table(table)) if headers => {
@@ -51,7 +51,7 @@ pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
     }
 }
 
-/// Returns a colour as three numbers, or as `#rrggbb` where that is exact and the numbers would be
+/// Returns a colour as three numbers, or as `#rrggbb` if that is exact and the numbers would be
 /// long.
 fn color_leaf(value: &Value) -> toml_edit::Value {
     let code = color(value).filter(|c| c.0.iter().any(|x| x.fract() != 0.0));
@@ -100,7 +100,7 @@ fn is_default(field: &Field, value: &Value) -> bool {
     }
 }
 
-/// Returns `value`, which is no table, as a TOML value; lists have the layout `[1.0, 2.0]`.
+/// Returns `value`, which is not a table, as a TOML value. Lists have the layout `[1.0, 2.0]`.
 pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
     match value {
         Value::String(text) => text.as_str().into(),
@@ -119,7 +119,8 @@ pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
     }
 }
 
-/// Returns the shortest digits that read back as `number`, with an exponent instead of many zeros.
+/// Returns `number` with the shortest digits that are read back exactly. An exponent replaces many
+/// zeros.
 fn float(number: f64) -> toml_edit::Value {
     let size = number.abs();
     let zeros = number.is_finite() && size != 0.0 && !(1e-5..1e16).contains(&size);

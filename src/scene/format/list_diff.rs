@@ -4,11 +4,10 @@ use std::collections::{BTreeSet, HashMap};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use toml::Value;
 
-/// Returns for each entry of `new` the index of its origin in `old`, or `None` if it has none; no
-/// index occurs twice. Entries match if they have the same name. Otherwise they match if they are
-/// equal, or if they are between the same neighbours and one may be an edit of the other: neither
-/// has a name, or only the names differ. Takes time proportional to the number of entries and its
-/// logarithm.
+/// Returns for each entry of `new` the index of its origin in `old`, or `None`; no index occurs
+/// twice. Entries match if they have the same name. Otherwise they match if they are equal, or if
+/// they are between the same neighbours and one may be an edit of the other: neither has a name, or
+/// only the names differ. The time is n log n for n entries.
 pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     let mut free = Free::of(old);
     let mut from = vec![None; new.len()];
@@ -33,7 +32,7 @@ pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     from
 }
 
-/// Entries that are no origin yet, by name and by contents.
+/// Entries of the old list without a match so far, by name and by contents.
 struct Free<'a> {
     entries: &'a [Value],
     named: HashMap<&'a str, BTreeSet<usize>>,
@@ -77,7 +76,7 @@ impl<'a> Free<'a> {
         Some(self.take(first))
     }
 
-    /// Takes the first of the entries `after..before` of which `entry` may be an edit.
+    /// Takes the first of the entries `after..before` that `entry` may be an edit of.
     fn take_edited(&mut self, entry: &Value, after: usize, before: usize) -> Option<usize> {
         let renamed = self.equal_but_name.get(&hash(entry, false)).and_then(|alike| {
             let mut between = alike.range(after..before).copied();
@@ -117,7 +116,7 @@ fn is_equal_but_name(a: &Value, b: &Value) -> bool {
     without_name(a) == without_name(b)
 }
 
-/// Hash of an entry, with or without its name. Equal entries have the same hash.
+/// Returns the hash of an entry, with or without its name. Equal entries have the same hash.
 fn hash(entry: &Value, with_name: bool) -> u64 {
     let mut hasher = DefaultHasher::new();
     let name = if with_name { name(entry) } else { None };
@@ -152,7 +151,7 @@ mod tests {
     use super::*;
     use std::ops::Range;
 
-    /// Parses entries `name/value`.
+    /// Parses entries of the form `name/value`.
     fn list(text: &str) -> Vec<Value> {
         let entry = |word: &str| {
             let (name, value) = word.split_once('/').unwrap();
@@ -188,7 +187,7 @@ mod tests {
         }
     }
 
-    /// The rule of [`align`] word by word, in quadratic time.
+    /// Returns the result of [`align`] by the literal rule, in quadratic time.
     fn align_by_search(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
         let mut from = vec![None; new.len()];
         let find =

@@ -10,7 +10,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 use toml_edit::{DocumentMut, InlineTable, Item, Key, Table};
 
-/// A former word and the present word that replaces it.
+/// A former word and the current word that replaces it.
 type Pair = (&'static str, &'static str);
 
 const SCENE: &[Pair] = &[("views", "cameras")];
@@ -34,8 +34,8 @@ fn keys_at(path: &[String]) -> &'static [Pair] {
     }
 }
 
-/// Returns the key whose values were renamed in the table at `path`, and these values. Returns
-/// `None` if the table has no such key.
+/// Returns a key and its renamed values, in the table at `path`. Returns `None` if no values were
+/// renamed in the table.
 fn values_at(path: &[String]) -> Option<(&'static str, Vec<Pair>)> {
     match path {
         [film] if film == "film" => Some(("filter", vec![("center", "point")])),
@@ -52,24 +52,24 @@ fn values_at(path: &[String]) -> Option<(&'static str, Vec<Pair>)> {
 pub(crate) struct FormerWord {
     /// Byte offset of the word in the file.
     start: usize,
-    /// Path of keys to the table that contains the word, in present words.
+    /// Path of keys to the table that contains the word, in current words.
     table: Vec<String>,
-    /// Key that has the word as its value; `None` if the word is itself a key.
+    /// Key with the word as its value; `None` if the word is itself a key.
     key: Option<&'static str>,
     former: &'static str,
     present: &'static str,
 }
 
-/// A table that has a key under both its former and its present name.
+/// Table with a key under both its former and its current name.
 struct Conflict {
     table: Vec<String>,
     former: (&'static str, Range<usize>),
     present: (&'static str, Range<usize>),
 }
 
-/// Replaces the former words in `root` by the present ones; the spans of keys and values stay.
-/// `root` is the parsed `part` of the file with this name and text. Returns the replaced words, and adds an error for each table
-/// that has a key under both names.
+/// Replaces the former words in `root` by the current ones. The spans of keys and values are kept.
+/// `root` is the parsed `part` of the file with this name and text. Returns the replaced words, and
+/// adds an error for each table with a key under both names.
 pub(crate) fn migrate(
     (file, text): (&str, &str),
     root: &mut DeTable,
@@ -170,9 +170,9 @@ impl Migration<'_> {
     }
 }
 
-/// Returns the former word of `words` that comes first in the file, with its offset and the name
-/// that diagnostics use for its table. `root` is the parsed `part` that has the words. Returns `None`
-/// if there are no words.
+/// Returns the former word of `words` that comes first in the file, its offset, and the name of its
+/// table for diagnostics. `root` is the parsed `part` that contains the words. Returns `None` if
+/// there are no words.
 pub(crate) fn first_word(
     root: &DeTable,
     part: &Part,
@@ -182,8 +182,8 @@ pub(crate) fn first_word(
     Some((first.start, first.clone(), subject_in(root, &first.table, part.first_object)))
 }
 
-/// Returns the warning about the `count` former words of a file, which states the first of them, in
-/// the table `subject`.
+/// Returns the warning about the `count` former words of a file. It quotes the first of them, which
+/// is in the table `subject`.
 pub(crate) fn warning(
     (file, text): (&str, &str),
     (start, first, subject): &(usize, FormerWord, String),
@@ -207,7 +207,8 @@ pub(crate) fn warning(
     }
 }
 
-/// Replaces the former `words` in `document` by the present ones; order, layout and comments stay.
+/// Replaces the former `words` in `document` by the current ones. Order, layout and comments are
+/// kept.
 pub(crate) fn write_present(document: &mut DocumentMut, words: &[FormerWord]) {
     for word in words {
         let table = word.table.iter().try_fold(document.as_item_mut(), |item, key| {
@@ -231,7 +232,7 @@ pub(crate) fn write_present(document: &mut DocumentMut, words: &[FormerWord]) {
     }
 }
 
-/// Renames the key `former` of `table`; entries keep their order.
+/// Renames the key `former` of `table`. The order of the entries is kept.
 fn rename_key(table: &mut Item, former: &str, present: &str) {
     let renamed = |key: Key| {
         if key.get() != former {

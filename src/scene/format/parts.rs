@@ -6,8 +6,8 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Length from which on a part of objects ends before the next `[[object]]` \[bytes\]. Files up to
-/// this length have one part.
+/// Length \[bytes\] after which a part ends before the next `[[object]]`. Files up to this length
+/// have one part.
 pub(crate) const PART_BYTES: usize = 256 << 10;
 
 /// Part of a scene file.
@@ -19,12 +19,12 @@ pub(crate) struct Part {
     pub first_object: usize,
 }
 
-/// Beginning of a section of a TOML document.
+/// Beginning of a section of a TOML document, by its header.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Header {
     /// `[[object]]`.
     Object,
-    /// A table inside of the object above, such as `[object.shape]`.
+    /// A table inside of the previous object, such as `[object.shape]`.
     InObject,
     Other,
 }
@@ -36,7 +36,7 @@ impl Part {
         Self { ranges: vec![everything], first_object: 0 }
     }
 
-    /// Returns the text of this part of the file with this `text`.
+    /// Returns the text of this part; `text` is that of the whole file.
     pub fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
         match self.ranges.as_slice() {
             [range] => Cow::Borrowed(&text[range.clone()]),
@@ -52,7 +52,7 @@ impl Part {
         }
     }
 
-    /// Returns the byte offset in the file of the offset `at` in the text of this part.
+    /// Converts the byte offset `at` in the text of this part to a byte offset in the file.
     pub fn in_file(&self, mut at: usize) -> usize {
         for range in &self.ranges {
             if at < range.len() {
@@ -64,9 +64,9 @@ impl Part {
     }
 }
 
-/// Returns the parts of a file: everything but the objects, then the objects in parts of at least
-/// `part_bytes` and the remaining ones. Returns a single part if the file is shorter, has no objects,
-/// or continues an object after another section.
+/// Divides a file into parts: first all tables except for the objects, then the objects in parts of
+/// at least `part_bytes`, except for the last one. Returns a single part if the file is shorter,
+/// has no objects, or continues an object after another section.
 pub(crate) fn split(text: &str, part_bytes: usize) -> Vec<Part> {
     let sections = sections(text);
     let objects = sections.iter().filter(|(_, header)| *header == Header::Object).count();
@@ -157,8 +157,8 @@ fn end_of_line(bytes: &[u8], at: usize) -> usize {
     bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |length| at + length)
 }
 
-/// Returns the offset after the string that begins with the quotation mark at `at`. An unterminated
-/// string of one line ends with the line.
+/// Returns the offset after the string that begins with the quotation mark at `at`. A single-line
+/// string without an end is taken to end with the line.
 fn end_of_string(bytes: &[u8], at: usize) -> usize {
     let quote = bytes[at];
     let is_quoted = |at: usize, marks: usize| {

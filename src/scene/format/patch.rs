@@ -30,7 +30,7 @@ pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml:
 }
 
 /// Returns `true` if nothing is written for `item`: it is missing, an empty list of tables, or a
-/// table without a header and without values.
+/// table without header and values.
 fn is_nothing(item: &Item) -> bool {
     match item {
         Item::None => true,
@@ -40,7 +40,7 @@ fn is_nothing(item: &Item) -> bool {
     }
 }
 
-/// Keys of a table and the types of their values.
+/// Keys of a table, with the types of their values.
 enum Keys {
     /// Keys of these fields.
     Fixed(&'static [Field]),
@@ -67,8 +67,8 @@ struct Rewriter {
 }
 
 impl Rewriter {
-    /// Changes `table`, which describes `old`, to describe `new`. `headers` is `true` if inner
-    /// tables may have `[headers]` of their own.
+    /// Changes `table`, which describes `old`, to describe `new`. Inner tables may have `[headers]`
+    /// if `headers` is `true`.
     fn table(
         &mut self,
         table: &mut dyn TableLike,
@@ -222,8 +222,8 @@ impl Rewriter {
     }
 }
 
-/// Renames named tables in place, with their comments. A removed table and an added one match if
-/// their values are equal. Returns `old` under the new names.
+/// Renames named tables in place and keeps their comments. A removed table and an added one are a
+/// renamed table if their values are equal. Returns `old` with the new names.
 fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
     let mut renamed = old.clone();
     for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {
@@ -244,8 +244,8 @@ fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> to
     renamed
 }
 
-/// Removes the comment after the last entry of `list` and returns it, if another entry follows.
-/// `followed` is `true` if one follows. Otherwise returns an empty string.
+/// Removes and returns the comment after the last entry of `list`, if `followed` is `true` because
+/// another entry will follow. Otherwise returns an empty string.
 fn comment_of_the_last(list: &mut toml_edit::Array, followed: bool) -> String {
     let trailing = list.trailing().as_str().unwrap_or_default();
     match trailing.rfind('\n') {
@@ -267,7 +267,7 @@ fn spaces_before(value: &toml_edit::Value) -> String {
     }
 }
 
-/// Replaces the value of `item`, which is no table, by `new`. In a list of numbers, only the
+/// Replaces the value of `item`, which is not a table, by `new`. In a list of numbers, only the
 /// numbers that differ from `old` are replaced.
 fn edit_leaf(item: &mut Item, old: Option<&Value>, new: &Value) {
     let Some(value) = item.as_value_mut() else {
@@ -292,7 +292,7 @@ fn edit_leaf(item: &mut Item, old: Option<&Value>, new: &Value) {
     replace(value, code.map_or_else(|| leaf(new), toml_edit::Value::from));
 }
 
-/// Replaces the value `place` by `new` and keeps the comments and spaces around it.
+/// Replaces the value `place` by `new`. The comments and spaces around it are kept.
 fn replace(place: &mut toml_edit::Value, mut new: toml_edit::Value) {
     *new.decor_mut() = place.decor().clone();
     *place = new;

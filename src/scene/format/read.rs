@@ -15,20 +15,22 @@ use std::sync::Arc;
 
 use toml::de::{DeTable, Deserializer};
 
-/// Largest scene file that is read [bytes]. A file of this size has about four million objects.
+/// Size of the largest scene file that is read [bytes]. A file of this size has about four million
+/// objects.
 pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
-/// Memory for each byte of a scene file, while it is read and while its world is compiled \[bytes\].
-/// A million spheres in 53 MB take 768 MB; files with shorter objects take more for a byte.
+/// Peak memory per byte of a scene file, while it is read and while its world is compiled
+/// \[bytes\]. A million spheres in 53 MB take 768 MB. Files with shorter objects take more per
+/// byte.
 const SCENE_BYTES: u64 = 20;
 
 impl Scene {
     /// Reads and validates the scene file at `path`.
     ///
     /// # Errors
-    /// The first 100 errors, with line and column: not readable, not UTF-8, not TOML, unknown keys, wrong
-    /// types, values out of range, undefined names. Values are validated only if keys and types are
-    /// right.
+    /// Returns the first 100 errors, with line and column: not readable, not UTF-8, not TOML,
+    /// unknown keys, wrong types, values out of range, undefined names. Values are validated only
+    /// if there are no errors in keys and types.
     pub fn read(path: &Path) -> Result<Self, SceneErrors> {
         let resolver = AssetResolver::new(path, Arc::default());
         read_text(path, |path| File::open(path))
@@ -54,8 +56,8 @@ impl Scene {
     }
 }
 
-/// A valid scene and the text that describes it. The text was parsed once, part by part, and the
-/// scene validated once.
+/// A valid scene and the text that describes it. The text has been parsed once, part by part, and
+/// the scene has been validated once.
 pub(crate) struct SourceScene<'a> {
     pub scene: Scene,
     pub former_words: Vec<FormerWord>,
@@ -193,14 +195,14 @@ impl<'a> SourceScene<'a> {
     }
 }
 
-/// Result of reading the parts of a file.
+/// Result of reading the parts of a file separately.
 enum Reading {
     Done,
     /// The parts do not describe the scene that the whole file describes.
     NotInParts,
 }
 
-/// Returns the text of the scene file at `path`, which `open` opens.
+/// Returns the text of the scene file at `path`. `open` opens the file.
 pub(crate) fn read_text(
     path: &Path,
     open: impl Fn(&Path) -> io::Result<File>,
@@ -258,7 +260,7 @@ mod tests {
     use crate::scene::Object;
     use std::fs;
 
-    /// Parses `text` in parts of single objects, and as a whole.
+    /// Parses `text` twice: in parts of single objects, and as a whole.
     fn both(text: &str, name: &str) -> [Result<Scene, SceneErrors>; 2] {
         // Meshes are equal only if they were read once.
         let assets = Arc::default();
@@ -336,7 +338,8 @@ mod tests {
         }
     }
 
-    /// Twice the objects with one error each take twice the time, up to counting.
+    /// Checks that twice the objects, with one error each, take twice the time. Further errors are
+    /// only counted.
     #[test]
     fn errors_of_large_files_are_found_in_one_pass() {
         // Each lookup of a line from the beginning of this file would read 2 MB; 20,000 of them

@@ -13,7 +13,7 @@ use std::ops;
 use toml::Spanned;
 use toml::de::{DeInteger, DeTable, DeValue};
 
-/// Keys of a scene file.
+/// Top-level keys of a scene file.
 pub const FIELDS: &[Field] = &[
     table("film", FILM_FIELDS, "Film: size of the picture, pixel filter, sample limit."),
     table("trace", TRACE_FIELDS, "Integrator: kinds of rays, depth, acceleration structure."),
@@ -54,7 +54,7 @@ const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) 
     Field::optional(name, ValueType::Table(fields), "", "its keys have their defaults", doc)
 }
 
-/// Adds the schema errors in `root`, the parsed `part` of the scene file `file`.
+/// Adds the schema errors in `root`, which is the parsed `part` of the scene file `file`.
 pub(crate) fn check(
     file: &str,
     root: &Spanned<DeTable>,
@@ -65,7 +65,7 @@ pub(crate) fn check(
     walk.table(root.get_ref(), 0..0, FIELDS);
 }
 
-/// Returns a path in words: `shape.sphere`, `step 2 of transform`, `shape.cube of part 1 of
+/// Returns a path as a phrase: `shape.sphere`, `step 2 of transform`, `shape.cube of part 1 of
 /// shape.union`.
 fn phrase(keys: &[String]) -> String {
     let number = |position: &String| position.parse().map_or(0, |i: usize| i + 1);
@@ -104,7 +104,7 @@ impl SchemaChecker<'_> {
         });
     }
 
-    /// Returns the part of the current path below the table that the subject of a diagnostic names:
+    /// Returns the part of the current path inside of the table that is the subject of diagnostics:
     /// `shape.sphere`.
     fn inner(&self) -> String {
         let above = match self.path.first().map(String::as_str) {
@@ -114,7 +114,7 @@ impl SchemaChecker<'_> {
         phrase(self.path.get(above..).unwrap_or_default())
     }
 
-    /// Adds an error about a value of a wrong type.
+    /// Adds an error about a value of the wrong type.
     fn wrong(&mut self, span: ops::Range<usize>, value: &DeValue, expected: &str) {
         if self.errors.skips(self.part.in_file(span.start)) {
             return;
@@ -126,8 +126,8 @@ impl SchemaChecker<'_> {
         self.add(span, format!("{name} is {}", describe(value)), format!("Expected {expected}."));
     }
 
-    /// Adds an error about an unknown key. Returns the key that was probably intended; `None` if no
-    /// key is similar, or if there are enough errors.
+    /// Adds an error about an unknown key. Returns the most similar valid key; `None` if no key is
+    /// similar, or if there are enough errors.
     fn unknown(
         &mut self,
         key: &Spanned<toml::de::DeString>,
@@ -205,8 +205,7 @@ impl SchemaChecker<'_> {
         self.path.pop();
     }
 
-    /// Validates each entry of a list with `each`, while the index of the entry is part of the
-    /// path.
+    /// Validates each entry of a list with `each`. The path contains the entry's index meanwhile.
     fn entries(
         &mut self,
         list: &[Spanned<DeValue>],
@@ -267,9 +266,9 @@ impl SchemaChecker<'_> {
     }
 }
 
-/// Returns `true` if a value that is no table has the right type. Ranges of whole numbers are
-/// checked here, since an unsigned integer cannot hold values outside. All other ranges are checked
-/// in [`Scene::faults`](crate::scene::Scene::faults).
+/// Returns `true` if a value that is not a table has the right type. Ranges of whole numbers are
+/// checked here, because the unsigned integers of descriptions cannot hold values outside of them.
+/// Other ranges are checked in [`Scene::faults`](crate::scene::Scene::faults).
 fn fits(takes: ValueType, value: &DeValue) -> bool {
     let list = |n: usize, each: &dyn Fn(&DeValue) -> bool| match value {
         DeValue::Array(list) => list.len() == n && list.iter().all(|v| each(v.get_ref())),

@@ -9,8 +9,8 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Returns line and column of the byte offset `at` in `text`, both from 1; columns count
-/// characters.
+/// Returns line and column of the byte offset `at` in `text`. Both are counted from 1; columns
+/// count characters.
 pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
     LineCounter::new(text).line_column(at)
 }
@@ -18,7 +18,7 @@ pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
 /// Lines and columns of ascending byte offsets, found in one pass over the text.
 pub(crate) struct LineCounter<'a> {
     text: &'a str,
-    /// Offset up to which `lines` counts the line ends.
+    /// Offset up to which line endings have been counted in `lines`.
     counted: usize,
     lines: usize,
 }
@@ -28,8 +28,8 @@ impl<'a> LineCounter<'a> {
         Self { text, counted: 0, lines: 0 }
     }
 
-    /// Returns line and column of the byte offset `at`, both from 1; columns count characters. `at`
-    /// is at least the offset of the call before.
+    /// Returns line and column of the byte offset `at`. Both are counted from 1; columns count
+    /// characters. `at` must not be less than in the previous call.
     pub fn line_column(&mut self, at: usize) -> (usize, usize) {
         let mut at = at.min(self.text.len());
         while !self.text.is_char_boundary(at) {
@@ -45,8 +45,8 @@ impl<'a> LineCounter<'a> {
     }
 }
 
-/// Returns the span of the value at `path`. If the file does not have this value, the span is that
-/// of the nearest ancestor in the path.
+/// Returns the span of the value at `path`. If the file does not have this value, returns the span
+/// of its nearest ancestor.
 fn span(root: &DeTable, path: &[String]) -> Range<usize> {
     let Some((first, rest)) = path.split_first() else { return 0..0 };
     match root.get(first.as_str()) {
@@ -70,8 +70,8 @@ fn deepest_span(value: &Spanned<DeValue>, path: &[String]) -> Range<usize> {
     }
 }
 
-/// Adds diagnostics for `problems` of the scene in the file with this name and text, which consists
-/// of `parts`. The parts that contain the problems are parsed again.
+/// Adds diagnostics for `problems` of the scene. The file has this name and text and consists of
+/// `parts`. The parts that contain the problems are parsed again.
 pub(crate) fn locate(
     (file, text): (&str, &str),
     parts: &[Part],

@@ -1,7 +1,7 @@
 //! Suggestions ("Did you mean"): the nearest known word.
 
-/// Returns the word of `words` nearest to `given`, if `given` may be a typing error of that word.
-/// Returns `None` otherwise.
+/// Returns the word of `words` most similar to `given`. Returns `None` if `given` is not likely to
+/// be a typing error of it.
 pub(crate) fn nearest<'a>(
     given: &str,
     words: impl IntoIterator<Item = &'a str>,
@@ -16,8 +16,8 @@ pub(crate) fn nearest<'a>(
     (distance <= 1 + length / 4 && distance < length).then_some(word)
 }
 
-/// Returns the Damerau-Levenshtein distance (optimal string alignment) regardless of case: the
-/// number of insertions, deletions, replacements and transpositions of neighbours from `a` to `b`.
+/// Returns the Damerau-Levenshtein distance (optimal string alignment) of `a` and `b`, ignoring
+/// case: the number of insertions, deletions, replacements and transpositions of neighbours.
 fn distance(a: &str, b: &str) -> usize {
     let [a, b]: [Vec<char>; 2] = [a, b].map(|s| s.to_lowercase().chars().collect());
     let mut rows = vec![vec![0; b.len() + 1]; a.len() + 1];

@@ -13,11 +13,11 @@ const MIXED: usize = 4;
 /// Bayer's ordered pattern of 2 x 2 pixels.
 const PATTERN: [[usize; 2]; 2] = [[0, 2], [3, 1]];
 /// Share of the accumulated error that the choice of the next colour compensates. A share of 1
-/// reproduces the mean best but mixes distant colours, which looks coarse because half a cell is
-/// large.
+/// reproduces the mean best, but mixes distant colours, which looks coarse in pixels as large as
+/// half a cell.
 const STRENGTH: f32 = 0.5;
 
-/// Returns the index of a table colour for each pixel.
+/// Returns the index of a table colour for each pixel of `raster`, by ordered dithering.
 pub fn dithered(raster: &Raster) -> Vec<u8> {
     let mut last = None;
     let mut mixed = [0; MIXED];
@@ -53,7 +53,8 @@ mod tests {
     use super::*;
     use crate::terminal::cells::Oklab;
 
-    /// Compares the mean over the pattern with the nearest single table colour.
+    /// Checks that the mean over the pattern is closer to the target than the nearest single table
+    /// colour.
     #[test]
     fn dithered_mean_is_closer_than_nearest_color() {
         let (mut plain, mut mixed) = (0.0, 0.0);

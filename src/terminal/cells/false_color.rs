@@ -38,8 +38,8 @@ impl Scale {
         Self { low, high, logarithmic: true, reversed: false }
     }
 
-    /// Returns the position of `value` in the colour map, from 0 (dark) to 1 (bright). NaN has the
-    /// position of `low`.
+    /// Returns the position of `value` in the colour map, from 0 (dark) to 1 (bright). NaN is shown
+    /// like `low`.
     pub fn part(&self, value: f64) -> f64 {
         let [low, high, value] =
             [self.low, self.high, value].map(|v| if self.logarithmic { v.ln() } else { v });
@@ -59,13 +59,14 @@ impl Scale {
         }
     }
 
-    /// Returns the colour of a value.
+    /// Returns the colour of `value` on this scale.
     pub fn color(&self, value: f64) -> [u8; 3] {
         magnitude(self.part(value))
     }
 }
 
-/// Returns the colour of a magnitude. `part` is clamped to 0 (dark) to 1 (bright).
+/// Returns the colour at position `part` of the colour map, from 0 (dark) to 1 (bright). Other
+/// values are clamped.
 pub fn magnitude(part: f64) -> [u8; 3] {
     let color = colorous::INFERNO.eval_continuous(part.clamp(0.0, 1.0));
     [color.r, color.g, color.b]

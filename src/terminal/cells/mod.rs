@@ -34,7 +34,7 @@ impl Colors {
     /// All variants, in the order in which the colour key cycles through them.
     pub const ALL: [Self; 4] = [Self::True, Self::Indexed, Self::Sixteen, Self::Mono];
 
-    /// Returns the name for users.
+    /// Returns the name that users see.
     pub fn name(self) -> &'static str {
         match self {
             Self::True => "24-bit colour",
@@ -57,8 +57,8 @@ pub struct Raster {
 }
 
 impl Raster {
-    /// Creates an image of `width` x `height` pixels. `pixel(index)` returns the colour of a pixel;
-    /// indices count row by row.
+    /// Creates an image of `width` x `height` pixels. `pixel(index)` returns the colour of the
+    /// pixel with an index; pixels are numbered row by row.
     pub fn from_fn(width: usize, height: usize, pixel: impl FnMut(usize) -> [u8; 3]) -> Self {
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
     }
@@ -80,7 +80,7 @@ pub enum CellColor {
     Indexed(u8),
 }
 
-/// Terminal cell of the picture: glyph and colours.
+/// Terminal cell of the picture: its glyph and its colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PictureCell {
     /// Character of the cell, one column wide.
@@ -92,8 +92,8 @@ pub struct PictureCell {
 }
 
 impl PictureCell {
-    /// Returns the mean colours of the upper and the lower half, as a dark terminal with xterm's
-    /// colours shows them.
+    /// Returns the mean colours of the upper and the lower half of the cell, as shown by a terminal
+    /// with a dark background and xterm's colours.
     pub fn halves(&self) -> [Oklab; 2] {
         let rgb = |color, plain| match color {
             CellColor::Plain => plain,
@@ -110,8 +110,8 @@ impl PictureCell {
 }
 
 impl PictureCell {
-    /// Returns the colours of the upper and the lower half. Returns `None` unless each half has one
-    /// 24-bit colour.
+    /// Returns the 24-bit colours of the upper and the lower half. Returns `None` if a half has
+    /// several colours, or one that is not 24-bit.
     pub fn colors(&self) -> Option<[[u8; 3]; 2]> {
         let halves = match self.glyph {
             '▀' => [self.fg, self.bg],
@@ -192,8 +192,8 @@ impl PictureCells {
     }
 }
 
-/// Creates a cell from the colours of its halves. `lower` is `None` below the last row of pixels.
-/// The glyph of equal halves is a space.
+/// Creates a cell from the colours of its upper and lower half. `lower` is `None` below the last
+/// row of pixels. The glyph of equal halves is a space.
 fn two_halves(upper: CellColor, lower: Option<CellColor>) -> PictureCell {
     match lower {
         Some(lower) if lower == upper => {

@@ -27,8 +27,8 @@ pub(crate) fn linear(rgb: [u8; 3]) -> [f32; 3] {
     rgb.map(|code| table[usize::from(code)])
 }
 
-/// Converts linear light to the 8-bit sRGB level whose linear light is nearest. `linear` is clamped
-/// to 0..=1.
+/// Converts linear light to the nearest 8-bit sRGB level, by the distance in linear light. `linear`
+/// is clamped to 0..=1.
 pub(crate) fn code(linear: f32) -> u8 {
     let table = &*LINEAR;
     let above = table.partition_point(|l| *l < linear).min(255);
@@ -54,8 +54,8 @@ impl Oklab {
         }
     }
 
-    /// Returns the Euclidean distance of two colours. It is 1 between black and white. A distance
-    /// of 0.02 is just visible if the colours are side by side.
+    /// Returns the Euclidean distance of two colours. It is 1 between black and white. Differences
+    /// of about 0.02 are just visible side by side.
     pub fn distance(self, other: Self) -> f32 {
         self.distance_squared(other).sqrt()
     }
@@ -75,7 +75,8 @@ mod tests {
         assert!(worst < tolerance, "{got:?}, not {:?}", [l, a, b]);
     }
 
-    /// Pairs of XYZ and OKLab from the publication, rounded there to three places.
+    /// Checks the pairs of XYZ and OKLab from the publication, which are rounded to three places
+    /// there.
     #[test]
     fn oklab_matches_published_pairs() {
         // Linear sRGB from CIE XYZ at D65 (IEC 61966-2-1).
@@ -96,7 +97,7 @@ mod tests {
         }
     }
 
-    /// Expected values are those of CSS Color 4 and its test suite.
+    /// Checks the primaries against values of CSS Color 4 and its test suite.
     #[test]
     fn oklab_of_primaries_matches_css() {
         near(Oklab::of([255, 255, 255]), [1.0, 0.0, 0.0], 1e-4);

@@ -23,18 +23,18 @@ const SHADES: [char; 3] = ['░', '▒', '▓'];
 /// Background colours of mixtures: black, two greys and white. They leave the hue of the foreground
 /// unchanged.
 const NEUTRAL: [u8; 4] = [0, 7, 8, 15];
-/// Least gain for which half blocks are preferred to a shade: the sum of the OKLab errors of both
-/// halves must be smaller by this distance. Without it a changing picture would flicker between
-/// half blocks and shades.
+/// Smallest gain for which half blocks are preferred to a shade: the sum of the OKLab errors of
+/// both halves must be smaller by this distance. Without this limit, a changing picture would
+/// flicker between half blocks and shades.
 const HALVES_GAIN: f32 = 0.05;
 
 /// Returns the share of the cell that `glyph` covers, 0..=1. Returns 0.5 for glyphs that are not in
-/// the table, such as half blocks.
+/// [`COVERAGE`], such as half blocks.
 pub fn coverage(glyph: char) -> f32 {
     COVERAGE.iter().find(|(known, _)| *known == glyph).map_or(0.5, |(_, part)| *part)
 }
 
-/// Returns the mean colour of a cell of which `fg` covers the share `coverage` and `bg` the
+/// Returns the mean colour of a cell. `fg` covers the share `coverage`, and `bg` covers the
 /// remainder.
 pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
     let (fg, bg) = (linear(fg), linear(bg));
@@ -80,7 +80,8 @@ pub fn nearest(rgb: [u8; 3]) -> u8 {
     BARE.nearest(rgb) as u8
 }
 
-/// Returns the cell in 16 colours that approximates two halves: a shade for both, or a half block.
+/// Returns the cell in 16 colours that approximates the colours `upper` and `lower` of its halves:
+/// a shade or a half block.
 pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     let target = [upper, lower].map(Oklab::of);
     let [a, b] = [upper, lower].map(linear);
@@ -102,7 +103,8 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     CELLS[shade]
 }
 
-/// Returns the cell without colours that approximates the lightness of two halves.
+/// Returns the cell without colours whose glyph approximates the lightness of its halves, `upper`
+/// and `lower`.
 pub fn pair_mono(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     static LIGHTNESS: LazyLock<Vec<(char, f32)>> = LazyLock::new(|| {
         COVERAGE.map(|(glyph, part)| (glyph, mixture(PLAIN_FG, PLAIN_BG, part).l)).to_vec()

@@ -5,10 +5,10 @@ use crate::terminal::cells::oklab::Oklab;
 use crate::terminal::cells::palette_cache::PaletteCache;
 use std::sync::LazyLock;
 
-/// 8-bit levels along each edge of the colour cube.
+/// 8-bit sRGB levels along each edge of the colour cube.
 const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
-/// First index of the colour cube. The 16 colours before it differ between users and are not
-/// chosen.
+/// First index of the colour cube. The 16 colours before it are never used, because users configure
+/// them.
 const FIRST: u8 = 16;
 /// First index of the greys.
 const GREYS: u8 = 232;
@@ -45,13 +45,13 @@ pub fn rgb(index: u8) -> [u8; 3] {
     }
 }
 
-/// The colours of the cube and the greys, which start at [`FIRST`].
+/// Palette of the usable colours: the cube and the greys, from index [`FIRST`] on.
 static CHOICES: LazyLock<PaletteCache> =
     LazyLock::new(|| PaletteCache::new((FIRST..=255).map(|index| Oklab::of(rgb(index))).collect()));
 
-/// Returns the index of the colour nearest to `rgb` among the cube and the greys. `rgb` is rounded
-/// to 6 bits per channel. The error of this is small, because neighbours in the table differ by at
-/// least 10 of 255 levels.
+/// Returns the index of the colour nearest to `rgb` among the cube and the greys. `rgb` is first
+/// rounded to 6 bits per channel; the resulting error is small, because neighbours in the table
+/// differ by at least 10 of 255 levels.
 pub fn nearest(rgb: [u8; 3]) -> u8 {
     FIRST + CHOICES.nearest(rgb) as u8
 }
@@ -82,7 +82,7 @@ mod tests {
         }
     }
 
-    /// Compares the cached colour with the result of a search at full precision.
+    /// Compares results of the cache with results of a search at full precision.
     #[test]
     fn nearest_color_matches_exact_search() {
         let mut exact_hits = 0;

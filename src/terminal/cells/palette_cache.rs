@@ -7,11 +7,12 @@ use std::sync::atomic::{AtomicU16, Ordering};
 /// 255 levels.
 const BITS: usize = 6;
 
-/// Palette that remembers the nearest colour of each sRGB colour, rounded to 6 bits per channel.
+/// Palette with a cache: it stores the nearest palette colour of each sRGB colour, rounded to 6
+/// bits per channel.
 pub struct PaletteCache {
     looks: Vec<Oklab>,
-    /// Index of the nearest palette colour plus 1, for each of the 2^18 boxes of sRGB. 0 means that
-    /// the box was not searched yet.
+    /// Index plus 1 of the nearest palette colour, for each of the 2^18 rounded sRGB colours. 0
+    /// means that it was not searched yet.
     known: Vec<AtomicU16>,
 }
 

@@ -23,7 +23,7 @@ const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
 /// Attributes that are visible on a space character.
 const LINES: Modifier = Modifier::REVERSED.union(Modifier::UNDERLINED).union(Modifier::CROSSED_OUT);
 
-/// Colours and attributes with which the terminal shows the next character.
+/// Colours and attributes that the terminal uses for the next character.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Pen {
     fg: Color,
@@ -65,7 +65,8 @@ impl Encoder {
         self.cursor = (width == 1 && x + 1 < self.columns).then_some((x + 1, y));
     }
 
-    /// Marks the position of the cursor as unknown, after other output has moved it.
+    /// Marks the position of the cursor as unknown. Callers use this after other output that moves
+    /// the cursor.
     pub fn moved(&mut self) {
         self.cursor = None;
     }
@@ -95,7 +96,7 @@ impl Encoder {
         out.extend(shortest.as_bytes());
     }
 
-    /// Returns a symbol and a pen that together look like `cell` and need the fewest bytes.
+    /// Returns the symbol and the pen that show `cell` with the fewest bytes.
     fn cheapest<'a>(&self, cell: &'a Cell) -> (&'a str, Pen) {
         let Cell { fg, bg, modifier, .. } = *cell;
         let symbol = cell.symbol();
@@ -288,7 +289,8 @@ mod tests {
     }
 
     proptest! {
-        /// Cells are sent in any order and over any previous contents.
+        /// Checks that an emulator shows the encoded cells, sent in any order and over any previous
+        /// contents.
         #[test]
         fn emulator_shows_encoded_cells(
             cells in prop::collection::vec((0..SIZE[0], 0..SIZE[1], any_cell()), 1..120),

@@ -18,10 +18,10 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::{Position, Rect};
 use std::time::Duration;
 
-/// Number of bytes of a frame besides its cells: cursor, synchronised update, acknowledgement
-/// request.
+/// Number of bytes of a frame in addition to its cells: cursor, synchronised update,
+/// acknowledgement request.
 const FRAME_OVERHEAD: usize = 64;
-/// Time without change of the picture after which invisible differences are sent as well.
+/// Time without a change of the picture before invisible differences are sent.
 const IDLE: Duration = Duration::from_secs(2);
 
 /// Contents that the terminal should show.
@@ -36,8 +36,8 @@ pub struct TargetFrame<'a> {
     /// For each cell of the picture's area, row by row, `true` if the cell shows the picture, and
     /// `false` if text covers it.
     pub uncovered: &'a [bool],
-    /// Number that increases when the picture changes for another reason than more samples, such as
-    /// an edit or a camera movement.
+    /// Number that increases when the picture changes for another reason than additional samples,
+    /// such as an edit or a camera movement.
     pub subject: u64,
     /// Number that increases when the picture may have changed.
     pub version: u64,
@@ -52,7 +52,7 @@ pub struct TargetFrame<'a> {
 pub struct Frame {
     /// `true` if the frame contains cells of the picture.
     pub picture: bool,
-    /// Number of bytes that encode invisible differences.
+    /// Number of bytes of the cells with invisible differences.
     pub flushed: usize,
 }
 
@@ -77,9 +77,9 @@ pub struct FrameDiff {
     encoder: Encoder,
     picture_diff: PerceptualDiff,
     subject: Option<u64>,
-    /// `true` until cells of the current subject, exact or as a mosaic, were sent.
+    /// `true` until cells of the current subject, exact or as a mosaic, have been sent.
     fresh: bool,
-    /// Number of samples per pixel at which cells are compared again.
+    /// Number of samples per pixel at which the cells are compared next.
     next_samples: f64,
     version: u64,
     /// Time of the last change of the version.
@@ -115,8 +115,8 @@ impl FrameDiff {
         self.encoder.moved();
     }
 
-    /// Appends the next frame, within the limits of `allowance`, to `out`. Appends no bytes if
-    /// there is nothing to send. OKLab differences up to `threshold` count as invisible.
+    /// Appends the next frame, within the limits of `allowance`, to `out`. Appends nothing if there
+    /// are no differences. OKLab differences up to `threshold` are treated as invisible.
     pub fn frame(
         &mut self,
         target: &TargetFrame,
@@ -159,7 +159,7 @@ impl FrameDiff {
         frame
     }
 
-    /// Sends every cell that differs.
+    /// Appends every cell that differs.
     fn send_all(&mut self, target: &TargetFrame, out: &mut Vec<u8>) {
         for (x, y, cell) in self.shown.diff_iter(target.cells) {
             self.encoder.cell(out, x, y, cell);
@@ -168,8 +168,8 @@ impl FrameDiff {
         self.pending = Pending::default();
     }
 
-    /// Sends rows of text that differ: as many as fit into `room` bytes, but at least one. Returns
-    /// `true` if all of them were sent.
+    /// Appends rows of text that differ: as many as fit into `room` bytes, but at least one.
+    /// Returns `true` if none remain.
     fn send_text(&mut self, target: &TargetFrame, room: usize, out: &mut Vec<u8>) -> bool {
         let differences = self.shown.diff(target.cells);
         let text = differences.into_iter().filter(|(x, y, _)| !target.shows_picture(*x, *y));
@@ -219,7 +219,7 @@ impl FrameDiff {
         self.picture_diff.compare(target, &self.shown, is_due, threshold);
     }
 
-    /// Sends as many cells of the picture as fit into `allowance`.
+    /// Appends as many cells of the picture as fit into `allowance`.
     fn send_picture(
         &mut self,
         target: &TargetFrame,
@@ -271,9 +271,9 @@ impl FrameDiff {
         frame
     }
 
-    /// Encodes as many cells of `order` as fit into `room` bytes, those with the largest
-    /// differences first. `order` has the difference and the index of each cell; `cell` returns the
-    /// cell of an index.
+    /// Encodes as many cells of `order` as fit into `room` bytes, the largest differences first.
+    /// `order` lists the difference and the index of each cell; `cell` returns the cell with an
+    /// index.
     fn fitting<'a>(
         &self,
         area: Rect,
@@ -329,7 +329,7 @@ impl FrameDiff {
     }
 }
 
-/// Encoded cells of the picture.
+/// Encoded cells of the picture that fit into a frame.
 struct Part {
     bytes: Vec<u8>,
     /// State of the encoder after these bytes.

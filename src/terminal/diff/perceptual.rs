@@ -7,23 +7,23 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 
-/// Difference of a cell with unknown contents. It is greater than that between black and white, so
+/// Difference of a cell with unknown contents. It is larger than that between black and white, so
 /// that such cells are sent first.
 const UNKNOWN: f32 = 2.0;
 
-/// Colours of one cell of the picture.
+/// Target and shown colours of one cell of the picture.
 #[derive(Clone, Copy, Debug)]
 struct CellColors {
     /// Cell of the target frame. `None` where text covers the picture.
     target: Option<PictureCell>,
-    /// Colours of the two halves of the target cell.
+    /// Colours of the halves of the target cell.
     look: [Oklab; 2],
-    /// Colours of the two halves that the terminal shows. `None` if unknown.
+    /// Colours of the halves of the cell on the terminal. `None` if unknown.
     shown: Option<[Oklab; 2]>,
-    /// `true` if a difference of this cell may count as visible. After the cell was sent exactly,
-    /// its differences do not count until the next due comparison.
+    /// `true` if a difference of this cell may be visible. After the cell has been sent exactly,
+    /// its differences are ignored until the next full comparison.
     counts: bool,
-    /// Difference between shown and target cell. 0 if they are equal.
+    /// Difference between target and shown cell; 0 if they are equal.
     error: f32,
     /// `true` if the difference is visible.
     visible: bool,
@@ -62,8 +62,8 @@ impl PerceptualDiff {
         }
     }
 
-    /// Compares the shown cells with the target. If `is_due` is `true`, every difference may count
-    /// as visible. Otherwise only cells whose differences counted before are considered.
+    /// Compares the shown cells with the target. In a full comparison (`is_due`) every difference
+    /// above `threshold` is visible, otherwise only those of cells with `counts`.
     pub fn compare(&mut self, target: &TargetFrame, shown: &Buffer, is_due: bool, threshold: f32) {
         for (index, cell_colors) in self.cells.iter_mut().enumerate() {
             let cell_position = position(self.area, index);
@@ -131,9 +131,9 @@ impl PerceptualDiff {
         self.cells.iter().any(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
 
-    /// Returns a mosaic with blocks of `side` x `side` half cells. The first value has all its
-    /// cells. The second has the cells at which the mosaic is closer to the target than the shown
-    /// cell: the gain in OKLab distance, and the index.
+    /// Creates a mosaic of the target with blocks of `side` x `side` half cells. Returns all its
+    /// cells, and a list of the cells that it improves: the gain (how much closer to the target
+    /// than the shown cell, in OKLab distance) and the index.
     pub fn coarse(&self, target: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
         let rows = usize::from(self.area.height);
@@ -173,12 +173,13 @@ impl PerceptualDiff {
     }
 }
 
-/// Returns the larger of the OKLab distances of the upper and the lower halves.
+/// Returns the larger of two OKLab distances: between the upper halves and between the lower
+/// halves.
 fn difference(a: [Oklab; 2], b: [Oklab; 2]) -> f32 {
     a[0].distance(b[0]).max(a[1].distance(b[1]))
 }
 
-/// Converts a cell of a ratatui buffer to a cell of the picture.
+/// Converts a cell of a ratatui buffer to a [`PictureCell`].
 fn picture_cell(cell: &Cell) -> PictureCell {
     let cell_color = |color| match color {
         Color::Rgb(r, g, b) => CellColor::Rgb([r, g, b]),

@@ -48,7 +48,7 @@ impl Fixture {
         fixture
     }
 
-    /// Paints both halves of every cell with `color`, the lower one with slightly more red.
+    /// Paints both halves of every cell with `color`. The lower half has slightly more red.
     fn paint(&mut self, color: impl Fn(u16, u16) -> [u8; 3]) {
         for at in PICTURE.positions() {
             let [r, g, b] = color(at.x - PICTURE.x, at.y - PICTURE.y);

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Frame without acknowledgement.
+/// Frame that the terminal has not acknowledged yet.
 #[derive(Clone, Copy, Debug)]
 pub struct InFlight {
     pub sent: Duration,
@@ -12,14 +12,14 @@ pub struct InFlight {
     pub picture: bool,
 }
 
-/// Acknowledged frame.
+/// Frame that the terminal has acknowledged.
 #[derive(Clone, Copy, Debug)]
 pub struct Acked {
     pub sent: Duration,
     pub bytes: usize,
     /// `true` if no other frame was in flight when this one was sent.
     pub alone: bool,
-    /// Previously acknowledged frame: times at which it was sent and acknowledged.
+    /// Times at which the previously acknowledged frame was sent and acknowledged.
     pub previous: Option<[Duration; 2]>,
 }
 
@@ -27,7 +27,7 @@ pub struct Acked {
 #[derive(Debug, Default)]
 pub struct FramesInFlight {
     queue: VecDeque<(InFlight, bool)>,
-    /// Last acknowledged frame: times at which it was sent and acknowledged.
+    /// Times at which the last acknowledged frame was sent and acknowledged.
     last_acked: Option<[Duration; 2]>,
 }
 

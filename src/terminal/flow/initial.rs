@@ -5,7 +5,7 @@ use crate::terminal::flow::{DEFAULT_RATE, PacingMode};
 use std::time::Duration;
 
 /// Shortest plausible round trip over SSH. A faster reply comes from a program on this side of the
-/// connection instead of the terminal.
+/// connection, not from the terminal.
 const TOO_SOON: Duration = Duration::from_millis(3);
 
 /// State of the connection before the first frame.
@@ -23,8 +23,8 @@ pub struct InitialLink {
 
 impl InitialLink {
     /// Derives the state from the replies of `terminal`. `queue` is `true` if the kernel reports
-    /// the length of its TCP send queue. `rate` is a fixed rate given by the user, in bytes per
-    /// second; the rate is not measured then.
+    /// the length of its TCP send queue. `rate` is a fixed rate from the user, in bytes per second,
+    /// in place of a measured one.
     pub fn of(terminal: &Capabilities, queue: bool, rate: Option<f64>) -> Self {
         let fallback = if queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
         let multiplexer = terminal.environment.multiplexer;

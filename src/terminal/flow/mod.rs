@@ -26,21 +26,21 @@ pub use tcp_send_queue::TcpSendQueue;
 
 /// Shortest interval between frames.
 pub const FRAME_INTERVAL: Duration = Duration::from_millis(33);
-/// Shortest interval between frames of text alone without user input, over an SSH connection.
+/// Shortest interval between frames with text only, over an SSH connection and without user input.
 pub const TEXT_INTERVAL: Duration = Duration::from_millis(500);
-/// Time that the transmission of a full frame takes at the current rate.
+/// Duration of the transmission of a full frame at the current rate.
 const FRAME_SPAN: Duration = Duration::from_millis(100);
 /// Smallest, initial and largest byte budget of a frame.
 const BUDGET: [f64; 3] = [2e3, 8e3, 200e3];
 /// Largest number of frames in flight. A frame is in flight until it is acknowledged.
 const MAX_IN_FLIGHT: usize = 6;
-/// Largest number of bytes of text-only frames in flight, in addition to frames with cells of the
-/// picture.
+/// Largest number of bytes of frames in flight with text only, in addition to frames with cells of
+/// the picture.
 const MAX_TEXT: usize = 1500;
-/// Size of a frame, in bytes, below which its acknowledgement may raise the measured rate but not
-/// lower it. Latency dominates the time of such a frame.
+/// Size of a frame in bytes below which its acknowledgement may raise the measured rate, but not
+/// lower it: the time of a small frame is mostly latency.
 const SMALL: usize = 1000;
-/// Time after which an acknowledgement counts as lost.
+/// Time after which an acknowledgement is treated as lost.
 const LOST_AFTER: Duration = Duration::from_secs(3);
 /// Number of consecutive losses after which no more acknowledgements are requested.
 const MAX_LOSSES: u32 = 3;
@@ -48,32 +48,31 @@ const MAX_LOSSES: u32 = 3;
 const PROBE_INTERVAL: Duration = Duration::from_secs(30);
 /// Weight of a new measurement in the rate, which is an exponential moving average.
 const NEW_WEIGHT: f64 = 0.3;
-/// Time after user input during which the user counts as active.
+/// Time after user input in which the user is treated as active.
 const ACTIVE_TIME: Duration = Duration::from_millis(500);
 /// Interval at which the kernel's send queue is measured.
 const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
 /// Interval at which the queue is measured after no byte has left it for [`LOST_AFTER`].
 const STALLED_INTERVAL: Duration = Duration::from_millis(500);
-/// Round trip that is assumed until it is measured.
+/// Assumed round trip before the first measurement.
 const DEFAULT_ROUND_TRIP: Duration = Duration::from_millis(100);
-/// Time without any sign of the terminal after which the connection counts as silent.
+/// Time without input from the terminal after which the connection is treated as silent.
 const SILENT_AFTER: Duration = Duration::from_secs(30);
-/// Acknowledgements that come within this time are measured together: the connection between may
-/// have held the first ones back.
+/// Acknowledgements that arrive within this time are measured together, because the connection may
+/// have delayed the first ones.
 const ACKS_TOGETHER: Duration = Duration::from_millis(20);
 /// Rate of a connection that cannot be measured, in bytes per second.
 pub const DEFAULT_RATE: f64 = 30e3;
-/// Share of the rate that refinement may use: the sending of differences below the threshold of
-/// visibility.
+/// Share of the rate for refinement, which sends differences below the threshold of visibility.
 const REFINEMENT_SHARE: f64 = 0.25;
 
-/// Method by which frames are paced.
+/// Method of pacing frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PacingMode {
     /// The terminal is local and needs no acknowledgements.
     Unlimited,
-    /// The terminal acknowledges each frame by a reply, which passes through the multiplexer if
-    /// there is one.
+    /// The terminal acknowledges each frame by a reply. The request passes through the multiplexer,
+    /// if there is one.
     AckClocked(Option<Multiplexer>),
     /// The kernel reports the length of its TCP send queue.
     SendQueue,
@@ -97,7 +96,7 @@ pub struct FrameBudget {
 pub struct LinkStatus {
     /// Rate in bytes per second, measured or fixed.
     pub rate: f64,
-    /// Method by which frames are paced.
+    /// Method of pacing frames.
     pub mode: PacingMode,
 }
 
@@ -105,15 +104,16 @@ pub struct LinkStatus {
 #[derive(Debug)]
 pub struct FlowControl {
     mode: PacingMode,
-    /// Mode to resume when a reply comes. `None` while no mode is suspended.
+    /// Mode to resume when a reply arrives. `None` if no mode is suspended.
     suspended_mode: Option<PacingMode>,
     start: InitialLink,
     /// Measured or fixed rate in bytes per second.
     rate: f64,
     round_trip: Option<Duration>,
     round_trip_at: Duration,
-    /// Rate from which the round trip is measured again: half of the rate at the last measurement. A
-    /// queue that is too short for a round trip that has grown lowers the rate as well.
+    /// Rate below which the round trip is measured again: half of the rate at the last measurement.
+    /// A longer round trip also lowers the measured rate, because the frames in flight no longer
+    /// fill it.
     doubtful_rate: f64,
     in_flight: FramesInFlight,
     losses: u32,
@@ -122,26 +122,26 @@ pub struct FlowControl {
     /// End of the last period of user activity.
     active_until: Duration,
     last_frame: Option<Duration>,
-    /// Time at which the bytes sent without acknowledgement will have been transmitted, estimated
-    /// by the rate.
+    /// Estimated time at which the bytes without an acknowledgement request will have been
+    /// transmitted.
     free_at: Duration,
-    /// Time at which all frames sent with a request for acknowledgement will have been transmitted,
-    /// estimated by the rate. The connection is idle from then on.
+    /// Estimated time at which all frames with an acknowledgement request will have been
+    /// transmitted, so that the connection is idle.
     clear_at: Duration,
-    /// Earliest time at which a frame may again contain refinement.
+    /// Earliest time at which a frame may contain refinement again.
     refine_at: Duration,
     send_queue: SendQueueEstimate,
     /// Last measurement of the rate by acknowledgements.
     ack_sample: Option<AckSample>,
 }
 
-/// Bytes whose transmission began between two times, until their acknowledgement.
+/// Bytes whose transmission began between two times, counted until their acknowledgement.
 #[derive(Clone, Copy, Debug)]
 struct AckSample {
     earliest_start: Duration,
     latest_start: Duration,
-    /// Time at which the frame before these bytes was sent, if their transmission began after its
-    /// acknowledgement.
+    /// Time at which the frame before these bytes was sent. `None` if their transmission began
+    /// before its acknowledgement.
     sent_from: Option<Duration>,
     at: Duration,
     bytes: usize,
@@ -202,8 +202,8 @@ impl FlowControl {
         self.active_until = now + ACTIVE_TIME;
     }
 
-    /// Returns the multiplexer through which the request for acknowledgement after a frame passes.
-    /// The inner `None` means no multiplexer. Returns `None` if no request is to be sent.
+    /// Returns the multiplexer through which the acknowledgement request after a frame must pass;
+    /// the inner `None` means no multiplexer. Returns `None` if no request should be sent.
     pub fn ack_request(&self) -> Option<Option<Multiplexer>> {
         match self.mode {
             PacingMode::AckClocked(multiplexer) => Some(multiplexer),
@@ -218,7 +218,7 @@ impl FlowControl {
     }
 
     /// Returns the time of the next measurement of the kernel's send queue. Returns `None` if none
-    /// is needed: bytes are not in the queue, or the queue does not pace the frames.
+    /// is needed, because the queue is empty or does not pace the frames.
     pub fn measures_at(&self, now: Duration) -> Option<Duration> {
         if self.mode != PacingMode::SendQueue {
             return None;
@@ -227,9 +227,9 @@ impl FlowControl {
         self.send_queue.next_at(if is_stalled { STALLED_INTERVAL } else { QUEUE_INTERVAL })
     }
 
-    /// Returns the time from which the connection counts as silent if nothing comes before.
-    /// `blocked_since` is the start of a write to the terminal that has not returned. Returns `None`
-    /// if no bytes are under way whose arrival would be noticed.
+    /// Returns the time from which the connection is treated as silent, if no input arrives before.
+    /// `blocked_since` is the start of a write to the terminal that has not returned. Returns
+    /// `None` if no bytes are known to be waiting for transmission.
     pub fn silent_at(&self, blocked_since: Option<Duration>) -> Option<Duration> {
         let is_measured = self.mode == PacingMode::SendQueue;
         let stalled_since = self.send_queue.stalled_since().filter(|_| is_measured);
@@ -255,8 +255,8 @@ impl FlowControl {
         due.then_some(FrameBudget { bytes: text_bytes, picture: false, refinement: 0 })
     }
 
-    /// Returns the next time at which [`FlowControl::allowance`] may permit a frame even if no
-    /// reply or input comes before. `text` is `true` if text may remain to be sent.
+    /// Returns the next time at which [`FlowControl::allowance`] may permit a frame if no reply or
+    /// input arrives before. `text` is `true` if text may remain to be sent.
     pub fn wakes_at(&self, now: Duration, text: bool) -> Duration {
         let after = |interval| self.last_frame.map_or(now, |last| last + interval);
         let frame = after(FRAME_INTERVAL);
@@ -279,7 +279,7 @@ impl FlowControl {
         if at > now { at } else { now + QUEUE_INTERVAL }
     }
 
-    /// Returns the earliest time at which a frame may again contain refinement.
+    /// Returns the earliest time at which a frame may contain refinement again.
     pub fn refine_at(&self) -> Duration {
         self.refine_at
     }
@@ -306,8 +306,8 @@ impl FlowControl {
         }
     }
 
-    /// Records that `bytes` bytes were sent without a request for acknowledgement, because they end
-    /// inside an escape sequence. The time of their transmission is estimated by the rate.
+    /// Records that `bytes` bytes were sent without an acknowledgement request, because they end
+    /// inside of an escape sequence. Their transmission is estimated by the rate.
     pub fn sent_unasked(&mut self, now: Duration, bytes: usize) {
         if let PacingMode::AckClocked(_) = self.mode {
             self.last_frame = Some(now);
@@ -409,7 +409,7 @@ impl FlowControl {
         }
     }
 
-    /// Counts all frames in flight as lost if the oldest one is overdue at `now`.
+    /// Treats all frames in flight as lost if the oldest one is overdue at `now`.
     pub fn expire(&mut self, now: Duration) {
         if self.lost_at().is_none_or(|at| at > now) {
             return;
@@ -486,23 +486,23 @@ impl FlowControl {
         }
     }
 
-    /// Returns the number of bytes in the kernel's send queue from which no frame is sent: the bytes
-    /// of a round trip, which keep the connection busy, and of one frame.
+    /// Returns the number of bytes in the kernel's send queue above which no frame is sent: the
+    /// bytes of one round trip, which keep the connection busy, and of one frame.
     fn max_queue(&self) -> f64 {
         let time = self.round_trip.unwrap_or(DEFAULT_ROUND_TRIP) + FRAME_SPAN;
         (self.rate * time.as_secs_f64()).max(BUDGET[0])
     }
 
     /// Returns the number of frames in flight that keeps the connection busy: one frame in
-    /// transmission, and the frames that fit into a round trip.
+    /// transmission, and those that fit into a round trip.
     fn target_in_flight(&self) -> usize {
         let round_trips =
             self.round_trip.unwrap_or_default().as_secs_f64() / FRAME_SPAN.as_secs_f64();
         (1 + round_trips.round() as usize).clamp(2, MAX_IN_FLIGHT)
     }
 
-    /// Returns `true` if the next frame is to measure the round trip. While the user is active, only
-    /// a rate that has fallen by half is a reason.
+    /// Returns `true` if the next frame should measure the round trip. While the user is active,
+    /// this happens only if the rate has fallen by half.
     fn is_probing(&self, now: Duration) -> bool {
         let is_known = self.round_trip.is_some() && now < self.round_trip_at + PROBE_INTERVAL;
         let is_measurable = matches!(self.mode, PacingMode::AckClocked(_) | PacingMode::SendQueue);

@@ -2,16 +2,16 @@
 
 use std::time::Duration;
 
-/// Time after a frame was sent in which the queue is not measured: the bytes may not have reached
-/// it, since another process, such as `sshd`, passes them on.
+/// Time after sending a frame in which the queue is not measured. Another process, such as `sshd`,
+/// passes the bytes on, so that they may not have reached the queue.
 const SETTLING: Duration = Duration::from_millis(10);
-/// Shortest busy period, while the round trip is unknown, whose end is believed. A queue that is
-/// empty earlier may not have got the bytes yet.
+/// Shortest busy period that is measured while the round trip is unknown. A queue that is empty
+/// earlier may not have received the bytes yet.
 const BELIEVED_AFTER: Duration = Duration::from_millis(50);
-/// Time over which bytes are counted for a rate. The queue is measured every 20 ms.
+/// Duration over which bytes are counted for a rate. The queue is measured every 20 ms.
 const SAMPLE: Duration = Duration::from_millis(100);
 
-/// Estimate of the length of the send queue and of the rate at which bytes leave it.
+/// Estimate of the send queue's length and of the rate at which bytes leave it.
 #[derive(Debug, Default)]
 pub struct SendQueueEstimate {
     /// Number of bytes in the queue: the last measurement plus the bytes sent since.
@@ -23,8 +23,8 @@ pub struct SendQueueEstimate {
     /// Time of the last frame.
     sent_at: Duration,
     busy: Option<Busy>,
-    /// Start of a rate sample that was too short when the queue became empty, and the number of bytes
-    /// that had left the queue by then. The next frames may continue it.
+    /// Start of a rate sample that was too short when the queue became empty, and the number of
+    /// bytes that had left the queue before. The next frames may continue it.
     short_sample: Option<(Duration, f64)>,
 }
 
@@ -32,25 +32,27 @@ pub struct SendQueueEstimate {
 #[derive(Debug)]
 struct Busy {
     since: Duration,
-    /// Start of the rate sample that ends with the period: the start of this period or of an earlier
-    /// one, and the number of bytes that had left the queue before.
+    /// Start of the rate sample that ends with the period, and the number of bytes that had left
+    /// the queue before. It may begin in an earlier period.
     whole: (Duration, f64),
-    /// Size in bytes of the only frame of the period; `None` if there are more.
+    /// Size in bytes of the period's only frame; `None` for several frames.
     alone: Option<usize>,
-    /// Start of the present rate sample, and the number of bytes that had left the queue by then.
+    /// Start of the current rate sample, and the number of bytes that had left the queue before.
     sample: Option<(Duration, f64)>,
-    /// The queue was full at some time in the sample, so that its rate is that of the connection.
+    /// `true` if the queue was full at some time in the sample, so that the sample's rate is that
+    /// of the connection.
     is_full: bool,
-    /// Time at which bytes last left the queue, or the start of the period.
+    /// Time at which bytes last left the queue; initially the start of the period.
     progress: Duration,
-    /// Largest number of bytes that had left the queue in any measurement.
+    /// Largest number of bytes that had left the queue, over all measurements.
     most_drained: f64,
 }
 
 /// Result of a measurement of the queue.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct QueueSample {
-    /// Time in which a frame without other frames in flight was acknowledged, and its size.
+    /// Time to the acknowledgement of a frame without other frames in flight, and the size of this
+    /// frame.
     pub round_trip: Option<(Duration, usize)>,
     /// Bytes per second that left the queue.
     pub rate: Option<f64>,
@@ -59,8 +61,7 @@ pub struct QueueSample {
 }
 
 impl SendQueueEstimate {
-    /// Records a frame of `bytes` bytes. `limit` is the number of bytes from which the queue counts
-    /// as full.
+    /// Records a frame of `bytes` bytes. `limit` is the number of bytes at which the queue is full.
     pub fn sent(&mut self, now: Duration, bytes: usize, limit: f64) {
         match &mut self.busy {
             Some(busy) => busy.alone = None,
@@ -87,21 +88,21 @@ impl SendQueueEstimate {
         }
     }
 
-    /// Returns the earliest time of the next measurement if they are `interval` apart. Returns
-    /// `None` if no bytes are in the queue.
+    /// Returns the earliest time of the next measurement, `interval` after the last one. Returns
+    /// `None` if the queue is empty.
     pub fn next_at(&self, interval: Duration) -> Option<Duration> {
         self.busy.as_ref()?;
         let settled = self.sent_at + SETTLING;
         Some(self.asked.map_or(settled, |asked| settled.max(asked + interval)))
     }
 
-    /// Returns the time since which the queue is not empty and no bytes have left it.
+    /// Returns the time since which no bytes have left a queue that is not empty.
     pub fn stalled_since(&self) -> Option<Duration> {
         self.busy.as_ref().map(|busy| busy.progress)
     }
 
-    /// Records a measurement: `bytes` bytes are in the queue. `limit` is the number of bytes from
-    /// which the queue counts as full, `round_trip` the shortest round trip known.
+    /// Records the measured number of `bytes` in the queue. `limit` is the number of bytes at which
+    /// the queue is full, and `round_trip` is the shortest known round trip.
     pub fn measured(
         &mut self,
         now: Duration,

@@ -5,7 +5,7 @@
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
-/// SSH connection in the kernel's table of TCP connections.
+/// Send queue of one TCP connection (that of SSH), read from the kernel's table of connections.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TcpSendQueue {
     local: SocketAddr,
@@ -103,7 +103,7 @@ mod tests {
         );
     }
 
-    /// The test does not read from its connection, so the bytes stay in the queue.
+    /// Checks that unread bytes stay in the queue. The other end of the connection does not read.
     #[test]
     #[cfg(target_os = "linux")]
     fn kernel_reports_unread_bytes() {

@@ -24,9 +24,9 @@ impl Wire {
     }
 }
 
-/// Sends frames for `seconds`, each as large as permitted. Returns two results for the second half
-/// of this time: the share of the connection's rate that was used, and the longest time for which
-/// bytes waited in the connection.
+/// Sends frames of the permitted size for `seconds`. Returns two results for the second half of
+/// this time: the share of the connection's rate that was used, and the longest time that bytes
+/// waited in the connection.
 fn saturate(
     flow: &mut FlowControl,
     wire: &mut Wire,
@@ -173,8 +173,8 @@ fn send_queue_replaces_lost_replies() {
     assert_eq!(flow.reading().unwrap().mode, PacingMode::FixedRate);
 }
 
-/// Simulated connection whose send queue is measured. Bytes reach the queue `LAG` after they were
-/// sent, and leave it when the other end acknowledges them.
+/// Simulated connection with a send queue. Bytes reach the queue `LAG` after they were sent, and
+/// leave it when the other end acknowledges them.
 struct MeasuredWire {
     wire: Wire,
     /// Frames: time of arrival in the queue, start and end of transmission, and size.
@@ -210,8 +210,8 @@ impl MeasuredWire {
         self.frames.iter().map(in_queue).sum::<f64>().ceil() as usize
     }
 
-    /// Advances by `seconds`. `wants` returns the bytes to send at a time, of the number permitted.
-    /// Returns the longest time for which bytes waited in the last quarter.
+    /// Simulates `seconds`. `wants(time, limit)` returns the number of bytes to send. Returns the
+    /// longest time that bytes waited in the last quarter.
     fn run(
         &mut self,
         flow: &mut FlowControl,
@@ -290,7 +290,8 @@ fn rate_stays_true_after_convergence() {
     assert!((0.7..1.2).contains(&(found / 125e3)), "{found:.0}");
 }
 
-/// The terminal is slow at times, when the round trip is measured and when a frame is acknowledged.
+/// Checks that late replies do not lower the rate. The terminal is slow at times, when the round
+/// trip is measured and when a frame is acknowledged.
 #[test]
 fn late_replies_prove_no_rate() {
     for (rate, round_trip) in [(125e3, 100), (32e3, 300)] {
@@ -328,7 +329,8 @@ fn late_replies_prove_no_rate() {
     }
 }
 
-/// A relay takes bytes at once, up to its buffer, and sends them at the rate of the connection.
+/// Checks the measured rate behind a relay that accepts bytes at once, up to its buffer, and sends
+/// them at the rate of the connection.
 #[test]
 fn rate_is_true_behind_a_relay_that_buffers() {
     const RELAYED: f64 = 8e3;

@@ -15,11 +15,11 @@ const CHUNK: usize = 1024;
 /// colour.
 pub const IMAGE: u8 = 163;
 
-/// Character that stands for a cell of an image (Unicode placeholder).
+/// Unicode placeholder: character of a cell that shows a part of an image.
 const PLACEHOLDER: char = '\u{10eeee}';
 
-/// Combining marks that encode the row of a placeholder. The protocol has a table of them; each
-/// item here is the first and last code point of a consecutive run of that table.
+/// Combining marks that encode the row of a placeholder. Each item is the first and the last code
+/// point of a run of consecutive marks in the protocol's table.
 const MARKS: [[u32; 2]; 29] = [
     [0x305, 0x305],
     [0x30d, 0x30e],
@@ -66,7 +66,7 @@ pub fn placeholder(row: u16) -> String {
 
 /// Returns the bytes that show the image file `png` at `place`. If `stretched` is `true`, the
 /// terminal scales the image to these cells. If `through_tmux` is `true`, the bytes are wrapped for
-/// the terminal outside tmux, which shows the image at the positions of placeholders.
+/// the terminal outside of tmux, which shows the image in the cells with placeholders.
 pub fn transfer(png: &[u8], place: Area, stretched: bool, through_tmux: bool) -> Transfer {
     let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
     let letters = STANDARD.encode(png);
@@ -101,7 +101,7 @@ pub fn transfer(png: &[u8], place: Area, stretched: bool, through_tmux: bool) ->
     transfer
 }
 
-/// Wraps a sequence so that tmux passes it to the terminal outside tmux.
+/// Wraps a sequence so that tmux passes it to the terminal outside of tmux.
 fn wrapped(sequence: &str) -> String {
     format!("\x1bPtmux;{}\x1b\\", sequence.replace('\x1b', "\x1b\x1b"))
 }

@@ -31,11 +31,11 @@ const BYTES_PER_PIXEL: f64 = 1.6;
 pub enum Protocol {
     /// Kitty's protocol, without a multiplexer.
     Kitty,
-    /// Kitty's protocol with Unicode placeholders, sent through tmux to the terminal outside it.
+    /// Kitty's protocol with Unicode placeholders, sent through tmux to the terminal outside of it.
     KittyThroughTmux,
     /// Sixel with this number of colours.
     Sixel(u16),
-    /// Half blocks, without a protocol.
+    /// Half blocks in place of an image protocol.
     Blocks,
 }
 
@@ -55,21 +55,21 @@ pub struct ImageViewport {
     pub max_bytes: Option<f64>,
 }
 
-/// Image prepared for the screen.
+/// Image prepared for the screen of an [`ImageViewport`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewerImage {
     /// Columns and rows of the screen for which the image was prepared.
     pub screen: [u16; 2],
     /// Width and height of the image in the file, in pixels.
     pub size: [usize; 2],
-    /// Width and height of the image as shown, in pixels.
+    /// Width and height of the displayed image, in pixels.
     pub shown: [usize; 2],
     /// Protocol.
     pub protocol: Protocol,
-    /// Cells that the image covers, in whole or in part.
+    /// Cells that the image covers, fully or in part.
     pub place: Area,
-    /// Half blocks that show the image without the protocol. Beside an image of the protocol they
-    /// fill only cells that this image covers completely.
+    /// Half blocks that show the image. With an image protocol they fill only the cells that the
+    /// image covers fully.
     pub raster: Raster,
     /// Bytes that show the image by the protocol. Empty for [`Protocol::Blocks`].
     pub transfer: Transfer,
@@ -91,7 +91,7 @@ impl Protocol {
         }
     }
 
-    /// Returns the name for users.
+    /// Returns the name that users see.
     pub fn name(self) -> &'static str {
         match self {
             Self::Kitty => "kitty's protocol",
@@ -103,8 +103,8 @@ impl Protocol {
 }
 
 impl ImageViewport {
-    /// Returns the size of the largest image and the size of a cell, in pixels. A half block counts
-    /// as one square pixel.
+    /// Returns the size of the largest image and the size of a cell, in pixels. With half blocks, a
+    /// pixel is one half block.
     fn px(&self) -> ([usize; 2], [usize; 2]) {
         let cell = match self.protocol {
             Protocol::Blocks => [1, 2],
@@ -122,7 +122,7 @@ impl ImageViewport {
         (largest, cell)
     }
 
-    /// Returns the size at which an image of `size` is shown. Images are never enlarged.
+    /// Returns the displayed size of an image of `size`. Images are never enlarged.
     fn fitting(&self, size: [usize; 2]) -> [usize; 2] {
         let (largest, _) = self.px();
         let [width, height] = size.map(|n| n as f64);
@@ -150,7 +150,7 @@ impl ViewerImage {
         Self::of(size, &pixels, viewport)
     }
 
-    /// Prepares an image of `size`, with pixels row by row, for `viewport`.
+    /// Prepares an image of size `size` for `viewport`. Pixels are row by row.
     fn of(size: [usize; 2], pixels: &[[u8; 3]], viewport: &ImageViewport) -> Result<Self, String> {
         if size.contains(&0) || viewport.screen[1] < 2 {
             return Err("the screen is too small for a picture".to_string());
@@ -188,8 +188,7 @@ impl ViewerImage {
     }
 
     /// Returns the text and the indexed colour of the cells in row `row` of `place` after the
-    /// transfer. Returns `None` if the protocol draws the image over the cells, without
-    /// placeholders.
+    /// transfer. Returns `None` if the protocol draws the image without placeholders.
     pub fn placeholder(&self, row: u16) -> Option<(String, u8)> {
         let has_placeholders = self.protocol == Protocol::KittyThroughTmux;
         has_placeholders.then(|| (kitty::placeholder(row), kitty::IMAGE))

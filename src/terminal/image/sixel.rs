@@ -5,8 +5,8 @@ use crate::terminal::image::transfer::Transfer;
 use crossterm::cursor::MoveTo;
 use icy_sixel::{EncodeOptions, sixel_encode};
 
-/// Largest number of strips of an image. Each strip is an image of its own for the terminal, and
-/// xterm keeps at most 16 images.
+/// Largest number of strips of an image. The terminal treats each strip as an image, and xterm
+/// keeps at most 16 images.
 const MAX_STRIPS: u16 = 16;
 
 /// Returns the bytes that show `pixels`, in rows of `width` pixels, at `place`. `cell_height` is

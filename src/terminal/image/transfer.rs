@@ -10,12 +10,13 @@ pub struct Transfer {
     /// Offsets between sequences, in ascending order, at which other output may be sent. The last
     /// offset is the length of `bytes`.
     pub stops: Vec<usize>,
-    /// `true` if a sequence may be divided at any byte, and ended early by ST (string terminator).
+    /// `true` if a sequence may be divided at any byte, and terminated early by ST (string
+    /// terminator).
     pub divisible: bool,
-    /// Bytes that remove the image, even if it was sent in part only.
+    /// Bytes that remove the image, even if only a part of it was sent.
     pub remove: Vec<u8>,
-    /// `true` if the image overwrites the cells that it covers, so that they must be drawn again
-    /// after it.
+    /// `true` if the image overwrites the cells that it covers. They must be drawn again after the
+    /// image is removed.
     pub destroys: bool,
 }
 
@@ -46,7 +47,7 @@ impl Transfer {
 mod tests {
     use super::*;
 
-    /// Only divisible sequences are divided.
+    /// Checks that the slices cover all bytes, and that only divisible sequences are divided.
     #[test]
     fn slices_are_contiguous_and_complete() {
         for divisible in [false, true] {

@@ -10,7 +10,7 @@ use crate::world::culling::light_projection::{LightProjection, ProjectedBounds};
 /// Largest number of entries in a cell. The primitives closest to the light are kept.
 const MAX_PER_CELL: usize = 16;
 
-/// Value of [`Entry::exempt_item`] for primitives without exemption: they may occlude rays that
+/// Value of [`Entry::exempt_item`] for primitives that are not exempt: they may occlude rays that
 /// start on their own outside.
 const NO_ITEM: u32 = u32::MAX;
 
@@ -34,7 +34,8 @@ struct Cell<S> {
     /// Range of the cell in `entries`, from `first` up to `end`.
     first: u32,
     end: u32,
-    /// Depth up to which the entries are complete. Rays from greater depths traverse the BVH.
+    /// Depth up to which the list of entries is complete. Rays from greater depths traverse the
+    /// BVH.
     complete_to: S,
 }
 
@@ -54,15 +55,15 @@ struct Entry<S> {
     number: u32,
     /// [`Occluder::exempt_item`], or [`NO_ITEM`].
     exempt_item: u32,
-    /// Smallest depth of the primitive. Depth is the distance from a point light; for a directional
-    /// light it is the distance from the plane through the origin, against the direction of the
+    /// Smallest depth of the primitive: its distance from a point light. For a directional light it
+    /// is the distance from the plane through the origin, measured against the direction of the
     /// light.
     near: S,
 }
 
 impl<S: Float> LightBuffer<S> {
-    /// Creates the buffer of a light. Returns `None` if the buffer would be incomplete: half of the
-    /// occluders or more do not fit in most of their cells.
+    /// Creates the buffer of a light. Returns `None` if the buffer would be incomplete: at least
+    /// half of the occluders do not fit in most of their cells.
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
         let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match target {
@@ -131,11 +132,11 @@ impl<S: Float> LightBuffer<S> {
         Some(Self { projection, side, max_coordinate: S::from_f64(max_coordinate), cells, entries })
     }
 
-    /// Returns the lanes of `active` whose ray hits a primitive nearer than `t_max`; the result
-    /// equals that of [`Aggregate::occluded`]. The rays start on the primitives `start_item`, in the
-    /// lanes `starts_outside` on their outside. `candidates` are the possible occluders.
+    /// Returns the lanes of `active` whose ray hits a primitive nearer than `t_max`. The result
+    /// equals that of [`Aggregate::occluded`] for `candidates`, the possible occluders. The rays
+    /// start on the primitives `start_item`, in the lanes `starts_outside` on their outside.
     ///
-    /// The rays are passed by reference: a struct of them would be copied, which costs 7 % on the
+    /// The rays are passed by reference, because a copied struct of them costs 7 % on the
     /// reflecting tracks.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
@@ -291,7 +292,7 @@ mod tests {
         }
     }
 
-    /// Rays behind full cells traverse the BVH.
+    /// Checks that rays behind full cells traverse the BVH.
     #[test]
     fn light_buffer_falls_back_to_bvh_behind_full_cells() {
         let mut random = Random(4);
@@ -310,7 +311,7 @@ mod tests {
         }
     }
 
-    /// The far side of a ball occludes lights from its inside.
+    /// Checks that the far side of a ball occludes lights from its inside.
     #[test]
     fn shadow_ray_from_inside_is_occluded_by_its_own_primitive() {
         let balls = [

@@ -12,7 +12,7 @@ use std::ops::Range;
 /// projection. Wider views use a cube map.
 const MAX_TANGENT: f64 = 3.0;
 
-/// Projection of points in space to a face and two coordinates on that face, each from 0 to 1.
+/// Projection of points from a light to a face and two coordinates on that face, each from 0 to 1.
 pub(crate) enum LightProjection<S> {
     /// Projection from a point light among the primitives onto the six faces of a cube around it.
     CubeMap,
@@ -29,9 +29,9 @@ impl<S: Float> LightProjection<S> {
         if matches!(self, Self::CubeMap) { 6 } else { 1 }
     }
 
-    /// Returns the cell that contains the origin of each ray as seen from the light, and the depth
-    /// of the origin. Points outside of the projection get an arbitrary cell. `limit` is the
-    /// distance between origin and light, `side` the number of cells along a side of a face.
+    /// Returns the cell of each ray's origin as seen from the light, and the depth of the origin.
+    /// Points outside of the projection get an arbitrary cell. `limit` is the distance between
+    /// origin and light. `side` is the number of cells along a side of a face.
     #[inline(always)]
     pub fn lookup<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
         let side = L::from_f64(side as f64);
@@ -122,7 +122,7 @@ impl<S: Float> ProjectedBounds<S> {
 }
 
 /// Returns the smallest and the largest x / z over the points of a ball with z > 0. `x` and `z` are
-/// the coordinates of the centre. Returns `None` if the ball has no such points.
+/// the coordinates of its centre. Returns `None` if the ball has no such points.
 fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     let distance = x.hypot(z);
     if distance <= radius {

@@ -10,8 +10,8 @@ use crate::primitive::{
 use crate::world::culling::light_buffer::{LightBuffer, Occluder};
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 
-/// Candidates (primitives that have to be tested) of some camera rays, and of the shadow rays from
-/// their hit points.
+/// Candidates of some camera rays and of the shadow rays from their hit points. Candidates are the
+/// primitives that rays must be tested against.
 #[derive(Clone, Debug)]
 pub struct TileCandidates {
     /// Primitives that the camera rays can hit.
@@ -22,8 +22,8 @@ pub struct TileCandidates {
 }
 
 impl TileCandidates {
-    /// Returns the candidates of rays without culling: all primitives, for camera rays and for each
-    /// of `lights` lights.
+    /// Returns the candidates without culling: all primitives, for camera rays and for each of
+    /// `lights` lights.
     pub(crate) fn all<L: SimdFloat>(geometry: &Aggregate<L>, lights: usize) -> Self {
         Self { primary: geometry.all().clone(), occluders: vec![geometry.all().clone(); lights] }
     }
@@ -31,14 +31,14 @@ impl TileCandidates {
 
 /// Method that finds the candidates of a tile.
 pub(crate) enum CullingMode {
-    /// Bounding volumes are tested against the tile's view frustum, and against the space between
-    /// the frustum and the lights.
+    /// Tests bounding volumes against the tile's view frustum, and against the space between the
+    /// frustum and the lights.
     Frusta(FrustumCuller),
-    /// Bounding rectangles of the projected primitives are tested against the tile.
+    /// Tests the bounding rectangles of the projected primitives against the tile.
     ScreenBounds(Vec<ScreenBounds>),
-    /// Candidate lists are stored per screen cell; the primitives are in a BVH.
+    /// Stores candidate lists per screen cell; the primitives are in a BVH.
     ScreenGrid(ScreenGrid),
-    /// No candidate lists. The geometry may have bounding boxes or a BVH.
+    /// No culling. The geometry may have bounding boxes or a BVH.
     Off,
 }
 
@@ -96,7 +96,7 @@ pub(crate) struct FrustumCuller {
 
 impl FrustumCuller {
     /// Creates the culler of `forms`, one for each primitive. `start` contains the origins of all
-    /// camera rays; `None` if they start on a near plane. `entered` holds `true` for each primitive
+    /// camera rays; `None` if they start on a near plane. `entered` is `true` for each primitive
     /// that paths can be inside of. `max_end_offset` is the largest distance between a light and
     /// the end point of its shadow rays. `emitters` are the bounding spheres of the emitters.
     pub fn new(

@@ -33,7 +33,7 @@ const OFFSET_TIES: f64 = 1.5;
 /// intersect.
 const MIN_COSINE: f64 = 0.5;
 
-/// Kind of a surface. It determines the order in which rays cross coincident surfaces.
+/// Kind of a surface, which determines the order in which rays cross coincident surfaces.
 #[derive(Clone, Copy, Debug)]
 enum SurfaceKind {
     /// Boundary of a transparent solid with this priority (see [`MediumStack`]).
@@ -46,14 +46,14 @@ enum SurfaceKind {
     Sheet,
 }
 
-/// Contact: a primitive that may touch another one.
+/// Contact of a primitive with another one, which may touch it.
 #[derive(Clone, Copy, Debug)]
 struct Contact<S> {
-    /// Id of the primitive. For a compound, the id of its first part.
+    /// Id of the other primitive. For a compound, the id of its first part.
     item: u32,
     /// Smallest tie distance (see [`TIE`]) at this contact, in scene units.
     tie: S,
-    /// Corners of the bounding box; infinite along axes on which the primitive is unbounded.
+    /// Corners of the other primitive's bounding box; infinite along axes on which it is unbounded.
     low: [S; 3],
     high: [S; 3],
 }
@@ -72,9 +72,9 @@ impl<S: Float> Contact<S> {
         rounding.max(L::splat(self.tie))
     }
 
-    /// Returns the lanes whose point may be on the primitive: its distance from the bounding box is
-    /// at most two ties. One tie is the reach of the search for coincident surfaces, the other one
-    /// covers the search's own rounding error.
+    /// Returns the lanes whose point may be on the other primitive: its distance from the bounding
+    /// box is at most two ties. One tie is the range of the search for coincident surfaces; the
+    /// other covers the rounding error of the search.
     #[inline(always)]
     fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
         let distance =
@@ -91,12 +91,12 @@ fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
     point.max_abs() * L::from_f64(TIE * L::EPSILON)
 }
 
-/// Contacts between primitives. At least one primitive of each touching pair transmits.
+/// Contacts of all primitives. In each pair that touches, at least one primitive transmits.
 pub(crate) struct Contacts<S> {
     /// Contacts of each primitive.
     contacts: Vec<Vec<Contact<S>>>,
-    /// Kind of each primitive's surface, and the magnitude of its layer (position in the order of
-    /// coincident surfaces).
+    /// Kind of each primitive's surface, and the magnitude of its layer (its position in the order
+    /// of coincident surfaces).
     kinds: Vec<(SurfaceKind, S)>,
 }
 
@@ -129,13 +129,13 @@ pub(crate) struct CoincidentQuery<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> CoincidentState<L> {
-    /// Returns the state of rays in the opposite directions.
+    /// Returns the state for the opposite directions.
     pub fn reversed(&self) -> Self {
         Self { axis: -self.axis, layer: -self.layer, ..*self }
     }
 
-    /// Returns the state `yes` in lanes where `mask` is true and `no` elsewhere. The field `lanes`
-    /// is a copy of that in `no`.
+    /// Returns the state `yes` in lanes where `mask` is true and `no` elsewhere, except for the
+    /// field `lanes`, which is that of `no`.
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self {
             lanes: no.lanes,
@@ -201,8 +201,8 @@ impl<S: Float> Contacts<S> {
     }
 
     /// Returns the lanes whose `point`, on the primitive `items`, may touch another primitive. Most
-    /// primitives touch others in small regions only; the bounding boxes of the others exclude the
-    /// remaining points.
+    /// primitives touch others only in small regions. Points outside of the others' bounding boxes
+    /// are excluded.
     #[inline(always)]
     pub fn near<L: SimdFloat<Scalar = S>>(
         &self,
@@ -222,8 +222,7 @@ impl<S: Float> Contacts<S> {
     }
 
     /// Returns the layer of primitive `item` for rays that come from a surface with the layer
-    /// `before`. `leaves` selects rays that leave the primitive: those that run along its outward
-    /// normal.
+    /// `before`. `leaves` selects rays that leave the primitive, along its outward normal.
     fn layer<L: SimdFloat<Scalar = S>>(&self, item: u32, leaves: L::Mask, before: L) -> L {
         let (kind, layer) = &self.kinds[item as usize];
         let layer = L::splat(*layer);
@@ -235,8 +234,8 @@ impl<S: Float> Contacts<S> {
         L::select(is_negative, -layer, layer)
     }
 
-    /// Finds the next surface along the rays of `coincident` among those that coincide with their
-    /// start points. `media` are the media of the rays.
+    /// Finds the next surface along the rays among those that coincide with their start points.
+    /// `coincident` is the state of the rays, and `media` are their media.
     pub fn next<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
@@ -285,7 +284,7 @@ impl<S: Float> Contacts<S> {
     }
 
     /// Replaces `out` by the coincident surface with the smallest layer above that of `coincident`,
-    /// if it is below the layer of `out`.
+    /// in lanes in which this layer is below that of `out`.
     #[inline(never)]
     fn search<L: SimdFloat<Scalar = S>>(
         &self,

@@ -9,10 +9,10 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
-/// Adds the ambient light and the light of all sources that the surfaces reflect to the radiance in
-/// `out`. Lanes in `bouncing` get no ambient light: a diffuse bounce finds the light that it stands
-/// for. `transmittance` returns the share of light that the medium before the surfaces lets through
-/// on a way of the given length; `None` if no medium absorbs light.
+/// Adds reflected ambient light and reflected light of all sources to the radiance in `out`. Lanes
+/// in `bouncing` get no ambient light, which stands for the indirect light that a diffuse bounce
+/// computes there. `transmittance(d)` is the share of light that the medium before the surfaces
+/// lets through over the distance `d`; `None` if no medium absorbs light.
 #[inline(always)]
 pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

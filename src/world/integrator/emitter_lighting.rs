@@ -61,7 +61,7 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
     }
 }
 
-/// Adds the radiance that the surfaces themselves emit. `hit` is the hits of `path`.
+/// Adds the radiance that surfaces at the hit points emit. `hit` is the hits of `path`.
 #[inline(never)]
 pub(crate) fn surface_emission<L: SimdFloat>(
     world: &World<L>,
@@ -85,7 +85,7 @@ pub(crate) fn surface_emission<L: SimdFloat>(
     }
 }
 
-/// Reflection lobes in the direction of an emitter.
+/// State of the reflection lobes at the hit points, for multiple importance sampling of emitters.
 pub(crate) struct ReflectingLobes<L: SimdFloat> {
     /// Lanes whose reflected rays the integrator follows.
     pub lanes: L::Mask,
@@ -93,9 +93,8 @@ pub(crate) struct ReflectingLobes<L: SimdFloat> {
     pub share: L,
 }
 
-/// Adds the light of all emitters that the surfaces reflect. `bounce` is the number of earlier
-/// surfaces of the path. `transmittance` is that of
-/// [`direct_lighting`](super::direct_lighting::direct_lighting).
+/// Adds the reflected light of all emitters. `bounce` is the number of earlier surfaces of the
+/// path. `transmittance` is that of [`direct_lighting`](super::direct_lighting::direct_lighting).
 #[inline(never)]
 pub(crate) fn emitter_lighting<L: SimdFloat>(
     world: &World<L>,
@@ -179,9 +178,9 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
     }
 }
 
-/// Returns the value of the reflection lobe of BSDF `index` in the given direction, with the cosine
-/// of the light, and the density \[1/sr\] of the reflected ray in this direction. `incident` are the
-/// directions of the incoming rays.
+/// Returns the value of the reflection lobe of BSDF `index` in the given direction, times the
+/// cosine of the light, and the density \[1/sr\] of the reflected ray in this direction. `incident`
+/// are the directions of the incoming rays.
 #[inline(never)]
 pub(crate) fn lobe_value<L: SimdFloat>(
     world: &World<L>,

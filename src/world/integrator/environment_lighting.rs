@@ -45,9 +45,8 @@ pub(crate) fn visible_environments<L: SimdFloat>(
     }
 }
 
-/// Adds the light of all environments that the surfaces reflect. `bounce` is the number of earlier
-/// surfaces of the path. `glossy` selects lanes with a glossy lobe, whose directions have a finite
-/// density.
+/// Adds the reflected light of all environments. `bounce` is the number of earlier surfaces of the
+/// path. `glossy` selects lanes with a glossy lobe, whose directions have a finite density.
 #[inline(never)]
 pub(crate) fn environment_lighting<L: SimdFloat>(
     world: &World<L>,
@@ -105,8 +104,8 @@ pub(crate) fn environment_lighting<L: SimdFloat>(
     }
 }
 
-/// Adds the reflected radiance `value` from the directions `wi` to `out`, in lanes whose shadow ray
-/// reaches the environment.
+/// Adds the reflected radiance `value` of light from the directions `wi` to `out`, in lanes whose
+/// shadow ray reaches the environment.
 #[inline(always)]
 fn add<L: SimdFloat>(
     world: &World<L>,

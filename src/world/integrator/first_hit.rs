@@ -4,7 +4,7 @@ use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::world::world::World;
 
-/// Features of the first hit of a camera ray.
+/// Object, distance and normal at the first hit of a camera ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstHit {
     /// Index in the scene's list of objects; `None` for the background.
@@ -112,7 +112,7 @@ mod tests {
     }
 
     /// Checks object, distance and normal of first hits. Ten pixels cover one unit of the picture
-    /// plane; the rectangles are 5 units away.
+    /// plane; the rectangles are 5 units from the eye.
     #[test]
     fn first_hits_have_objects_distances_and_normals() {
         let points = [[15.0, 10.0], [21.0, 10.0], [9.0, 10.0], [15.0, 0.5], [21.0, 19.9]];

@@ -24,9 +24,9 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::integrator::transmission::{Branch, TransmissionIntegrator};
 use crate::world::world::World;
 
-/// Density \[1/sr\] that rays of diffuse bounces have in multiple importance sampling. It is so
-/// small that samples of points on emitters get all the weight. The radiance of environments is not
-/// added to rays of this density.
+/// Density \[1/sr\] of diffuse bounces in multiple importance sampling. It is so small that samples
+/// of points on emitters get the full weight. The radiance of environments is not added to rays of
+/// this density.
 pub(crate) const NO_DENSITY: f64 = 1e-30;
 
 /// Limits of the diffuse bounces of a world.
@@ -38,10 +38,10 @@ pub(crate) struct DiffuseLimits {
     pub caustics: bool,
 }
 
-/// Hits of a generation, reduced to one per lane by weighted reservoir sampling: the hit at which
-/// the diffuse bounce starts.
+/// Reservoir of weighted reservoir sampling, which keeps one hit per lane of all hits of a
+/// generation. The diffuse bounce starts at this hit.
 pub(crate) struct DiffuseReservoir<L: SimdFloat> {
-    /// Number of packets of hits that were offered.
+    /// Number of packets of hits that were offered so far.
     offers: u32,
     /// Lanes that have a hit.
     lanes: L::Mask,
@@ -74,9 +74,9 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         }
     }
 
-    /// Offers the hits of `path` for the diffuse bounce. `media` and `coincident` are the state of
-    /// a ray that leaves on the side from which the path arrived. Returns the lanes that reflect
-    /// diffusely; they get their indirect light from the bounce instead of ambient light.
+    /// Offers the hits of `path` to the reservoir. `media` and `coincident` are the state of a ray
+    /// that leaves on the side from which the path arrived. Returns the lanes that reflect
+    /// diffusely; they get indirect light from the bounce instead of ambient light.
     #[inline(never)]
     pub fn offer(
         &mut self,
@@ -124,8 +124,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         lanes
     }
 
-    /// Returns the rays of the next generation. `u` and `v` are uniform in [0, 1) and determine the
-    /// direction.
+    /// Returns the rays of the next generation. Their directions are sampled with `u` and `v`,
+    /// uniform in [0, 1).
     fn start(&self, world: &World<L>, (u, v): (L, L)) -> Branch<L> {
         let direction = Frame::around(self.normal).to_world(cosine_hemisphere(u, v));
         // The largest channel of the throughput becomes the sum of all weights.

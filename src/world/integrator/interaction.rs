@@ -10,8 +10,8 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     /// Unit shading normal, on the side from which the rays arrive.
     pub normal: Vec3<L>,
     /// Unit geometric normal, on the side from which the rays arrive. It differs from `normal` only
-    /// on smooth meshes and bump-mapped surfaces. Light from behind the geometric normal does not
-    /// reach the surface.
+    /// on smooth meshes and bump-mapped surfaces. Light from the other side of the geometric
+    /// surface does not reach the hit point.
     pub geometric: Vec3<L>,
     /// Hit points.
     pub point: Vec3<L>,
@@ -27,7 +27,7 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     pub albedo_factor: Vec3<L>,
     /// Diffuse albedo.
     pub diffuse: Vec3<L>,
-    /// Lanes that have a BSDF. Only hits on the back of a one-sided surface have none.
+    /// Lanes with a BSDF. All hits have one, except for those on the back of a one-sided surface.
     pub has_bsdf: L::Mask,
     /// Lanes whose BSDF reflects direct light.
     pub direct_mask: L::Mask,
@@ -73,23 +73,22 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.reflecting = self.reflecting.and_not(lanes);
     }
 
-    /// Excludes `lanes` from direct lighting, and their lobes from the sampling of points on
-    /// emitters.
+    /// Excludes `lanes` from direct lighting, and from the sampling of points on emitters.
     #[inline(always)]
     pub fn shade(&mut self, lanes: L::Mask) {
         self.direct_mask = self.direct_mask.and_not(lanes);
         self.shaded = self.shaded | lanes;
     }
 
-    /// Returns `direction`, mirrored at the tangent plane of the geometric normal in lanes where it
-    /// points into the surface.
+    /// Returns `direction`, mirrored at the geometric tangent plane in lanes in which it points
+    /// into the surface.
     #[inline(always)]
     pub fn reflect_into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
         let height = direction.dot(self.geometric).min(L::zero());
         self.geometric.mul_add(height * L::from_f64(-2.0), direction)
     }
 
-    /// Copies the interaction of `other` in `lanes`. No mask of `self` is set in these lanes.
+    /// Copies the interaction of `other` in `lanes`, in which no mask of `self` is set.
     #[inline(always)]
     fn blend(&mut self, lanes: L::Mask, other: &Self) {
         self.normal = Vec3::select(lanes, other.normal, self.normal);

@@ -19,7 +19,7 @@ use glam::DVec3;
 /// the stack holds those listed last.
 const MAX_NESTING: usize = 4;
 
-/// Interior list of each ray: priorities of the solids that the ray is inside of, in descending
+/// Medium stack of each ray: priorities of the solids that the ray is inside of, in descending
 /// order. Priority 0 marks an empty entry. The solid with the highest priority fills the space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MediumStack<L> {
@@ -97,7 +97,7 @@ impl StartRegion {
     }
 }
 
-/// Transmissive surfaces of a world, and the media inside of them.
+/// Transmissive surfaces of a world, and the media that they bound.
 pub(crate) struct NestedDielectrics<L: SimdFloat> {
     /// Priority of the transparent solid that each primitive bounds; 0 if it bounds none.
     priority_of: Vec<u32>,
@@ -109,12 +109,12 @@ pub(crate) struct NestedDielectrics<L: SimdFloat> {
     /// Solids that may contain the origins of camera rays: the priority of each, and its boundary
     /// as geometry.
     around_eye: Vec<(u32, Aggregate<L>)>,
-    /// Contacts between primitives, at least one of each touching pair transmissive. `None` if
-    /// there are none.
+    /// Contacts between primitives. In each pair that touches, at least one primitive transmits.
+    /// `None` if there are none.
     pub contacts: Option<Contacts<L::Scalar>>,
 }
 
-/// Hits of a packet on transmissive surfaces.
+/// Hits of a packet on transmissive surfaces (interfaces).
 pub(crate) struct InterfaceHit<L: SimdFloat> {
     /// Lanes whose ray hits a transmissive surface.
     pub lanes: L::Mask,
@@ -122,8 +122,8 @@ pub(crate) struct InterfaceHit<L: SimdFloat> {
     pub outer: L::Mask,
     /// Lanes whose ray hits a thin surface, which bounds no solid.
     pub thin: L::Mask,
-    /// Lanes whose ray hits a suppressed boundary: inside of a solid with a higher priority, where
-    /// the boundary has no effect.
+    /// Lanes whose ray hits a suppressed boundary: one inside of a solid with a higher priority,
+    /// where it has no effect.
     pub suppressed: L::Mask,
     /// Index of refraction on the side from which the ray arrives.
     pub n_i: L,
@@ -273,7 +273,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
     }
 }
 
-/// Returns exp(-coefficient x distance) with the absorption coefficients of the solid of each priority.
+/// Returns exp(-coefficient x distance). The coefficient in each lane is that of the solid with the
+/// lane's priority.
 #[inline(never)]
 fn transmittance<L: SimdFloat>(absorption: &[[L::Scalar; 3]], priority: L, distance: L) -> Vec3<L> {
     let of = |lane| absorption[priority.lane(lane).to_f64() as usize];

@@ -16,11 +16,11 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
 /// Traces paths in a world without transmissive surfaces, and overwrites them. The paths start in
-/// the given lanes and end after `depth` reflections.
+/// the given lanes and end after `depth` reflections. `reservoir` collects the hits from which
+/// indirect diffuse light may bounce.
 ///
-/// `EMITTERS` is `true` if the world has emitters or indirect diffuse light; `reservoir` takes the
-/// hits from which the latter may bounce. `SIMPLE` is `true` if the world has neither and
-/// [`World::simple`] is `true`, here and in all called functions.
+/// `EMITTERS` is `true` if the world has emitters or indirect diffuse light. `SIMPLE` is `true` if
+/// the world has neither and [`World::simple`] is `true`, here and in all called functions.
 #[inline(never)]
 pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS: bool>(
     world: &'a World<L>,
@@ -99,8 +99,8 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
 }
 
 /// Replaces the rays of `path` by reflected rays, with directions sampled from the reflection
-/// lobes. `bounce` is the number of earlier reflections. `emitters` is `true` if the density of the
-/// directions is needed. Returns the lanes whose new throughput is at least
+/// lobes. `bounce` is the number of earlier reflections. The density of the directions is computed
+/// only if `emitters` is `true`. Returns the lanes whose new throughput is at least
 /// [`min_weight`](World::min_weight).
 #[inline(always)]
 pub(crate) fn sample_reflection<L: SimdFloat, const SIMPLE: bool>(

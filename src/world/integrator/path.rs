@@ -11,7 +11,7 @@ pub struct Radiance<L> {
     pub groups: [Vec3<L>; MAX_GROUPS],
 }
 
-/// Number of rays of traced packets, and the kind of their reflections.
+/// Number of traced rays, and a flag for random choices.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     /// Number of rays: camera, shadow, reflected and transmitted.
@@ -28,7 +28,7 @@ pub(crate) struct Path<L> {
     /// Factor by which radiance along the ray contributes to the radiance of the sample (beta).
     pub throughput: Vec3<L>,
     /// Density \[1/sr\] with which the ray was sampled; the largest finite number for camera rays,
-    /// mirrors and refraction. It is read only in worlds with emitters.
+    /// mirrors and refraction. It is used only in worlds with emitters.
     pub lobe_density: L,
 }
 

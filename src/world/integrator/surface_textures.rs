@@ -104,12 +104,12 @@ impl<L: SimdFloat> SurfaceTextures<L> {
         self.of_item.iter().flatten()
     }
 
-    /// Returns `true` if a texture changes the albedo of some primitive.
+    /// Returns `true` if the albedo of some primitive has a texture.
     pub fn is_colored(&self) -> bool {
         self.textures().any(|texture| texture.albedo.is_some())
     }
 
-    /// Returns `true` if a bump map changes the normals of some primitive.
+    /// Returns `true` if the normals of some primitive have a bump map.
     pub fn is_bumped(&self) -> bool {
         self.textures().any(|texture| texture.bump.is_some())
     }
@@ -127,7 +127,7 @@ impl<L: SimdFloat> SurfaceTextures<L> {
 }
 
 /// Returns the texture coordinates at the hit points: those of the mesh if `mapping` uses them and
-/// the mesh has some, otherwise those of the projection.
+/// the mesh has them, otherwise those of the projection.
 fn coordinates<L: SimdFloat>(
     geometry: &Aggregate<L>,
     mapping: &TextureMapping<L::Scalar>,
@@ -169,10 +169,10 @@ pub(crate) fn albedo_factor<L: SimdFloat>(
     Some(vertex_color.map_or(color, |vertex_color| vertex_color.component_mul(color)))
 }
 
-/// Returns unit shading normals at the hit points of rays along `direction`: interpolated on smooth
-/// meshes, perturbed by bump maps. `geometric` is the geometric normal on the side from which the
-/// rays arrive. The shading normal is on the same side, and is bent so that it faces the rays.
-/// `front` selects lanes in which `geometric` points outwards.
+/// Returns unit shading normals at the hit points of rays along `direction`. They are interpolated
+/// on smooth meshes and perturbed by bump maps. `geometric` is the geometric normal on the side
+/// from which the rays arrive. The shading normal is on the same side, and is bent so that it faces
+/// the rays. `front` selects lanes in which `geometric` points outwards.
 #[inline(never)]
 pub(crate) fn shading_normal<L: SimdFloat>(
     world: &World<L>,

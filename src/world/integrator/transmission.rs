@@ -67,9 +67,9 @@ pub(crate) struct TransmissionIntegrator<'a, L: SimdFloat> {
 
 impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     /// Traces the rays of `start`, over at most `depth` surfaces after the first, and overwrites
-    /// `start`. In every lane, the transmitted branch of an interface is traced before the reflected
-    /// one, whatever the other lanes do. `reservoir` takes the hits from which indirect diffuse
-    /// light may bounce.
+    /// `start`. In each lane, the transmitted branch of an interface is traced before the reflected
+    /// one, independent of the other lanes. `reservoir` collects the hits from which indirect
+    /// diffuse light may bounce.
     #[inline(never)]
     pub fn trace(
         &self,
@@ -110,9 +110,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     }
 
     /// Traces the rays of `branch` and adds the radiance of their hit points to `out`. Replaces
-    /// `branch` by its continuation, of at most `depth` surfaces after the first. Returns `false` if
-    /// no path continues. `waiting` takes the reflected branches of the next interfaces, up to
-    /// interface [`SPLIT_DEPTH`].
+    /// `branch` by its continuation, of at most `depth` surfaces after the first. Returns `false`
+    /// if no path continues. Reflected branches of interfaces up to number [`SPLIT_DEPTH`] are
+    /// pushed to `waiting`.
     fn advance(
         &self,
         branch: &mut Branch<L>,
@@ -283,8 +283,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     /// Resolves hits of `lanes` on coincident surfaces. It replaces `hit` and `interaction` by
     /// those of the surface with the lowest layer, which the path crosses first (see [`Contacts`]).
     /// `contact_lanes` are the lanes whose hit point may touch another primitive. `behind` is the
-    /// coincident surface that was found behind the start points of the rays, if there is one.
-    /// Returns the state of rays that pass the surface. Returns `None` if no surfaces coincide.
+    /// coincident surface behind the start points of the rays, if one was found. Returns the state
+    /// of rays that pass the surface, or `None` if no surfaces coincide.
     #[inline(never)]
     fn coincident(
         &self,
@@ -356,8 +356,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         self.nested_dielectrics.cross(interaction, transmissive, media, index)
     }
 
-    /// Returns the lanes whose reflected rays are followed, with the fraction of the light that the
-    /// surfaces reflect. Rough interfaces are left out: their rays alone find the emitters.
+    /// Returns the lanes whose reflected rays are followed, and the fraction of the light that the
+    /// surfaces reflect. Rough interfaces are excluded, because only their rays find the emitters.
     fn reflecting_lobes(
         &self,
         path: &Path<L>,
@@ -382,7 +382,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         ReflectingLobes { lanes: followed.and_not(interface_hit.suppressed), share }
     }
 
-    /// Samples the reflected and transmitted directions at surfaces of which at least one
+    /// Samples the reflected and transmitted directions at surfaces, at least one of which
     /// transmits. `bounce` is the number of surfaces that the path has hit before.
     fn split_directions(
         &self,

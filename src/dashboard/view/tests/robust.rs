@@ -25,7 +25,7 @@ proptest! {
     }
 }
 
-/// Draws every state at sizes around every threshold of the layout.
+/// Draws every state at screen sizes around each threshold of the layout.
 #[test]
 fn every_state_draws_at_threshold_sizes() {
     for (_, make) in STATES {
