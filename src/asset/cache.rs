@@ -51,7 +51,7 @@ impl fmt::Display for LoadProgress {
                 write!(f, "reading {}: {:.1} MB", name(file), *bytes as f64 / 1e6)
             }
             Self::Building { file, triangles } => {
-                write!(f, "reading {}: a tree over {triangles} triangles", name(file))
+                write!(f, "reading {}: BVH of {triangles} triangles", name(file))
             }
         }
     }
@@ -167,7 +167,7 @@ impl Assets {
             check_memory(path, "the file", needed)?;
             let triangles = TriangleMesh::parse(self.read(path, key, MAX_BYTES)?)?;
             let count = triangles.triangles.len();
-            let tree = format!("the tree over {count} triangles");
+            let tree = format!("the BVH of {count} triangles");
             check_memory(path, &tree, (count as u64).saturating_mul(BUILD_BYTES))?;
             (self.progress)(&LoadProgress::Building { file: path.to_path_buf(), triangles: count });
             Ok(Mesh::new(triangles))

@@ -12,8 +12,8 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
-/// Number of node visits per primitive after which slow passes pair neighbours in the order of the
-/// curve. Boxes at random positions need 3 visits per primitive altogether.
+/// Number of node visits per primitive before slow passes are shortened: they then merge each two
+/// neighbours on the Morton curve. Boxes at random positions need 3 visits per primitive altogether.
 const PATIENT_VISITS: usize = 8;
 
 /// Limit of a slow pass: fewer than one pair per this number of nodes would be merged.

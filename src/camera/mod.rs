@@ -158,7 +158,7 @@ impl Camera {
         (view.cross(up).length() <= 1e-6).then(|| {
             ValidationError::new(
                 "up",
-                "up is parallel to the view direction, so that the picture could lie any way round",
+                "up is parallel to the view direction, which leaves the orientation of the picture undefined",
                 "an `up` across the view direction, such as [0.0, 0.0, -1.0] when looking down",
             )
         })

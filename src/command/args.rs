@@ -32,7 +32,7 @@ pub struct Cli {
 /// Arguments of `zerkalo` without a command.
 #[derive(Clone, Debug, Args)]
 pub struct EditArgs {
-    /// A scene file [default: the built-in mirror room], or a checkpoint to continue
+    /// A scene file [default: a built-in scene], or a checkpoint to continue
     pub scene: Option<PathBuf>,
     #[command(flatten)]
     pub compute: ComputeArgs,
@@ -110,7 +110,7 @@ pub enum Command {
     Info(InfoArgs),
     /// Write a commented starter scene
     New(NewArgs),
-    /// Report the abilities of the terminal and of the connection, and how to improve them
+    /// Report the capabilities of the terminal and of the connection, and how to improve them
     Doctor(DoctorArgs),
 }
 
@@ -380,8 +380,8 @@ fn max_threads() -> usize {
 }
 
 impl TerminalArgs {
-    /// Returns the terminal settings for these options in the environment `surroundings`.
-    pub fn setup(&self, surroundings: Environment) -> TerminalSetup {
+    /// Returns the terminal settings for these options in `environment`.
+    pub fn setup(&self, environment: Environment) -> TerminalSetup {
         let colors = match self.color {
             ColorArg::True => Some(Colors::True),
             ColorArg::Indexed => Some(Colors::Indexed),
@@ -390,7 +390,7 @@ impl TerminalArgs {
             ColorArg::Auto => None,
         };
         let bandwidth = self.bandwidth.map(|kilobytes| 1e3 * kilobytes);
-        TerminalSetup { colors, surroundings, bandwidth }
+        TerminalSetup { colors, environment, bandwidth }
     }
 }
 

@@ -214,8 +214,8 @@ impl DoctorReport {
             }
             if color_term.is_empty() && few_colors {
                 hints.push(
-                    "SendEnv COLORTERM in ~/.ssh/config where you sit, AcceptEnv COLORTERM in \
-                     /etc/ssh/sshd_config here: the number of colours comes with you",
+                    "SendEnv COLORTERM in ~/.ssh/config on your machine, AcceptEnv COLORTERM in \
+                     /etc/ssh/sshd_config here: transmits the number of colours",
                 );
             }
         }

@@ -115,7 +115,7 @@ pub fn terminal_environment() -> Result<Environment, &'static str> {
         return Err("the dashboard needs a terminal");
     }
     match environment.term.as_str() {
-        "dumb" => Err("TERM=dumb: a terminal that cannot place text shows no dashboard"),
+        "dumb" => Err("TERM=dumb: the dashboard needs a terminal that can position text"),
         _ => Ok(environment),
     }
 }

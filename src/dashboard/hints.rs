@@ -111,10 +111,10 @@ pub fn reference() -> String {
 
 /// Mouse gestures and their effects.
 const MOUSE: &[(&str, &str)] = &[
-    ("click in the picture", "selects what is seen there; while probing: shows that pixel"),
+    ("click in the picture", "selects the visible object; while probing: shows the pixel"),
     ("drag in the picture", "orbits; while moving: moves the selection in the ground plane"),
     ("drag with the right button, or with Ctrl or Alt", "pans; while moving: moves it up and down"),
-    ("click with the right button, or with Ctrl or Alt", "focuses the lens on what is there"),
+    ("click with the right button, or with Ctrl or Alt", "focuses the lens on the visible point"),
     ("wheel over the picture", "dollies"),
     ("click in a panel or list", "selects; a second time: opens"),
     ("wheel over the field under the cursor", "steps its value; elsewhere: scrolls"),

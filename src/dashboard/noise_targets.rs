@@ -6,9 +6,9 @@ use crate::render::session::{QUALITIES, Report};
 
 /// Description of the picture's look at each noise target.
 const LOOKS: [&str; QUALITIES.len()] = [
-    "a draft: grain is plain to see",
+    "a draft: grain is visible",
     "grain in dark and even parts",
-    "grain is seen only by comparing",
+    "grain is visible by comparison",
     "clean: half a step of 8 bits",
     "finer than 8 bits can show",
     "for 16-bit files and measurements",

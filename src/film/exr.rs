@@ -12,7 +12,7 @@
 
 use crate::film::bands::Bands;
 use crate::film::exr_header::Ordered;
-use crate::film::image_data::{ImageData, WriteSeek};
+use crate::film::image_data::{ImageData, WriteSeek, replace_start};
 use crate::film::light_weights::{Replicates, Sums};
 use crate::film::metadata::padded;
 use exr::block::UncompressedBlock;
@@ -26,7 +26,7 @@ use exr::meta::attribute::{
 };
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::meta::{BlockDescription, Headers};
-use std::io::{self, Cursor, SeekFrom};
+use std::io::{self, Cursor};
 use std::ops::Range;
 
 /// Width and height of a tile in pixels. A row of tiles is held in memory while it is encoded.
@@ -85,13 +85,7 @@ fn encode_to(
     let last = bands.metadata();
     if last != metadata {
         let [before, after] = [&metadata, &last].map(|m| header(picture, &channels, m));
-        let (before, after) = (before?, after?);
-        if before.len() != after.len() {
-            return Err(io::Error::other("metadata of another length").into());
-        }
-        sink.seek(SeekFrom::Start(0))?;
-        sink.write_all(&after)?;
-        sink.seek(SeekFrom::End(0))?;
+        replace_start(sink, &before?, &after?)?;
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
-use std::io::{Seek, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 
 /// Size and settings of a picture file without its samples, which come from
 /// [`Bands`](crate::film::Bands).
@@ -33,3 +33,21 @@ pub enum Depth {
 /// Output that an encoder can write to and seek in.
 pub(super) trait WriteSeek: Write + Seek {}
 impl<T: Write + Seek> WriteSeek for T {}
+
+/// Replaces `before`, the first bytes of a file, by `after`, then seeks to the end of the file.
+///
+/// # Errors
+/// Fails if the lengths differ, or the output cannot be written.
+pub(super) fn replace_start(
+    sink: &mut dyn WriteSeek,
+    before: &[u8],
+    after: &[u8],
+) -> io::Result<()> {
+    if before.len() != after.len() {
+        return Err(io::Error::other("metadata of another length"));
+    }
+    sink.seek(SeekFrom::Start(0))?;
+    sink.write_all(after)?;
+    sink.seek(SeekFrom::End(0))?;
+    Ok(())
+}

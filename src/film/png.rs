@@ -2,14 +2,14 @@
 
 use crate::film::bands::Bands;
 use crate::film::display::quantised_16;
-use crate::film::image_data::{Depth, ImageData, WriteSeek};
+use crate::film::image_data::{Depth, ImageData, WriteSeek, replace_start};
 use crate::film::light_weights::Replicates;
 use crate::film::metadata::padded;
 use png::{
     BitDepth, ColorType, Compression, Encoder, EncodingError, ScaledFloat, SourceChromaticities,
     SrgbRenderingIntent, Writer,
 };
-use std::io::{self, SeekFrom, Write};
+use std::io::{self, Write};
 
 /// Size of the chunks of image data \[bytes\].
 const CHUNK_BYTES: usize = 1 << 18;
@@ -45,13 +45,7 @@ fn encode_to(
     writer.finish()?;
     let last = bands.metadata();
     if last != metadata {
-        let [before, after] = [preamble(picture, &metadata)?, preamble(picture, &last)?];
-        if before.len() != after.len() {
-            return Err(io::Error::other("metadata of another length").into());
-        }
-        sink.seek(SeekFrom::Start(0))?;
-        sink.write_all(&after)?;
-        sink.seek(SeekFrom::End(0))?;
+        replace_start(sink, &preamble(picture, &metadata)?, &preamble(picture, &last)?)?;
     }
     Ok(())
 }

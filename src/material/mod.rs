@@ -4,7 +4,6 @@ mod bsdf;
 mod fresnel;
 mod mapping;
 mod microfacet;
-mod properties;
 mod refraction;
 mod rough_interface;
 mod texture;
@@ -16,7 +15,6 @@ pub use bsdf::{
 pub use fresnel::{Reflectance, f0_from_index, index_from_f0};
 pub use mapping::{Projection, TexCoord, TextureMapping};
 pub use microfacet::{MicrofacetDistribution, SMOOTH_ALPHA};
-pub use properties::{BsdfProperties, Energy};
 pub use refraction::{FresnelSplit, Interface};
 pub use rough_interface::{InterfaceMedia, InterfaceSample};
 pub use texture::{
@@ -78,9 +76,9 @@ description! {
         /// `transmission` remains there, and total internal reflection unless `fresnel` is `dielectric`.
         two_sided: bool = true;
         /// Texture that multiplies `color`.
-        texture: Option<Texture>, or "one colour all over";
+        texture: Option<Texture>, or "a uniform colour";
         /// Heights that perturb the shading normals; the outline of the surface does not change.
-        bump: Option<Bump>, or "as smooth as the shape";
+        bump: Option<Bump>, or "no bumps";
     }
 }
 

@@ -157,13 +157,13 @@ impl BoundingVolume {
 
     /// Returns a ball that contains the part of the form that rays of `frustum` can hit; `None` if
     /// they cannot hit the form.
-    pub fn clip_to(&self, pencil: &Frustum) -> Option<BoundingSphere> {
-        let Frustum { apex, forward, corners, .. } = pencil;
+    pub fn clip_to(&self, frustum: &Frustum) -> Option<BoundingSphere> {
+        let Frustum { apex, forward, corners, .. } = frustum;
         let ball = self.ball;
-        if ball.radius.is_finite() && !pencil.meets(&ball) {
+        if ball.radius.is_finite() && !frustum.meets(&ball) {
             return None;
         }
-        let room = pencil.origin_error() + ray_error(ball.center);
+        let room = frustum.origin_error() + ray_error(ball.center);
         // Depths along `forward` between which the form lies.
         let middle = (ball.center - *apex).dot(*forward);
         let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
@@ -172,11 +172,11 @@ impl BoundingVolume {
             // at the corners if all four cross the plane in front. The slacks allow for rounding of
             // the plane's height above the apex and of the slopes of the lines, and for the tilt of
             // the lens towards the plane.
-            let tilt = pencil.lens_radius * normal.reject_from_normalized(*forward).length();
+            let tilt = frustum.lens_radius * normal.reject_from_normalized(*forward).length();
             let height = offset - normal.dot(*apex);
             let (height, toward) = (height.abs(), normal * height.signum());
-            let slack = self.ray_error(*apex) + F32_RAY_ERROR * pencil.lens_radius + tilt;
-            let slope_error = (tilt + F32_RAY_ERROR * pencil.lens_radius) / pencil.focus;
+            let slack = self.ray_error(*apex) + F32_RAY_ERROR * frustum.lens_radius + tilt;
+            let slope_error = (tilt + F32_RAY_ERROR * frustum.lens_radius) / frustum.focus;
             let slopes = corners.map(|c| (toward.dot(c), F32_RAY_ERROR * c.length() + slope_error));
             if height <= slack {
                 // The apex may be on either side.
@@ -199,7 +199,7 @@ impl BoundingVolume {
         let ends: [DVec3; 8] =
             std::array::from_fn(|i| *apex + corners[i % 4] * if i < 4 { near } else { far });
         let part = BoundingSphere::around(&ends);
-        let blur = pencil.blur(near, far);
+        let blur = frustum.blur(near, far);
         let part = BoundingSphere { radius: part.radius + room + blur, ..part };
         Some(if part.radius < ball.radius { part } else { ball })
     }
@@ -348,7 +348,7 @@ mod tests {
     }
 
     /// Returns a frustum from (0, 0, 5) along -z that extends 0.1 to each side at unit distance.
-    fn pencil() -> Frustum {
+    fn frustum() -> Frustum {
         let corners = [(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)];
         Frustum {
             apex: DVec3::Z * 5.0,
@@ -361,7 +361,7 @@ mod tests {
 
     #[test]
     fn a_pencil_meets_what_is_in_front_of_it() {
-        let part = |form: &Form| BoundingVolume::new(form).clip_to(&pencil());
+        let part = |form: &Form| BoundingVolume::new(form).clip_to(&frustum());
         assert!(part(&ball([0.0, 0.0, 0.0], 1.0)).is_some());
         assert!(part(&ball([1.4, 0.0, 0.0], 1.0)).is_some());
         assert!(part(&ball([2.0, 0.0, 0.0], 1.0)).is_none());
@@ -435,16 +435,17 @@ mod tests {
     /// Checks a frustum of 175 degrees with rays in all of its directions. The apex is not in front
     /// of the middle of the corners, which are more than 90 degrees from their mean direction.
     #[test]
-    fn a_wide_pencil_meets_what_its_lines_meet() {
+    fn wide_frustum_meets_balls_that_its_rays_hit() {
         let apex = DVec3::new(1.0, -2.0, 5.0);
         let edge = 87.5f64.to_radians().tan();
         let ends =
             [(-edge, edge), (0.6 * edge, edge), (0.6 * edge, -0.6 * edge), (-edge, -0.6 * edge)];
         let corners = ends.map(|(x, y)| DVec3::new(x, y, -1.0));
-        let pencil = Frustum { apex, forward: DVec3::NEG_Z, corners, lens_radius: 0.0, focus: 1.0 };
+        let frustum =
+            Frustum { apex, forward: DVec3::NEG_Z, corners, lens_radius: 0.0, focus: 1.0 };
         let meets = |center: DVec3, radius: f64| {
             BoundingVolume::new(&Form::Sphere(SphereForm { center, radius }))
-                .clip_to(&pencil)
+                .clip_to(&frustum)
                 .is_some()
         };
         let (mut outside, mut inside) = (0, 0);
@@ -469,17 +470,17 @@ mod tests {
     /// Checks that a plane through the apex is never excluded. Its height above the apex is lost in
     /// rounding, so that rays may hit either side.
     #[test]
-    fn a_plane_through_the_eye_is_not_ruled_out() {
+    fn plane_through_apex_is_not_excluded() {
         for offset in [5.0 - 1e-7, 5.0, 5.0 + 1e-7] {
             let plane = BoundingVolume::new(&Form::Plane(PlaneForm { normal: DVec3::Z, offset }));
-            assert!(plane.clip_to(&pencil()).is_some(), "{offset}");
+            assert!(plane.clip_to(&frustum()).is_some(), "{offset}");
         }
     }
 
     /// Checks that all points of a form that are inside of the frustum are inside of the clipped
     /// ball.
     #[test]
-    fn the_part_seen_holds_every_point_met() {
+    fn clipped_ball_holds_all_visible_points() {
         let mut random = 1u64;
         let mut unit = || {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -487,12 +488,12 @@ mod tests {
         };
         let slanted =
             Form::Plane(PlaneForm { normal: DVec3::new(0.3, 0.4, 0.5).normalize(), offset: 0.2 });
-        let part = BoundingVolume::new(&slanted).clip_to(&pencil()).unwrap();
+        let part = BoundingVolume::new(&slanted).clip_to(&frustum()).unwrap();
         let Form::Plane(PlaneForm { normal, offset }) = slanted else { unreachable!() };
         for _ in 0..1000 {
             let toward = DVec3::new(0.2 * unit() - 0.1, 0.2 * unit() - 0.1, -1.0);
-            let t = (offset - normal.dot(pencil().apex)) / normal.dot(toward);
-            let hit = BoundingSphere { center: pencil().apex + toward * t, radius: 0.0 };
+            let t = (offset - normal.dot(frustum().apex)) / normal.dot(toward);
+            let hit = BoundingSphere { center: frustum().apex + toward * t, radius: 0.0 };
             assert!(t > 0.0 && part.overlaps(&hit));
         }
     }

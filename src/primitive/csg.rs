@@ -183,10 +183,8 @@ impl<S: Float> Compounds<S> {
     }
 
     /// Returns the spans of part number `i` of a compound.
-    ///
-    /// `SINGLE` is `true` if every part of the compound has one span.
     #[inline(always)]
-    fn spans_of<'a, L, const SINGLE: bool>(
+    fn spans_of<'a, L>(
         &self,
         compound: &SolidOperand<S>,
         spans: &'a [Interval<L>],
@@ -197,7 +195,7 @@ impl<S: Float> Compounds<S> {
 
     /// Returns the lanes in which the point at the distance `t` is inside of the compound.
     #[inline(always)]
-    fn inside<L: SimdFloat<Scalar = S>, const SINGLE: bool>(
+    fn inside<L: SimdFloat<Scalar = S>>(
         &self,
         compound: &SolidOperand<S>,
         spans: &[Interval<L>],
@@ -207,7 +205,7 @@ impl<S: Float> Compounds<S> {
             let mut top = 0;
             for op in &self.ops[compound.ops.clone()] {
                 if let Op::Part(i) = op {
-                    stack[top] = inside_any(self.spans_of::<_, SINGLE>(compound, spans, *i), t);
+                    stack[top] = inside_any(self.spans_of(compound, spans, *i), t);
                     top += 1;
                     continue;
                 }
@@ -225,7 +223,7 @@ impl<S: Float> Compounds<S> {
 
     /// Returns the transition of the compound between the distances `before` and `after`, with the
     /// surface that is visible there.
-    fn change<L: SimdFloat<Scalar = S>, const SINGLE: bool>(
+    fn change<L: SimdFloat<Scalar = S>>(
         &self,
         compound: &SolidOperand<S>,
         spans: &[Interval<L>],
@@ -243,7 +241,7 @@ impl<S: Float> Compounds<S> {
             let mut top = 0;
             for op in &self.ops[compound.ops.clone()] {
                 if let Op::Part(i) = op {
-                    let spans = self.spans_of::<_, SINGLE>(compound, spans, *i);
+                    let spans = self.spans_of(compound, spans, *i);
                     let (was, is) = (inside_any(spans, before), inside_any(spans, after));
                     let mut t = spans[0].leave;
                     for span in spans {
@@ -308,12 +306,7 @@ impl<S: Float> Compounds<S> {
                         }
                     });
                 }
-                let found = (&*spans, &ends[..count]);
-                if compound.spans == parts.len() {
-                    self.sweep_events::<_, true>(compound, found, base, near, hit);
-                } else {
-                    self.sweep_events::<_, false>(compound, found, base, near, hit);
-                }
+                self.sweep_events(compound, (&*spans, &ends[..count]), base, near, hit);
             });
         });
     }
@@ -325,7 +318,7 @@ impl<S: Float> Compounds<S> {
     /// is within the tie of the other, so that the wide tie of a grazing face does not absorb other
     /// faces.
     #[inline(always)]
-    fn sweep_events<L: SimdFloat<Scalar = S>, const SINGLE: bool>(
+    fn sweep_events<L: SimdFloat<Scalar = S>>(
         &self,
         compound: &SolidOperand<S>,
         (spans, ends): (&[Interval<L>], &[Event<L>]),
@@ -343,10 +336,10 @@ impl<S: Float> Compounds<S> {
                 continue;
             }
             let middle = L::from_f64(0.5) * end.t + L::from_f64(0.5) * next.t;
-            let inside = self.inside::<_, SINGLE>(compound, spans, middle);
+            let inside = self.inside(compound, spans, middle);
             let changed = gap & (inside.and_not(state) | state.and_not(inside));
             if changed.any() {
-                let seen = self.change::<_, SINGLE>(compound, spans, base, before, middle);
+                let seen = self.change(compound, spans, base, before, middle);
                 let ahead = changed & seen.t.gt(L::zero());
                 let nearer = ahead & seen.t.lt(hit.t);
                 hit.t = L::select(nearer, seen.t, hit.t);

@@ -67,7 +67,7 @@ impl SceneBvh {
         let pad = ray.origin.max_abs() * L::from_f64(4.0 * L::EPSILON);
         let packet = SlabPacket::new(ray, Vec3::new(pad, pad, pad));
         let boxes = &self.boxes;
-        if self.is_together(ray, wanted) {
+        if self.is_coherent(ray, wanted) {
             let bounds = PacketBounds::around(&packet, wanted);
             let leaf = |number: usize, limit| leaf(self.items[number] as usize, limit);
             return with_stack::<_, _, 128, 512>(BVH_WIDTH, boxes, |stack| {
@@ -89,7 +89,7 @@ impl SceneBvh {
     /// Returns `true` if the rays in the lanes `wanted` are coherent enough to traverse the BVH as
     /// a packet.
     #[inline(always)]
-    fn is_together<L: SimdFloat>(&self, ray: &Ray<L>, wanted: u32) -> bool {
+    fn is_coherent<L: SimdFloat>(&self, ray: &Ray<L>, wanted: u32) -> bool {
         if L::WIDTH == 1 || wanted.count_ones() < 2 {
             return false;
         }

@@ -22,11 +22,11 @@ use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 /// Measured by `benches/mesh.rs` (lines `together or apart`): packets of eight are faster up to
 /// differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million; packets of four
 /// up to half of that.
-const TOGETHER: f64 = 2.5;
+const COHERENCE_LIMIT: f64 = 2.5;
 
 /// Largest difference, per lane, between the rays of a packet that traverses the BVH as a whole,
 /// for any number of triangles.
-const TOGETHER_AT_MOST: f64 = 0.04;
+const MAX_COHERENT_SPREAD: f64 = 0.04;
 
 /// Closest triangle of each lane.
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +89,7 @@ impl<L: SimdFloat> ShearedRay<L> {
     /// (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an
     /// orthonormal frame for the shear).
     #[inline(always)]
-    fn meet(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
+    fn intersect(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
         let p = corners.map(|c| self.frame.to_local(c - self.origin));
         // Products are not fused: equal rounding keeps their order.
         let area = |a: Vec3<L>, b: Vec3<L>| a.x * b.y - a.y * b.x;
@@ -122,7 +122,7 @@ struct MeshTraversal<'a, const ANY: bool> {
 impl<const ANY: bool> MeshTraversal<'_, ANY> {
     /// Traverses the BVH with the packet as a whole.
     #[inline(always)]
-    fn together<L: SimdFloat>(
+    fn traverse_as_packet<L: SimdFloat>(
         &self,
         (ray, packet): (&Ray<L>, &SlabPacket<L>),
         limit: L,
@@ -165,7 +165,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
                         Vec3::new(broadcast(c[0][i]), broadcast(c[1][i]), broadcast(c[2][i]))
                     };
                     let (t, hit_mask) =
-                        sheared_ray.meet(leaf.corners.each_ref().map(broadcast_corner));
+                        sheared_ray.intersect(leaf.corners.each_ref().map(broadcast_corner));
                     let tie = hit_mask & t.le(found.t);
                     if tie.none() {
                         continue;
@@ -189,15 +189,15 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     fn run<L: SimdFloat>(&self, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
         let packet = slab_packet(ray, self.mesh);
         let wanted = limit.gt(L::zero()).bits();
-        if is_together(ray, wanted, self.mesh) {
-            return self.together((ray, &packet), limit);
+        if is_coherent(ray, wanted, self.mesh) {
+            return self.traverse_as_packet((ray, &packet), limit);
         }
-        self.apart((ray, &packet), limit)
+        self.traverse_separately((ray, &packet), limit)
     }
 
     /// Traverses the BVH with each ray of the packet separately.
     #[inline(always)]
-    fn apart<L: SimdFloat>(
+    fn traverse_separately<L: SimdFloat>(
         &self,
         (ray, packet): (&Ray<L>, &SlabPacket<L>),
         limit: L,
@@ -213,7 +213,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             let sheared_ray = ShearedRay::<L>::only(&rays[lane]);
             let (best, triangle) = &mut found[lane];
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
-                let (t, hit_mask) = sheared_ray.meet(ShearedRay::corners(leaf, part));
+                let (t, hit_mask) = sheared_ray.intersect(ShearedRay::corners(leaf, part));
                 let mut bits = (hit_mask & t.le(L::splat(*best))).bits() & valid_lanes();
                 while bits != 0 {
                     let lane = bits.trailing_zeros();
@@ -250,13 +250,14 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
 /// Returns `true` if the rays in the lanes `wanted` are coherent enough to traverse the BVH as a
 /// packet.
 #[inline(always)]
-fn is_together<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
+fn is_coherent<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     if L::WIDTH == 1 || wanted.count_ones() < 2 {
         return false;
     }
     let [low, high] = mesh.mesh().bounds;
     let size = (0..3).map(|i| f64::from(high[i]) - f64::from(low[i])).fold(0.0, f64::max);
-    let turn = (TOGETHER / (mesh.mesh().triangles.len() as f64).sqrt()).min(TOGETHER_AT_MOST);
+    let turn =
+        (COHERENCE_LIMIT / (mesh.mesh().triangles.len() as f64).sqrt()).min(MAX_COHERENT_SPREAD);
     let turn = turn * L::WIDTH as f64;
     ray.is_coherent(wanted, turn, turn * size)
 }
@@ -284,5 +285,9 @@ pub fn closest_with<L: SimdFloat>(
     all: bool,
 ) -> TriangleHit<L> {
     let (packet, walk) = (slab_packet(ray, mesh), MeshTraversal::<false> { mesh });
-    if all { walk.together((ray, &packet), limit) } else { walk.apart((ray, &packet), limit) }
+    if all {
+        walk.traverse_as_packet((ray, &packet), limit)
+    } else {
+        walk.traverse_separately((ray, &packet), limit)
+    }
 }

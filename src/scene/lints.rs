@@ -32,7 +32,7 @@ impl Scene {
         };
         add(
             materials(&brighter_than_its_light),
-            "Legal: the picture is clipped only when it is shown.",
+            "Allowed: the picture is clipped only for display.",
         );
         add(
             materials(&|m| {

@@ -182,7 +182,7 @@ impl Recovery {
     }
 
     /// Takes over the recovery file of `lost`: this session writes to it from now on.
-    pub fn take_up(&mut self, lost: Orphan) {
+    pub fn adopt(&mut self, lost: Orphan) {
         self.forget();
         self.saved = Some(lost.kept);
     }

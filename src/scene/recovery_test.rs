@@ -45,7 +45,7 @@ fn recovery_file_is_found_after_its_process_ends() {
     drop(found);
     let mut heir = of(&path);
     let lost = heir.find().orphans.pop().unwrap();
-    heir.take_up(lost);
+    heir.adopt(lost);
     assert!(of(&path).find().elsewhere);
     heir.keep("four", None).unwrap();
     assert_eq!(names(folder.path()), [".a.toml.unsaved"]);

@@ -96,8 +96,8 @@ macro_rules! compounds {
                 }
                 vec![ValidationError::new(
                     "of",
-                    "the parts together have no end",
-                    "a solid with an end: planes can be taken from one, or intersected with one",
+                    "the compound is unbounded",
+                    "a bounded solid: planes can be subtracted from one, or intersected with one",
                 )]
             }
 

@@ -58,7 +58,7 @@ impl ShapeDesc for Rectangle {
             .and(parallel.then(|| {
                 ValidationError::new(
                     "up",
-                    "up is parallel to normal, so that the rectangle could lie any way round",
+                    "up is parallel to normal, which leaves the orientation of the rectangle undefined",
                     "an `up` across the normal, such as [0.0, 0.0, -1.0] for one that lies flat",
                 )
             }))

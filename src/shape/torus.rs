@@ -12,7 +12,7 @@ description! {
     pub struct Torus {
         /// Centre.
         center: [f64; 3], in COORDINATE "scene units";
-        /// Direction about which the ring runs.
+        /// Direction of the axis, which is perpendicular to the plane of the ring.
         axis: [f64; 3], as Direction;
         /// Radius of the circle in the middle of the tube.
         ring: f64, in SIZE "scene units";

@@ -193,7 +193,7 @@ pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<Validatio
     if !is_well_conditioned(&map) {
         return Some(ValidationError::new(
             "transform",
-            "transform flattens the object or tears it apart",
+            "transform flattens or stretches the object too much",
             "factors within 1e12 of each other and of 1",
         ));
     }
@@ -215,7 +215,7 @@ pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<Validatio
     (extent < 1e-12 * max_coordinate).then(|| {
         ValidationError::new(
             "transform",
-            "transform makes the object too small for the place where it stands",
+            "transform makes the object too small for its distance from the origin",
             "sizes and coordinates within a factor of 1e12 of each other",
         )
     })

@@ -82,6 +82,14 @@ fn shipped_scenes_agree_with_reference_tracer() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Checks that `samples` samples per pixel of `scene` agree with a picture of the reference tracer.
+fn check_agreement(name: &str, scene: &Scene, samples: u32, reference_samples: u32) {
+    let reference = reference(scene, reference_samples, Mutation::None).unwrap();
+    let verdict = Picture::new(scene, samples).beside(&reference, reference_samples);
+    println!("{name}: {verdict}");
+    assert!(verdict.agree(), "{name}: {verdict}");
+}
+
 /// Checks that a deliberate error is detected, and that the same samples agree without it.
 fn check_detection(mutation: Mutation, name: &str, scene: &Scene, samples: u32) {
     let picture = Picture::new(scene, SAMPLES);
@@ -222,10 +230,8 @@ fn diffuse_bounces_agree_with_reference_tracer() {
             if name.contains(' ') { small(parsed(OPEN_BOX)) } else { small(shipped(name)) };
         scene.trace.max_diffuse_depth = bounces;
         (scene.trace.max_depth, scene.trace.caustics) = (depth, caustics);
-        let reference = reference(&scene, REFERENCE_SAMPLES, Mutation::None).unwrap();
-        let verdict = Picture::new(&scene, SAMPLES / 2).beside(&reference, REFERENCE_SAMPLES);
-        println!("{name}, {bounces} bounces, depth {depth}, caustics {caustics}: {verdict}");
-        assert!(verdict.agree(), "{name}, {bounces} bounces, depth {depth}, {caustics}: {verdict}");
+        let name = format!("{name}, {bounces} bounces, depth {depth}, caustics {caustics}");
+        check_agreement(&name, &scene, SAMPLES / 2, REFERENCE_SAMPLES);
     }
 }
 
@@ -249,10 +255,8 @@ fn lenses_agree_with_reference_tracer() {
             scene.camera.focus = Some(Focus::Distance(5.0));
         }
         assert_eq!(scene.faults(), []);
-        let reference = reference(&scene, REFERENCE_SAMPLES, Mutation::None).unwrap();
-        let verdict = Picture::new(&scene, SAMPLES).beside(&reference, REFERENCE_SAMPLES);
-        println!("{name}, {aperture:?}, {focus:?}: {verdict}");
-        assert!(verdict.agree(), "{name}, {aperture:?}, {focus:?}, near {near}: {verdict}");
+        let name = format!("{name}, {aperture:?}, {focus:?}, near {near}");
+        check_agreement(&name, &scene, SAMPLES, REFERENCE_SAMPLES);
     }
 }
 
@@ -319,11 +323,8 @@ fn rough_and_absorbing_glass_agrees_with_reference_tracer() {
             for horizon in [BelowHorizon::Fold, BelowHorizon::Absorb] {
                 let mut scene = rough_glass(&format!("{lobe}\nfresnel = \"{law}\""));
                 scene.trace.below_horizon = horizon;
-                let samples = 2 * REFERENCE_SAMPLES;
-                let reference = reference(&scene, samples, Mutation::None).unwrap();
-                let verdict = Picture::new(&scene, SAMPLES / 4).beside(&reference, samples);
-                println!("{lobe:?}, {law:?}, {horizon:?}: {verdict}");
-                assert!(verdict.agree(), "{lobe}, {law}, {horizon:?}: {verdict}");
+                let name = format!("{lobe:?}, {law:?}, {horizon:?}");
+                check_agreement(&name, &scene, SAMPLES / 4, 2 * REFERENCE_SAMPLES);
             }
         }
     }
@@ -376,11 +377,8 @@ fn one_sided_transparent_objects_reflect_on_their_front_only() {
                 3.0 * side,
             );
             let scene = small(parsed(&text));
-            let samples = 2 * REFERENCE_SAMPLES;
-            let reference = reference(&scene, samples, Mutation::None).unwrap();
-            let verdict = Picture::new(&scene, SAMPLES).beside(&reference, samples);
-            println!("{law:?} from {side}: {verdict}");
-            assert!(verdict.agree(), "{law} from {side}: {verdict}");
+            let name = format!("{law:?} from {side}");
+            check_agreement(&name, &scene, SAMPLES, 2 * REFERENCE_SAMPLES);
         }
     }
 }

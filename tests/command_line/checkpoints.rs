@@ -121,7 +121,7 @@ fn checkpoints_of_other_renders_are_refused_with_a_remedy() {
         ),
         ("scene.toml", &["--resume", "cut.zk"], "it ends in the middle of"),
         ("scene.toml", &["--resume", "altered.zk"], "it is damaged or was altered: the checksum"),
-        ("scene.toml", &["--resume", "scene.toml"], "it is no film file"),
+        ("scene.toml", &["--resume", "scene.toml"], "it is not a film file"),
         ("scene.toml", &["--resume", "none.zk"], "there is no such file"),
         ("scene.toml", &["--checkpoint", "a.zk"], "add --resume a.zk to continue it, or remove it"),
         ("scene.toml", &["--checkpoint", "lit.toml"], "there is another file of this name"),

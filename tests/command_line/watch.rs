@@ -161,7 +161,7 @@ fn files_that_do_not_belong_together_are_refused_by_name() {
         ("other-0.zk", "belong to different plans"),
         ("job-2.zk", "both hold shard 2"),
         ("a.zk", "it belongs to no plan"),
-        ("scene.toml", "it is no film file"),
+        ("scene.toml", "it is not a film file"),
     ] {
         replace(&desk, "job-1.zk", &fs::read(desk.path(foreign)).unwrap());
         assert!(films.poll());

@@ -94,7 +94,7 @@ impl Connection {
             self.now += STEP;
             self.arrive();
             self.flow.expire(self.now);
-            if self.flow.asks_kernel(self.now) {
+            if self.flow.wants_queue_length(self.now) {
                 let queued = self.queued();
                 self.flow.held_back(self.now, Some(queued));
             }

@@ -3,10 +3,11 @@
 
 mod albedo;
 mod chi_square;
-mod claims;
 mod closed_forms;
+mod conservation;
 mod highlights;
 mod lanes;
+mod properties;
 mod rough;
 mod sampler;
 mod setup;

@@ -1,6 +1,7 @@
 //! Whole paths: furnaces, parallel mirrors, scalar samples against packets.
 
 use crate::common::report::report;
+use crate::lobes::properties::{Energy, ReflectionModel};
 use crate::lobes::setup::*;
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::material::{Lobe, Masking};
@@ -10,7 +11,6 @@ use zerkalo::world::{AnyWorld, Options, Precision};
 /// Every sample of a ball in a white furnace is exactly rho, for every energy-conserving lobe; at the
 /// silhouette lobes are partly below the surface and folded up.
 fn furnace<L: SimdFloat>() {
-    use zerkalo::material::Energy;
     let rho = 0.75;
     let text = "film = { size = [24, 24] }
         camera = { eye = [0.0, 0.0, 3.0], target = [0.0, 0.0, 0.0], view_angle.vertical = 45.0 }

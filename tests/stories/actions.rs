@@ -155,7 +155,9 @@ fn camera_stories() -> Vec<Story> {
             // The front of the ball.
             (d.scene().camera.focus_depth() - 4.5).abs() < 0.01
         }),
-        story("camera as in the file", c(), "Left Up Home", |a, d| camera(a) == camera(d.scene())),
+        story("reset the camera to the file", c(), "Left Up Home", |a, d| {
+            camera(a) == camera(d.scene())
+        }),
         story("store this viewpoint", c(), "n Ctrl-u `door` Enter", |a, d| {
             d.scene().cameras["door"] == a.camera
         }),
@@ -236,7 +238,7 @@ fn object_stories() -> Vec<Story> {
             (0.01..0.02).contains(&normal(d.scene())[0])
         }),
         story("snap the selection to ground", BALL, "g", |_, d| ball(d.scene()) == [0.0, 0.5, 0.0]),
-        story("give it a material of its own", BALL, "M", |a, d| {
+        story("give the object its own material", BALL, "M", |a, d| {
             let material = &d.scene().objects[1].material;
             material != "red" && d.scene().materials[material] == a.materials["red"]
         }),
@@ -247,7 +249,9 @@ fn panel_stories() -> Vec<Story> {
     let c = || Target::Camera;
     vec![
         story("next panel or field", c(), "Tab", |_, d| d.model.focus == Focus::Outline),
-        story("panel or field before", c(), "Shift-Tab", |_, d| d.model.focus == Focus::Inspector),
+        story("previous panel or field", c(), "Shift-Tab", |_, d| {
+            d.model.focus == Focus::Inspector
+        }),
         story("leave, back to the picture", BALL, "m Esc", |_, d| d.model.mode == Mode::Orbit),
         story("inspect, type a value, choose", BALL, "Enter", |_, d| {
             d.model.focus == Focus::Inspector
@@ -274,7 +278,7 @@ fn panel_stories() -> Vec<Story> {
         story("field down, fine", c(), "Enter Shift-Left", |_, d| {
             (-0.05..-0.001).contains(&eye(d.scene())[0])
         }),
-        story("field back to its default", c(), "Enter `7` Enter Down Backspace", |_, d| {
+        story("reset the field to its default", c(), "Enter `7` Enter Down Backspace", |_, d| {
             eye(d.scene()) == [0.0, 1.0, 5.0]
         }),
         story("only the picture", c(), "z", |_, d| {
@@ -292,7 +296,7 @@ fn file_stories() -> Vec<Story> {
             d.disk[Path::new(FILE)] == room_with_views().replacen("eye = [0.0", "eye = [7.0", 1)
                 && !d.model.is_unsaved()
         }),
-        story("write a checkpoint, to continue another time", c(), "K", |_, d| {
+        story("write a checkpoint to continue later", c(), "K", |_, d| {
             d.asked(|e| matches!(e, Effect::Checkpoint(_))) && d.notice().contains("room-1.zk")
         }),
         story("save as", c(), "W Ctrl-u `copy` Enter", |_, d| {
@@ -343,7 +347,7 @@ fn picture_stories() -> Vec<Story> {
         story("copy the path of the last picture", c(), "p y", |_, d| {
             d.asked(|e| matches!(e, Effect::Copy(_)))
         }),
-        story("look at the last picture", c(), "p o", |_, d| {
+        story("view the last picture", c(), "p o", |_, d| {
             d.asked(|e| matches!(e, Effect::ViewImage { .. }))
         }),
         story("probe down", c(), "i Down", move |_, d| probe(d)[1] > 24),
@@ -383,7 +387,7 @@ fn picture_stories() -> Vec<Story> {
         story("find an action", c(), ":", |_, d| {
             matches!(d.model.overlay, Some(Overlay::Palette(_)))
         }),
-        story("what the scene contains", c(), ":", |_, d| {
+        story("inventory of the scene", c(), ":", |_, d| {
             matches!(d.model.overlay, Some(Overlay::Inventory { .. }))
         }),
     ]

@@ -271,9 +271,7 @@ impl Desk {
 
     /// Undoes every edit.
     pub fn undo_all(&mut self) {
-        while self.model.history.undo_label().is_some() {
-            assert!(self.model.history.undo().is_some());
-        }
+        while self.model.history.undo().is_some() {}
     }
 
     pub fn asked(&self, what: impl Fn(&Effect) -> bool) -> bool {

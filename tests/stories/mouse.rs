@@ -75,7 +75,7 @@ fn drag_is_one_undo_step() {
     assert_eq!(desk.scene().camera.eye, eye, "the second drag");
     desk.keys("u");
     assert_eq!(desk.text(), ROOM, "the first");
-    assert!(desk.model.history.undo_label().is_none());
+    assert!(desk.model.history.undo().is_none());
 }
 
 #[test]

@@ -42,7 +42,7 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     let loaded = tobj::load_obj_buf(&mut lines, &options, |path| libraries.load(path));
     let (models, materials) = loaded.map_err(|error| {
         let place = FileLocation::Line(lines.line);
-        source.error(place, describe(error), "a line as the OBJ format has it")
+        source.error(place, describe(error), "a line of the OBJ format")
     })?;
     let libraries = libraries.found.into_inner();
     if let Some(error) = libraries.error {

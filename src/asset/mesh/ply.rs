@@ -178,7 +178,7 @@ fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(
     }
     let order = |name| header.elements.get_index_of(name);
     if order("face") < order("vertex") {
-        let found = "the faces stand before the vertices";
+        let found = "the faces precede the vertices";
         return Err(source.error(FileLocation::Whole, found, "vertices first"));
     }
     let mut least = 0u128;
@@ -191,7 +191,7 @@ fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(
         least += bytes as u128 * element.count as u128;
         if least > left as u128 + 1 {
             let found = format!(
-                "the header announces {} times {}, more than the file holds",
+                "the header declares {} times {}, more than the file holds",
                 element.count, element.name
             );
             return Err(source.error(FileLocation::Whole, found, "as many as there are"));

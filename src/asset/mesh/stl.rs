@@ -38,7 +38,7 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
         };
         if !fits {
             let found =
-                format!("the header announces {announced} triangles, more than the file holds");
+                format!("the header declares {announced} triangles, more than the file holds");
             let expected = format!("at most {}", (bytes.len() - HEADER) / TRIANGLE);
             return Err(source.error(FileLocation::Byte(80), found, &expected));
         }

@@ -90,8 +90,8 @@ fn caution(steadiness: &Steadiness) -> Option<String> {
         }
         (true, others) => {
             let reason = others.unwrap_or_else(|| {
-                "too few runs fitted in, or the machine itself is now faster, now slower \
-                 (a virtual machine, heat, a battery)"
+                "there were too few runs, or the speed of the machine varies (a virtual machine, heat, \
+                 a battery)"
                     .to_string()
             });
             Some(format!(

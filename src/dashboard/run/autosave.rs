@@ -213,7 +213,7 @@ impl Autosave {
     pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let orphan = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, orphan.text.clone()).ok());
-        self.recovery.take_up(orphan);
+        self.recovery.adopt(orphan);
         file
     }
 

@@ -40,14 +40,14 @@ pub struct TerminalReport {
 ///
 /// # Errors
 /// Fails if there is no terminal, or the terminal is closed during the probe.
-pub fn diagnose(surroundings: Environment, measure: bool) -> io::Result<TerminalReport> {
+pub fn diagnose(environment: Environment, measure: bool) -> io::Result<TerminalReport> {
     // The alternate screen hides text that a terminal prints for requests that it does not support.
     let signals = block()?;
     let screen = Screen::enter()?;
     let tty = screen.tty();
     watch(signals, screen.tty(), Duration::ZERO)?;
-    let mut keyboard = Keyboard::new(&surroundings);
-    let mut terminal = probe(&tty, &mut keyboard, surroundings, &|| false)?;
+    let mut keyboard = Keyboard::new(&environment);
+    let mut terminal = probe(&tty, &mut keyboard, environment, &|| false)?;
     let multiplexer = terminal.environment.multiplexer;
     if multiplexer.is_some() && terminal.passthrough.is_none() {
         terminal.passthrough = answer(&tty, &mut keyboard, multiplexer, &[], PATIENCE)?;

@@ -169,7 +169,7 @@ impl EffectRunner {
     }
 
     fn refuse(&self, error: &io::Error) {
-        let why = format!("no thread to render with: {error}");
+        let why = format!("cannot start a rendering thread: {error}");
         let _ = self.results.send(Message::Exported(Err(why)));
     }
 }

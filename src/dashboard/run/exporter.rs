@@ -168,7 +168,7 @@ fn render(
     let settings = Settings { stop: request.stop, ..request.settings };
     let mut session: Session = match Session::new(request.threads, options, settings) {
         Ok(session) => session,
-        Err(error) => return Some(Err(format!("no threads to render with: {error}"))),
+        Err(error) => return Some(Err(format!("cannot start rendering threads: {error}"))),
     };
     session.set_scene(request.scene);
     loop {

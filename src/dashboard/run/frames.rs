@@ -21,7 +21,7 @@ const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
 
 /// Upper bound of the bytes of an acknowledgement request (a request of the cursor position, 14
 /// bytes inside tmux).
-const QUESTION_BYTES: usize = 16;
+const ACK_REQUEST_BYTES: usize = 16;
 
 /// Pipeline of frames to the terminal.
 pub struct FramePipeline {
@@ -159,7 +159,7 @@ impl FramePipeline {
             self.removing = false;
         }
         let mut bytes = self.writer.buffer();
-        upload.next(budget.bytes.saturating_sub(QUESTION_BYTES), &mut bytes);
+        upload.next(budget.bytes.saturating_sub(ACK_REQUEST_BYTES), &mut bytes);
         self.diff.moved();
         if upload.is_open() {
             self.flow.sent_unasked(now, bytes.len());
@@ -196,7 +196,7 @@ impl FramePipeline {
     }
 
     /// Records that the terminal acknowledged a frame at time `at`.
-    pub fn answered(&mut self, at: Duration) {
+    pub fn acknowledged(&mut self, at: Duration) {
         self.flow.on_ack(at);
     }
 
@@ -215,7 +215,7 @@ impl FramePipeline {
     /// the kernel's send queue.
     pub fn look(&mut self, now: Duration) {
         self.flow.expire(now);
-        if self.flow.asks_kernel(now) {
+        if self.flow.wants_queue_length(now) {
             self.flow.held_back(now, self.queue.as_ref().and_then(TcpSendQueue::bytes));
         }
     }

@@ -74,7 +74,7 @@ pub struct TerminalSetup {
     /// Colour depth of the terminal; `None` to use the detected one.
     pub colors: Option<Colors>,
     /// Terminal-related environment variables.
-    pub surroundings: Environment,
+    pub environment: Environment,
     /// Fixed bandwidth in bytes per second; `None` to adapt to the connection.
     pub bandwidth: Option<f64>,
 }
@@ -151,13 +151,13 @@ fn run_on_terminal(
     terminal: TerminalSetup,
     trace: Option<PathBuf>,
 ) -> io::Result<Ended> {
-    let TerminalSetup { colors, surroundings, bandwidth } = terminal;
+    let TerminalSetup { colors, environment, bandwidth } = terminal;
     let signals = signals::block()?;
     let screen = Screen::enter()?;
     let signals = signals::watch(signals, screen.tty(), signals::PATIENCE)?;
-    let mut keyboard = Keyboard::new(&surroundings);
+    let mut keyboard = Keyboard::new(&environment);
     let ending = || signals.is_ending();
-    let probed = probe(&screen.tty(), &mut keyboard, surroundings, &ending);
+    let probed = probe(&screen.tty(), &mut keyboard, environment, &ending);
     let Ok((terminal, screen_size)) = probed.and_then(|terminal| Ok((terminal, size()?))) else {
         return Ok(Ended {
             signalled: Some(HUNG_UP),
@@ -339,7 +339,7 @@ impl Dashboard {
             Event::Mouse(mouse) => Message::Mouse(mouse),
             Event::Paste(text) => Message::Paste(text),
             Event::Reply(Reply::Cursor { .. }) => {
-                self.frames.answered(at.saturating_duration_since(self.began));
+                self.frames.acknowledged(at.saturating_duration_since(self.began));
                 return;
             }
             Event::Reply(reply @ (Reply::Graphics(true) | Reply::Version(_))) => {

@@ -183,7 +183,7 @@ pub static COMMANDS: &[Command] = &[
     command(C::Camera, "fly up", &[(Flying, "r PageUp")], |c| c.fly(Up)).hints(&[hint(&[H::Flying], 3, "r f", "up, down")]),
     command(C::Camera, "fly down", &[(Flying, "f PageDown")], |c| c.fly(Down)),
     command(C::Camera, "frame the selection", &[(Anywhere, "f")], |c| c.frame()).hints(&[hint(&[H::Outline], 6, "f", "frame")]),
-    command(C::Camera, "camera as in the file", &[(Picture, "Home")], |c| c.reset_camera()),
+    command(C::Camera, "reset the camera to the file", &[(Picture, "Home")], |c| c.reset_camera()),
     command(C::Camera, "open the aperture", &[(Anywhere, "*")], |c| c.aperture(1.0)),
     command(C::Camera, "close the aperture", &[(Anywhere, "/")], |c| c.aperture(-1.0)),
     command(C::Camera, "focus on the probe or the selection", &[(Anywhere, "F")], |c| c.focus()),
@@ -237,10 +237,10 @@ pub static COMMANDS: &[Command] = &[
     command(C::Objects, "turn left, fine", &[(Turning, "Shift-Left")], |c| c.turn_selection(Left, Fine)).hints(&[hint(&[H::Turning], 2, "Shift", "1°")]),
     command(C::Objects, "turn right, fine", &[(Turning, "Shift-Right")], |c| c.turn_selection(Right, Fine)),
     command(C::Objects, "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::Moving], 4, "g", "snap to ground")]),
-    command(C::Objects, "give it a material of its own", &[(Anywhere, "M")], |c| c.own_material()),
+    command(C::Objects, "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
 
     command(C::Panels, "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).while_watching().hints(&[hint(&[H::Picture], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
-    command(C::Panels, "panel or field before", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).while_watching(),
+    command(C::Panels, "previous panel or field", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).while_watching(),
     command(C::Panels, "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Turning, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).while_watching().available(always).while_typing().hints(&[
         hint(&[H::Moving, H::Turning, H::Flying, H::Probing], 9, "Esc", "done"),
         hint(&[H::Outline, H::Inspector], 9, "Esc", "picture"),
@@ -272,7 +272,7 @@ pub static COMMANDS: &[Command] = &[
     command(C::Panels, "field down", &[(Inspector, "Left"), (Overlay, "Left")], |c| c.step_field(-1.0)),
     command(C::Panels, "field up, fine", &[(Inspector, "Shift-Right"), (Overlay, "Shift-Right")], |c| c.step_field(0.1)).hints(&[hint(&[H::Inspector], 3, "Shift", "fine")]),
     command(C::Panels, "field down, fine", &[(Inspector, "Shift-Left"), (Overlay, "Shift-Left")], |c| c.step_field(-0.1)),
-    command(C::Panels, "field back to its default", &[(Inspector, "Backspace")], |c| c.clear_field()).hints(&[hint(&[H::Inspector], 5, "Backspace", "default")]),
+    command(C::Panels, "reset the field to its default", &[(Inspector, "Backspace")], |c| c.clear_field()).hints(&[hint(&[H::Inspector], 5, "Backspace", "default")]),
     command(C::Panels, "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()).while_watching(),
 
     command(C::File, "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::Picture], 9, "u", "undo")]),
@@ -281,13 +281,13 @@ pub static COMMANDS: &[Command] = &[
     command(C::File, "save as", &[(Anywhere, "W")], |c| c.ask_path()),
     command(C::File, "read the file again", &[(Anywhere, "Ctrl-o")], |c| c.reload()).available(always),
     command(C::File, "recover edits of a crashed session", &[], |c| c.ask_recovery()).available(always),
-    command(C::File, "write a checkpoint, to continue another time", &[(Anywhere, "K")], |c| c.checkpoint()),
+    command(C::File, "write a checkpoint to continue later", &[(Anywhere, "K")], |c| c.checkpoint()),
     command(C::File, "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).while_watching().available(always).over_image(),
     command(C::File, "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).while_watching().available(always).over_image().hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
 
     command(C::Picture, "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).while_watching().hints(&[hint(&[H::Picture, H::Watching], 10, "p", "PNG")]),
     command(C::Picture, "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).while_watching().hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
-    command(C::Picture, "look at the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).while_watching(),
+    command(C::Picture, "view the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).while_watching(),
     command(C::Picture, "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()).while_watching(),
     command(C::Picture, "render at another size", &[(Anywhere, "Ctrl-e")], |c| c.ask_export_size()),
     command(C::Picture, "cancel the running export", &[(Anywhere, "Ctrl-x")], |c| c.cancel_export()),
@@ -321,7 +321,7 @@ pub static COMMANDS: &[Command] = &[
 
     command(C::Help, "all keys", &[(Anywhere, "? F1")], |c| c.open_overlay(Overlay::Help { scroll: 0 })).while_watching().available(always).hints(&[hint(&[H::First, H::Picture, H::Watching], 12, "?", "keys")]),
     command(C::Help, "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.open_palette()).while_watching().available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::Picture], 11, ":", "all")]),
-    command(C::Help, "what the scene contains", &[], |c| c.open_overlay(Overlay::Inventory { scroll: 0 })),
+    command(C::Help, "inventory of the scene", &[], |c| c.open_overlay(Overlay::Inventory { scroll: 0 })),
 ];
 
 impl Chapter {

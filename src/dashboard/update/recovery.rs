@@ -39,7 +39,7 @@ impl UpdateContext<'_> {
             text,
             &[
                 ('r', "recover them: undo returns to the file", Answer::Recover),
-                ('f', "look at the file, decide later", Answer::Nothing),
+                ('f', "view the file, decide later", Answer::Nothing),
                 ('d', "discard them", Answer::Discard),
             ],
         );

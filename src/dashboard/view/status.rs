@@ -154,10 +154,10 @@ fn state(model: &Model, report: &Report, theme: &Theme) -> (String, Style) {
         State::Tracing if model.paused => ("‖ paused", theme.warn()),
         State::Tracing => ("● tracing", theme.accent()),
         State::Finished(StoppedBy::Noise | StoppedBy::Rmse) => {
-            ("✓ converged, resting", theme.good())
+            ("✓ converged, finished", theme.good())
         }
-        State::Finished(StoppedBy::Spp) => ("✓ samples reached, resting", theme.good()),
-        State::Finished(StoppedBy::Time) => ("✓ time over, resting", theme.good()),
+        State::Finished(StoppedBy::Spp) => ("✓ samples reached, finished", theme.good()),
+        State::Finished(StoppedBy::Time) => ("✓ time over, finished", theme.good()),
         State::Finished(StoppedBy::RaysPerPixel) => ("✓ rays per pixel reached", theme.good()),
         State::Finished(StoppedBy::Full) => ("✓ no more samples fit", theme.good()),
     };

@@ -107,7 +107,7 @@ impl<R: Read> FilmReader<R> {
         let magic = input.take(MAGIC.len() as u64, "its first bytes")?;
         if magic != MAGIC {
             return Err(input.error(
-                "it is no film file: its first bytes are others",
+                "it is not a film file",
                 "name a file that `zerkalo render --checkpoint` has written",
             ));
         }
@@ -142,7 +142,7 @@ impl<R: Read> FilmReader<R> {
         }
         let mut header = head
             .and_then(|head| decode_head(&mut Fields::new(&head), length))
-            .ok_or_else(|| input.damaged("its head has impossible values"))?;
+            .ok_or_else(|| input.damaged("its header has invalid values"))?;
         header.metadata = metadata
             .and_then(|metadata| decode_metadata(&mut Fields::new(&metadata)))
             .ok_or_else(|| input.damaged("its metadata are not readable"))?;
@@ -217,7 +217,7 @@ impl<R: Read> FilmReader<R> {
                 visit(&mut fields, numbers.clone()).map(|()| tiles = numbers.end)
             });
             if visited.is_none() {
-                return Err(input.damaged(format!("a tile from {tiles} on has impossible values")));
+                return Err(input.damaged(format!("a tile from {tiles} on has invalid values")));
             }
             checksums.update(&next.checksum);
             next = input.chunk()?;

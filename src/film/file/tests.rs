@@ -132,7 +132,7 @@ fn altered_bytes_are_refused() {
         assert!(!error.what.is_empty() && !error.remedy.is_empty());
     }
     let error = read(b"\x89PNG\r\n\x1a\n0000").unwrap_err().to_string();
-    assert!(error.contains("it is no film file") && error.contains("--checkpoint"), "{error}");
+    assert!(error.contains("it is not a film file") && error.contains("--checkpoint"), "{error}");
     let mut newer = bytes.clone();
     newer[8] = 2;
     let error = read(&newer).unwrap_err().to_string();
@@ -167,5 +167,5 @@ fn claimed_size_is_compared_with_the_length_of_the_file() {
     let head = vec![header.encode()];
     let end = encode_end(&film, &head);
     let error = read(&[&head[0][..], &end].concat()).unwrap_err().to_string();
-    assert!(error.contains("its head has impossible values"), "{error}");
+    assert!(error.contains("its header has invalid values"), "{error}");
 }

@@ -143,7 +143,7 @@ impl Plan {
         };
         if !bytes.starts_with(START) {
             let remedy = "name a file that `zerkalo plan` has written";
-            return Err(whole(&lines, "it is no plan: its first line is another", remedy));
+            return Err(whole(&lines, "it is not a plan file", remedy));
         }
         let Ok(text) = std::str::from_utf8(bytes) else {
             return Err(whole(&lines, "it is damaged: it is not UTF-8", DAMAGED));
@@ -372,7 +372,7 @@ mod tests {
         }
         let other = parsed("zerkalo plan 2\n").unwrap_err();
         assert!(other.contains("job.plan:1: found `zerkalo plan 2`"), "{other}");
-        assert!(parsed("[film]\nsize = [1, 1]\n").unwrap_err().contains("it is no plan"));
+        assert!(parsed("[film]\nsize = [1, 1]\n").unwrap_err().contains("it is not a plan file"));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Edit targets: parts of a scene that can be selected and edited.
 
-use crate::scene::{Diagnostic, Object, Problem, Scene};
+use crate::scene::{Object, Scene};
 use crate::value::truncated;
 
 /// Selectable and editable part of a scene.
@@ -124,38 +124,6 @@ impl Target {
         keys.iter().map(|key| key.to_string()).collect()
     }
 
-    /// Returns the target at `path`, which is the path of a [`Problem`]. Returns `None` if the path
-    /// does not lead to a target, for example that of the whole scene.
-    pub fn of_path(path: &[String]) -> Option<Self> {
-        let index = || path.get(1)?.parse().ok();
-        match path.first()?.as_str() {
-            "camera" => Some(Self::Camera),
-            "cameras" => path.get(1).cloned().map(Self::View),
-            "ambient" => Some(Self::Ambient),
-            "background" => Some(Self::Background),
-            "light" => index().map(Self::Light),
-            "object" => index().map(Self::Object),
-            "materials" => path.get(1).cloned().map(Self::Material),
-            "film" => Some(Self::Film),
-            "trace" => Some(Self::IntegratorSettings),
-            _ => None,
-        }
-    }
-
-    /// Returns the target that `problem` is about, and the key inside this target. The key is empty
-    /// if the problem is about the target as a whole.
-    pub fn of_finding(problem: &Problem) -> Option<(Self, String)> {
-        let subject = Self::of_path(&problem.path)?;
-        let key = problem.path.get(subject.path().len()..).unwrap_or_default();
-        Some((subject, key.join(".")))
-    }
-
-    /// Returns the target that `message` is about; `None` if it is about none.
-    pub fn of_message(scene: &Scene, message: &Diagnostic) -> Option<Self> {
-        let subjects = outline(scene).into_iter().map(|(_, subject)| subject);
-        subjects.into_iter().find(|subject| subject.title(scene) == message.subject)
-    }
-
     /// Returns the name of the target in the outline: `lamp`, `light 2`. An object without a name
     /// is named by its kind and index: `sphere 3` is the third object. Names from files are
     /// sanitised and truncated to 40 characters.
@@ -219,24 +187,8 @@ mod tests {
     }
 
     #[test]
-    fn problems_and_diagnostics_lead_to_their_target() {
-        let mut scene = built_in();
-        scene.lights[0].name.clear();
-        scene.cameras.insert("left".into(), scene.camera.clone());
-        for (_, subject) in outline(&scene) {
-            assert_eq!(Target::of_path(&subject.path()).as_ref(), Some(&subject));
-            let message = Diagnostic {
-                file: String::new(),
-                line_column: None,
-                subject: subject.title(&scene),
-                found: String::new(),
-                help: String::new(),
-            };
-            assert_eq!(Target::of_message(&scene, &message), Some(subject));
-        }
-        scene.materials.get_mut("red").unwrap().roughness = -1.0;
-        let found = Target::of_finding(&scene.faults()[0]);
-        assert_eq!(found, Some((Target::Material("red".into()), "roughness".into())));
+    fn targets_exist_and_have_materials() {
+        let scene = built_in();
         assert!(!Target::Object(6).exists(&scene) && !Target::View("x".into()).exists(&scene));
         assert_eq!(Target::Object(2).material(&scene), Some(Target::Material("red".into())));
         assert_eq!(Target::Camera.material(&scene), None);

@@ -92,8 +92,8 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     }
     let [top, bottom] = [upper, lower].map(nearest);
     let error = |looks: [Oklab; 2]| target[0].distance(looks[0]) + target[1].distance(looks[1]);
-    let halves_error = error([top, bottom].map(|index| BARE.look(index.into())));
-    if top != bottom && halves_error + HALVES_GAIN < error([SHADED.look(shade); 2]) {
+    let halves_error = error([top, bottom].map(|index| BARE.color(index.into())));
+    if top != bottom && halves_error + HALVES_GAIN < error([SHADED.color(shade); 2]) {
         return PictureCell {
             glyph: '▀',
             fg: CellColor::Indexed(top),

@@ -58,7 +58,7 @@ pub fn nearest(rgb: [u8; 3]) -> u8 {
 
 /// Returns the OKLab lightness, 0..=1, of a colour of the cube or a grey.
 pub fn lightness(index: u8) -> f32 {
-    CHOICES.look(usize::from(index.saturating_sub(FIRST))).l
+    CHOICES.color(usize::from(index.saturating_sub(FIRST))).l
 }
 
 #[cfg(test)]

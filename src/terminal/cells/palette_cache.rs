@@ -10,7 +10,7 @@ const BITS: usize = 6;
 /// Palette with a cache: it stores the nearest palette colour of each sRGB colour, rounded to 6
 /// bits per channel.
 pub struct PaletteCache {
-    looks: Vec<Oklab>,
+    colors: Vec<Oklab>,
     /// Index plus 1 of the nearest palette colour, for each of the 2^18 rounded sRGB colours. 0
     /// means that it was not searched yet.
     known: Vec<AtomicU16>,
@@ -18,13 +18,13 @@ pub struct PaletteCache {
 
 impl PaletteCache {
     /// Creates a palette of 1 to 65,535 colours.
-    pub fn new(looks: Vec<Oklab>) -> Self {
-        Self { looks, known: (0..1 << (3 * BITS)).map(|_| AtomicU16::new(0)).collect() }
+    pub fn new(colors: Vec<Oklab>) -> Self {
+        Self { colors, known: (0..1 << (3 * BITS)).map(|_| AtomicU16::new(0)).collect() }
     }
 
     /// Returns the palette colour `index`.
-    pub fn look(&self, index: usize) -> Oklab {
-        self.looks[index]
+    pub fn color(&self, index: usize) -> Oklab {
+        self.colors[index]
     }
 
     /// Returns the index of the palette colour nearest to `rgb`. `rgb` is rounded to 6 bits per
@@ -48,7 +48,7 @@ impl PaletteCache {
     /// Returns the index of the palette colour nearest to `target`.
     pub fn search(&self, target: Oklab) -> usize {
         let mut best = (f32::INFINITY, 0);
-        for (index, look) in self.looks.iter().enumerate() {
+        for (index, look) in self.colors.iter().enumerate() {
             let distance = target.distance_squared(*look);
             if distance < best.0 {
                 best = (distance, index);

@@ -213,7 +213,7 @@ impl FlowControl {
 
     /// Returns `true` if the caller should now measure the kernel's send queue and pass the result
     /// to [`FlowControl::held_back`].
-    pub fn asks_kernel(&self, now: Duration) -> bool {
+    pub fn wants_queue_length(&self, now: Duration) -> bool {
         self.measures_at(now).is_some_and(|at| at <= now)
     }
 

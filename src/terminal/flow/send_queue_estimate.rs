@@ -17,7 +17,7 @@ pub struct SendQueueEstimate {
     /// Number of bytes in the queue: the last measurement plus the bytes sent since.
     pub bytes: f64,
     /// Time of the last measurement.
-    pub asked: Option<Duration>,
+    pub measured_at: Option<Duration>,
     /// Number of bytes sent in total.
     sent: f64,
     /// Time of the last frame.
@@ -93,7 +93,7 @@ impl SendQueueEstimate {
     pub fn next_at(&self, interval: Duration) -> Option<Duration> {
         self.busy.as_ref()?;
         let settled = self.sent_at + SETTLING;
-        Some(self.asked.map_or(settled, |asked| settled.max(asked + interval)))
+        Some(self.measured_at.map_or(settled, |at| settled.max(at + interval)))
     }
 
     /// Returns the time since which no bytes have left a queue that is not empty.
@@ -110,7 +110,7 @@ impl SendQueueEstimate {
         limit: f64,
         round_trip: Option<Duration>,
     ) -> QueueSample {
-        self.asked = Some(now);
+        self.measured_at = Some(now);
         let Some(busy) = &mut self.busy else {
             self.bytes = bytes as f64;
             return QueueSample::default();

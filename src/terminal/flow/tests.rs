@@ -168,7 +168,7 @@ fn send_queue_replaces_lost_replies() {
     let now = LOST_AFTER * MAX_LOSSES;
     // The kernel no longer lists the connection.
     flow.sent(now, 4000, true, 0);
-    assert!(flow.measures_at(now).is_some_and(|at| flow.asks_kernel(at)));
+    assert!(flow.measures_at(now).is_some_and(|at| flow.wants_queue_length(at)));
     flow.held_back(now, None);
     assert_eq!(flow.reading().unwrap().mode, PacingMode::FixedRate);
 }
@@ -222,7 +222,7 @@ impl MeasuredWire {
         let mut longest = Duration::ZERO;
         for at in from * 1000..(from + seconds) * 1000 {
             let now = ms(at);
-            if flow.asks_kernel(now) {
+            if flow.wants_queue_length(now) {
                 let queue = self.queue(now);
                 flow.held_back(now, Some(queue));
             }
@@ -341,7 +341,7 @@ fn rate_is_true_behind_a_relay_that_buffers() {
         let mut pass = |seconds: std::ops::Range<u64>, wants: &dyn Fn(u64, usize) -> usize| {
             for at in seconds.start * 1000..seconds.end * 1000 {
                 let now = ms(at);
-                if flow.asks_kernel(now) {
+                if flow.wants_queue_length(now) {
                     let backlog = wire.free_at.saturating_sub(now).as_secs_f64() * rate;
                     flow.held_back(now, Some((backlog - RELAYED).max(0.0) as usize));
                 }
@@ -385,11 +385,14 @@ fn connection_without_acknowledgements_becomes_silent() {
     while flow.silent_at(None).unwrap() > now {
         assert!(now < ms(60_000));
         now += ms(20);
-        if flow.asks_kernel(now) {
+        if flow.wants_queue_length(now) {
             flow.held_back(now, Some(5000));
         }
     }
-    assert_eq!(flow.measures_at(now), Some(flow.send_queue.asked.unwrap() + STALLED_INTERVAL));
+    assert_eq!(
+        flow.measures_at(now),
+        Some(flow.send_queue.measured_at.unwrap() + STALLED_INTERVAL)
+    );
     // Input and acknowledgements are signs of life.
     flow.act(now);
     assert!(flow.silent_at(None).unwrap() > now);

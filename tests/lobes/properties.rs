@@ -1,6 +1,6 @@
-//! Physical properties of each reflection model, verified by tests.
+//! Physical properties that the tests demand of each reflection model.
 
-use crate::material::{Fresnel, Highlight, Lobe};
+use zerkalo::material::{Fresnel, Highlight, Lobe};
 
 /// Energy balance of a reflection model at coefficient 1 and reflectance 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,13 +28,17 @@ impl BsdfProperties {
     pub const LAMBERT: Self = Self { reciprocal: true, energy: Energy::Conserving };
 }
 
-impl Lobe {
-    /// Returns the properties of reflection by this lobe.
-    ///
-    /// The lobes `cone` and `square` are uniform about the mirror direction, so that their density
-    /// is symmetric in light and view. The BSDF is this density divided by the cosine of the light;
-    /// it is therefore not symmetric.
-    pub fn properties(self) -> BsdfProperties {
+/// A reflection model with known properties.
+pub trait ReflectionModel {
+    /// Returns the properties of reflection by this model.
+    fn properties(self) -> BsdfProperties;
+}
+
+impl ReflectionModel for Lobe {
+    // The lobes `cone` and `square` are uniform about the mirror direction, so that their density
+    // is symmetric in light and view. The BSDF is this density divided by the cosine of the light;
+    // it is therefore not symmetric.
+    fn properties(self) -> BsdfProperties {
         match self {
             Self::Mirror => BsdfProperties { reciprocal: true, energy: Energy::Conserving },
             Self::Cone | Self::Square => {
@@ -47,9 +51,8 @@ impl Lobe {
     }
 }
 
-impl Highlight {
-    /// Returns the properties of this highlight model.
-    pub fn properties(self) -> BsdfProperties {
+impl ReflectionModel for Highlight {
+    fn properties(self) -> BsdfProperties {
         match self {
             Self::Phong => BsdfProperties { reciprocal: false, energy: Energy::Unbounded },
             Self::CookTorrance => BsdfProperties { reciprocal: true, energy: Energy::Losing },
@@ -57,14 +60,12 @@ impl Highlight {
     }
 }
 
-impl Fresnel {
-    /// Returns the properties of a transparent surface in this Fresnel mode, for reflection and
-    /// transmission together.
-    pub fn transmission_properties(self) -> BsdfProperties {
-        match self {
-            Self::Dielectric => BsdfProperties { reciprocal: true, energy: Energy::Conserving },
-            // k_r and k_t are independent, and the inner sides of surfaces do not reflect.
-            _ => BsdfProperties { reciprocal: false, energy: Energy::Unbounded },
-        }
+/// Returns the properties of a transparent surface in the Fresnel mode `fresnel`, for reflection
+/// and transmission together.
+pub fn transmission_properties(fresnel: Fresnel) -> BsdfProperties {
+    match fresnel {
+        Fresnel::Dielectric => BsdfProperties { reciprocal: true, energy: Energy::Conserving },
+        // k_r and k_t are independent, and the inner sides of surfaces do not reflect.
+        _ => BsdfProperties { reciprocal: false, energy: Energy::Unbounded },
     }
 }
