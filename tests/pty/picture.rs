@@ -161,6 +161,6 @@ fn restart_rendering(terminal: &mut Terminal, spp: u32) {
     let done = format!("{spp} of {spp} spp");
     terminal.wait_for(&done, |screen| {
         let text = screen.contents();
-        (text.contains("finished") && text.contains(&done)).then_some(())
+        (text.contains("✓ samples reached") && text.contains(&done)).then_some(())
     });
 }

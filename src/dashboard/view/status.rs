@@ -153,11 +153,9 @@ fn state(model: &Model, report: &Report, theme: &Theme) -> (String, Style) {
         State::Paused => ("‖ paused", theme.warn()),
         State::Tracing if model.paused => ("‖ paused", theme.warn()),
         State::Tracing => ("● tracing", theme.accent()),
-        State::Finished(StoppedBy::Noise | StoppedBy::Rmse) => {
-            ("✓ converged, finished", theme.good())
-        }
-        State::Finished(StoppedBy::Spp) => ("✓ samples reached, finished", theme.good()),
-        State::Finished(StoppedBy::Time) => ("✓ time over, finished", theme.good()),
+        State::Finished(StoppedBy::Noise | StoppedBy::Rmse) => ("✓ converged", theme.good()),
+        State::Finished(StoppedBy::Spp) => ("✓ samples reached", theme.good()),
+        State::Finished(StoppedBy::Time) => ("✓ time over", theme.good()),
         State::Finished(StoppedBy::RaysPerPixel) => ("✓ rays per pixel reached", theme.good()),
         State::Finished(StoppedBy::Full) => ("✓ no more samples fit", theme.good()),
     };
