@@ -1,15 +1,14 @@
 //! The film of a session is independent of threads, interruptions and earlier scenes.
 
+use crate::support;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use zerkalo::film::Display;
+use zerkalo::render::Checkpoint;
 use zerkalo::render::export::Provenance;
-use zerkalo::render::schedule::{Criterion, Settings, Stop};
+use zerkalo::render::schedule::Stop;
 use zerkalo::render::session::{Report, Session, State};
-use zerkalo::render::{Checkpoint, Options};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
+use zerkalo::sampling::SamplerKind;
 use zerkalo::scene::Scene;
-use zerkalo::world;
 
 const SCENE: &str = r#"
 [film]
@@ -34,14 +33,7 @@ shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0,
 "#;
 
 fn session(threads: usize, adaptive: bool) -> Session {
-    let options = Options {
-        world: world::Options::default(),
-        sampling: SampleSettings { seed: 3, kind: SamplerKind::Sobol },
-        display: Display::default(),
-    };
-    let stop = Stop { spp: Some(150), ..Stop::default() };
-    let settings = Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
-    Session::new(threads, options, settings).unwrap()
+    support::session(threads, 3, Stop { spp: Some(150), ..Stop::default() }, adaptive)
 }
 
 fn scene() -> Arc<Scene> {

@@ -1,4 +1,4 @@
-//! `zerkalo doctor`: reports the abilities of the terminal and of the connection, how the dashboard
+//! `zerkalo doctor`: reports the capabilities of the terminal and of the connection, how the dashboard
 //! uses them, and how to improve them.
 
 use crate::command::args::DoctorArgs;

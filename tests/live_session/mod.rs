@@ -3,18 +3,16 @@
 
 mod noise;
 
+use crate::support;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 use zerkalo::film::{Display, LinearImage, Tone};
 use zerkalo::lanes::{SimdFloat, Single};
-use zerkalo::render::Options;
-use zerkalo::render::schedule::{Criterion, Settings, Stop, StoppedBy};
+use zerkalo::render::schedule::{Stop, StoppedBy};
 use zerkalo::render::session::{Session, Snapshot, State, View};
-use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::value::Color;
-use zerkalo::world;
 
 const SCENE: &str = r#"
 [film]
@@ -61,17 +59,7 @@ fn noise(codes: f64) -> Stop {
 }
 
 fn session(stop: Stop, adaptive: bool) -> Session {
-    session_of(3, stop, adaptive)
-}
-
-fn session_of(seed: u64, stop: Stop, adaptive: bool) -> Session {
-    let options = Options {
-        world: world::Options::default(),
-        sampling: SampleSettings { seed, kind: SamplerKind::Sobol },
-        display: Display::default(),
-    };
-    let settings = Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
-    Session::new(2, options, settings).unwrap()
+    support::session(2, 3, stop, adaptive)
 }
 
 fn wait(session: &Session, wanted: impl Fn(&Snapshot) -> bool) -> Snapshot {

@@ -131,55 +131,51 @@ fn picture_follows_terminal_size() {
     assert_eq!(terminal.end().0, 0);
 }
 
+/// Opens and closes the help, then quits. This takes no prompt, because no scene was edited.
+fn open_help_and_quit(mut terminal: Terminal) {
+    terminal.send("?");
+    terminal.wait_for_text("orbit left");
+    terminal.send("\x1b");
+    terminal.wait_until_gone("orbit left");
+    terminal.send("q");
+    assert_eq!(terminal.end().0, 0);
+}
+
 #[test]
 fn pasted_text_is_not_keys() {
     let fixture = Fixture::new();
     let mut terminal = fixture.open(&[], [120, 36]);
     wait_for_picture(&terminal);
     terminal.send("\x1b[200~qqq]]]x\x1b[201~");
-    // Nothing was edited, so the program quits without a prompt.
-    terminal.send("?");
-    terminal.wait_for_text("orbit left");
-    terminal.send("\x1b");
-    terminal.wait_until_gone("orbit left");
-    terminal.send("q");
-    assert_eq!(terminal.end().0, 0);
+    open_help_and_quit(terminal);
 }
 
 /// Environment of an SSH connection.
 const SSH: &[(&str, &str)] = &[("SSH_CONNECTION", "192.0.2.1 50000 192.0.2.2 22")];
 
+/// Opens the dashboard over SSH, in a terminal that replies to requests or does not.
+fn open_over_ssh(fixture: &Fixture, replies: bool) -> Terminal {
+    let (folder, size) = (fixture.0.path(), [120, 36]);
+    let terminal = Terminal::start(&Start { command: &[PROGRAM], folder, size, env: SSH, replies });
+    wait_for_picture(&terminal);
+    terminal
+}
+
 #[test]
 fn terminal_without_replies_gets_a_fixed_rate() {
     let fixture = Fixture::new();
-    let (folder, size) = (fixture.0.path(), [120, 36]);
-    let start = Start { command: &[PROGRAM], folder, size, env: SSH, replies: false };
-    let mut terminal = Terminal::start(&start);
-    wait_for_picture(&terminal);
+    let terminal = open_over_ssh(&fixture, false);
     terminal.wait_for_text("KB/s fixed");
-    terminal.send("?");
-    terminal.wait_for_text("orbit left");
-    terminal.send("\x1b");
-    terminal.wait_until_gone("orbit left");
-    terminal.send("q");
-    assert_eq!(terminal.end().0, 0);
+    open_help_and_quit(terminal);
 }
 
 #[test]
 fn unrequested_replies_are_not_keys() {
     let fixture = Fixture::new();
-    let (folder, size) = (fixture.0.path(), [120, 36]);
-    let start = Start { command: &[PROGRAM], folder, size, env: SSH, replies: true };
-    let mut terminal = Terminal::start(&start);
-    wait_for_picture(&terminal);
+    let mut terminal = open_over_ssh(&fixture, true);
     terminal.wait_for_text("KB/s");
     terminal.send("\x1b[24;80R\x1b]11;rgb:1e1e/1e1e/2e2e\x1b\\\x1b[?2026;2$y\x1b_Gi=31;OK\x1b\\\x1b[>0;276;0c");
-    terminal.send("?");
-    terminal.wait_for_text("orbit left");
-    terminal.send("\x1b");
-    terminal.wait_until_gone("orbit left");
-    terminal.send("q");
-    assert_eq!(terminal.end().0, 0);
+    open_help_and_quit(terminal);
 }
 
 /// The probe waits for replies until a signal arrives.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use zerkalo::film::{Display, Film, Replicates};
 use zerkalo::render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
+use zerkalo::render::session::Session;
 use zerkalo::render::wave::{Job, Wave, WaveReport};
 use zerkalo::render::{Options, RenderState};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
@@ -50,6 +51,17 @@ pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> RenderState {
 pub fn begin_with(scene: &Scene, sampling: SampleSettings, precision: Precision) -> RenderState {
     let world = world::Options { precision, ..world::Options::default() };
     RenderState::new(scene, &Options { world, sampling, display: Display::default() }, None)
+}
+
+/// A session that traces with `threads` threads until `stop`.
+pub fn session(threads: usize, seed: u64, stop: Stop, adaptive: bool) -> Session {
+    let options = Options {
+        world: world::Options::default(),
+        sampling: SampleSettings { seed, kind: SamplerKind::Sobol },
+        display: Display::default(),
+    };
+    let settings = Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel: 0, stop };
+    Session::new(threads, options, settings).unwrap()
 }
 
 /// A pool of `threads` threads.
