@@ -34,7 +34,7 @@ impl<S: Float> MicrofacetDistribution<S> {
 
     /// Samples a microfacet normal that is visible from `view`. Both are in the frame of the
     /// surface normal. `u` and `v` are uniform in [0, 1). The density is G_1 D V.H / N.V, with G_1
-    /// of [`MicrofacetEval::visibility`].
+    /// of `MicrofacetEval::visibility`.
     #[inline(always)]
     pub fn sample_visible<L: SimdFloat<Scalar = S>>(
         &self,

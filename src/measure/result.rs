@@ -179,7 +179,7 @@ impl Measured {
 
     /// Returns the time at which the true error fell to `codes`, interpolated between points in
     /// log-log coordinates. Returns `None` if the error stayed larger. Points with an uncertain
-    /// error are ignored, see [`MAX_SPREAD`].
+    /// error are ignored, see `MAX_SPREAD`.
     pub fn time_to(&self, codes: f64) -> Option<TimeToTarget> {
         self.interpolated_time(codes, |p| {
             let certain = p.errors.spread <= MAX_SPREAD;

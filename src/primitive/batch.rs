@@ -208,7 +208,7 @@ fn occluded<L: SimdFloat>(
 /// Origin of an item: index of its form, and part of the form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PrimitiveId {
-    /// Index of the form in the list given to [`compile`].
+    /// Index of the form in the list given to `compile`.
     pub form: usize,
     /// Number of the part of a compound; 0 for other forms. In lists of items the first part means
     /// the whole compound; further parts are never intersected on their own.

@@ -65,7 +65,7 @@ pub(crate) fn append(out: &mut String, command: impl Command) {
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Full-screen use of the terminal. Dropping this value restores the terminal, as does a panic in
-/// any thread. After any other end of the process, a [`Restorer`] restores it, if one could be
+/// any thread. After any other end of the process, a `Restorer` restores it, if one could be
 /// started.
 pub struct Screen {
     tty: Arc<Tty>,
