@@ -15,7 +15,7 @@ A scene file is [TOML](https://toml.io) text in UTF-8. Only objects are needed: 
 and every key with a default may be left out. Unknown keys are errors.
 
 - The coordinate system is right-handed: x to the right, y up, z towards the viewer. *Near* is +z.
-- Lengths are in scene units, whatever those are; |coordinates| are at most 1e9.
+- Lengths are in scene units of any size. Coordinates are from -1e9 to 1e9.
 - Angles are in degrees. Rotations are counter-clockwise seen against the axis: from above, for a
   rotation about the vertical.
 - A colour is `[red, green, blue]`, linear, or `\"#rrggbb\"`, sRGB. It may exceed 1.
@@ -46,13 +46,13 @@ and every key with a default may be left out. Unknown keys are errors.
 - Where a transparent surface coincides with another one, within rounding, as the bottom of a glass on
   a table, the picture is the limit of a vanishing gap between them: light leaves the glass and then
   hits the table, whichever face rounding puts in front. Two glasses that touch have such a gap, too,
-  whatever their indices: for one body that fills both, let them overlap. Of solids on the same side
+  also with equal indices: to make one body of both, let them overlap. Of solids on the same side
   of a common face, such as a box in the corner of a larger one, the transparent one lies outside the
   opaque one, and of transparent ones the one listed last. An open transparent surface on an opaque
   one is in front of it on either side; of two, the one listed last. Which of two coincident opaque
-  surfaces is visible is left to rounding, but is the same for every `acceleration`, number of
-  threads and SIMD width; where it matters, move one of them by a thousandth of its size, or make
-  both one compound, which shows the part listed first.
+  surfaces is visible depends on rounding, but not on `acceleration`, number of threads or SIMD
+  width. To decide it, move one of them by a thousandth of its size, or make one compound of both,
+  which shows the part listed first.
 - A light on a surface, within rounding, acts as a light at a vanishing distance from it, on the side
   of the lit point. So a light on the ceiling lights all of the room; the surface itself stays dark.
   A solid occludes what is behind it. An open surface (plane, platform, rectangle) has no inside, so
@@ -76,7 +76,7 @@ and every key with a default may be left out. Unknown keys are errors.
   that of lights with a size. The emission of other shapes (torus, cylinder, cone, plane, compound,
   sphere scaled to an ellipsoid, larger mesh) is found only by rays that hit them: the camera's,
   reflected, transmitted, and those of diffuse bounces. It makes no highlights, and without
-  `max_diffuse_depth` it does not light matt surfaces; `zerkalo check` says so.
+  `max_diffuse_depth` it does not light matt surfaces; `zerkalo check` reports this.
 - A texture multiplies the `color` of its material in the ambient and the diffuse part. White leaves
   it unchanged: `color = [1.0, 1.0, 1.0]` with `texture.image = { file = \"wood.png\", scale =
   [2.0, 2.0] }` or `texture.checker = { even = \"#ffffff\", odd = \"#202020\" }`. A bump,
@@ -100,8 +100,8 @@ and every key with a default may be left out. Unknown keys are errors.
 - An environment light is infinitely far away in all directions. It adds to the background, lights matt
   surfaces, makes highlights, and is seen by the camera and in mirrors unless `visible = false`. Its image
   is equirectangular: the top row is up (+y), the middle is towards -z, a quarter to the right of the middle
-  is +x. Numbers of Radiance and OpenEXR files are radiances, with negative ones taken as 0; numbers of PNG
-  and JPEG files are sRGB levels. An image has at most 33554432 pixels.
+  is +x. Values of Radiance and OpenEXR files are radiances (negative values are
+  replaced by 0); values of PNG and JPEG files are sRGB levels. An image has at most 33554432 pixels.
 - A spot light has its full intensity inside the cone of `inner_angle` about its axis and none outside the
   cone of `outer_angle`. Between them the factor is t^2 (3 - 2t), where t rises linearly with the cosine of
   the angle from 0 at the outer to 1 at the inner cone. Equal angles make a sharp edge.
@@ -109,8 +109,8 @@ and every key with a default may be left out. Unknown keys are errors.
   distance. With `inverse-square` the intensity is a radiant intensity [W/sr]: the
   irradiance is intensity x cosine / distance squared.
 
-- Files of earlier versions open, too: `zerkalo check` names the first word that has another name now,
-  and saving writes the present words. `index` became `ior`, `reflectance` `f0`, `depth` `max_depth`,
+- Files of earlier versions open, too. `zerkalo check` reports the first renamed word, and saving
+  writes the current words. `index` became `ior`, `reflectance` `f0`, `depth` `max_depth`,
   `min_weight` `min_throughput`, `level` `ray_types`, `horizon` `below_horizon`, `unit_cylinder`
   `unit_frustum`, `[views.NAME]` `[cameras.NAME]`, filter `center` `point`; accelerations `projected`,
   `object`, `world` and `hierarchy` became `screen-bounds`, `obb`, `aabb` and `bvh`.
