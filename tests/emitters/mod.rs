@@ -4,4 +4,4 @@ mod forms;
 mod irradiance;
 mod mirrors;
 mod objects;
-mod setup;
+pub(crate) mod setup;

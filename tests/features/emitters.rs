@@ -1,8 +1,9 @@
 //! Lights with a size.
 
+use crate::emitters::setup::check;
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Change, material, row};
-use crate::support::shipped;
+use crate::support::{parsed, shipped};
 use zerkalo::light::{Environment, Light, LightUnit, Point};
 use zerkalo::scene::Scene;
 
@@ -50,6 +51,24 @@ fn d5_rectangle_light() {
             ("a matt floor", &|s| material(s, "floor").reflection = 0.0),
         ],
     );
+    let filled = |height: f64| {
+        let side = 0.5 * height;
+        let scene = parsed(&format!(
+            "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
+             [camera]\neye = [0.0, 0.1, 0.0]\ndirection = [0.0, -1.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
+             view_angle.vertical = 0.1\n\
+             [materials.mirror]\nambient = 0.0\ndiffuse = 0.0\nspecular = 0.0\nreflection = 0.7\n\
+             lobe = \"cone\"\nroughness = 0.2\n\
+             [[light]]\nrectangle = {{ center = [0.0, {height:?}, 0.0], size = [{side:?}, {side:?}], \
+             normal = [0.0, -1.0, 0.0] }}\n\
+             [[object]]\nmaterial = \"mirror\"\n\
+             shape.platform = {{ center = [0.0, 0.0, 0.0], size = [0.2, 0.2] }}\n"
+        ));
+        (format!("height {height}"), scene, 0.7)
+    };
+    // A light that fills the cone lobe. Either technique alone finds all of its light, points of the light with the
+    // weight 0.22 and reflected rays with the weight 0.78.
+    check(&[filled(0.5), filled(1.0), filled(20.0)], 1 << 14, [1e-4, 1e-9]);
 }
 
 #[test]
