@@ -32,6 +32,7 @@ fn scenes() -> Vec<(String, Scene)> {
         "lobe-ggx.toml",
         "glass.toml",
         "depth-of-field.toml",
+        "many-lights.toml",
     ]
     .map(|name| (name.to_string(), sized(shipped(name), SIZE)))
     .into()
@@ -267,6 +268,7 @@ fn golden_pictures_do_not_depend_on_lane_count() {
         ("reflecting-tracks", "--noise 2"),
         ("gallery-glass", "--spp 45"),
         ("rays-per-pixel", "--spp 50 --uniform"),
+        ("many-lights", "--rmse 0.004"),
     ] {
         let scene = format!("{}/scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
         let mut command = Command::new(env!("CARGO_BIN_EXE_zerkalo"));

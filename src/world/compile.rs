@@ -16,6 +16,7 @@ use crate::world::integrator::indirect_diffuse::DiffuseLimits;
 use crate::world::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::world::integrator::surface_textures::SurfaceTextures;
 use crate::world::inventory::{Inventory, InventorySources};
+use crate::world::light_choice::LightChoice;
 use crate::world::light_groups::{LightGroupSource, LightGroups};
 use crate::world::lights_on_surfaces::OnSurface;
 use crate::world::radiance_range::SceneDistances;
@@ -178,6 +179,7 @@ struct CompiledLights<S> {
     groups: LightGroups,
     scales: Vec<f64>,
     sources: Vec<DeltaSource<S>>,
+    choice: Option<LightChoice<S>>,
     emitters: Vec<EmitterSource<S>>,
     environments: Vec<EnvironmentSource<S>>,
     emission: SurfaceEmission<S>,
@@ -207,12 +209,13 @@ impl<S: Float> CompiledLights<S> {
             });
             Some(ShadowRayTarget { light: delta, on_surface })
         };
-        let sources = light_sources(scene, &emitting, delta_light);
+        let mut sources = light_sources(scene, &emitting, delta_light);
+        let choice = LightChoice::take(&mut sources);
         let emitter = |light: &Light| Emitter::new(light, geometry.origin, lift);
         let emitters = light_sources(scene, &emitting, emitter);
         let environments = light_sources(scene, &emitting, EnvironmentLight::new);
         let emission = SurfaceEmission::new(scene, &geometry.forms, primitives, &groups, lift);
-        Self { groups, scales, sources, emitters, environments, emission }
+        Self { groups, scales, sources, choice, emitters, environments, emission }
     }
 
     /// Returns the target of the shadow rays (a point or a direction) for each light without a
@@ -234,13 +237,15 @@ impl<S: Float> CompiledLights<S> {
         let emitters = emitters.map(|light| (light.center(), light.radius()));
         let objects = self.emission.emitters().map(|light| (light.center(), light.radius()));
         let balls = emitters.chain(objects);
-        balls.map(|(center, radius)| BoundingSphere { center, radius }).collect()
+        let balls = balls.map(|(center, radius)| BoundingSphere { center, radius });
+        balls.chain(self.choice.iter().flat_map(LightChoice::balls)).collect()
     }
 
     /// Number of lights without a size, of emitters and of objects from which light is sampled.
     /// Environments have no lists of occluders.
     fn count(&self) -> usize {
-        self.sources.len() + self.emitters.len() + self.emission.counts()[0]
+        let strata = self.choice.as_ref().map_or(0, LightChoice::strata);
+        self.sources.len() + self.emitters.len() + self.emission.counts()[0] + strata
     }
 
     /// Largest distance between a light and the end point of its shadow rays.
@@ -364,6 +369,7 @@ impl<L: SimdFloat> World<L> {
                 bsdfs: &materials.bsdfs,
                 groups: &lights.groups.members,
                 lights: lights.count() + lights.environments.len(),
+                light_choice: lights.choice.is_some(),
                 emissive: lights.emission.counts(),
                 diffuse_limits: materials.diffuse_limits(scene),
                 precision: if L::EPSILON > 1e-10 { "single" } else { "double" },
@@ -395,6 +401,7 @@ impl<L: SimdFloat> World<L> {
             groups: lights.groups,
             scales: lights.scales,
             sources: lights.sources,
+            light_choice: lights.choice,
             emitters: lights.emitters,
             environments: lights.environments,
             emission: lights.emission,

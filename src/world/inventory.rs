@@ -23,6 +23,8 @@ pub(super) struct InventorySources<'a, S> {
     pub groups: &'a [LightGroupSource],
     /// Number of lights that emit.
     pub lights: usize,
+    /// `true` if paths choose among the point lights.
+    pub light_choice: bool,
     /// Number of emissive objects from which light is sampled, and of other emissive objects.
     pub emissive: [usize; 2],
     pub diffuse_limits: Option<DiffuseLimits>,
@@ -39,6 +41,7 @@ impl Inventory {
             bsdfs,
             groups,
             lights,
+            light_choice,
             emissive,
             precision,
             diffuse_limits,
@@ -101,6 +104,9 @@ impl Inventory {
         };
         for kind in ["point", "directional", "spot", "sphere", "rectangle", "disk", "environment"] {
             parts.extend(counted(light_count(kind), &format!("{kind} light")));
+        }
+        if light_choice {
+            parts.push("choice of lights".to_string());
         }
         parts.extend(counted(emissive[0] + emissive[1], "emissive object"));
         if emissive[1] > 0 {

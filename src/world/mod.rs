@@ -6,6 +6,7 @@ mod compile;
 mod culling;
 mod integrator;
 mod inventory;
+mod light_choice;
 mod light_groups;
 mod lights_on_surfaces;
 mod pixel_block;

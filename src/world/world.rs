@@ -17,6 +17,7 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::integrator::surface_textures::SurfaceTextures;
 use crate::world::integrator::transmission::{Branch, TransmissionIntegrator};
 use crate::world::inventory::Inventory;
+use crate::world::light_choice::LightChoice;
 use crate::world::light_groups::LightGroups;
 use crate::world::lights_on_surfaces::OnSurface;
 use crate::world::surface_emission::SurfaceEmission;
@@ -77,6 +78,8 @@ pub struct World<L: SimdFloat> {
     pub(super) bsdf_of: Vec<u32>,
     pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
     pub(super) sources: Vec<DeltaSource<L::Scalar>>,
+    /// Point lights of which a few are asked at each hit; `sources` holds the others. `None` if all are asked.
+    pub(super) light_choice: Option<LightChoice<L::Scalar>>,
     /// Lights with a size.
     pub(super) emitters: Vec<EmitterSource<L::Scalar>>,
     /// Environment lights.
@@ -168,8 +171,15 @@ impl<L: SimdFloat> World<L> {
         origin: [usize; 2],
         extent: [usize; 2],
     ) -> Option<TileCandidates> {
-        let lights = self.sources.len() + self.emitters.len() + self.emission.counts()[0];
+        let strata = self.light_choice.as_ref().map_or(0, LightChoice::strata);
+        let lights = self.first_stratum() + strata;
         self.culling.candidates(&self.geometry, lights, &self.camera, (origin, extent))
+    }
+
+    /// Index of the first stratum of chosen lights in the lists of occluders.
+    #[inline(always)]
+    pub(super) fn first_stratum(&self) -> usize {
+        self.sources.len() + self.emitters.len() + self.emission.counts()[0]
     }
 
     /// Returns `true` if the world has lights with a size, environment lights or emissive objects.

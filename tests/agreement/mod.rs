@@ -29,7 +29,7 @@ const REFERENCE_SAMPLES: u32 = 96;
 const SAMPLES: u32 = 512;
 
 /// Scenes that must be compared.
-const GALLERY: [&str; 17] = [
+const GALLERY: [&str; 18] = [
     "mirror-room.toml",
     "gallery-triptych.toml",
     "gallery-metals.toml",
@@ -47,6 +47,7 @@ const GALLERY: [&str; 17] = [
     "disk-light.toml",
     "environment.toml",
     "emissive-objects.toml",
+    "many-lights.toml",
 ];
 
 #[test]

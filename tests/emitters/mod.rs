@@ -2,6 +2,7 @@
 
 mod forms;
 mod irradiance;
+mod many;
 mod mirrors;
 mod objects;
 pub(crate) mod setup;

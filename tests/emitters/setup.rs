@@ -15,13 +15,12 @@ pub fn scene(text: &str) -> Scene {
     Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Mean and its standard error of the red radiance of the pixel (0, 0) over `count` independent
-/// samples, all light groups together. The lights have unit intensity.
-pub fn radiance<L: SimdFloat>(scene: &Scene, count: u32, seed: u64) -> (f64, f64) {
+/// Passes the red radiance of each light group in `count` independent samples of the pixel (0, 0) to `visit`. The lights
+/// have unit intensity, except those in a shared group.
+pub fn samples<L: SimdFloat>(scene: &Scene, count: u32, seed: u64, mut visit: impl FnMut(&[f64])) {
     let world = World::<L>::new(scene);
     let settings = SampleSettings { seed, kind: SamplerKind::Random };
     let sampler = Sampler::<L>::new(settings, world.camera_dimensions());
-    let (mut sum, mut squares) = (0.0, 0.0);
     for first in (0..count).step_by(L::WIDTH) {
         let points = sampler.block(first, L::WIDTH);
         let draws = points.for_pixel(sampler.key((0, 0), 0));
@@ -33,15 +32,30 @@ pub fn radiance<L: SimdFloat>(scene: &Scene, count: u32, seed: u64) -> (f64, f64
         world.trace(rays, None, &draws, L::mask(true), &mut radiance);
         for lane in 0..L::WIDTH {
             let groups = &radiance.groups[..world.groups()];
-            let sample: f64 = groups.iter().map(|g| g.x.lane(lane).to_f64()).sum();
-            assert!(sample.is_finite(), "seed {seed}, sample {first} + {lane}: {sample}");
-            sum += sample;
-            squares += sample * sample;
+            let sample: Vec<f64> = groups.iter().map(|g| g.x.lane(lane).to_f64()).collect();
+            let finite = sample.iter().all(|x| x.is_finite());
+            assert!(finite, "seed {seed}, sample {first} + {lane}: {sample:?}");
+            visit(&sample);
         }
     }
+}
+
+/// Mean and its standard error of a quantity with the given sum and sum of squares over `count` samples.
+pub fn mean_and_error(sum: f64, squares: f64, count: u32) -> (f64, f64) {
     let n = f64::from(count);
     let mean = sum / n;
     (mean, ((squares / n - mean * mean).max(0.0) / (n - 1.0)).sqrt())
+}
+
+/// Mean and its standard error of the red radiance of the pixel (0, 0), all light groups together; see [`samples`].
+pub fn radiance<L: SimdFloat>(scene: &Scene, count: u32, seed: u64) -> (f64, f64) {
+    let (mut sum, mut squares) = (0.0, 0.0);
+    samples::<L>(scene, count, seed, |groups| {
+        let sample: f64 = groups.iter().sum();
+        sum += sample;
+        squares += sample * sample;
+    });
+    mean_and_error(sum, squares, count)
 }
 
 /// Checks the mean radiance of each scene against its expected value by z-test in both precisions.

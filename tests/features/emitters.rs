@@ -1,11 +1,11 @@
-//! Lights with a size.
+//! Lights with a size, and many lights.
 
 use crate::emitters::setup::check;
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Change, material, row};
 use crate::support::{parsed, shipped};
-use zerkalo::light::{Environment, Light, LightUnit, Point};
-use zerkalo::scene::Scene;
+use zerkalo::light::{Environment, Falloff, Light, LightUnit, Point};
+use zerkalo::scene::{RayTypes, Scene};
 
 /// Asserts that `file` agrees with the plain tracer, and none of its `mutations` does.
 fn alike(file: &str, mutations: &[(&str, Change)]) {
@@ -120,6 +120,25 @@ fn d10_emissive_objects() {
             ("a brighter sign", &|s| material(s, "sign").emission *= 1.2),
             ("a sign with two sides", &|s| material(s, "sign").two_sided = true),
             ("no bounce that finds the ring", &|s| s.trace.max_diffuse_depth = 0),
+        ],
+    );
+}
+
+#[test]
+fn d11_many_lights() {
+    alike(
+        "many-lights.toml",
+        &[
+            ("three lamps switched off", &|s| s.lights[..3].iter_mut().for_each(|l| l.on = false)),
+            ("the second string without its lamps", &|s| s.lights.truncate(20)),
+            ("no falloff", &|s| s.lights[..20].iter_mut().for_each(|l| l.falloff = Falloff::None)),
+            ("strings exchanged", &|s| {
+                let colors: Vec<_> = s.lights.iter().map(|light| light.color).collect();
+                let lights = s.lights.iter_mut().rev();
+                lights.zip(colors).for_each(|(light, color)| light.color = color);
+            }),
+            ("no shadows", &|s| s.trace.ray_types = RayTypes::Primary),
+            ("a darker mirror", &|s| material(s, "mirror").reflection = 0.6),
         ],
     );
 }

@@ -122,7 +122,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
     }
     let origin = interaction.ray_origin();
     let view = -path.ray.direction;
-    let occluders = &candidates.occluders[world.sources.len()..];
+    let occluders = &candidates.occluders[world.sources.len()..world.first_stratum()];
     for (index, occluders) in occluders.iter().enumerate() {
         let numbers = sampler.light_2d(bounce, index as u32);
         let source = match world.emitters.get(index) {

@@ -1,5 +1,6 @@
 //! Integrators: radiance along camera rays.
 
+pub(crate) mod chosen_lights;
 pub(crate) mod coincident_surfaces;
 pub(crate) mod direct_lighting;
 pub(crate) mod emitter_lighting;

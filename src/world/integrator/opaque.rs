@@ -5,6 +5,7 @@ use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
 use crate::material::ReflectionLobe;
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
+use crate::world::integrator::chosen_lights::chosen_lights;
 use crate::world::integrator::direct_lighting::direct_lighting;
 use crate::world::integrator::emitter_lighting::{
     ReflectingLobes, emitter_lighting, reflected_density, surface_emission, visible_emitters,
@@ -66,6 +67,17 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
             |_| None,
             (&mut *out, &mut counts),
         );
+        if let Some(choice) = &world.light_choice {
+            chosen_lights::<_, SIMPLE>(
+                world,
+                (choice, &candidates.occluders[world.first_stratum()..]),
+                path,
+                &interaction,
+                (sampler, bounce),
+                &|_| None,
+                (&mut *out, &mut counts),
+            );
+        }
         let is_last = bounce == depth;
         if EMITTERS {
             let lanes = if is_last { L::mask(false) } else { interaction.reflecting };

@@ -6,6 +6,7 @@ use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
 use crate::material::{Bsdf, Interface, InterfaceMedia, ReflectionLobe, Transmission};
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
+use crate::world::integrator::chosen_lights::chosen_lights;
 use crate::world::integrator::coincident_surfaces::{CoincidentQuery, CoincidentState, Contacts};
 use crate::world::integrator::direct_lighting::direct_lighting;
 use crate::world::integrator::emitter_lighting::{
@@ -189,6 +190,17 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             transmittance,
             (&mut *out, &mut *counts),
         );
+        if let Some(choice) = &world.light_choice {
+            chosen_lights::<_, false>(
+                world,
+                (choice, &candidates.occluders[world.first_stratum()..]),
+                path,
+                &interaction,
+                (self.sampler, bounce),
+                &transmittance,
+                (&mut *out, &mut *counts),
+            );
+        }
         if has_emitters {
             let lobes = if bounce == depth {
                 ReflectingLobes { lanes: L::mask(false), share: L::one() }

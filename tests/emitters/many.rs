@@ -1,0 +1,115 @@
+//! Many point lights, of which each path asks a few, against the sum over all of them.
+
+use crate::common::Numbers;
+use crate::common::normal::two_sided_z;
+use crate::emitters::setup::{array, check, mean_and_error, radiance, samples, scene};
+use glam::DVec3;
+use std::f64::consts::PI;
+use zerkalo::lanes::{Double, Single};
+use zerkalo::scene::Scene;
+
+/// Least number of point lights of which a few are chosen.
+const CHOSEN: usize = 16;
+
+/// Positions of `count` lights around the origin, a quarter of them below the plane y = 0, and some at the same place.
+fn positions(count: usize, numbers: &mut Numbers) -> Vec<DVec3> {
+    let position = |i: usize| match i % 9 {
+        8 => DVec3::new(0.5, 0.75, 0.25),
+        _ => numbers.in_cube(2.0) + DVec3::Y,
+    };
+    (0..count).map(position).collect()
+}
+
+/// Creates the scene of a white matt receiver at the origin that faces up, under lights of unit intensity. Every
+/// third light has no falloff.
+fn receiver(lights: &[DVec3]) -> Scene {
+    let mut text = "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
+         [camera]\neye = [0.0, 0.01, 0.0]\ndirection = [0.0, -1.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
+         view_angle.vertical = 0.1\n\
+         [materials.white]\ncolor = [1.0, 1.0, 1.0]\nambient = 0.0\ndiffuse = 1.0\nspecular = 0.0\n\
+         [[object]]\nmaterial = \"white\"\n\
+         shape.platform = { center = [0.0, 0.0, 0.0], size = [0.01, 0.01] }\n"
+        .to_string();
+    for (i, position) in lights.iter().enumerate() {
+        let falloff = if i.is_multiple_of(3) { "none" } else { "inverse-square" };
+        text += &format!(
+            "[[light]]\npoint = {{ position = {} }}\nfalloff = \"{falloff}\"\n",
+            array(*position)
+        );
+    }
+    scene(&text)
+}
+
+/// Radiance of the receiver by light `i` at `position`.
+fn expected(i: usize, position: DVec3) -> f64 {
+    let irradiance = if i.is_multiple_of(3) { PI } else { 1.0 / position.length_squared() };
+    irradiance * (position.y / position.length()).max(0.0) / PI
+}
+
+#[test]
+fn irradiance_of_chosen_lights_is_the_sum_over_all_lights() {
+    let mut numbers = Numbers::new(22);
+    let mut cases = Vec::new();
+    for count in [CHOSEN, 23, 24, 33, 64, 100, 191, 1000] {
+        let lights = positions(count, &mut numbers);
+        let sum = lights.iter().enumerate().map(|(i, position)| expected(i, *position)).sum();
+        cases.push((format!("{count} lights"), receiver(&lights), sum));
+    }
+    check(&cases, 1 << 15, [1e-4, 1e-9]);
+}
+
+/// Every light group has the right mean by itself, so that groups can be mixed afterwards.
+#[test]
+fn each_group_of_chosen_lights_has_its_own_mean() {
+    let lights = positions(40, &mut Numbers::new(7));
+    let scene = receiver(&lights);
+    let count = 1 << 16;
+    let mut sums: Vec<(f64, f64)> = Vec::new();
+    samples::<Single>(&scene, count, 5, |groups| {
+        sums.resize(groups.len(), (0.0, 0.0));
+        for ((sum, squares), sample) in sums.iter_mut().zip(groups) {
+            *sum += sample;
+            *squares += sample * sample;
+        }
+    });
+    assert_eq!(sums.len(), 8, "seven lights of their own, and a group of the others");
+    let limit = two_sided_z(1e-3 / sums.len() as f64);
+    for (group, (sum, squares)) in sums.into_iter().enumerate() {
+        let own = |i: &usize| if group < 7 { *i == group } else { *i >= 7 };
+        let expected: f64 = (0..lights.len()).filter(own).map(|i| expected(i, lights[i])).sum();
+        let (mean, error) = mean_and_error(sum, squares, count);
+        let off = (mean - expected).abs() - 1e-4 * expected;
+        assert!(off <= limit * error, "group {group}: {mean} ± {error}, expected {expected}");
+    }
+}
+
+/// Below the least number of lights all of them are asked, without noise.
+#[test]
+fn few_lights_are_all_asked() {
+    let lights = positions(CHOSEN, &mut Numbers::new(3));
+    let (_, error) = radiance::<Double>(&receiver(&lights[1..]), 64, 1);
+    assert!(error < 1e-9, "{error}");
+    let (_, error) = radiance::<Double>(&receiver(&lights), 64, 1);
+    assert!(error > 1e-3, "{error}");
+}
+
+/// Lights at one place, on surfaces, far away and very near give finite samples.
+#[test]
+fn a_thousand_lights_at_extreme_places_have_finite_samples() {
+    let mut lights = positions(1000, &mut Numbers::new(11));
+    for (i, light) in lights.iter_mut().enumerate() {
+        match i % 10 {
+            0 => *light = DVec3::new(0.001, 0.0, 0.002),
+            1 => *light *= 1e8,
+            2 => *light = DVec3::Y * 1e-7,
+            3 => *light = DVec3::ZERO,
+            _ => {}
+        }
+    }
+    let scene = receiver(&lights);
+    for (mean, error) in
+        [radiance::<Single>(&scene, 1 << 12, 1), radiance::<Double>(&scene, 1 << 12, 2)]
+    {
+        assert!(mean > 0.0 && error.is_finite(), "{mean} ± {error}");
+    }
+}
