@@ -1,8 +1,8 @@
 //! zerkalo: a progressive, accumulating ray tracer that lives in a terminal.
 //!
 //! ARCHITECTURE.md has the map of the folders and the allowed imports, which a test guards. The
-//! library consists of three crates, whose modules are all found here: `zerkalo-scene`,
-//! `zerkalo-render` and this one.
+//! library consists of four crates, whose modules are all found here: `zerkalo-scene`,
+//! `zerkalo-world`, `zerkalo-render` and this one.
 
 pub use zerkalo_render::{
     asset, bvh, camera, disk, film, lanes, light, material, primitive, render, sampling, scene,

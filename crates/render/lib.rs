@@ -1,15 +1,14 @@
-//! zerkalo, part 2 of 3: compiled worlds, films and rendering. All kernels are compiled here.
+//! zerkalo, part 3 of 4: films and rendering.
 //!
-//! The source is in `src`, one folder per module. The modules of part 1 are re-exported, so that
-//! paths are the same in every part.
+//! The source is in `src`, one folder per module. The modules of earlier parts are re-exported, so
+//! that paths are the same in every part.
 
-pub use zerkalo_scene::{
+pub use zerkalo_world::{
     asset, bvh, camera, disk, lanes, light, material, primitive, sampling, scene, shape, value,
+    world,
 };
 
 #[path = "../../src/film/mod.rs"]
 pub mod film;
 #[path = "../../src/render/mod.rs"]
 pub mod render;
-#[path = "../../src/world/mod.rs"]
-pub mod world;

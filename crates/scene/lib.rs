@@ -1,4 +1,4 @@
-//! zerkalo, part 1 of 3: descriptions of scenes, their files, and the kernels that intersect and shade.
+//! zerkalo, part 1 of 4: descriptions of scenes, their files, and the kernels that intersect and shade.
 //!
 //! The source is in `src`, one folder per module. The crate is separate so that it compiles beside
 //! the others.

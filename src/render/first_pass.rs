@@ -5,7 +5,7 @@ use crate::film::{Film, TILE, TILE_PIXELS, Tile, TileHandle, lattice_pixels};
 use crate::lanes::SimdFloat;
 use crate::render::pass::{PassContext, RejectedSamples, TileRenderer};
 use crate::render::wave::{JobReport, Wave, WaveReport};
-use crate::world::{AnyWorld, Counts, TileTracer, World, dispatch};
+use crate::world::{AnyWorld, Counts, TileTracer, World};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
@@ -20,7 +20,10 @@ pub fn run(
     context: PassContext,
     on_stage: &mut dyn FnMut(&Film),
 ) -> Option<WaveReport> {
-    dispatch!(world, world => trace_first_pass(world, film, wave, context, on_stage))
+    match world {
+        AnyWorld::Single(world) => trace_first_pass(world, film, wave, context, on_stage),
+        AnyWorld::Double(world) => trace_first_pass(world, film, wave, context, on_stage),
+    }
 }
 
 /// Number of adjacent tiles in a strip. The tiles of a strip share packets in stages that add only

@@ -6,7 +6,6 @@ use crate::render::wave::{Job, JobReport, Wave, WaveReport};
 use crate::sampling::SampleSettings;
 use crate::world::{
     AnyWorld, CameraTracer, Counts, MAX_BLOCK_PIXELS, MAX_GROUPS, Radiance, TileTracer, World,
-    dispatch,
 };
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,7 +31,10 @@ pub fn run(
     estimator: &Estimator,
     context: PassContext,
 ) -> WaveReport {
-    dispatch!(world, world => run_typed(world, film, wave, estimator, context))
+    match world {
+        AnyWorld::Single(world) => run_typed(world, film, wave, estimator, context),
+        AnyWorld::Double(world) => run_typed(world, film, wave, estimator, context),
+    }
 }
 
 /// Traces the jobs as [`run`] does, for one lane type.

@@ -43,12 +43,11 @@ pub enum AnyWorld {
 macro_rules! dispatch {
     ($any:expr, $world:ident => $value:expr) => {
         match $any {
-            $crate::world::AnyWorld::Single($world) => $value,
-            $crate::world::AnyWorld::Double($world) => $value,
+            AnyWorld::Single($world) => $value,
+            AnyWorld::Double($world) => $value,
         }
     };
 }
-pub(crate) use dispatch;
 
 impl AnyWorld {
     /// Compiles `scene`, which has no validation errors.

@@ -333,6 +333,7 @@ impl<L: SimdFloat> World<L> {
         Self::compile(scene, &RecenteredGeometry::new(scene), false)
     }
 
+    #[inline(never)]
     pub(super) fn compile(
         scene: &Scene,
         recentered: &RecenteredGeometry,

@@ -19,7 +19,6 @@ mod truncation_bias;
 #[allow(clippy::module_inception, reason = "the file of `World`, in the folder of the same name")]
 mod world;
 
-pub(crate) use any_world::dispatch;
 pub use any_world::{AnyWorld, Options, Precision};
 pub use culling::tile::TileCandidates;
 pub use integrator::first_hit::FirstHit;
@@ -28,4 +27,4 @@ pub use inventory::Inventory;
 pub use light_groups::{LightGroupSource, LightGroups, MAX_GROUPS};
 pub use pixel_block::MAX_BLOCK_PIXELS;
 pub use tile_tracer::{CameraTracer, TileTracer, TracedPacket};
-pub use world::World;
+pub use world::{KERNELS, World};

@@ -2,7 +2,7 @@
 
 use crate::bvh::Ray;
 use crate::camera::PerspectiveCamera;
-use crate::lanes::{Float, SimdFloat, Vec3};
+use crate::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use crate::light::{DeltaLight, Emitter, EnvironmentLight};
 use crate::material::Bsdf;
 use crate::primitive::Aggregate;
@@ -240,3 +240,19 @@ impl<L: SimdFloat> World<L> {
         first_hit::trace_first_hits(self, points, hits);
     }
 }
+
+/// Type of [`World::trace`] for the lane type `L`.
+type Trace<L> = fn(
+    &World<L>,
+    (Vec3<L>, Vec3<L>),
+    Option<&TileCandidates>,
+    &PacketSampler<'_, L>,
+    <L as SimdFloat>::Mask,
+    &mut Radiance<L>,
+) -> Counts;
+
+/// [`World::trace`] in both precisions. The library needs no table of these functions: naming them
+/// makes the compiler generate their machine code in this crate. Other crates then call it instead
+/// of generating their own.
+#[doc(hidden)]
+pub static KERNELS: (Trace<Single>, Trace<Double>) = (World::trace, World::trace);

@@ -43,13 +43,17 @@ type Meeting = (f64, DVec3, usize, usize);
 
 impl Leaf {
     /// Distances, normals and triangle indices of all crossings.
-    fn crossings(&self, origin: DVec3, direction: DVec3) -> Vec<(f64, DVec3, usize)> {
+    fn crossings(
+        &self,
+        origin: DVec3,
+        direction: DVec3,
+    ) -> impl Iterator<Item = (f64, DVec3, usize)> {
         let origin = self.own_from_scene.transform_point3(origin);
         let direction = self.own_from_scene.transform_vector3(direction);
-        let hits = self.pieces.iter().flat_map(|piece| piece.meet(origin, direction)).flatten();
-        let hits = hits.map(|(t, n)| (t, n, 0));
-        let mesh_hits = self.mesh.iter().flat_map(|mesh| mesh.meet(origin, direction));
-        hits.chain(mesh_hits).map(|(t, n, i)| (t, self.scene_normal(n), i)).collect()
+        let hits = self.pieces.iter().flat_map(move |piece| piece.meet(origin, direction));
+        let hits = hits.flatten().map(|(t, n)| (t, n, 0));
+        let mesh_hits = self.mesh.iter().flat_map(move |mesh| mesh.meet(origin, direction));
+        hits.chain(mesh_hits).map(|(t, n, i)| (t, self.scene_normal(n), i))
     }
 
     /// Interpolated normal of triangle `i` at `point`; `None` for flat shading.

@@ -133,10 +133,18 @@ fn torus_crossings(
         return Vec::new();
     }
     let place = |i: usize| middle + half * (2.0 * i as f64 / STEPS as f64 - 1.0);
+    // The height is a distance: it keeps its sign over this number of steps. The factor covers
+    // rounding.
+    let steps_per_height = 0.999 * STEPS as f64 / (2.0 * half * length2.sqrt());
     let mut out = Vec::new();
     let mut before = height(place(0));
+    let mut next = 1 + (before.abs() * steps_per_height) as usize;
     for i in 1..=STEPS {
+        if i < next {
+            continue;
+        }
         let after = height(place(i));
+        next = i + 1 + (after.abs() * steps_per_height) as usize;
         if (before < 0.0) != (after < 0.0) {
             let (mut low, mut high) = (place(i - 1), place(i));
             for _ in 0..60 {

@@ -13,7 +13,8 @@ pub type Crossings = Box<dyn Fn(DVec3, DVec3) -> Vec<f64> + Sync>;
 
 /// Analytic form of an object.
 pub enum AnalyticShape {
-    Solid(Inside),
+    /// Implicit function, and its largest slope: infinity if that is unknown.
+    Solid(Inside, f64),
     Thin(Crossings),
 }
 
@@ -32,7 +33,16 @@ impl AnalyticShape {
                 let [width, height] = r.size;
                 Self::Thin(rectangle(v(r.center), right * (0.5 * width), up * (0.5 * height)))
             }
-            shape => Self::Solid(placed(inside(shape), &object.transform)),
+            shape => {
+                let is_distance =
+                    matches!(shape, Shape::Sphere(_) | Shape::Plane(_) | Shape::Cuboid(_))
+                        && !object
+                            .transform
+                            .iter()
+                            .any(|step| matches!(step, TransformOp::Scale(_)));
+                let slope = if is_distance { 1.0 } else { f64::INFINITY };
+                Self::Solid(placed(inside(shape), &object.transform), slope)
+            }
         }
     }
 }

@@ -107,11 +107,20 @@ fn check_hit(ray: &PixelRay, near: f64, shapes: &[AnalyticShape], hit: &FirstHit
     let (first, last) = (near_t + tolerance, far_t - 2.0 * tolerance);
     for (i, shape) in shapes.iter().enumerate() {
         match shape {
-            AnalyticShape::Solid(inside) => {
+            AnalyticShape::Solid(inside, slope) => {
                 let side = inside(point_at(first)) < 0.0;
+                // Number of steps over which a value of 1 keeps its sign. The factor covers rounding.
+                let steps_per_value = 0.999 * STEPS as f64 / ((last - first).abs() * slope);
+                let mut next = 1;
                 for k in 1..=STEPS {
+                    if k < next {
+                        continue;
+                    }
                     let t = first + (last - first) * k as f64 / STEPS as f64;
                     let f = inside(point_at(t));
+                    if (f < 0.0) == side {
+                        next = k + 1 + (f.abs() * steps_per_value) as usize;
+                    }
                     if f.abs() > 4.0 * tolerance && (f < 0.0) != side {
                         return Err(format!("the ray crosses object {i} before {depth}"));
                     }
@@ -135,7 +144,7 @@ fn check_hit(ray: &PixelRay, near: f64, shapes: &[AnalyticShape], hit: &FirstHit
         return Err(format!("the normal {normal} points away from the eye"));
     }
     match shape {
-        AnalyticShape::Solid(inside) => {
+        AnalyticShape::Solid(inside, _) => {
             let f = inside(end);
             if f.abs() > 4.0 * tolerance {
                 return Err(format!("the hit is {f} off the surface of object {object}"));

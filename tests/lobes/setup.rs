@@ -99,6 +99,18 @@ pub fn each_reflection<L: SimdFloat>(
     count: u32,
     mut take: impl FnMut(Vector, Vector),
 ) {
+    reflect::<L>(material, (incident, n), fold, numbers, count, &mut take);
+}
+
+/// [`each_reflection`] with one instance per lane type.
+fn reflect<L: SimdFloat>(
+    material: &Material,
+    (incident, n): (Vector, Vector),
+    fold: bool,
+    numbers: Numbers,
+    count: u32,
+    take: &mut dyn FnMut(Vector, Vector),
+) {
     let finish = Bsdf::<L::Scalar>::new(material, true);
     let (strength, spread) = finish.reflection.unwrap();
     let (incident, n) = (Vec3::<L>::of(incident), Vec3::<L>::of(n));
@@ -159,6 +171,18 @@ pub fn each_crossing<L: SimdFloat>(
     numbers: Numbers,
     count: u32,
     mut take: impl FnMut(Crossing),
+) {
+    cross::<L>(material, (incident, n), (sides, fold), numbers, count, &mut take);
+}
+
+/// [`each_crossing`] with one instance per lane type.
+fn cross<L: SimdFloat>(
+    material: &Material,
+    (incident, n): (Vector, Vector),
+    (sides, fold): (Sides, bool),
+    numbers: Numbers,
+    count: u32,
+    take: &mut dyn FnMut(Crossing),
 ) {
     let finish = Bsdf::<L::Scalar>::new(material, true);
     let transmission = finish.transmission.unwrap();

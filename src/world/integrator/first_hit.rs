@@ -26,6 +26,7 @@ impl FirstHit {
 
 /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the same
 /// length. A point is a column and a row of the raster in pixels, with fractions.
+#[inline(never)]
 pub(crate) fn trace_first_hits<L: SimdFloat>(
     world: &World<L>,
     points: &[[f64; 2]],

@@ -194,6 +194,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
 
     /// Returns the media in which camera rays start: the solids whose boundary each ray first hits
     /// from inside.
+    #[inline(never)]
     pub fn at_start(&self, ray: &Ray<L>) -> MediumStack<L> {
         let mut media = MediumStack::vacuum();
         for (priority, solid) in &self.around_eye {
