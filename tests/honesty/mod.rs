@@ -1,6 +1,7 @@
 //! Estimated errors against true errors, and unbiasedness of the picture, on a scene with a closed form for
 //! every pixel and on the mirror room.
 
+mod coverage;
 mod scenes;
 mod survey;
 

@@ -1,6 +1,7 @@
 //! Random scenes for the honesty survey: sparse pictures, whose noise is concentrated in few pixels, and dense ones.
 
 use crate::common::Numbers;
+use crate::honesty::coverage::Balls;
 use crate::support::{parsed, shipped, sized};
 use std::fmt::Write;
 use zerkalo::scene::Scene;
@@ -23,6 +24,8 @@ pub const KINDS: [&str; 10] = [
 pub struct Sample {
     pub name: String,
     pub scene: Scene,
+    /// Closed form of the picture, for unshaded balls.
+    pub balls: Option<Balls>,
 }
 
 /// Uniform integer from `low` to `high`.
@@ -42,15 +45,21 @@ pub fn scene(seed: u64) -> Sample {
     let kind = (seed % KINDS.len() as u64) as usize;
     let mut n = Numbers::new(seed.wrapping_mul(0x9e37_79b9) ^ 0x5eed);
     let size = [[160, 120], [160, 128], [200, 100], [240, 180]][whole(&mut n, 0, 3) as usize];
+    let name = format!("{seed} {}", KINDS[kind]);
+    let unshaded = |balls: Balls| Sample {
+        name: name.clone(),
+        scene: parsed(&balls_text(&balls, size)),
+        balls: Some(balls),
+    };
     let scene = match kind {
-        0 => balls(&mut n, size, 1, 1.0),
+        0 => return unshaded(balls(&mut n, size, 1, 1.0)),
         1 => {
             let count = whole(&mut n, 20, 100);
-            balls(&mut n, size, count, 1.0)
+            return unshaded(balls(&mut n, size, count, 1.0));
         }
         2 => {
             let (count, bright) = (whole(&mut n, 100, 500), n.log_uniform(3.0, 100.0));
-            balls(&mut n, size, count, bright)
+            return unshaded(balls(&mut n, size, count, bright));
         }
         3 => hairlines(&mut n, size),
         4 => checkerboard(&mut n, size),
@@ -71,7 +80,7 @@ pub fn scene(seed: u64) -> Sample {
             scene
         }
     };
-    Sample { name: format!("{seed} {}", KINDS[kind]), scene }
+    Sample { name, scene, balls: None }
 }
 
 fn head(size: [u32; 2], background: &str, ambient: f64) -> String {
@@ -83,22 +92,29 @@ fn head(size: [u32; 2], background: &str, ambient: f64) -> String {
 }
 
 /// Even balls of about a pixel, or smaller and brighter than white.
-fn balls(n: &mut Numbers, size: [u32; 2], count: u32, brightness: f64) -> Scene {
+fn balls(n: &mut Numbers, size: [u32; 2], count: u32, radiance: f64) -> Balls {
     let pixel = 2.0 * HALF_HEIGHT / f64::from(size[1]);
     let across = HALF_HEIGHT * f64::from(size[0]) / f64::from(size[1]);
-    let mut text = head(size, "[0.01, 0.01, 0.01]", 1.0);
-    write!(text, "[materials.m]\ncolor = {:?}\ndiffuse = 0.0\n", [brightness; 3]).unwrap();
-    for _ in 0..count {
+    let ball = |_| {
         let (x, y) = (n.between(-across, across), n.between(-HALF_HEIGHT, HALF_HEIGHT));
         let radius =
-            pixel * if brightness > 1.0 { n.log_uniform(0.05, 0.5) } else { n.between(0.3, 1.5) };
+            pixel * if radiance > 1.0 { n.log_uniform(0.05, 0.5) } else { n.between(0.3, 1.5) };
+        ([x, y, 0.0], radius)
+    };
+    Balls { balls: (0..count).map(ball).collect(), radiance, background: 0.01 }
+}
+
+fn balls_text(balls: &Balls, size: [u32; 2]) -> String {
+    let mut text = head(size, &format!("{:?}", [balls.background; 3]), 1.0);
+    write!(text, "[materials.m]\ncolor = {:?}\ndiffuse = 0.0\n", [balls.radiance; 3]).unwrap();
+    for ([x, y, z], radius) in &balls.balls {
         write!(
             text,
-            "[[object]]\nmaterial = \"m\"\nshape.sphere = {{ center = [{x}, {y}, 0.0], radius = {radius} }}\n"
+            "[[object]]\nmaterial = \"m\"\nshape.sphere = {{ center = [{x}, {y}, {z}], radius = {radius} }}\n"
         )
         .unwrap();
     }
-    parsed(&text)
+    text
 }
 
 /// Long boxes thinner than a pixel.

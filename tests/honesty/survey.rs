@@ -16,28 +16,33 @@ const LIMIT_SPP: u32 = 1024;
 /// Effective pixels of a scene's pictures after which their error over the estimate is known to 1 / sqrt(1600) or 2.5 %.
 const ENOUGH: f64 = 1600.0;
 
-fn codes(rendering: &RenderState) -> Vec<f64> {
+fn codes(radiance: &[[f64; 3]]) -> Vec<f64> {
     let display = Display::default();
-    let radiance = picture(rendering, Replicates::Both);
     radiance.iter().flat_map(|rgb| display.codes(*rgb)).collect()
 }
 
-/// A uniform picture of another seed with its own estimated error.
+/// The closed form of a picture, or a uniform picture of another seed with its own estimated error.
 struct Reference {
     codes: Vec<f64>,
     own: f64,
 }
 
 impl Reference {
+    /// `count` is the number of samples of each replicate of a picture without a closed form.
     fn new(sample: &Sample, count: u32) -> Self {
+        if let Some(balls) = &sample.balls {
+            let radiance = balls.pixels(sample.scene.film.size.map(|n| n as usize));
+            let gray: Vec<[f64; 3]> = radiance.into_iter().map(|value| [value; 3]).collect();
+            return Self { codes: codes(&gray), own: 0.0 };
+        }
         let rendering = rendered(&sample.scene, 987_654, Precision::Auto, count);
         let own = rendering.film.noise(&rendering.mix, &Display::default()).unwrap().rmse_codes;
-        Self { codes: codes(&rendering), own }
+        Self { codes: codes(&picture(&rendering, Replicates::Both)), own }
     }
 
     /// True mean squared error of a picture in 8-bit levels, without the error of the reference; below 0 by chance.
     fn square(&self, rendering: &RenderState) -> f64 {
-        let got = codes(rendering);
+        let got = codes(&picture(rendering, Replicates::Both));
         let sum: f64 = got.iter().zip(&self.codes).map(|(g, r)| (g - r).powi(2)).sum();
         sum / got.len() as f64 - self.own * self.own
     }
@@ -166,6 +171,23 @@ fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     assert_honest(&outcomes);
 }
 
+/// Repeated decisions do not give the fewest samples to tiles whose validation estimate is low by chance: stars whose
+/// error was 1.55 times the reported one.
+#[test]
+fn reported_error_of_stars_is_not_selected() {
+    let Outcome { of_seeds, .. } = examine(62, 0, 24);
+    assert!((0.9..1.3).contains(&of_seeds), "true/reported {of_seeds}");
+}
+
+/// Uniform pictures report the error of all pixels, not the larger one of two estimates: single balls whose error was 0.77
+/// to 0.8 of the reported one. The ratio of each is uncertain by 6 %.
+#[test]
+fn reported_error_of_few_pixels_is_that_of_all() {
+    let ratios = [60, 130, 180].map(|number| examine(number, 0, 96).of_seeds);
+    let mean = ratios.iter().product::<f64>().cbrt();
+    assert!((0.88..1.12).contains(&mean), "true/reported {ratios:?}");
+}
+
 /// 200 scenes, or `ZERKALO_SCENES` from `ZERKALO_FIRST` on.
 #[test]
 #[ignore = "hours: cargo test --test engine honesty::survey_of_200 -- --ignored --nocapture"]
@@ -174,7 +196,7 @@ fn survey_of_200_scenes() {
         |name: &str, default| std::env::var(name).map_or(default, |v| v.parse().unwrap());
     let first: u64 = variable("ZERKALO_FIRST", 0);
     let numbers = first..first + variable("ZERKALO_SCENES", 200);
-    let outcomes: Vec<Outcome> = numbers.map(|number| examine(number, 4096, 64)).collect();
+    let outcomes: Vec<Outcome> = numbers.map(|number| examine(number, 4096, 1024)).collect();
     let finite = || outcomes.iter().filter(|o| o.of_seeds.is_finite());
     let inside = finite().filter(|o| (0.9..=1.15).contains(&o.of_seeds)).count();
     let extreme = finite().map(|o| o.of_seeds).fold(0.0, f64::max);
@@ -197,7 +219,8 @@ fn single_ball_ends_with_few_samples() {
         [materials.white]\ncolor = [1.0, 1.0, 1.0]
         [[object]]\nmaterial = \"white\"
         shape.sphere = { center = [1.222713, -2.075768, 0.0], radius = 0.019905 }";
-    let sample = Sample { name: "single ball".into(), scene: crate::support::parsed(text) };
+    let scene = crate::support::parsed(text);
+    let sample = Sample { name: "single ball".into(), scene, balls: None };
     for seed in 0..6 {
         let stop = Stop { noise_codes: Some(0.2), spp: Some(4 * LIMIT_SPP), ..Stop::default() };
         let (_, uniform, reason) = run(&sample, seed, false, stop, |_, _| false);

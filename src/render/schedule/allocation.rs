@@ -7,11 +7,13 @@
 //! did not select them (cross-fitting, Chernozhukov et al. 2018).
 //!
 //! The expected error of a tile is calibrated by similar tiles. Tiles with similar allocation
-//! estimates and sample counts form a *class*. The error of a class is the mean of the validation
-//! estimates of its tiles. An allocation estimate that is low by chance therefore starves no tile:
-//! a feature that only validation pixels contain raises the expected error of all tiles of the
-//! class. An allocation estimate that is high by chance draws few samples from other tiles.
+//! estimates and sample counts form a *class*. The expected error is mostly the mean of the
+//! validation estimates of the class. An allocation estimate that is low by chance therefore
+//! starves no tile: a feature that only validation pixels contain raises the expected error of all
+//! tiles of the class. An allocation estimate that is high by chance draws few samples from other
+//! tiles.
 
+use crate::film::TILE_PIXELS;
 use crate::render::schedule::tile::Tile;
 use crate::render::schedule::{Criterion, MAX_SAMPLES, SAMPLE_ALIGNMENT, Schedule, to_packet};
 use crate::render::wave::Job;
@@ -39,6 +41,16 @@ const WORTHWHILE: f64 = 0.25;
 /// Weight of a tile's own allocation estimate, relative to the validation estimate of one tile of
 /// its class.
 const OWN_WEIGHT: f64 = 0.25;
+/// Number of tiles below which a class is widened by the nearest classes. The validation estimate of
+/// a tile then has little weight in its own expected error. In a class of few tiles, those whose
+/// estimate is low by chance would get no samples, and the sum of the validation estimates, which is
+/// reported, would be too low. True over reported error of 40 pictures of balls of a pixel and of
+/// stars (`tests/honesty`, 48 to 64 seeds each): 1.02 to 1.55 without widening, 0.96 to 1.24 with 9
+/// tiles, 0.94 to 1.23 with 17.
+const MIN_CLASS_TILES: f64 = 17.0;
+/// Largest distance of a class by which another one is widened: a factor of 4 in the estimate, or
+/// two octaves of the sample count.
+const MAX_CLASS_DISTANCE: u32 = 4;
 
 /// A block of samples that a decision may allocate to a tile.
 pub(super) struct Candidate {
@@ -244,31 +256,69 @@ impl Schedule {
     }
 
     /// Returns the expected error of each tile. It is a weighted mean of the validation estimates
-    /// of all tiles of its class and of the tile's own allocation estimate. The weights are numbers
-    /// of pixels; that of the own estimate is multiplied by [`OWN_WEIGHT`]. The own estimate keeps
-    /// the expected error above 0 if the tile is alone in its class and its validation estimate is
-    /// 0.
+    /// of its class, which is widened if it has few tiles, and of the tile's own allocation
+    /// estimate. The weights are numbers of pixels; that of the own estimate is multiplied by
+    /// [`OWN_WEIGHT`]. The own estimate keeps the expected error above 0 if the validation
+    /// estimates of the class are 0.
     fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
         let variance =
             |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);
-        let mut classes: BTreeMap<Class, (f64, f64)> = BTreeMap::new();
         let class_of = |tile: &Tile, models: &TileModels| -> Class {
             let estimate = variance(&models.allocation, tile);
             (tile.done.ilog2(), (estimate > 0.0).then(|| (2.0 * estimate.log2()).floor() as i32))
         };
+        let mut classes: BTreeMap<Class, WeightedSum> = BTreeMap::new();
         for (tile, models) in self.tiles.iter().zip(models) {
-            let (sum, weight) = classes.entry(class_of(tile, models)).or_default();
-            *sum += f64::from(tile.pixels) * variance(&models.validation, tile);
-            *weight += f64::from(tile.pixels);
+            let sum = classes.entry(class_of(tile, models)).or_default();
+            sum.add(f64::from(tile.pixels), variance(&models.validation, tile));
         }
+        let widened: BTreeMap<Class, WeightedSum> =
+            classes.keys().map(|class| (*class, widened(*class, &classes))).collect();
         let calibrate = |(tile, models): (&Tile, &TileModels)| {
-            let (sum, weight) = classes[&class_of(tile, models)];
-            let own_weight = OWN_WEIGHT * f64::from(tile.pixels);
-            let own_sum = own_weight * variance(&models.allocation, tile);
-            let mse = (own_sum + sum) / (own_weight + weight) / f64::from(tile.done);
-            models.allocation.through(tile.done, mse)
+            let mut expected = widened[&class_of(tile, models)];
+            expected.add(OWN_WEIGHT * f64::from(tile.pixels), variance(&models.allocation, tile));
+            models.allocation.through(tile.done, expected.mean() / f64::from(tile.done))
         };
         self.tiles.iter().zip(models).map(calibrate).collect()
+    }
+}
+
+/// Returns the sum over `class` and its nearest classes, as far as it takes to reach
+/// [`MIN_CLASS_TILES`]. The validation estimates of the other classes are scaled to the allocation
+/// estimate of `class`. A class without any estimated error is returned alone.
+fn widened(class: Class, classes: &BTreeMap<Class, WeightedSum>) -> WeightedSum {
+    let mut sum = classes[&class];
+    let (octave, Some(half_octave)) = class else { return sum };
+    for distance in 1..=MAX_CLASS_DISTANCE {
+        if sum.weight >= MIN_CLASS_TILES * TILE_PIXELS as f64 {
+            break;
+        }
+        for ((other_octave, other), others) in classes {
+            let Some(other) = other else { continue };
+            if 2 * octave.abs_diff(*other_octave) + half_octave.abs_diff(*other) == distance {
+                sum.sum += others.sum * 2f64.powf(0.5 * f64::from(half_octave - other));
+                sum.weight += others.weight;
+            }
+        }
+    }
+    sum
+}
+
+/// Sum of weighted values, with the sum of the weights.
+#[derive(Clone, Copy, Default)]
+struct WeightedSum {
+    sum: f64,
+    weight: f64,
+}
+
+impl WeightedSum {
+    fn add(&mut self, weight: f64, value: f64) {
+        self.sum += weight * value;
+        self.weight += weight;
+    }
+
+    fn mean(self) -> f64 {
+        self.sum / self.weight
     }
 }
 

@@ -152,7 +152,7 @@ impl Schedule {
             self.samples += u64::from(job.count) * u64::from(tile.pixels);
             self.rays += report.rays;
             let count = job.first + job.count;
-            tile.record(report, count);
+            tile.record(report);
             if wave.replicate == 1 {
                 tile.done = count;
             }
@@ -169,7 +169,7 @@ impl Schedule {
 
     /// Computes the picture's noise from that of its tiles.
     fn update_noise(&mut self) {
-        self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error.map(|(_, e)| e)));
+        self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error));
         if let Some(noise) = self.noise {
             self.convergence.record(self.rays as f64, self.settings.criterion.of_picture(noise));
         }
@@ -183,13 +183,13 @@ impl Schedule {
     /// Latest estimate of each tile's RMSE in 8-bit levels, in row order; 0 before the first
     /// estimate.
     pub fn tile_noise_codes(&self) -> Vec<f32> {
-        let codes = |t: &Tile| t.error.map_or(0.0, |(_, e)| e.of_all().codes.sqrt() as f32);
+        let codes = |t: &Tile| t.error.map_or(0.0, |e| e.of_all().codes.sqrt() as f32);
         self.tiles.iter().map(codes).collect()
     }
 
     /// Latest estimate of each tile's error, in row order; `None` before the first estimate.
     pub(super) fn tile_estimates(&self) -> impl Iterator<Item = Option<TileNoise>> {
-        self.tiles.iter().map(|tile| tile.error.map(|(_, error)| error))
+        self.tiles.iter().map(|tile| tile.error)
     }
 
     /// Number of samples traced so far, over all pixels.

@@ -67,7 +67,7 @@ impl Schedule {
             schedule.samples += traced;
             schedule.rays += tile.rays;
         }
-        let estimates: Vec<_> = samples.iter().map(|s| Some((s.count, s.error))).collect();
+        let estimates: Vec<_> = samples.iter().map(|s| Some(s.error)).collect();
         schedule.set_estimates(&estimates);
         schedule
     }

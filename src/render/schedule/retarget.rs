@@ -27,10 +27,9 @@ impl Schedule {
         self.convergence = ConvergenceFit::default();
     }
 
-    /// Sets the estimates of all tiles, in row order. They were made between two waves. An entry
-    /// `(count, error)` is an estimate from `count` samples per replicate; `None` means that the
-    /// tile has too few samples.
-    pub fn set_estimates(&mut self, estimates: &[Option<(u32, TileNoise)>]) {
+    /// Sets the estimates of all tiles, in row order. They were made between two waves. `None`
+    /// means that the tile has too few samples.
+    pub fn set_estimates(&mut self, estimates: &[Option<TileNoise>]) {
         for (tile, estimate) in self.tiles.iter_mut().zip(estimates) {
             tile.set_estimate(*estimate);
         }

@@ -125,16 +125,16 @@ fn decode_tile(tile: &mut Tile, fields: &mut Fields) -> Option<()> {
     Some(())
 }
 
-fn encode_estimate((count, noise): &(u32, TileNoise), out: &mut Vec<u8>) {
-    out.extend(count.to_le_bytes());
+fn encode_estimate(noise: &TileNoise, out: &mut Vec<u8>) {
+    out.extend(noise.samples.to_le_bytes());
     [noise.reported, noise.allocation, noise.squares].into_iter().for_each(|m| mse(m, out));
 }
 
-fn decode_estimate(pixels: u32, fields: &mut Fields) -> Option<(u32, TileNoise)> {
-    let count = fields.u32().filter(|count| *count > 0)?;
+fn decode_estimate(pixels: u32, fields: &mut Fields) -> Option<TileNoise> {
+    let samples = fields.u32().filter(|samples| *samples > 0)?;
     let [reported, allocation, squares] =
         [decode_mse(fields)?, decode_mse(fields)?, decode_mse(fields)?];
-    Some((count, TileNoise { reported, allocation, squares, pixels }))
+    Some(TileNoise { reported, allocation, squares, pixels, samples })
 }
 
 fn length(length: usize, out: &mut Vec<u8>) {

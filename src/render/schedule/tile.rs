@@ -18,11 +18,11 @@ pub(super) struct Tile {
     pub rays: u64,
     /// `true` if a path has hit a glossy lobe.
     pub glossy: bool,
-    /// Latest noise estimate, with the number of samples per replicate from which it was made.
-    pub error: Option<(u32, TileNoise)>,
-    /// Earlier noise estimates with their sample counts, oldest first. From one entry to the next
-    /// the count at least doubles.
-    pub history: Vec<(u32, TileNoise)>,
+    /// Latest noise estimate.
+    pub error: Option<TileNoise>,
+    /// Earlier noise estimates, oldest first. From one entry to the next the sample count at least
+    /// doubles.
+    pub history: Vec<TileNoise>,
 }
 
 impl Tile {
@@ -30,12 +30,12 @@ impl Tile {
         Self { pixels, done: 0, rays: 0, glossy: false, error: None, history: Vec::new() }
     }
 
-    /// Records the report of a job after which each replicate has `count` samples per pixel.
-    pub fn record(&mut self, report: &JobReport, count: u32) {
+    /// Records the report of a job.
+    pub fn record(&mut self, report: &JobReport) {
         self.rays += report.rays;
         self.glossy |= report.glossy;
         if let Some(error) = report.error {
-            self.record_error(error, count);
+            self.record_error(error);
         }
     }
 
@@ -46,17 +46,17 @@ impl Tile {
     }
 
     /// Replaces all estimates by `estimate`; `None` for too few samples.
-    pub fn set_estimate(&mut self, estimate: Option<(u32, TileNoise)>) {
+    pub fn set_estimate(&mut self, estimate: Option<TileNoise>) {
         self.forget_estimates();
-        if let Some((count, error)) = estimate {
-            self.record_error(error, count);
+        if let Some(error) = estimate {
+            self.record_error(error);
         }
     }
 
-    fn record_error(&mut self, error: TileNoise, count: u32) {
-        self.error = Some((count, error));
-        if self.history.last().is_none_or(|(before, _)| count / 2 >= *before) {
-            self.history.push((count, error));
+    fn record_error(&mut self, error: TileNoise) {
+        self.error = Some(error);
+        if self.history.last().is_none_or(|before| error.samples / 2 >= before.samples) {
+            self.history.push(error);
             if self.history.len() > DOUBLINGS as usize + 1 {
                 self.history.remove(0);
             }
@@ -72,7 +72,7 @@ impl Tile {
     /// Latest validation estimate of the mean squared error, which is the reported one; 0 before
     /// the first estimate.
     pub fn mse(&self, criterion: Criterion) -> f64 {
-        self.error.map_or(0.0, |(_, e)| criterion.of(e.reported))
+        self.error.map_or(0.0, |e| criterion.of(e.reported))
     }
 
     /// Iterates over all estimates: the sample count, and the mean squared errors of the allocation
@@ -80,8 +80,8 @@ impl Tile {
     pub fn estimates(&self, criterion: Criterion) -> impl Iterator<Item = (f64, [f64; 2])> {
         let latest = self.error.filter(|e| self.history.last() != Some(e));
         let all = self.history.iter().copied().chain(latest);
-        all.map(move |(n, e)| {
-            (f64::from(n), [e.allocation, e.reported].map(|mse| criterion.of(mse)))
+        all.map(move |e| {
+            (f64::from(e.samples), [e.allocation, e.reported].map(|mse| criterion.of(mse)))
         })
     }
 
@@ -89,7 +89,7 @@ impl Tile {
     /// Returns `None` before the first doubling.
     pub fn last_doubling(&self, criterion: Criterion) -> Option<[(f64, f64); 2]> {
         let [.., before, after] = self.history.as_slice() else { return None };
-        Some([before, after].map(|(n, e)| (f64::from(*n), criterion.of(e.allocation))))
+        Some([before, after].map(|e| (f64::from(e.samples), criterion.of(e.allocation))))
     }
 
     /// Returns the slope p with which the RMSE falls with the sample count n: RMSE ~ n^-p.
@@ -99,12 +99,12 @@ impl Tile {
     /// by 5 to 35 per cent; a slope over one doubling is therefore uncertain by 0.05 to 0.4.
     pub fn slope(&self, criterion: Criterion, pooled: f64) -> f64 {
         const PRIOR_DOUBLINGS: f64 = 2.0;
-        let [(n0, first), .., (n1, last)] = self.history.as_slice() else { return pooled };
+        let [first, .., last] = self.history.as_slice() else { return pooled };
         let (before, after) = (criterion.of(first.allocation), criterion.of(last.allocation));
         if !(before > 0.0 && after > 0.0) {
             return pooled;
         }
-        let doublings = (f64::from(*n1) / f64::from(*n0)).log2();
+        let doublings = (f64::from(last.samples) / f64::from(first.samples)).log2();
         let fitted = 0.5 * (before / after).log2() / doublings;
         clamp_slope((doublings * fitted + PRIOR_DOUBLINGS * pooled) / (doublings + PRIOR_DOUBLINGS))
     }

@@ -194,11 +194,8 @@ impl ActiveRender {
     /// nothing.
     pub fn reestimate(&mut self, pool: &rayon::ThreadPool, cancel_wave: &AtomicBool) -> bool {
         let (film, estimator) = (&self.state.film, self.state.estimator());
-        let estimate = |tile: usize| -> Option<(u32, TileNoise)> {
-            let tile = film.tile(tile)?;
-            let [a, b] = tile.counts();
-            Some((a.midpoint(b), estimator.tile_so_far(tile)?))
-        };
+        let estimate =
+            |tile: usize| -> Option<TileNoise> { estimator.tile_so_far(film.tile(tile)?) };
         let estimates: Option<Vec<_>> = pool.install(|| {
             let tiles = (0..film.tile_count()).into_par_iter().with_min_len(16);
             tiles

@@ -97,7 +97,7 @@ fn decisions_are_deterministic_and_independent_of_time() {
 }
 
 /// Noise that only validation pixels contain draws samples, but few more than a uniform picture
-/// takes.
+/// with the same true error takes.
 #[test]
 fn noise_in_validation_pixels_is_sampled_away() {
     for hidden in [vec![7], (0..100).step_by(3).collect::<Vec<_>>()] {
@@ -107,10 +107,11 @@ fn noise_in_validation_pixels_is_sampled_away() {
             Model { hidden: hidden.clone(), ..Model::exact(truth) }
         };
         for target in [2.0, 0.5] {
-            let (uniform, reason) = model().finish(until(noise(target), false));
-            assert_eq!(reason, StoppedBy::Noise);
-            let (adaptive, reason) = model().finish(until(noise(target), true));
+            let mut picture = model();
+            let (adaptive, reason) = picture.finish(until(noise(target), true));
             assert_eq!(reason, StoppedBy::Noise, "{hidden:?}");
+            let (uniform, reason) = model().finish(until(noise(picture.rmse()), false));
+            assert_eq!(reason, StoppedBy::Noise);
             let ratio = adaptive.rays() as f64 / uniform.rays() as f64;
             assert!(ratio <= 1.5, "{hidden:?}, {target}: {ratio} times the rays");
         }

@@ -93,8 +93,7 @@ fn new_estimates_replace_the_old_ones() {
     assert_eq!((schedule.noise(), schedule.eta_seconds(1.0)), (None, None));
     // The picture becomes three times as bright on the display, and its error three times as large.
     model.truth.iter_mut().for_each(|t| t.sigma *= 3.0);
-    let estimates: Vec<_> =
-        (0..36).map(|tile| Some((schedule.tiles[tile].done, model.estimate(tile)))).collect();
+    let estimates: Vec<_> = (0..36).map(|tile| Some(model.estimate(tile))).collect();
     schedule.set_estimates(&estimates);
     let after = schedule.noise().unwrap();
     assert!((after.rmse_codes / before.rmse_codes - 3.0).abs() < 1e-9);

@@ -83,7 +83,8 @@ impl Model {
         if self.hidden.contains(&tile) {
             (allocation, reported) = (mse(0.0), mse(2.0 * reported.codes));
         }
-        TileNoise { reported, allocation, squares: SPREAD_OUT, pixels: PIXELS }
+        let samples = self.counts[0][tile];
+        TileNoise { reported, allocation, squares: SPREAD_OUT, pixels: PIXELS, samples }
     }
 
     /// True squared error of the picture (A + B) / 2.

@@ -82,7 +82,7 @@ fn schedule_of_samples_predicts_what_the_schedule_does() {
             count: tile.done,
             rays_per_sample: tile.rays_per_sample(),
             glossy: tile.glossy,
-            error: tile.error.unwrap().1,
+            error: tile.error.unwrap(),
         })
         .collect();
     let again = Schedule::of_samples(&samples, until(noise(0.5), true));
