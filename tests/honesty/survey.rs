@@ -76,73 +76,84 @@ fn run(
 /// One scene of the survey.
 struct Outcome {
     name: String,
-    /// True over reported RMSE of the first adaptive picture.
-    ratio: f64,
-    /// Effective pixels of its error.
-    pixels: f64,
     /// True over reported RMSE of the adaptive pictures of all seeds.
-    of_seeds: f64,
-    /// Rays over those of the uniform picture with the same true error.
+    ratio: f64,
+    /// Effective pixels of their errors.
+    pixels: f64,
+    /// Rays over those of uniform pictures with the same true error.
     rays: f64,
 }
 
-/// Number of rays at which a uniform picture has the error `target`, interpolated between its waves; that of the last
-/// wave if it does not reach `target`.
-fn uniform_rays(sample: &Sample, seed: u64, reference: &Reference, target: f64) -> f64 {
+/// Number of rays at which uniform pictures of `seeds` have the mean squared error `target`, interpolated between their
+/// waves; that of the last wave if they do not reach `target`.
+fn uniform_rays(sample: &Sample, seeds: &[u64], reference: &Reference, target: f64) -> f64 {
+    // The counts of a picture that is far from its target double: all seeds have the same waves.
     let stop = Stop { spp: Some(2 * LIMIT_SPP), noise_codes: Some(1e-9), ..Stop::default() };
-    let mut curve: Vec<(f64, f64)> = Vec::new();
-    run(sample, seed, false, stop, |rendering, schedule| {
-        curve.push((schedule.rays() as f64, reference.square(rendering).max(0.0).sqrt()));
-        curve.last().is_some_and(|(_, error)| *error <= target)
-    });
-    match curve.as_slice() {
-        [.., (r0, e0), (r1, e1)] if e1 <= &target && e0 > e1 => {
-            let share = (e0 / target).ln() / (e0 / e1.max(1e-9)).ln();
-            r0 * (r1 / r0).powf(share)
+    let curves: Vec<Vec<(f64, f64)>> = seeds
+        .iter()
+        .map(|seed| {
+            let mut curve = Vec::new();
+            run(sample, *seed, false, stop, |rendering, schedule| {
+                let square = reference.square(rendering);
+                curve.push((schedule.rays() as f64, square));
+                square <= 0.25 * target
+            });
+            curve
+        })
+        .collect();
+    let mean = |wave: usize| {
+        let points = curves.iter().map(|curve| curve[wave.min(curve.len() - 1)]);
+        let (rays, squares) =
+            points.fold((0.0, 0.0), |(r, s), (rays, square)| (r + rays, s + square));
+        (rays / seeds.len() as f64, squares / seeds.len() as f64)
+    };
+    let waves = curves.iter().map(Vec::len).max().expect("a seed");
+    let mut before = mean(0);
+    for wave in 1..waves {
+        let (rays, square) = mean(wave);
+        if square <= target && before.1 > square {
+            let share = (before.1 / target).ln() / (before.1 / square.max(1e-18)).ln();
+            return before.0 * (rays / before.0).powf(share.max(0.0));
         }
-        [.., (rays, _)] => *rays,
-        [] => f64::NAN,
+        before = (rays, square);
     }
+    before.0
 }
 
 /// Compares reported and true error of adaptive pictures of a scene. Where k pixels carry the noise, the error of one
 /// picture scatters by 1 / sqrt(2 k) of its value, and so does any estimate of it. Seeds are added, at most `seeds`,
-/// until their pictures together have `ENOUGH` such pixels.
+/// until their pictures together have `ENOUGH` such pixels. The first eight seeds are compared with uniform pictures.
 fn examine(number: u64, reference_count: u32, seeds: u64) -> Outcome {
     let sample = scene(number);
     let reference = Reference::new(&sample, reference_count);
     let target = [1.0, 0.5, 0.25][(number / 10 % 3) as usize];
     let stop = Stop { noise_codes: Some(target), spp: Some(LIMIT_SPP), ..Stop::default() };
-    let (mut truths, mut reports, mut pixels, mut rays) = (Vec::new(), Vec::new(), Vec::new(), 0.0);
-    let count = |pixels: &[f64]| pixels.len() as u64;
-    while pixels.is_empty() || count(&pixels) < seeds && pixels.iter().sum::<f64>() < ENOUGH {
-        let seed = number + 1 + 1000 * count(&pixels);
+    let (mut truths, mut reports, mut rays, mut pixels) = (Vec::new(), Vec::new(), Vec::new(), 0.0);
+    let mut used = Vec::new();
+    while used.is_empty() || (used.len() as u64) < seeds && pixels < ENOUGH {
+        let seed = number + 1 + 1000 * used.len() as u64;
         let (rendering, schedule, _) = run(&sample, seed, true, stop, |_, _| false);
         let noise = schedule.noise().expect("an estimate");
-        let square = reference.square(&rendering);
-        if pixels.is_empty() {
-            let uniform = uniform_rays(&sample, seed, &reference, square.max(0.0).sqrt());
-            rays = schedule.rays() as f64 / uniform;
-        }
-        truths.push(square);
+        truths.push(reference.square(&rendering));
         reports.push(noise.rmse_codes.powi(2));
-        pixels.push(noise.effective_pixels.codes);
+        rays.push(schedule.rays() as f64);
+        pixels += noise.effective_pixels.codes;
+        used.push(seed);
     }
-    let rms =
-        |squares: &[f64]| (squares.iter().sum::<f64>() / squares.len() as f64).max(0.0).sqrt();
-    let ratio = rms(&truths[..1]) / rms(&reports[..1]);
-    let of_seeds = rms(&truths) / rms(&reports);
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let first = used.len().min(8);
+    let uniform = uniform_rays(&sample, &used[..first], &reference, mean(&truths[..first]));
+    let rays = mean(&rays[..first]) / uniform;
+    let [truth, reported] = [&truths, &reports].map(|squares| mean(squares).max(0.0).sqrt());
+    let ratio = truth / reported;
     println!(
-        "{:26} target {target:.2}: reported {:.3}, true {:.3}, true/reported {of_seeds:.3} ({ratio:.3} of the first seed), \
-         {:.0} effective pixels of {} seeds, rays {rays:.2} of uniform, reference {:.3}",
+        "{:26} target {target:.2}: reported {reported:.3}, true {truth:.3}, true/reported {ratio:.3}, \
+         {pixels:.0} effective pixels of {} seeds, rays {rays:.2} of uniform, reference {:.3}",
         sample.name,
-        rms(&reports),
-        rms(&truths),
-        pixels.iter().sum::<f64>(),
-        pixels.len(),
+        used.len(),
         reference.own
     );
-    Outcome { name: sample.name, ratio, pixels: pixels[0], of_seeds, rays }
+    Outcome { name: sample.name, ratio, pixels, rays }
 }
 
 /// Checks that the true error agrees with the reported one within their uncertainty (both are means of k squares, uncertain
@@ -175,15 +186,15 @@ fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
 /// error was 1.55 times the reported one.
 #[test]
 fn reported_error_of_stars_is_not_selected() {
-    let Outcome { of_seeds, .. } = examine(62, 0, 24);
-    assert!((0.9..1.3).contains(&of_seeds), "true/reported {of_seeds}");
+    let Outcome { ratio, .. } = examine(62, 0, 24);
+    assert!((0.9..1.3).contains(&ratio), "true/reported {ratio}");
 }
 
 /// Uniform pictures report the error of all pixels, not the larger one of two estimates: single balls whose error was 0.77
 /// to 0.8 of the reported one. The ratio of each is uncertain by 6 %.
 #[test]
 fn reported_error_of_few_pixels_is_that_of_all() {
-    let ratios = [60, 130, 180].map(|number| examine(number, 0, 96).of_seeds);
+    let ratios = [60, 130, 180].map(|number| examine(number, 0, 96).ratio);
     let mean = ratios.iter().product::<f64>().cbrt();
     assert!((0.88..1.12).contains(&mean), "true/reported {ratios:?}");
 }
@@ -197,15 +208,14 @@ fn survey_of_200_scenes() {
     let first: u64 = variable("ZERKALO_FIRST", 0);
     let numbers = first..first + variable("ZERKALO_SCENES", 200);
     let outcomes: Vec<Outcome> = numbers.map(|number| examine(number, 4096, 1024)).collect();
-    let finite = || outcomes.iter().filter(|o| o.of_seeds.is_finite());
-    let inside = finite().filter(|o| (0.9..=1.15).contains(&o.of_seeds)).count();
-    let extreme = finite().map(|o| o.of_seeds).fold(0.0, f64::max);
-    let highest = finite().map(|o| o.rays).fold(0.0, f64::max);
+    let inside = outcomes.iter().filter(|o| (0.9..=1.15).contains(&o.ratio)).count();
+    let extreme = outcomes.iter().map(|o| o.ratio).fold(0.0, f64::max);
+    let highest = outcomes.iter().map(|o| o.rays).fold(0.0, f64::max);
     println!(
         "{inside} of {} within 0.9 to 1.15, at most {extreme:.2}; at most {highest:.2} times the uniform rays",
-        finite().count()
+        outcomes.len()
     );
-    assert_honest(&outcomes);
+    assert!(100 * inside >= 95 * outcomes.len() && extreme <= 1.3 && highest <= 1.5);
 }
 
 /// White ball of about a pixel on a dark background: its tile is noisy in validation pixels only.
