@@ -194,6 +194,8 @@ fn keep_elsewhere(
     let (reply, kept) = bounded(1);
     thread::spawn(move || {
         let kept = recovery.keep(&text, base).map(|()| recovery.path().map(Path::to_path_buf));
+        // This releases the lock of the file, so that the next start offers its edits.
+        drop(recovery);
         // Sending fails if the receiver has timed out and is gone.
         let _ = reply.send(kept.map_err(|error| error.to_string()));
     });
