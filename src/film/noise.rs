@@ -62,7 +62,8 @@ impl Mse {
 /// Estimated error of one tile. Its pixels alternate between white and black, like a checkerboard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileNoise {
-    /// Validation estimate, from the white pixels. It is reported to the user.
+    /// Validation estimate, from the white pixels. The noise of the picture is computed from it,
+    /// unless all tiles have the same number of samples.
     pub reported: Mse,
     /// Allocation estimate, from the black pixels. It selects tiles for further samples.
     pub allocation: Mse,
