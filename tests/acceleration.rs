@@ -99,6 +99,21 @@ fn random_scenes_are_equal_under_every_acceleration() {
 /// Small and elongated pictures with view angles from narrow to almost 180 degrees, so that one
 /// tile may span more than a half space around its centre, with planes and rectangles of every
 /// slope.
+/// A pyramid whose coordinates are large beside its size. At its silhouette edges the face that is
+/// closest to the rounded hit point may face away from the ray.
+#[test]
+fn silhouette_edges_are_equal_under_every_acceleration() {
+    let text = "film.size = [10, 30]\n\
+         camera = { eye = [-3000.0, 0.4, 0.126], direction = [-2.11, -0.422, 0.0] }\n\
+         [[light]]\ndirectional.direction = [0.0, 1.0, 0.0]\n\
+         [[object]]\nshape.pyramid = { corner = [-3008.2618, -1.0, 1.0], side = 1.0404831432143558, \
+         apex_height = 1.04, height = 1.0 }\n\
+         transform = [{ translate = [3010.0, 0.502467749931503, -0.1] }, { scale = [1.0, 1.0, 0.4] }, \
+         { translate = [-3010.0, 1.0, 0.12647119695611247] }]\n\
+         [[object]]\nshape.sphere = { center = [1.0, 0.5, 0.5], radius = 1.0 }\n";
+    same("pyramid", &parsed(text), Precision::Single, 64);
+}
+
 #[test]
 fn view_angles_are_equal_under_every_acceleration() {
     let flat = "[[object]]\nshape.plane = { point = [0.0, -6.0, 0.0], normal = [0.0, 1.0, 0.0] }\n\

@@ -33,6 +33,13 @@ const RIM: f64 = 1.0 / 16_384.0;
 /// errors do not decide between axes at equal angles to the normal.
 const TIE: f64 = 1.001;
 
+/// Largest error of a projection of a surface point, in rounding errors of the point's largest coordinate.
+const POINT_ROUNDINGS: f64 = 16.0;
+
+/// Angle \[rounding errors\] between the normal of a surface and the gradient of a texture coordinate
+/// up to which the coordinate is constant along the surface.
+const ANGLE_ROUNDINGS: f64 = 64.0;
+
 /// Texture coordinates and their gradients in texture space. The unit of the coordinates is one
 /// repetition of the image.
 #[derive(Clone, Copy, Debug)]
@@ -64,6 +71,8 @@ pub struct TextureMapping<S> {
     extent: [S; 3],
     scale: [S; 2],
     offset: [S; 2],
+    /// Rounding error of the coordinates of the scene file.
+    input_error: S,
 }
 
 /// Returns the rotation from texture space to the axes of the projection's formula, which projects
@@ -84,12 +93,14 @@ fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
 impl<S: Float> TextureMapping<S> {
     /// Compiles `placement` for one part of an object. `projection` is the projection that
     /// `placement` selects for the part. `low` and `high` are opposite corners of the part's
-    /// bounding box, in texture space.
+    /// bounding box, in texture space. `input_error` is the rounding error of the coordinates of the
+    /// scene file.
     pub fn new(
         placement: &Placement,
         projection: Projection,
         scene_from_texture: &DAffine3,
         [low, high]: [DVec3; 2],
+        input_error: f64,
     ) -> Self {
         let rotation = axes_for(projection, placement.axis);
         let ends = [rotation * low, rotation * high];
@@ -120,6 +131,7 @@ impl<S: Float> TextureMapping<S> {
             extent: extent.to_array().map(S::from_f64),
             scale: scale.map(S::from_f64),
             offset: placement.offset.map(S::from_f64),
+            input_error: S::from_f64(input_error),
         }
     }
 
@@ -172,6 +184,45 @@ impl<S: Float> TextureMapping<S> {
             grad_u: unplaced.grad_u * su,
             grad_v: unplaced.grad_v * sv,
         }
+    }
+
+    /// Returns u and v for textures whose colour jumps at edges, such as checkers. `coordinates` are
+    /// those of `point` with the outer normal `normal`. `rounding` is the rounding error of the
+    /// point's largest coordinate.
+    ///
+    /// A flat face may lie in an edge: the lid of a box whose height is a whole number of squares.
+    /// There the coordinate is constant, and rounding would decide between two colours at each
+    /// point. A coordinate that is constant along the surface is therefore moved up by its largest
+    /// error. Other coordinates are returned as they are.
+    pub fn beside_edges<L: SimdFloat<Scalar = S>>(
+        &self,
+        coordinates: &TexCoord<L>,
+        normal: Vec3<L>,
+        rounding: L,
+    ) -> (L, L) {
+        let point_error = rounding.max(L::splat(self.input_error)) * L::from_f64(POINT_ROUNDINGS);
+        let periodic = matches!(self.projection, Projection::Spherical | Projection::Cylindrical);
+        let beside = |value: L, gradient: Vec3<L>, scale: S, offset: S, periodic: bool| {
+            let (scale, offset) = (L::splat(scale), L::splat(offset));
+            let gradient = Self::normal(&self.texture_from_scene, gradient);
+            let steepness = gradient.length_squared().sqrt();
+            let across = normal.mul_add(-normal.dot(gradient), gradient);
+            let moved = steepness * point_error;
+            let angle = L::from_f64(ANGLE_ROUNDINGS * L::EPSILON) + moved / scale;
+            let constant = across.length_squared().sqrt().le(steepness * angle);
+            let largest = value.abs() + offset.abs() + scale;
+            let error = largest.mul_add(L::from_f64(POINT_ROUNDINGS * L::EPSILON), moved);
+            // The ends of a turn are the same place.
+            let at_end = if periodic {
+                constant & (value - offset - scale).abs().le(error)
+            } else {
+                L::mask(false)
+            };
+            L::select(constant, L::select(at_end, offset, value) + error, value)
+        };
+        let TexCoord { u, v, grad_u, grad_v } = *coordinates;
+        let ([su, sv], [ou, ov]) = (self.scale, self.offset);
+        (beside(u, grad_u, su, ou, periodic), beside(v, grad_v, sv, ov, false))
     }
 
     /// Returns the unit normal perturbed by a bump map. `gradient` is the gradient of the height in
@@ -279,6 +330,7 @@ mod tests {
             projection,
             &scene_from_texture,
             corners,
+            0.0,
         )
     }
 
@@ -325,6 +377,7 @@ mod tests {
                 projection,
                 &DAffine3::IDENTITY,
                 [DVec3::NEG_ONE, DVec3::ONE],
+                0.0,
             );
             for point in [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]] {
                 let c = p.coordinates(Vec3::<f32>::of(point), Vec3::of([0.0, 1.0, 0.0]));
@@ -341,6 +394,7 @@ mod tests {
             Projection::Planar,
             &DAffine3::from_scale(DVec3::splat(7.0)),
             [DVec3::ZERO, DVec3::ONE],
+            0.0,
         );
         let slope = Vec3::<f64>::of([0.4, 0.0, 9.0]);
         let up = p.bumped(Vec3::of([0.0, 0.0, 1.0]), 1.0, slope);

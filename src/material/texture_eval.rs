@@ -105,6 +105,14 @@ impl<S: Float> CompiledTexture<S> {
         }
     }
 
+    /// Returns `true` if the colour jumps between neighbouring points.
+    pub fn has_edges(&self) -> bool {
+        match self {
+            Self::Checker(_) => true,
+            Self::Image { filter, .. } => *filter == TextureFilter::Nearest,
+        }
+    }
+
     /// Returns the colours at (u, v) in the lanes whose bits are set in `bits`.
     pub fn eval<L: SimdFloat<Scalar = S>>(&self, (u, v): (L, L), bits: u32) -> Vec3<L> {
         let coordinates = |lane| (u.lane(lane).to_f64(), v.lane(lane).to_f64());

@@ -11,7 +11,7 @@ use crate::primitive::{
 use crate::scene::{BelowHorizon, Filter, IntegratorSettings, RayTypes, Scene};
 use crate::world::culling::light_buffer::LightBuffer;
 use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
-use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates};
+use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates, outside_only};
 use crate::world::integrator::indirect_diffuse::DiffuseLimits;
 use crate::world::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::world::integrator::surface_textures::SurfaceTextures;
@@ -264,15 +264,15 @@ struct CompiledCulling<S> {
 }
 
 impl<S: Float> CompiledCulling<S> {
-    /// Compiles the culling of a scene. `entered` has one entry for each primitive: `true` if paths
-    /// can be inside of it.
+    /// Compiles the culling of a scene. `outside_only` has one entry for each primitive: `true` if
+    /// rays hit it only from outside.
     fn new<L: SimdFloat<Scalar = S>>(
         scene: &Scene,
         recentered: &RecenteredGeometry,
         geometry: &Aggregate<L>,
         camera: &PerspectiveCamera,
         lights: &CompiledLights<S>,
-        entered: &[bool],
+        outside_only: &[bool],
     ) -> Self {
         let mut all_candidates = TileCandidates::all(geometry, lights.count());
         let mut light_buffers = Vec::new();
@@ -280,13 +280,10 @@ impl<S: Float> CompiledCulling<S> {
         let forms = || geometry.sources().iter().map(form_of);
         let mode = match scene.trace.acceleration {
             Acceleration::Auto => {
-                // Rays that start on a near plane may start inside a primitive.
-                let lens = BoundingSphere { center: camera.eye(), radius: camera.lens_radius() };
-                let start = (scene.camera.near == 0.0).then_some(lens);
                 let light_targets = (lights.targets(), lights.max_end_offset());
                 let emitters = lights.emitter_bounds();
                 let culler =
-                    FrustumCuller::new(forms().collect(), start, entered, light_targets, emitters);
+                    FrustumCuller::new(forms().collect(), outside_only, light_targets, emitters);
                 all_candidates = culler.candidates(geometry, None);
                 if geometry.has_tree() {
                     if scene.trace.ray_types >= RayTypes::Shadows {
@@ -360,8 +357,13 @@ impl<L: SimdFloat> World<L> {
         let entered = nested_dielectrics
             .as_ref()
             .map_or(vec![false; bsdf_of.len()], NestedDielectrics::entered);
+        // Rays that start on a near plane may start inside a primitive.
+        let lens = BoundingSphere { center: camera.eye(), radius: camera.lens_radius() };
+        let start = (scene.camera.near == 0.0).then_some(lens);
+        let forms = primitives.iter().map(|id| &recentered.forms[id.form]);
+        let outside_only = outside_only(forms, start, &entered);
         let culling =
-            CompiledCulling::new(scene, recentered, &geometry, &camera, &lights, &entered);
+            CompiledCulling::new(scene, recentered, &geometry, &camera, &lights, &outside_only);
         let inventory = Inventory::new(
             scene,
             InventorySources {
@@ -394,6 +396,7 @@ impl<L: SimdFloat> World<L> {
             fold: scene.trace.below_horizon == BelowHorizon::Fold,
             nested_dielectrics,
             geometry,
+            outside_only,
             bsdf_of,
             bsdfs: materials.bsdfs,
             ambient: lights.groups.find(&LightGroupSource::Ambient),

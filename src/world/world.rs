@@ -74,6 +74,9 @@ pub(super) type EnvironmentSource<S> = LightSource<EnvironmentLight, S>;
 pub struct World<L: SimdFloat> {
     /// All primitives, in coordinates relative to the scene's centre.
     pub(super) geometry: Aggregate<L>,
+    /// `true` for each primitive that rays hit only from outside: a convex solid that contains
+    /// neither the eye nor a transmitted ray.
+    pub(super) outside_only: Vec<bool>,
     /// BSDF of each primitive, as an index into `bsdfs`.
     pub(super) bsdf_of: Vec<u32>,
     pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,

@@ -2,9 +2,11 @@
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, Traced};
+use crate::support::{parsed, picture, rendered};
 use glam::{DAffine3, DQuat, DVec3};
 use std::fs;
 use std::path::Path;
+use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
@@ -244,6 +246,42 @@ fn common_faces_of_nested_solids_have_an_order() {
                 setting.compare(gap, true, precision, 512);
                 setting.compare(gap, false, precision, 512);
             }
+        }
+    }
+}
+
+/// Light that bounces from the floor below a glass box meets the box's lower face, in contact as with
+/// a gap.
+#[test]
+fn diffuse_bounces_in_contact_are_the_limit_of_a_gap() {
+    for floor in ["matte", "glass"] {
+        for precision in [Precision::Single, Precision::Double] {
+            let mean = |gap: f64, seed: u64| {
+                let scene = parsed(&format!(
+                    "film.size = [8, 8]\nambient.color = [1, 1, 1]\ntrace.max_diffuse_depth = 1\n\
+                     camera = {{ eye = [0, 5, 0.1], target = [0, 0, 0], view_angle.vertical = 10 }}\n\
+                     materials.matte = {{ diffuse = 0.8 }}\n\
+                     materials.glass = {{ diffuse = 0.1, transmission = 1 }}\n\
+                     [[object]]\nmaterial = \"glass\"\n\
+                     shape.box = {{ center = [0, 0.5, 0], size = [2, 1, 2] }}\n\
+                     transform = [{{ translate = [0, {gap}, 0] }}]\n\
+                     [[object]]\nmaterial = \"{floor}\"\n\
+                     shape.box = {{ center = [0, -0.5, 0], size = [5, 1, 5] }}\n"
+                ));
+                let picture = picture(&rendered(&scene, seed, precision, 32), Replicates::Both);
+                picture.iter().map(|rgb| rgb[0]).sum::<f64>() / picture.len() as f64
+            };
+            let differences: Vec<f64> =
+                (0..8).map(|seed| mean(0.0, seed) - mean(GAP, seed)).collect();
+            let average = differences.iter().sum::<f64>() / 8.0;
+            let squares: f64 = differences.iter().map(|d| (d - average).powi(2)).sum();
+            let error = (squares / 56.0).sqrt();
+            // Of 7 degrees of freedom, t exceeds 8 with a probability of 1e-4. The gap itself moves
+            // edges by about its width.
+            assert!(
+                average.abs() < 8.0 * error + 10.0 * GAP,
+                "glass on {floor}, {precision:?}: {average} +- {error} brighter in contact"
+            );
         }
     }
 }

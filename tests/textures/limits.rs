@@ -190,6 +190,85 @@ fn texture_edits_read_each_file_once() {
     assert!(refused.to_string().contains("a.png"), "{refused}");
 }
 
+/// A flat face in the edge of a checker, or of a texture's pixels, has one colour, the same in both
+/// precisions.
+#[test]
+fn faces_in_edges_of_a_texture_have_one_color() {
+    let checker =
+        |keys: &str| format!("texture.checker = {{ even = [1, 0, 0], odd = [0, 1, 0], {keys} }}");
+    let lid = "box = { center = [0, -0.25, 0], size = [8, 0.5, 8] }";
+    let middle: &[DVec3] = &[DVec3::ZERO];
+    let aside = &[DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z].map(|axis| 0.6 * axis);
+    let cases = [
+        // The lid of a box, one square above its bottom.
+        (lid, checker("mapping = \"planar\", scale = [0.01, 1.0]"), middle),
+        (
+            "cylinder = { base = [0, -0.3, 0], top = [0, 0, 0], radius = 4 }",
+            checker("mapping = \"planar\", scale = [0.01, 5.0]"),
+            middle,
+        ),
+        // The equator of a spherical mapping, and the seam of its turn.
+        (
+            "plane = { point = [0.2, 0, 0.1], normal = [0, 1, 0] }",
+            checker(
+                "mapping = \"spherical\", axis = \"z\", scale = [0.1, 1.0], offset = [0.2, 0.0]",
+            ),
+            middle,
+        ),
+        (
+            "rectangle = { center = [0, 0, 0], size = [3, 3], normal = [0, 1, 0], up = [0, 0, -1] }",
+            checker(
+                "mapping = \"spherical\", axis = \"x\", scale = [0.5, 0.1], offset = [0.0, 0.2]",
+            ),
+            aside,
+        ),
+        (
+            lid,
+            "texture.image = { file = \"rows.png\", mapping = \"planar\", scale = [1.0, 2.0], \
+             filter = \"nearest\" }"
+                .to_string(),
+            middle,
+        ),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let rows =
+        ImageBuffer::from_fn(1, 2, |_, y| image::Rgb([255 * y as u8, 255 - 255 * y as u8, 0]));
+    rows.save(folder.path().join("rows.png")).unwrap();
+    let views = cases.iter().flat_map(|(shape, texture, views)| {
+        views.iter().map(move |target| (*shape, texture, *target))
+    });
+    for (shape, texture, target) in views {
+        for (turn, shift) in [(0.0, 0.0), (37.0, 0.0), (0.0, 100.1), (52.0, -3000.7)] {
+            let transform = format!(
+                "[{{ rotate = {{ axis = [1, 0.3, -0.4], degrees = {turn:?} }} }}, \
+                 {{ translate = [{shift:?}, 0.3, {shift:?}] }}]"
+            );
+            let rotation = glam::DQuat::from_axis_angle(
+                DVec3::new(1.0, 0.3, -0.4).normalize(),
+                f64::to_radians(turn),
+            );
+            let placed = |p: DVec3| (rotation * p + DVec3::new(shift, 0.3, shift)).to_array();
+            let text = format!(
+                "film.size = [16, 16]\nambient.color = [1, 1, 1]\n[camera]\neye = {:?}\ntarget = {:?}\n\
+                 up = [0.3, 0.2, 0.9]\nview_angle.vertical = 12\n[materials.m]\n{texture}\n\
+                 [[object]]\nmaterial = \"m\"\nshape.{shape}\ntransform = {transform}\n",
+                placed(target + DVec3::new(0.0, 4.0, 0.3)),
+                placed(target),
+            );
+            let path = folder.path().join("scene.toml");
+            fs::write(&path, &text).unwrap();
+            let scene = Scene::read(&path).unwrap_or_else(|e| panic!("{e}\n{text}"));
+            let [single, double] = [Precision::Single, Precision::Double].map(|p| shown(&scene, p));
+            for (precision, picture) in [("single", &single), ("double", &double)] {
+                let differ = picture.iter().filter(|color| color != &&picture[0]).count();
+                assert_eq!(differ, 0, "{precision}: pixels of another colour in\n{text}");
+            }
+            let difference = (DVec3::from(single[0]) - DVec3::from(double[0])).abs().max_element();
+            assert!(difference < 1e-6, "single {:?}, double {:?} in\n{text}", single[0], double[0]);
+        }
+    }
+}
+
 /// Pictures with textures are equal for packets of one pixel's samples and of neighbouring pixels.
 #[test]
 fn textures_do_not_depend_on_packets() {

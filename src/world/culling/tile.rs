@@ -81,6 +81,25 @@ impl CullingMode {
     }
 }
 
+/// Returns one value for each of `forms`: `true` for a convex solid that rays hit only from outside.
+/// Paths are inside of a solid only if they start there or are transmitted. `start` contains the
+/// origins of all camera rays; `None` if they start on a near plane. `entered` is `true` for each
+/// form whose surface transmits.
+pub(crate) fn outside_only<'a>(
+    forms: impl Iterator<Item = &'a Form>,
+    start: Option<BoundingSphere>,
+    entered: &[bool],
+) -> Vec<bool> {
+    let is_outside = |(form, entered): (&Form, &bool)| {
+        let excludes_start = |start| !form.bounding_sphere().overlaps(start);
+        form.is_convex()
+            && !form.is_flat()
+            && !entered
+            && start.as_ref().is_some_and(excludes_start)
+    };
+    forms.zip(entered).map(is_outside).collect()
+}
+
 /// Culling by view frusta and by the space between visible surfaces and the lights.
 pub(crate) struct FrustumCuller {
     /// Bounding volume of each primitive.
@@ -95,26 +114,22 @@ pub(crate) struct FrustumCuller {
 }
 
 impl FrustumCuller {
-    /// Creates the culler of `forms`, one for each primitive. `start` contains the origins of all
-    /// camera rays; `None` if they start on a near plane. `entered` is `true` for each primitive
-    /// that paths can be inside of. `max_end_offset` is the largest distance between a light and
-    /// the end point of its shadow rays. `emitters` are the bounding spheres of the emitters.
+    /// Creates the culler of `forms`, one for each primitive. `outside_only` is the result of
+    /// [`outside_only`]. `max_end_offset` is the largest distance between a light and the end point
+    /// of its shadow rays. `emitters` are the bounding spheres of the emitters.
     pub fn new(
         forms: Vec<&Form>,
-        start: Option<BoundingSphere>,
-        entered: &[bool],
+        outside_only: &[bool],
         (lights, max_end_offset): (Vec<LightTarget>, f64),
         emitters: Vec<BoundingSphere>,
     ) -> Self {
         let bound = |form: &Form| BoundingVolume::new(form).grown(max_end_offset);
         let bounds: Vec<BoundingVolume> = forms.into_iter().map(bound).collect();
-        // A shadow ray that leaves the outside of a convex primitive cannot hit it again. Paths are
-        // inside of a primitive only if they start there or are transmitted.
-        let self_shadowing = |(b, entered): (&BoundingVolume, &bool)| {
-            let contains_start = || start.is_none_or(|start| b.ball().overlaps(&start));
-            !b.is_convex() || !b.is_flat() && (*entered || contains_start())
+        // A shadow ray that leaves the outside of a convex primitive cannot hit it again.
+        let self_shadowing = |(b, outside_only): (&BoundingVolume, &bool)| {
+            !(outside_only | (b.is_flat() & b.is_convex()))
         };
-        let self_shadowing = bounds.iter().zip(entered).map(self_shadowing).collect();
+        let self_shadowing = bounds.iter().zip(outside_only).map(self_shadowing).collect();
         Self { lights, emitters, self_shadowing, bounds }
     }
 

@@ -87,7 +87,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
     ) -> L::Mask {
         let throughput = path.throughput.component_mul(interaction.diffuse);
         let weight = throughput.max_element();
-        let lanes = interaction.direct_mask & weight.gt(L::zero());
+        // A surface behind a coincident one is shaded from the lights, and has a bounce like others.
+        let lanes = interaction.has_bsdf & weight.gt(L::zero());
         if lanes.none() {
             return lanes;
         }
@@ -118,7 +119,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
                     (None, Some(old)) => (idle(&old), old),
                     (None, None) => return lanes,
                 };
-                Some(CoincidentState::select(taken, &new, &old))
+                let lanes = (taken & new.lanes) | old.lanes.and_not(taken);
+                Some(CoincidentState { lanes, ..CoincidentState::select(taken, &new, &old) })
             }
         };
         lanes

@@ -153,7 +153,9 @@ fn interact_one<L: SimdFloat, const SIMPLE: bool>(
     lanes: L::Mask,
 ) -> SurfaceInteraction<L> {
     let surface = world.geometry.surface(item, hit.triangle, ray.at(hit.t));
-    let front = surface.normal.dot(ray.direction).lt(L::zero());
+    // At a silhouette edge the surface closest to the rounded hit point may face away from the ray.
+    let outside_only = L::mask(world.outside_only[item as usize]);
+    let front = outside_only | surface.normal.dot(ray.direction).lt(L::zero());
     let geometric = Vec3::select(front, surface.normal, -surface.normal);
     let index = world.bsdf_of[item as usize];
     let bsdf = &world.bsdfs[index as usize];

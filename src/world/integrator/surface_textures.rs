@@ -70,6 +70,7 @@ impl<L: SimdFloat> SurfaceTextures<L> {
             return None;
         }
         let world_from_scene = DAffine3::from_translation(-origin);
+        let input_error = f64::EPSILON * origin.abs().max_element();
         // The texture spaces of the latest object are cached, because the primitives of an object
         // are adjacent.
         let mut spaces: (usize, Vec<TextureSpace>) = (usize::MAX, Vec::new());
@@ -87,7 +88,14 @@ impl<L: SimdFloat> SurfaceTextures<L> {
                 world_from_scene * object.scene_from_object() * space.shape_from_texture;
             let mapping_of = |placement: &Placement| {
                 let projection = projection(placement.mapping, space);
-                TextureMapping::new(placement, projection, &world_from_texture, space.corners)
+                let corners = space.corners;
+                TextureMapping::new(
+                    placement,
+                    projection,
+                    &world_from_texture,
+                    corners,
+                    input_error,
+                )
             };
             let texture = material.texture.as_ref();
             let bump = material.bump.as_ref();
@@ -165,7 +173,14 @@ pub(crate) fn albedo_factor<L: SimdFloat>(
         return vertex_color;
     };
     let coord = coordinates(&world.geometry, mapping, points);
-    let color = texture.eval((coord.u, coord.v), points.lanes.bits());
+    let (u, v) = if texture.has_edges() {
+        let SurfacePoint { point, normal, max_coordinate } = points.surface;
+        let rounding = max_coordinate.max(point.max_abs()) * L::from_f64(L::EPSILON);
+        mapping.beside_edges(&coord, normal, rounding)
+    } else {
+        (coord.u, coord.v)
+    };
+    let color = texture.eval((u, v), points.lanes.bits());
     Some(vertex_color.map_or(color, |vertex_color| vertex_color.component_mul(color)))
 }
 
