@@ -78,9 +78,16 @@ impl CanonicalShape for ParallelogramForm {
 
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
         let normal = self.u.cross(self.v).normalize();
-        let Some((low, high)) = self.bounds() else { return Vec::new() };
-        let away = (low - point).max(point - high).max_element();
-        let on = normal.dot(point - self.corner).abs() <= slack && away <= slack;
+        let from_corner = point - self.corner;
+        // Distance from the edge at the corner, and distance of the opposite edge from it.
+        let is_between = |edge: DVec3, other: DVec3| {
+            let across = edge.cross(normal).normalize();
+            let (distance, width) = (across.dot(from_corner), across.dot(other));
+            distance * width.signum() >= -slack && distance.abs() <= width.abs() + slack
+        };
+        let on = normal.dot(from_corner).abs() <= slack
+            && is_between(self.u, self.v)
+            && is_between(self.v, self.u);
         if on { vec![vec![normal]] } else { Vec::new() }
     }
 

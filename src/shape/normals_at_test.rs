@@ -2,7 +2,8 @@
 
 use crate::primitive::conical_frustum::AROUND_TIP;
 use crate::shape::{EXAMPLES, Shape};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
+use std::f64::consts::PI;
 
 /// Checks `normals_at` for rays from all sides. At a hit point it returns a normal that is not
 /// perpendicular to the ray. At the origin of the ray it returns none.
@@ -43,4 +44,20 @@ fn normals_at_corners_and_tips_are_several() {
     assert_eq!(count_at(DVec3::new(0.6, 1.0, 0.2)), 0);
     let cone = Shape::fitted_to("cone", DVec3::ZERO, DVec3::ONE).unwrap().form();
     assert_eq!(cone.normals_at(DVec3::Y, 1e-9).concat().len(), AROUND_TIP as usize);
+}
+
+#[test]
+fn normals_at_points_beside_a_turned_rectangle_are_none() {
+    let platform = Shape::fitted_to("platform", DVec3::ZERO, DVec3::ONE).unwrap().form();
+    let (low, high) = platform.bounds().unwrap();
+    let turn = DAffine3::from_rotation_y(0.25 * PI);
+    let turned = platform.transformed(&(turn * DAffine3::from_translation(-0.5 * (low + high))));
+    let count_at = |x: f64, z: f64| turned.normals_at(DVec3::new(x, 0.0, z), 1e-9).concat().len();
+    let half_diagonal = 0.5f64.sqrt();
+    for (x, z) in [(0.0, 0.0), (0.35, -0.35), (half_diagonal, 0.0), (0.0, -half_diagonal)] {
+        assert_eq!(count_at(x, z), 1, "{x} {z}");
+    }
+    for (x, z) in [(0.36, 0.36), (-0.6, 0.2), (half_diagonal + 1e-6, 0.0)] {
+        assert_eq!(count_at(x, z), 0, "{x} {z}");
+    }
 }

@@ -11,6 +11,7 @@ use crate::primitive::{
     CanonicalShape, ConvexPolyhedronForm, Form, MeshForm, ParallelogramForm, PrimitiveId,
 };
 use crate::scene::Scene;
+use crate::world::integrator::coincident_surfaces::pairs;
 use crate::world::light_groups::LightGroups;
 use crate::world::world::LightSource;
 use glam::DVec3;
@@ -19,6 +20,9 @@ use std::collections::{HashMap, HashSet};
 /// Largest number of triangles of a mesh from which light is sampled. A triangle takes 56 bytes in
 /// single precision.
 const MAX_TRIANGLES: usize = 1 << 16;
+
+/// Smallest cosine between the normals of parallel faces.
+const PARALLEL: f64 = 1.0 - 1e-6;
 
 /// Emission of an object, with its light group. The emitter is `None` if points of the object
 /// cannot be sampled.
@@ -61,10 +65,33 @@ impl<S: Float> SurfaceEmission<S> {
         let mut known = HashSet::new();
         let distinct = entries.iter().flatten().filter(|entry| known.insert(key(entry)));
         let objects: Vec<_> = distinct.copied().collect();
+        let emits: HashSet<usize> = objects.iter().map(|(form, ..)| *form).collect();
+        let is_solid = |form: usize| matches!(forms[form], Form::ConvexPolyhedron(_));
+        let lights = |form: usize| emits.contains(&form) && is_solid(form);
+        let mut neighbors: HashMap<usize, Vec<&Form>> = HashMap::new();
+        for (a, b) in pairs(forms, |a, b| lights(a) || lights(b)) {
+            for (form, other) in [(a, b), (b, a)] {
+                if lights(form) && forms[other].is_convex() {
+                    neighbors.entry(form).or_default().push(&forms[other]);
+                }
+            }
+        }
         let compile = |&(form, group, emission): &(usize, usize, [f64; 3])| {
             let two_sided = material_of(scene, form).is_none_or(|material| material.two_sided);
             let surface = surface_of(&forms[form]);
-            let light = surface.and_then(|surface| ObjectEmitter::new(&surface, two_sided, lift));
+            let light = surface.and_then(|surface| {
+                let light = ObjectEmitter::new(&surface, two_sided, lift)?;
+                let (ObjectSurface::ConvexTriangles(triangles), Some(others)) =
+                    (&surface, neighbors.get(&form))
+                else {
+                    return Some(light);
+                };
+                let is_covered = |triangle: &[DVec3; 3]| {
+                    others.iter().any(|other| covers(other, triangle, lift))
+                };
+                let covered: Vec<bool> = triangles.iter().map(is_covered).collect();
+                Some(light.without_covered(&covered))
+            });
             let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
             LightSource { light, group, emission, visible: true }
         };
@@ -110,6 +137,21 @@ impl<S: Float> SurfaceEmission<S> {
     pub fn emitters(&self) -> impl Iterator<Item = &ObjectEmitter<S>> {
         self.sources.iter().filter_map(|source| source.light.as_ref())
     }
+}
+
+/// Returns `true` if the convex form `other` covers the front of a triangle: all corners are within
+/// `slack` of one of its faces, which is parallel to the triangle. A solid faces the triangle's
+/// front; a flat form may face either side.
+fn covers(other: &Form, triangle: &[DVec3; 3], slack: f64) -> bool {
+    let [a, b, c] = *triangle;
+    let Some(normal) = (b - a).cross(c - a).try_normalize() else { return false };
+    let faces_front = |found: &DVec3| {
+        let cosine = found.dot(normal);
+        if other.is_flat() { cosine.abs() > PARALLEL } else { cosine < -PARALLEL }
+    };
+    let is_on_face =
+        |corner: &DVec3| other.normals_at(*corner, slack).iter().flatten().any(faces_front);
+    triangle.iter().all(is_on_face)
 }
 
 /// Returns the material of an object that is not a compound.

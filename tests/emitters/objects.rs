@@ -161,6 +161,34 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
 }
 
 /// A flat object with a two-sided material lights both sides, one with a one-sided material its front.
+/// The face of an emissive box that stands on a surface lights nothing behind that surface.
+#[test]
+fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
+    let turned = "transform = [{ rotate_y = 30.0 }]\n";
+    let lamp = object("lamp", "shape.box = { center = [0.1, 1.25, 0.0], size = [0.4, 0.5, 0.3] }");
+    let floors = [
+        "shape.platform = { center = [0.0, 1.0, 0.0], size = [3.0, 3.0] }",
+        "shape.plane = { point = [0.0, 1.0, 0.0], normal = [0.0, 1.0, 0.0] }",
+        "shape.plane = { point = [0.0, 1.0, 0.0], normal = [0.0, -1.0, 0.0] }",
+        "shape.box = { center = [0.0, 0.0, 0.0], size = [3.0, 2.0, 3.0] }",
+        "shape.cylinder = { base = [0.0, -1.0, 0.0], top = [0.0, 1.0, 0.0], radius = 2.0 }",
+    ];
+    let dark = floors.map(|floor| {
+        let rest = object("black", floor) + turned + &lamp + turned;
+        (floor.to_string(), receiver(DVec3::Y, MATT, &rest), 0.0)
+    });
+    check(&dark, 4096, ROUNDING);
+    // In the plane of a turned square, within its bounding box, and beside it.
+    let beside =
+        object("lamp", "shape.box = { center = [1.8, 1.05, 0.6], size = [0.1, 0.1, 0.1] }");
+    let square =
+        object("black", "shape.platform = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0] }")
+            + "transform = [{ rotate_y = 45.0 }, { translate = [1.2, 1.0, 0.0] }]\n";
+    let alone = receiver(DVec3::Y, MATT, &beside);
+    let with_square = receiver(DVec3::Y, MATT, &(square + &beside));
+    agree("box beside a square", &alone, &with_square, 4096);
+}
+
 #[test]
 fn back_of_a_flat_emissive_object_follows_two_sided() {
     let (text, corners) = rectangle(DVec3::Y, [1.0, 0.7]);

@@ -356,7 +356,7 @@ fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
 
 /// Returns all pairs of forms for which `wanted` is true and whose bounding boxes overlap or nearly
 /// overlap. The pairs are sorted.
-fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
+pub(crate) fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
     let mut out = Vec::new();
     let infinite = (DVec3::NEG_INFINITY, DVec3::INFINITY);
     let slack = 1e-5;
