@@ -74,8 +74,6 @@ enum CompiledSurface<S> {
         triangles: Vec<Triangle<S>>,
         /// `true` if the triangles enclose a convex solid.
         convex: bool,
-        /// `true` for each triangle whose front another object covers, so that it lights nothing.
-        covered: [bool; MAX_FACES],
     },
     /// More than [`MAX_FACES`] triangles, of which one is chosen by its area. They are sorted by
     /// their `end`.
@@ -145,7 +143,7 @@ impl<S: Float> ObjectEmitter<S> {
                 let triangles: Vec<_> = triangles.iter().zip(areas()).map(compile).collect();
                 let convex = matches!(surface, ObjectSurface::ConvexTriangles(_));
                 compiled = if triangles.len() <= MAX_FACES {
-                    CompiledSurface::Faces { triangles, convex, covered: [false; MAX_FACES] }
+                    CompiledSurface::Faces { triangles, convex }
                 } else {
                     CompiledSurface::Mesh(triangles)
                 };
@@ -160,19 +158,6 @@ impl<S: Float> ObjectEmitter<S> {
             lift: S::from_f64(lift),
             two_sided,
         })
-    }
-
-    /// Excludes triangles of a convex solid whose front another object covers. They are lifted beyond
-    /// the covering surface, and would light what is behind it. `covered` is `true` for each of
-    /// them, in the order of the triangles; the inside of the solid is lit as before. Other surfaces
-    /// stay as they are.
-    pub fn without_covered(mut self, covered: &[bool]) -> Self {
-        if let CompiledSurface::Faces { convex: true, covered: known, .. } = &mut self.surface {
-            for (known, covered) in known.iter_mut().zip(covered) {
-                *known = *covered;
-            }
-        }
-        self
     }
 
     /// Centre, in coordinates relative to the scene's centre.
@@ -226,9 +211,8 @@ impl<S: Float> ObjectEmitter<S> {
                 let density = rectangle.density(distance);
                 (wi, distance, density, density)
             }
-            CompiledSurface::Faces { triangles, convex, covered } => {
-                let (angles, total, backs) =
-                    self.solid_angles((triangles, covered), *convex, origin);
+            CompiledSurface::Faces { triangles, convex } => {
+                let (angles, total, backs) = self.solid_angles(triangles, *convex, origin);
                 let target = u * total;
                 let (mut before, mut start, mut angle) = (L::zero(), L::zero(), L::one());
                 let (mut chosen, mut done) = (L::from_id(0), L::mask(false));
@@ -285,8 +269,8 @@ impl<S: Float> ObjectEmitter<S> {
                 let (local, _) = self.lifted(local_of(axes, to_center), backs);
                 SphericalRectangle::new(size.map(L::splat), local).density(distance)
             }
-            CompiledSurface::Faces { triangles, convex, covered } => {
-                let (_, total, _) = self.solid_angles((triangles, covered), *convex, origin);
+            CompiledSurface::Faces { triangles, convex } => {
+                let (_, total, _) = self.solid_angles(triangles, *convex, origin);
                 (L::one() / total).masked(total.gt(L::zero()))
             }
             CompiledSurface::Mesh(triangles) => {
@@ -299,12 +283,11 @@ impl<S: Float> ObjectEmitter<S> {
     }
 
     /// Returns the solid angle of each triangle as seen from the receivers at `origin`, their sum,
-    /// and the lanes that see backs. From outside of a convex solid only fronts count. The fronts of
-    /// `covered` triangles have the solid angle 0.
+    /// and the lanes that see backs. From outside of a convex solid only fronts count.
     #[inline(always)]
     fn solid_angles<L: SimdFloat<Scalar = S>>(
         &self,
-        (triangles, covered): (&[Triangle<S>], &[bool; MAX_FACES]),
+        triangles: &[Triangle<S>],
         convex: bool,
         origin: Vec3<L>,
     ) -> ([L; MAX_FACES], L, L::Mask) {
@@ -317,12 +300,10 @@ impl<S: Float> ObjectEmitter<S> {
             }
         }
         let (mut angles, mut total) = ([L::zero(); MAX_FACES], L::zero());
-        for ((triangle, covered), angle) in triangles.iter().zip(covered).zip(&mut angles) {
+        for (triangle, angle) in triangles.iter().zip(&mut angles) {
             let triangle = PacketTriangle::splat(triangle, origin);
             let (seen, _, height) = self.seen_triangle(&triangle, backs);
-            let arrives = height.lt(L::zero());
-            let arrives = if *covered { arrives & backs } else { arrives };
-            *angle = seen.solid_angle.masked(arrives);
+            *angle = seen.solid_angle.masked(height.lt(L::zero()));
             total += *angle;
         }
         (angles, total, backs)

@@ -214,7 +214,13 @@ impl<S: Float> CompiledLights<S> {
         let emitter = |light: &Light| Emitter::new(light, geometry.origin, lift);
         let emitters = light_sources(scene, &emitting, emitter);
         let environments = light_sources(scene, &emitting, EnvironmentLight::new);
-        let emission = SurfaceEmission::new(scene, &geometry.forms, primitives, &groups, lift);
+        let start = start_region(scene, camera);
+        let is_entered = |form: usize| {
+            let transmits = |index: &u32| materials.bsdfs[*index as usize].transmission.is_some();
+            materials.of_object[form].iter().any(transmits) || start.reaches(&geometry.forms[form])
+        };
+        let emission =
+            SurfaceEmission::new(scene, &geometry.forms, primitives, &groups, lift, is_entered);
         Self { groups, scales, sources, choice, emitters, environments, emission }
     }
 

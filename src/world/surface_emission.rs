@@ -3,15 +3,22 @@
 //!
 //! Light is sampled from spheres, flat shapes, convex polyhedra, and meshes of up to
 //! [`MAX_TRIANGLES`] triangles. The emission of other shapes is found only by rays that hit them.
+//!
+//! Sampled points are lifted off their surface. Where the object touches another one, a lifted point is
+//! beyond the other's surface: below the floor that a box stands on, or inside of the glass that
+//! stands on a shining floor. Shadow rays from there would reach it. Compilation lists the objects
+//! that touch an emissive one and behind whose surfaces rays can start; shadow rays are tested
+//! against them a second time, up to the surface from which the point was lifted.
 
-use crate::lanes::Float;
+use crate::bvh::Ray;
+use crate::lanes::{Float, Mask, SimdFloat, next_distinct};
 use crate::light::{ObjectEmitter, ObjectSurface};
 use crate::material::Material;
 use crate::primitive::{
-    CanonicalShape, ConvexPolyhedronForm, Form, MeshForm, ParallelogramForm, PrimitiveId,
+    Aggregate, CanonicalShape, ConvexPolyhedronForm, Form, MeshForm, ParallelogramForm, PrimitiveId,
 };
 use crate::scene::Scene;
-use crate::world::integrator::coincident_surfaces::pairs;
+use crate::world::integrator::coincident_surfaces::touching_pairs;
 use crate::world::light_groups::LightGroups;
 use crate::world::world::LightSource;
 use glam::DVec3;
@@ -21,8 +28,8 @@ use std::collections::{HashMap, HashSet};
 /// single precision.
 const MAX_TRIANGLES: usize = 1 << 16;
 
-/// Smallest cosine between the normals of parallel faces.
-const PARALLEL: f64 = 1.0 - 1e-6;
+/// Largest distance between a lifted point and the surface of a touching object, in lifts.
+const CONTACT_LIFTS: f64 = 4.0;
 
 /// Emission of an object, with its light group. The emitter is `None` if points of the object
 /// cannot be sampled.
@@ -36,21 +43,34 @@ pub(super) struct SurfaceEmission<S> {
     sampled: usize,
     /// Index into `sources`, for each primitive; `None` for primitives that emit nothing.
     source_of: Vec<Option<u32>>,
+    /// Objects that touch the sampled objects, one list for each: the first primitive of each, and
+    /// `true` if it is flat.
+    touching: Vec<Vec<(u32, bool)>>,
+    /// Height of sampled points above their surface.
+    lift: S,
 }
 
 impl<S: Float> SurfaceEmission<S> {
     /// Compiles the emission of objects. `forms` are the shapes of all objects. `lift` is the
-    /// height of sampled points above the surfaces.
+    /// height of sampled points above the surfaces. `is_entered` returns `true` for an object that
+    /// rays can be inside of.
     pub fn new(
         scene: &Scene,
         forms: &[Form],
         primitives: &[PrimitiveId],
         groups: &LightGroups,
         lift: f64,
+        is_entered: impl Fn(usize) -> bool,
     ) -> Self {
         let emitting = groups.materials(scene);
         if emitting.is_empty() {
-            return Self { sources: Vec::new(), sampled: 0, source_of: Vec::new() };
+            return Self {
+                sources: Vec::new(),
+                sampled: 0,
+                source_of: Vec::new(),
+                touching: Vec::new(),
+                lift: S::default(),
+            };
         }
         // The group of each primitive, by object.
         let entry_of = |id: &PrimitiveId| {
@@ -65,33 +85,10 @@ impl<S: Float> SurfaceEmission<S> {
         let mut known = HashSet::new();
         let distinct = entries.iter().flatten().filter(|entry| known.insert(key(entry)));
         let objects: Vec<_> = distinct.copied().collect();
-        let emits: HashSet<usize> = objects.iter().map(|(form, ..)| *form).collect();
-        let is_solid = |form: usize| matches!(forms[form], Form::ConvexPolyhedron(_));
-        let lights = |form: usize| emits.contains(&form) && is_solid(form);
-        let mut neighbors: HashMap<usize, Vec<&Form>> = HashMap::new();
-        for (a, b) in pairs(forms, |a, b| lights(a) || lights(b)) {
-            for (form, other) in [(a, b), (b, a)] {
-                if lights(form) && forms[other].is_convex() {
-                    neighbors.entry(form).or_default().push(&forms[other]);
-                }
-            }
-        }
         let compile = |&(form, group, emission): &(usize, usize, [f64; 3])| {
             let two_sided = material_of(scene, form).is_none_or(|material| material.two_sided);
             let surface = surface_of(&forms[form]);
-            let light = surface.and_then(|surface| {
-                let light = ObjectEmitter::new(&surface, two_sided, lift)?;
-                let (ObjectSurface::ConvexTriangles(triangles), Some(others)) =
-                    (&surface, neighbors.get(&form))
-                else {
-                    return Some(light);
-                };
-                let is_covered = |triangle: &[DVec3; 3]| {
-                    others.iter().any(|other| covers(other, triangle, lift))
-                };
-                let covered: Vec<bool> = triangles.iter().map(is_covered).collect();
-                Some(light.without_covered(&covered))
-            });
+            let light = surface.and_then(|surface| ObjectEmitter::new(&surface, two_sided, lift));
             let emission = (emission != [1.0; 3]).then(|| emission.map(S::from_f64));
             LightSource { light, group, emission, visible: true }
         };
@@ -103,7 +100,55 @@ impl<S: Float> SurfaceEmission<S> {
         let (objects, sources): (Vec<_>, Vec<_>) = all.into_iter().unzip();
         let indices: HashMap<_, u32> = objects.iter().map(key).zip(0..).collect();
         let index_of = |entry: &Option<_>| indices.get(&key(entry.as_ref()?)).copied();
-        Self { sources, sampled, source_of: entries.iter().map(index_of).collect() }
+        let source_of = entries.iter().map(index_of).collect();
+        let touching = touching_objects(&objects[..sampled], forms, primitives, lift, is_entered);
+        Self { sources, sampled, source_of, touching, lift: S::from_f64(lift) }
+    }
+
+    /// Returns the lanes of `lanes` whose sampled points on emitter number `index` are behind the
+    /// surface of an object that touches the emitter. `ray` are the shadow rays to the points, at
+    /// the distance `distance`.
+    #[inline(always)]
+    pub fn covered<L: SimdFloat<Scalar = S>>(
+        &self,
+        index: usize,
+        geometry: &Aggregate<L>,
+        (ray, distance): (&Ray<L>, L),
+        lanes: L::Mask,
+    ) -> L::Mask {
+        match self.touching.get(index) {
+            Some(touching) if !touching.is_empty() => {
+                self.covered_by(touching, geometry, (ray, distance), lanes)
+            }
+            _ => L::mask(false),
+        }
+    }
+
+    #[inline(never)]
+    fn covered_by<L: SimdFloat<Scalar = S>>(
+        &self,
+        touching: &[(u32, bool)],
+        geometry: &Aggregate<L>,
+        (ray, distance): (&Ray<L>, L),
+        lanes: L::Mask,
+    ) -> L::Mask {
+        let lift = L::splat(self.lift) * L::from_f64(CONTACT_LIFTS);
+        let mut covered = L::mask(false);
+        for (item, flat) in touching {
+            let limit = L::select(lanes, L::from_f64(L::MAX), L::from_f64(-1.0));
+            let hit = geometry.closest_to(*item, ray, limit);
+            let mut found = lanes & hit.t.lt(limit);
+            while let Some((part, part_lanes)) = next_distinct(hit.item, found) {
+                found = found.and_not(part_lanes);
+                let normal = geometry.surface(part, hit.triangle, ray.at(hit.t)).normal;
+                // A ray leaves a solid along its outward normal.
+                let cosine = normal.dot(ray.direction);
+                let cosine = if *flat { cosine.abs() } else { cosine };
+                let is_near = ((hit.t - distance) * cosine).le(lift);
+                covered = covered | (part_lanes & cosine.gt(L::zero()) & is_near);
+            }
+        }
+        covered
     }
 
     /// Returns `true` if no object emits light.
@@ -139,19 +184,43 @@ impl<S: Float> SurfaceEmission<S> {
     }
 }
 
-/// Returns `true` if the convex form `other` covers the front of a triangle: all corners are within
-/// `slack` of one of its faces, which is parallel to the triangle. A solid faces the triangle's
-/// front; a flat form may face either side.
-fn covers(other: &Form, triangle: &[DVec3; 3], slack: f64) -> bool {
-    let [a, b, c] = *triangle;
-    let Some(normal) = (b - a).cross(c - a).try_normalize() else { return false };
-    let faces_front = |found: &DVec3| {
-        let cosine = found.dot(normal);
-        if other.is_flat() { cosine.abs() > PARALLEL } else { cosine < -PARALLEL }
+/// Returns, for each of the emissive `objects`, the objects that touch it and behind whose surfaces
+/// rays can start: the number of the first primitive, and `true` if it is flat.
+fn touching_objects(
+    objects: &[(usize, usize, [f64; 3])],
+    forms: &[Form],
+    primitives: &[PrimitiveId],
+    lift: f64,
+    is_entered: impl Fn(usize) -> bool,
+) -> Vec<Vec<(u32, bool)>> {
+    let emits: HashSet<usize> = objects.iter().map(|(form, ..)| *form).collect();
+    let mut touching: HashMap<usize, Vec<(u32, bool)>> = HashMap::new();
+    let mut first = vec![0; forms.len()];
+    for (item, source) in (0..).zip(primitives).filter(|(_, source)| source.part == 0) {
+        first[source.form] = item;
+    }
+    let is_behind = |form: usize| forms[form].is_flat() || is_entered(form);
+    let wanted = |a: usize, b: usize| {
+        (emits.contains(&a) && is_behind(b)) || (emits.contains(&b) && is_behind(a))
     };
-    let is_on_face =
-        |corner: &DVec3| other.normals_at(*corner, slack).iter().flatten().any(faces_front);
-    triangle.iter().all(is_on_face)
+    // A lamp inside of a room is far from its walls.
+    let is_close = |a: &Form, b: &Form| {
+        let ball = a.bounding_sphere();
+        b.clearance(ball.center).is_none_or(|distance| distance <= ball.radius + lift)
+    };
+    for (a, b) in touching_pairs(forms, wanted, lift) {
+        if !is_close(&forms[a], &forms[b]) || !is_close(&forms[b], &forms[a]) {
+            continue;
+        }
+        for (form, other) in [(a, b), (b, a)] {
+            // A flat object lights both sides of a flat one that it lies on, as a light does.
+            let both_flat = forms[form].is_flat() && forms[other].is_flat();
+            if emits.contains(&form) && is_behind(other) && !both_flat {
+                touching.entry(form).or_default().push((first[other], forms[other].is_flat()));
+            }
+        }
+    }
+    objects.iter().map(|(form, ..)| touching.get(form).cloned().unwrap_or_default()).collect()
 }
 
 /// Returns the material of an object that is not a compound.

@@ -160,7 +160,6 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     check(&cases, 1 << 15, ROUNDING);
 }
 
-/// A flat object with a two-sided material lights both sides, one with a one-sided material its front.
 /// The face of an emissive box that stands on a surface lights nothing behind that surface.
 #[test]
 fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
@@ -178,6 +177,26 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
         (floor.to_string(), receiver(DVec3::Y, MATT, &rest), 0.0)
     });
     check(&dark, 4096, ROUNDING);
+    let (_, corners) = rectangle(DVec3::new(0.1, 1.0, 0.0), [0.4, 0.3]);
+    // A floor that is smaller than the face covers a part of it.
+    let small = "shape.platform = { center = [0.1, 1.0, 0.0], size = [0.2, 0.1] }";
+    let (_, covered) = rectangle(DVec3::new(0.1, 1.0, 0.0), [0.2, 0.1]);
+    let seen = forms::polygon(&corners, DVec3::Y) - forms::polygon(&covered, DVec3::Y);
+    let partly = receiver(DVec3::Y, MATT, &(object("black", small) + &lamp));
+    check(&[("a part of the face".to_string(), partly, seen / PI)], 1 << 14, ROUNDING);
+    // Shadow rays end at glass, also where it stands on the lamp.
+    let glass = "[materials.glass]\ncolor = [0.0, 0.0, 0.0]\ntransmission = 1.0\n".to_string();
+    let block = "shape.box = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0] }";
+    let inside = [
+        "shape.platform = { center = [0.0, -0.5, 0.0], size = [3.0, 3.0] }",
+        "shape.box = { center = [0.0, -1.0, 0.0], size = [3.0, 1.0, 3.0] }",
+        "shape.box = { center = [0.3, -1.0, 0.2], size = [0.8, 1.0, 0.9] }",
+    ]
+    .map(|shape| {
+        let rest = glass.clone() + &object("glass", block) + &object("lamp", shape);
+        (format!("glass on {shape}"), receiver(DVec3::NEG_Y, MATT, &rest), 0.0)
+    });
+    check(&inside, 4096, ROUNDING);
     // In the plane of a turned square, within its bounding box, and beside it.
     let beside =
         object("lamp", "shape.box = { center = [1.8, 1.05, 0.6], size = [0.1, 0.1, 0.1] }");
@@ -189,6 +208,7 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     agree("box beside a square", &alone, &with_square, 4096);
 }
 
+/// A flat object with a two-sided material lights both sides, one with a one-sided material its front.
 #[test]
 fn back_of_a_flat_emissive_object_follows_two_sided() {
     let (text, corners) = rectangle(DVec3::Y, [1.0, 0.7]);

@@ -1,6 +1,7 @@
 //! Single precision, where `auto` selects it, against double precision.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
+use crate::random_scenes::gaps::shows_coincident_opaque;
 use crate::random_scenes::statistics::{Worst, blocks, mean_and_error, mean_of};
 use crate::support::{picture, rendered};
 use zerkalo::film::{Display, Replicates};
@@ -70,16 +71,18 @@ fn single_is_double(scene: &Scene) -> Verdict {
     }
     let [single, double] =
         [Precision::Single, Precision::Double].map(|p| codes(&scene, p, SAMPLES));
-    paired(scene.film.size, ["single", "double"], [&single, &double], FLOOR)
+    let verdict = paired(scene.film.size, ["single", "double"], [&single, &double], FLOOR);
+    // Rounding decides which of two coincident opaque surfaces is visible. In seed 36 the cap of a
+    // cylinder lies in a plane.
+    if matches!(verdict, Verdict::Different(_)) && shows_coincident_opaque(&scene) {
+        return Verdict::Skipped("two coincident opaque surfaces are visible");
+    }
+    verdict
 }
-
-/// Seeds of scenes in which two opaque surfaces of different colours coincide. Rounding decides which of
-/// them is in front. In seed 36 the cap of a cylinder lies in a plane.
-const COINCIDENT: [u64; 1] = [36];
 
 #[test]
 fn precisions() {
-    compare("precisions", (0..48).filter(|seed| !COINCIDENT.contains(seed)), single_is_double);
+    compare("precisions", 0..48, single_is_double);
 }
 
 #[test]

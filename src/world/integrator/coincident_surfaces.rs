@@ -383,6 +383,16 @@ pub(crate) fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Ve
     out
 }
 
+/// Returns all pairs of forms for which `wanted` is true and whose surfaces may come within `slack` of
+/// each other.
+pub(crate) fn touching_pairs(
+    forms: &[Form],
+    wanted: impl Fn(usize, usize) -> bool,
+    slack: f64,
+) -> impl Iterator<Item = (usize, usize)> {
+    pairs(forms, wanted).into_iter().filter(move |(a, b)| may_touch(&forms[*a], &forms[*b], slack))
+}
+
 /// Returns `true` if the surfaces of two forms may come within `slack` of each other.
 fn may_touch(a: &Form, b: &Form, slack: f64) -> bool {
     let normal = |form: &Form| form.plane().map(|plane| plane.normal);

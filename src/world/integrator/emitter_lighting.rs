@@ -166,6 +166,11 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
             let ray = Ray { origin, direction: light.wi };
             let occluded = world.geometry.occluded(&ray, light.distance, lit, occluders);
             lit = lit.and_not(occluded);
+            if let Some(object) = index.checked_sub(world.emitters.len()) {
+                let shadow_ray = (&ray, light.distance);
+                let emission = &world.emission;
+                lit = lit.and_not(emission.covered(object, &world.geometry, shadow_ray, lit));
+            }
             if lit.none() {
                 continue;
             }

@@ -91,7 +91,7 @@ pub(crate) struct StartRegion {
 impl StartRegion {
     /// Returns `true` if the bounding box of `form` overlaps the region, or if the form has no
     /// bounding box.
-    fn reaches(&self, form: &Form) -> bool {
+    pub fn reaches(&self, form: &Form) -> bool {
         form.bounds()
             .is_none_or(|(low, high)| self.eye.clamp(low, high).distance(self.eye) <= self.radius)
     }
