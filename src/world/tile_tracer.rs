@@ -1,10 +1,11 @@
 //! Tracing of camera samples for the pixels of a tile. The renderer gets radiance only from here.
 
+use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::sampling::warp::disk;
 use crate::sampling::{PacketSampler, SampleSettings, Sampler};
 use crate::world::culling::tile::TileCandidates;
-use crate::world::integrator::path::{Counts, Radiance};
+use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::light_groups::MAX_GROUPS;
 use crate::world::pixel_block::PixelBlock;
 use crate::world::world::World;
@@ -126,14 +127,16 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         let center = L::from_f64(0.5);
         let offset = if world.jitter() { sampler.pixel() } else { (center, center) };
         let camera = world.camera();
-        let mut rays = camera.rays(corner_directions, offset);
+        let (origin, direction) = camera.rays(corner_directions, offset);
+        let mut path = Path::new(Ray { origin, direction });
         if let Some(lens) = camera.lens() {
             let (u, v) = sampler.lens();
             let (x, y, _) = disk(u, v);
-            rays = camera.lens_rays(lens, corner_directions, offset, (x, y));
+            let (origin, direction) = camera.lens_rays(lens, corner_directions, offset, (x, y));
+            path.ray = Ray { origin, direction };
         }
         let candidates = self.candidates.as_ref();
-        let counts = world.trace(rays, candidates, sampler, active, &mut self.radiance);
+        let counts = world.trace(&mut path, candidates, sampler, active, &mut self.radiance);
         self.counts.rays += counts.rays;
         self.counts.glossy |= counts.glossy;
     }

@@ -1,6 +1,5 @@
 //! `World`: the scene as the integrators read it.
 
-use crate::bvh::Ray;
 use crate::camera::PerspectiveCamera;
 use crate::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use crate::light::{DeltaLight, Emitter, EnvironmentLight};
@@ -200,14 +199,13 @@ impl<L: SimdFloat> World<L> {
             && !self.environments.iter().any(|source| source.visible)
     }
 
-    /// Traces one packet of paths. `origin` and `direction` are those of camera rays, as
-    /// [`PerspectiveCamera::rays`] or [`PerspectiveCamera::lens_rays`] returns them. Lanes outside of
-    /// `active` stay black. `candidates` are the candidates of the camera rays and of the shadow
-    /// rays from their hit points; `None` if they are unknown.
+    /// Traces one packet of paths from the camera, and overwrites them. Lanes outside of `active`
+    /// stay black. `candidates` are the candidates of the camera rays and of the shadow rays from
+    /// their hit points; `None` if they are unknown.
     #[inline(always)]
     pub fn trace(
         &self,
-        (origin, direction): (Vec3<L>, Vec3<L>),
+        path: &mut Path<L>,
         candidates: Option<&TileCandidates>,
         sampler: &PacketSampler<'_, L>,
         active: L::Mask,
@@ -216,14 +214,13 @@ impl<L: SimdFloat> World<L> {
         for group in &mut out.groups[..self.groups()] {
             *group = Vec3::zero();
         }
-        let ray = Ray { origin, direction };
         let candidates = candidates.unwrap_or(&self.all_candidates);
         if let Some(limits) = self.diffuse_limits {
-            return trace_generations(self, limits, ray, candidates, sampler, active, out);
+            return trace_generations(self, limits, path.ray, candidates, sampler, active, out);
         }
         if let Some(nested_dielectrics) = &self.nested_dielectrics {
-            let mut start = Branch::camera(ray, active);
-            start.media = nested_dielectrics.at_start(&ray);
+            let mut start = Branch::camera(path.ray, active);
+            start.media = nested_dielectrics.at_start(&path.ray);
             TransmissionIntegrator { world: self, nested_dielectrics, sampler }
                 .trace(&mut start, self.depth, candidates, None, out)
         } else {
@@ -232,8 +229,7 @@ impl<L: SimdFloat> World<L> {
                 (false, true) => trace_opaque::<_, false, false>,
                 (_, false) => trace_opaque::<_, false, true>,
             };
-            let paths = (&mut Path::new(ray), active, self.depth);
-            trace(self, paths, candidates, sampler, None, out)
+            trace(self, (path, active, self.depth), candidates, sampler, None, out)
         }
     }
 
@@ -247,7 +243,7 @@ impl<L: SimdFloat> World<L> {
 /// Type of [`World::trace`] for the lane type `L`.
 type Trace<L> = fn(
     &World<L>,
-    (Vec3<L>, Vec3<L>),
+    &mut Path<L>,
     Option<&TileCandidates>,
     &PacketSampler<'_, L>,
     <L as SimdFloat>::Mask,

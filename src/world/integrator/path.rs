@@ -23,7 +23,7 @@ pub struct Counts {
 
 /// A packet of paths at their current vertex.
 #[derive(Clone, Copy)]
-pub(crate) struct Path<L> {
+pub struct Path<L> {
     pub ray: Ray<L>,
     /// Factor by which radiance along the ray contributes to the radiance of the sample (beta).
     pub throughput: Vec3<L>,
