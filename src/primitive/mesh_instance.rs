@@ -6,7 +6,7 @@
 
 use crate::asset;
 use crate::bvh::{Hit, LEAF_FLAG, Ray};
-use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn};
+use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn};
 use crate::primitive::batch::{SurfacePoint, UvGradients, max_coordinate};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
@@ -303,12 +303,21 @@ impl<S: Float> MeshInstance<S> {
         attributes: &[[f32; 3]],
     ) -> [Vec3<L>; 3] {
         let triangles = &self.mesh.mesh().triangles;
-        // Lanes that hit another item may hold any tag.
-        let number = |lane| (triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1);
-        array_from_fn(|k| {
-            Vec3::from_fn(|lane| {
-                attributes[triangles[number(lane)][k] as usize].map(|x| S::from_f64(f64::from(x)))
-            })
+        // Indices: vertex, axis, lane. Each triangle and each vertex is read once.
+        let mut values = [[[S::default(); MAX_WIDTH]; 3]; 3];
+        for lane in 0..L::WIDTH {
+            // Lanes that hit another item may hold any tag.
+            let triangle =
+                triangles[(triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1)];
+            for (vertex, values) in triangle.into_iter().zip(&mut values) {
+                for (x, values) in attributes[vertex as usize].into_iter().zip(values) {
+                    values[lane] = S::from_f64(f64::from(x));
+                }
+            }
+        }
+        let [a, b, c] = &values;
+        [a, b, c].map(|[x, y, z]| {
+            Vec3::new(L::from_fn(|i| x[i]), L::from_fn(|i| y[i]), L::from_fn(|i| z[i]))
         })
     }
 

@@ -220,7 +220,7 @@ impl<L: SimdFloat> World<L> {
         }
         if let Some(nested_dielectrics) = &self.nested_dielectrics {
             let mut start = Branch::camera(path.ray, active);
-            start.media = nested_dielectrics.at_start(&path.ray);
+            nested_dielectrics.add_at_start(&path.ray, &mut start.media);
             TransmissionIntegrator { world: self, nested_dielectrics, sampler }
                 .trace(&mut start, self.depth, candidates, None, out)
         } else {

@@ -158,7 +158,7 @@ pub(crate) fn trace_generations<L: SimdFloat>(
     let mut counts = Counts::default();
     let mut start = Branch::camera(ray, active);
     if let Some(nested_dielectrics) = &world.nested_dielectrics {
-        start.media = nested_dielectrics.at_start(&ray);
+        nested_dielectrics.add_at_start(&ray, &mut start.media);
     }
     // Largest number of surfaces after the first that reflect or transmit.
     let mut depth = world.depth;

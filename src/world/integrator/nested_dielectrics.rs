@@ -69,6 +69,20 @@ impl<L: SimdFloat> MediumStack<L> {
         out
     }
 
+    /// Adds `priority` in lanes whose ray first hits the boundary of `solid` from inside.
+    #[inline(never)]
+    fn add_if_inside(&mut self, ray: &Ray<L>, priority: u32, solid: &Aggregate<L>) {
+        let hit = solid.closest(ray, solid.all());
+        let mut remaining = hit.t.lt(L::from_f64(L::MAX));
+        let mut inside = L::mask(false);
+        while let Some((item, lanes)) = next_distinct(hit.item, remaining) {
+            let normal = solid.surface(item, hit.triangle, ray.at(hit.t)).normal;
+            inside = inside | (lanes & normal.dot(ray.direction).gt(L::zero()));
+            remaining = remaining.and_not(lanes);
+        }
+        *self = Self::select(inside, &self.with(L::from_f64(f64::from(priority))), self);
+    }
+
     /// Returns the stack `yes` in lanes where `mask` is true and `no` elsewhere.
     #[inline(always)]
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
@@ -192,24 +206,13 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         self.priority_of.iter().map(|priority| *priority > 0).collect()
     }
 
-    /// Returns the media in which camera rays start: the solids whose boundary each ray first hits
-    /// from inside.
-    #[inline(never)]
-    pub fn at_start(&self, ray: &Ray<L>) -> MediumStack<L> {
-        let mut media = MediumStack::vacuum();
+    /// Adds to `media` the solids in which camera rays start: those whose boundary each ray first
+    /// hits from inside.
+    #[inline(always)]
+    pub fn add_at_start(&self, ray: &Ray<L>, media: &mut MediumStack<L>) {
         for (priority, solid) in &self.around_eye {
-            let hit = solid.closest(ray, solid.all());
-            let mut remaining = hit.t.lt(L::from_f64(L::MAX));
-            let mut within = L::mask(false);
-            while let Some((item, lanes)) = next_distinct(hit.item, remaining) {
-                let normal = solid.surface(item, hit.triangle, ray.at(hit.t)).normal;
-                within = within | (lanes & normal.dot(ray.direction).gt(L::zero()));
-                remaining = remaining.and_not(lanes);
-            }
-            let entered = media.with(L::from_f64(f64::from(*priority)));
-            media = MediumStack::select(within, &entered, &media);
+            media.add_if_inside(ray, *priority, solid);
         }
-        media
     }
 
     /// Returns the fraction of light that is left after `distance` [scene units] in `media`, in
