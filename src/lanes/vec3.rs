@@ -1,6 +1,6 @@
 //! SIMD vectors of three coordinates, and orthonormal frames.
 
-use crate::lanes::{Float, SimdFloat};
+use crate::lanes::{Float, MAX_WIDTH, SimdFloat};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 /// Three coordinates, or three colour channels, in each lane.
@@ -33,7 +33,12 @@ impl<L: SimdFloat> Vec3<L> {
     /// Returns the vectors whose lane `i` is `f(i)`.
     #[inline(always)]
     pub fn from_fn(mut f: impl FnMut(usize) -> [L::Scalar; 3]) -> Self {
-        Self::new(L::from_fn(|i| f(i)[0]), L::from_fn(|i| f(i)[1]), L::from_fn(|i| f(i)[2]))
+        let mut axes = [[L::Scalar::default(); MAX_WIDTH]; 3];
+        for i in 0..L::WIDTH {
+            [axes[0][i], axes[1][i], axes[2][i]] = f(i);
+        }
+        let [x, y, z] = axes;
+        Self::new(L::from_fn(|i| x[i]), L::from_fn(|i| y[i]), L::from_fn(|i| z[i]))
     }
     /// Zero in every lane.
     #[inline(always)]

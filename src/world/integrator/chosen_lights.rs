@@ -1,19 +1,20 @@
 //! Direct lighting by a few lights out of many, which each lane chooses at each hit.
 
 use crate::bvh::Ray;
-use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
+use crate::lanes::{Mask, SimdFloat, next_distinct};
 use crate::primitive::PrimitiveSet;
 use crate::sampling::PacketSampler;
 use crate::world::integrator::interaction::SurfaceInteraction;
+use crate::world::integrator::nested_dielectrics::Media;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::light_choice::LightChoice;
 use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
-/// Adds an estimate of the light of all lights in `choice` that the surfaces reflect. `bounce` is the number
-/// of earlier surfaces of the path; `occluders` holds, for each stratum of lights, the primitives that may
-/// occlude it. `transmittance` is that of
-/// [`direct_lighting`](super::direct_lighting::direct_lighting).
+/// Adds an estimate of the light of all lights in `choice` that the surfaces reflect. `bounce` is
+/// the number of earlier surfaces of the path; `occluders` holds, for each stratum of lights, the
+/// primitives that may occlude it. `media` are the media of the paths; `None` in worlds without
+/// transmission.
 #[inline(never)]
 pub(crate) fn chosen_lights<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -21,7 +22,7 @@ pub(crate) fn chosen_lights<L: SimdFloat, const SIMPLE: bool>(
     path: &Path<L>,
     interaction: &SurfaceInteraction<L>,
     (sampler, bounce): (&PacketSampler<'_, L>, u32),
-    transmittance: &dyn Fn(L) -> Option<Vec3<L>>,
+    media: Option<Media<'_, L>>,
     (out, counts): (&mut Radiance<L>, &mut Counts),
 ) {
     let lanes = interaction.direct_mask;
@@ -65,7 +66,7 @@ pub(crate) fn chosen_lights<L: SimdFloat, const SIMPLE: bool>(
         }
         let mut value = path.throughput.component_mul(value);
         value = value * lights.irradiance(stratum, inverse);
-        if let Some(left) = transmittance(distance) {
+        if let Some(left) = media.and_then(|media| media.transmittance(distance)) {
             value = value.component_mul(left);
         }
         value = value.component_mul(lights.emission(stratum));

@@ -5,14 +5,14 @@ use crate::lanes::{Mask, SimdFloat, Vec3};
 use crate::light::DeltaLight;
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::interaction::SurfaceInteraction;
+use crate::world::integrator::nested_dielectrics::Media;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
 /// Adds reflected ambient light and reflected light of all sources to the radiance in `out`. Lanes
 /// in `bouncing` get no ambient light, which stands for the indirect light that a diffuse bounce
-/// computes there. `transmittance(d)` is the share of light that the medium before the surfaces
-/// lets through over the distance `d`; `None` if no medium absorbs light.
+/// computes there. `media` are the media of the paths; `None` in worlds without transmission.
 #[inline(always)]
 pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -20,7 +20,7 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
     interaction: &SurfaceInteraction<L>,
     candidates: &TileCandidates,
     bouncing: Option<L::Mask>,
-    transmittance: impl Fn(L) -> Option<Vec3<L>>,
+    media: Option<Media<'_, L>>,
     (out, counts): (&mut Radiance<L>, &mut Counts),
 ) {
     if let Some(group) = world.ambient {
@@ -83,7 +83,7 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
             value += highlight.masked(lanes);
         }
         let mut value = path.throughput.component_mul(value) * light.irradiance;
-        if let Some(left) = transmittance(light.distance) {
+        if let Some(left) = media.and_then(|media| media.transmittance(light.distance)) {
             value = value.component_mul(left);
         }
         out.groups[source.group] += source.emitted(value).masked(lit);

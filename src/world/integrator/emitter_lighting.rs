@@ -15,6 +15,7 @@ use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
 use crate::world::integrator::environment_lighting::{environment_lighting, visible_environments};
 use crate::world::integrator::interaction::SurfaceInteraction;
+use crate::world::integrator::nested_dielectrics::Media;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
@@ -28,14 +29,14 @@ pub(crate) fn power_heuristic<L: SimdFloat>(p: L, q: L) -> L {
 }
 
 /// Adds the radiance of the visible emitters that the rays of `lanes` reach before the distance
-/// `t_max`. `transmittance` is that of [`direct_lighting`](super::direct_lighting::direct_lighting).
+/// `t_max`. `media` are the media of the paths; `None` in worlds without transmission.
 #[inline(never)]
 pub(crate) fn visible_emitters<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
     t_max: L,
     lanes: L::Mask,
-    transmittance: impl Fn(L) -> Option<Vec3<L>>,
+    media: Option<Media<'_, L>>,
     out: &mut Radiance<L>,
 ) {
     for source in world.emitters.iter().filter(|source| source.visible) {
@@ -50,14 +51,15 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
             let density = source.light.density(origin, t);
             radiance = radiance * power_heuristic(path.lobe_density, density);
         }
-        if let Some(left) = transmittance(t) {
+        if let Some(left) = media.and_then(|media| media.transmittance(t)) {
             radiance = radiance.component_mul(left);
         }
         out.groups[source.group] += source.emitted(radiance).masked(seen);
     }
     let escaped = lanes.and_not(t_max.lt(L::from_f64(L::MAX)));
     if !world.environments.is_empty() && escaped.any() {
-        visible_environments(world, path, transmittance(L::from_f64(L::MAX)), escaped, out);
+        let left = media.and_then(|media| media.transmittance(L::from_f64(L::MAX)));
+        visible_environments(world, path, left, escaped, out);
     }
 }
 
@@ -94,7 +96,7 @@ pub(crate) struct ReflectingLobes<L: SimdFloat> {
 }
 
 /// Adds the reflected light of all emitters. `bounce` is the number of earlier surfaces of the
-/// path. `transmittance` is that of [`direct_lighting`](super::direct_lighting::direct_lighting).
+/// path. `media` are the media of the paths; `None` in worlds without transmission.
 #[inline(never)]
 pub(crate) fn emitter_lighting<L: SimdFloat>(
     world: &World<L>,
@@ -102,7 +104,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
     interaction: &SurfaceInteraction<L>,
     candidates: &TileCandidates,
     (sampler, bounce): (&PacketSampler<'_, L>, u32),
-    (lobes, transmittance): (&ReflectingLobes<L>, &dyn Fn(L) -> Option<Vec3<L>>),
+    (lobes, media): (&ReflectingLobes<L>, Option<Media<'_, L>>),
     (out, counts): (&mut Radiance<L>, &mut Counts),
 ) {
     let mut glossy = L::mask(false);
@@ -176,7 +178,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
             }
         }
         let mut radiance = path.throughput.component_mul(value) * light.irradiance;
-        if let Some(left) = transmittance(light.distance) {
+        if let Some(left) = media.and_then(|media| media.transmittance(light.distance)) {
             radiance = radiance.component_mul(left);
         }
         out.groups[source.group] += source.emitted(radiance).masked(lit);

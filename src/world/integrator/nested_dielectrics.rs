@@ -95,6 +95,24 @@ fn equal<L: SimdFloat>(a: L, b: L) -> L::Mask {
     a.le(b) & b.le(a)
 }
 
+/// Media that the rays of a packet are inside of, with their properties.
+#[derive(Clone, Copy)]
+pub(crate) struct Media<'a, L: SimdFloat> {
+    pub nested_dielectrics: &'a NestedDielectrics<L>,
+    pub stack: &'a MediumStack<L>,
+}
+
+impl<L: SimdFloat> Media<'_, L> {
+    /// Returns the fraction of light that is left after `distance` [scene units], in each channel,
+    /// by Beer's law. `distance` may be the largest finite number. Returns `None` if no solid of the
+    /// world absorbs light.
+    #[inline(always)]
+    pub fn transmittance(&self, distance: L) -> Option<Vec3<L>> {
+        let absorption = self.nested_dielectrics.absorption.as_ref()?;
+        Some(transmittance(absorption, self.stack.top(), distance))
+    }
+}
+
 /// Region in which camera rays start: a ball around the eye.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StartRegion {
@@ -213,15 +231,6 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         for (priority, solid) in &self.around_eye {
             media.add_if_inside(ray, *priority, solid);
         }
-    }
-
-    /// Returns the fraction of light that is left after `distance` [scene units] in `media`, in
-    /// each channel, by Beer's law. `distance` may be the largest finite number. Returns `None` if
-    /// no solid of the world absorbs light.
-    #[inline(always)]
-    pub fn transmittance(&self, media: &MediumStack<L>, distance: L) -> Option<Vec3<L>> {
-        let absorption = self.absorption.as_ref()?;
-        Some(transmittance(absorption, media.top(), distance))
     }
 
     /// Returns the index of refraction of the solid with `priority`.

@@ -45,7 +45,7 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
             out.groups[group] += path.throughput.masked(active.and_not(is_hit));
         }
         if EMITTERS {
-            visible_emitters(world, path, hit.t, active, |_| None, out);
+            visible_emitters(world, path, hit.t, active, None, out);
         }
         active = active & is_hit;
         let Some(first) = next_distinct(hit.item, active) else { return counts };
@@ -64,7 +64,7 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
             &interaction,
             candidates,
             bouncing,
-            |_| None,
+            None,
             (&mut *out, &mut counts),
         );
         if let Some(choice) = &world.light_choice {
@@ -74,7 +74,7 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
                 path,
                 &interaction,
                 (sampler, bounce),
-                &|_| None,
+                None,
                 (&mut *out, &mut counts),
             );
         }
@@ -87,7 +87,7 @@ pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS:
                 &interaction,
                 candidates,
                 (sampler, bounce),
-                (&ReflectingLobes { lanes, share: L::one() }, &|_| None),
+                (&ReflectingLobes { lanes, share: L::one() }, None),
                 (out, &mut counts),
             );
         }

@@ -14,7 +14,9 @@ use crate::world::integrator::emitter_lighting::{
 };
 use crate::world::integrator::indirect_diffuse::DiffuseReservoir;
 use crate::world::integrator::interaction::{SurfaceInteraction, interact};
-use crate::world::integrator::nested_dielectrics::{InterfaceHit, MediumStack, NestedDielectrics};
+use crate::world::integrator::nested_dielectrics::{
+    InterfaceHit, Media, MediumStack, NestedDielectrics,
+};
 use crate::world::integrator::opaque::sample_reflection;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
@@ -140,12 +142,12 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             hit.take_in(next.lanes, L::zero(), (next.item, next.triangle));
             behind = Some(next);
         }
-        let transmittance = |distance| self.nested_dielectrics.transmittance(media, distance);
+        let absorbing = Media { nested_dielectrics: self.nested_dielectrics, stack: media };
         let has_emitters = world.has_emitters();
         if has_emitters {
-            visible_emitters(world, path, hit.t, active, transmittance, out);
+            visible_emitters(world, path, hit.t, active, Some(absorbing), out);
         }
-        if let Some(left) = transmittance(hit.t) {
+        if let Some(left) = absorbing.transmittance(hit.t) {
             path.throughput = path.throughput.component_mul(left);
         }
         let is_hit = hit.t.lt(L::from_f64(L::MAX));
@@ -187,7 +189,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             &interaction,
             candidates,
             bouncing,
-            transmittance,
+            Some(absorbing),
             (&mut *out, &mut *counts),
         );
         if let Some(choice) = &world.light_choice {
@@ -197,7 +199,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 path,
                 &interaction,
                 (self.sampler, bounce),
-                &transmittance,
+                Some(absorbing),
                 (&mut *out, &mut *counts),
             );
         }
@@ -213,7 +215,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
                 &interaction,
                 candidates,
                 (self.sampler, bounce),
-                (&lobes, &transmittance),
+                (&lobes, Some(absorbing)),
                 (out, counts),
             );
         }
