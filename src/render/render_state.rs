@@ -201,7 +201,7 @@ impl RenderState {
             ((film.width() - x).min(TILE) * (film.height() - y).min(TILE)) as u32
         };
         let pixels: Vec<u32> = (0..film.tile_count()).map(pixels_of_tile).collect();
-        Schedule::new(&pixels, settings)
+        Schedule::new(&pixels, settings).with_light_period(self.world.light_period())
     }
 
     /// Traces the first sample of every pixel, from coarse to fine. Calls `on_refined` with the

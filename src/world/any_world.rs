@@ -5,6 +5,7 @@ use crate::scene::Scene;
 use crate::world::compile::RecenteredGeometry;
 use crate::world::integrator::first_hit::FirstHit;
 use crate::world::inventory::Inventory;
+use crate::world::light_choice::LightChoice;
 use crate::world::light_groups::LightGroups;
 use crate::world::precision;
 use crate::world::world::World;
@@ -110,6 +111,12 @@ impl AnyWorld {
     /// one in colours, intensities and switches of lights.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         dispatch!(self, world => world.groups.mix(scene))
+    }
+
+    /// Number of successive samples of a pixel that ask each light once; 1 if every sample asks all
+    /// lights.
+    pub fn light_period(&self) -> u32 {
+        dispatch!(self, world => world.light_choice.as_ref().map_or(1, LightChoice::period))
     }
 
     /// Features that the world contains.

@@ -120,6 +120,11 @@ impl<S: Float> LightChoice<S> {
         self.strata.len()
     }
 
+    /// Number of sets: as many successive samples of a pixel ask each light once.
+    pub fn period(&self) -> u32 {
+        self.sets.len() as u32
+    }
+
     /// Returns a sphere around the lights of each stratum.
     pub fn balls(&self) -> impl Iterator<Item = BoundingSphere> {
         self.strata.iter().map(|stratum| stratum.ball)

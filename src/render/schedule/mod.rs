@@ -90,6 +90,8 @@ pub struct Schedule {
     /// Samples per replicate at the latest noise estimate, in phases with equal counts in all
     /// tiles.
     estimated_at: u32,
+    /// See [`Schedule::with_light_period`].
+    light_period: u32,
 }
 
 impl Schedule {
@@ -108,7 +110,16 @@ impl Schedule {
             rays: 0,
             noise: None,
             estimated_at: 0,
+            light_period: 1,
         }
+    }
+
+    /// Returns the schedule of a world in which `light_period` samples of a replicate ask each light
+    /// once; see [`AnyWorld::light_period`](crate::world::AnyWorld::light_period). The error falls
+    /// steeply at this count, and estimates from fewer samples do not show what is left. They are
+    /// discarded as soon as a tile has an estimate from `light_period` samples.
+    pub fn with_light_period(self, light_period: u32) -> Self {
+        Self { light_period, ..self }
     }
 
     /// Returns the next step. `seconds` is the time since the start of the render. The caller
@@ -152,7 +163,7 @@ impl Schedule {
             self.samples += u64::from(job.count) * u64::from(tile.pixels);
             self.rays += report.rays;
             let count = job.first + job.count;
-            tile.record(report);
+            tile.record(report, self.light_period);
             if wave.replicate == 1 {
                 tile.done = count;
             }

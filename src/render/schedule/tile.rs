@@ -30,11 +30,15 @@ impl Tile {
         Self { pixels, done: 0, rays: 0, glossy: false, error: None, history: Vec::new() }
     }
 
-    /// Records the report of a job.
-    pub fn record(&mut self, report: &JobReport) {
+    /// Records the report of a job. Discards estimates from fewer than `light_period` samples per
+    /// replicate if the report has one from more.
+    pub fn record(&mut self, report: &JobReport, light_period: u32) {
         self.rays += report.rays;
         self.glossy |= report.glossy;
         if let Some(error) = report.error {
+            if error.samples >= light_period {
+                self.history.retain(|estimate| estimate.samples >= light_period);
+            }
             self.record_error(error);
         }
     }

@@ -47,6 +47,22 @@ fn adaptive_sampling_saves_samples() {
     }
 }
 
+/// Estimates from fewer samples than the light period would keep the expected error of tiles high
+/// that have none any more.
+#[test]
+fn tiles_without_error_after_the_light_period_get_no_more_samples() {
+    let least = |light_period| {
+        let mut model = Model::exact(vec![NOISY; 400]);
+        model.periodic = (100..400).collect();
+        model.light_period = light_period;
+        let (schedule, reason) = model.finish(until(noise(1.0), true));
+        assert_eq!(reason, StoppedBy::Noise);
+        schedule.spp().min
+    };
+    assert_eq!(least(PERIOD as u32), 2 * PERIOD as u32);
+    assert!(least(1) > 2 * PERIOD as u32);
+}
+
 #[test]
 fn noise_target_is_reached_without_overshoot() {
     for adaptive in [false, true] {

@@ -12,6 +12,8 @@ use crate::render::wave::JobReport;
 
 /// [`TileNoise::squares`] of an error that is spread over many pixels.
 const SPREAD_OUT: Mse = Mse { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
+/// Samples per replicate from which on [`Model::periodic`] tiles have no error.
+const PERIOD: f64 = 16.0;
 /// Number of pixels of a whole tile.
 const PIXELS: u32 = 256;
 
@@ -42,6 +44,10 @@ struct Model {
     aligned: bool,
     /// Tiles with an error that only validation pixels contain.
     hidden: Vec<usize>,
+    /// Tiles without error from [`PERIOD`] samples per replicate on.
+    periodic: Vec<usize>,
+    /// See [`Schedule::with_light_period`].
+    light_period: u32,
 }
 
 impl Model {
@@ -56,6 +62,8 @@ impl Model {
             waves: 0,
             aligned: true,
             hidden: Vec::new(),
+            periodic: Vec::new(),
+            light_period: 1,
         }
     }
 
@@ -92,6 +100,9 @@ impl Model {
         let t = self.truth[tile];
         let n = f64::from(self.counts[0][tile]);
         let [a, b] = [&self.walks[0][tile], &self.walks[1][tile]];
+        if self.periodic.contains(&tile) && n >= PERIOD {
+            return 0.0;
+        }
         if a.is_empty() {
             return t.sigma.powi(2) * n.powf(-2.0 * t.slope) / 2.0;
         }
@@ -131,7 +142,7 @@ impl Model {
     }
 
     fn schedule(&self, settings: Settings) -> Schedule {
-        Schedule::new(&self.pixels, settings)
+        Schedule::new(&self.pixels, settings).with_light_period(self.light_period)
     }
 
     /// Renders to the end, at one nanosecond per ray. Panics if the render does not end.
