@@ -33,11 +33,11 @@ impl<L: SimdFloat> Vec3<L> {
     /// Returns the vectors whose lane `i` is `f(i)`.
     #[inline(always)]
     pub fn from_fn(mut f: impl FnMut(usize) -> [L::Scalar; 3]) -> Self {
-        let mut axes = [[L::Scalar::default(); MAX_WIDTH]; 3];
-        for i in 0..L::WIDTH {
-            [axes[0][i], axes[1][i], axes[2][i]] = f(i);
+        let [mut x, mut y, mut z] = [[L::Scalar::default(); MAX_WIDTH]; 3];
+        let lanes = x.iter_mut().zip(&mut y).zip(&mut z).take(L::WIDTH);
+        for (i, ((x, y), z)) in lanes.enumerate() {
+            [*x, *y, *z] = f(i);
         }
-        let [x, y, z] = axes;
         Self::new(L::from_fn(|i| x[i]), L::from_fn(|i| y[i]), L::from_fn(|i| z[i]))
     }
     /// Zero in every lane.

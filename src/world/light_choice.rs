@@ -1,14 +1,16 @@
 //! Choice of lights at a surface point, in scenes with many point lights.
 //!
-//! The lights are divided into sets of three to six lights, and each path asks the lights of one set at each surface, all
-//! sets with the same probability. A set holds at most one light of each stratum, and the strata are consecutive parts of
-//! the lights in the order of a Morton curve, so that the lights of a set are spread over the scene.
+//! The lights are divided into sets of four to eight lights, and each path asks the lights of one
+//! set at each surface, all sets with the same probability. A set holds at most one light of each
+//! stratum, and the strata are consecutive parts of the lights in the order of a Morton curve, so
+//! that the lights of a set are spread over the scene.
 //!
-//! The number of sets is a power of two. Successive samples of a pixel are stratified over the sets, as Sobol points are,
-//! so that as many samples as there are sets ask every light once. With another number of sets the noise would be several
-//! times as large.
+//! The number of sets is a power of two. Successive samples of a pixel are stratified over the
+//! sets, as Sobol points are, so that as many samples as there are sets ask every light once. With
+//! another number of sets the noise would be several times as large.
 //!
-//! The probabilities depend neither on intensities nor on the place, so that light groups mix exactly.
+//! The probabilities depend neither on intensities nor on the place, so that light groups mix
+//! exactly.
 
 use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
 use crate::light::DeltaLight;
@@ -17,12 +19,12 @@ use crate::world::world::DeltaSource;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Least number of point lights of which some are chosen. In scenes with fewer every light is asked.
-/// `benches/many-lights.sh` measures the cost of both.
+/// Least number of point lights of which some are chosen. In scenes with fewer every light is
+/// asked. `benches/many-lights.sh` measures the cost of both.
 const MIN_LIGHTS: usize = 16;
 
 /// Least number of lights in a full set.
-const MIN_SET: usize = 3;
+const MIN_SET: usize = 4;
 
 /// Largest number of strata: the largest number of lights in a set.
 const MAX_STRATA: usize = 2 * MIN_SET;
@@ -30,7 +32,8 @@ const MAX_STRATA: usize = 2 * MIN_SET;
 /// Lights that a path asks together, one of each stratum.
 #[derive(Clone, Copy)]
 struct LightSet<S> {
-    /// Positions of the lights; NaN in strata that have no light in this set, so that no surface faces it.
+    /// Positions of the lights; NaN in strata that have no light in this set, so that no surface
+    /// faces it.
     positions: [[S; 3]; MAX_STRATA],
     /// Light group of each light, as an index.
     groups: [u32; MAX_STRATA],
@@ -66,8 +69,8 @@ pub(super) struct ChosenSets<'a, S> {
 }
 
 impl<S: Float> LightChoice<S> {
-    /// Takes the lights of which some are chosen out of `sources`: point lights that are not on a surface. Returns
-    /// `None` if they are so few that all of them are asked.
+    /// Takes the lights of which some are chosen out of `sources`: point lights that are not on a
+    /// surface. Returns `None` if they are so few that all of them are asked.
     pub fn take(sources: &mut Vec<DeltaSource<S>>) -> Option<Self> {
         let position = |source: &DeltaSource<S>| match source.light.light {
             DeltaLight::InverseSquare { position } | DeltaLight::Constant { position } => {
@@ -148,8 +151,8 @@ impl<S: Float> ChosenSets<'_, S> {
         Vec3::from_fn(|lane| self.sets[lane].positions[stratum])
     }
 
-    /// Returns the irradiance at normal incidence of lights with unit emission, divided by the probability of the choice.
-    /// `inverse` is the inverse of the distance.
+    /// Returns the irradiance at normal incidence of lights with unit emission, divided by the
+    /// probability of the choice. `inverse` is the inverse of the distance.
     #[inline(always)]
     pub fn irradiance<L: SimdFloat<Scalar = S>>(&self, stratum: usize, inverse: L) -> L {
         let count = L::from_f64(self.choice.sets.len() as f64);

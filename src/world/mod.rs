@@ -22,7 +22,7 @@ mod world;
 pub use any_world::{AnyWorld, Options, Precision};
 pub use culling::tile::TileCandidates;
 pub use integrator::first_hit::FirstHit;
-pub use integrator::path::{Counts, Radiance};
+pub use integrator::path::{Counts, Path, Radiance};
 pub use inventory::Inventory;
 pub use light_groups::{LightGroupSource, LightGroups, MAX_GROUPS};
 pub use pixel_block::MAX_BLOCK_PIXELS;

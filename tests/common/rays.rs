@@ -10,7 +10,7 @@ use zerkalo::primitive::{Aggregate, Form, SurfacePoint};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::shape::EXAMPLES;
-use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Precision, Radiance, World};
+use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Path, Precision, Radiance, World};
 
 /// A single ray in double precision: origin and unit direction.
 pub type Line = (DVec3, DVec3);
@@ -154,7 +154,7 @@ impl Traced {
         let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
         for (ray, count) in packets::<L>(lines) {
             let draws = points.for_pixel(sampler.key((0, 0), 0));
-            world.trace((ray.origin, ray.direction), None, &draws, L::mask(true), &mut radiance);
+            world.trace(&mut Path::new(ray), None, &draws, L::mask(true), &mut radiance);
             for i in 0..count {
                 let mut sum = DVec3::ZERO;
                 for (group, weight) in radiance.groups.iter().zip(&self.weights) {

@@ -1,10 +1,11 @@
 //! Scenes with one receiver and one light, and their radiance with its standard error.
 
 use crate::common::normal::two_sided_z;
+use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
-use zerkalo::world::{MAX_GROUPS, Radiance, World};
+use zerkalo::world::{MAX_GROUPS, Path, Radiance, World};
 
 /// Writes three numbers as a TOML array.
 pub fn array(v: glam::DVec3) -> String {
@@ -28,8 +29,9 @@ pub fn samples<L: SimdFloat>(scene: &Scene, count: u32, seed: u64, mut visit: im
         let offset = if world.jitter() { draws.pixel() } else { (half, half) };
         let corner = Vec3::splat(world.camera().pixel_corner_direction((0, 0)));
         let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
-        let rays = world.camera().rays(corner, offset);
-        world.trace(rays, None, &draws, L::mask(true), &mut radiance);
+        let (origin, direction) = world.camera().rays(corner, offset);
+        let mut path = Path::new(Ray { origin, direction });
+        world.trace(&mut path, None, &draws, L::mask(true), &mut radiance);
         for lane in 0..L::WIDTH {
             let groups = &radiance.groups[..world.groups()];
             let sample: Vec<f64> = groups.iter().map(|g| g.x.lane(lane).to_f64()).collect();

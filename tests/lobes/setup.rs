@@ -1,10 +1,11 @@
 //! Shared helpers: materials, vectors, sampled reflections, traced samples.
 
+use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Float, Mask, SimdFloat, Vec3};
 use zerkalo::material::{Bsdf, InterfaceMedia, Lobe, Masking, Material, ReflectionLobe};
 use zerkalo::sampling::{CameraDimensions, SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
-use zerkalo::world::{MAX_GROUPS, Radiance, World};
+use zerkalo::world::{MAX_GROUPS, Path, Radiance, World};
 
 pub type Vector = [f64; 3];
 
@@ -216,12 +217,13 @@ pub fn trace<L: SimdFloat>(
     let draws = points.for_pixel(sampler.key(pixel, replicate));
     let half = L::from_f64(0.5);
     let jitter = if world.jitter() { draws.pixel() } else { (half, half) };
-    let rays =
-        world.camera().rays(Vec3::splat(world.camera().pixel_corner_direction(pixel)), jitter);
+    let corner = Vec3::splat(world.camera().pixel_corner_direction(pixel));
+    let (origin, direction) = world.camera().rays(corner, jitter);
+    let mut path = Path::new(Ray { origin, direction });
     let mut radiance = Radiance { groups: [Vec3::zero(); MAX_GROUPS] };
     let all = L::mask(true);
     assert!(all.all());
-    world.trace(rays, None, &draws, all, &mut radiance);
+    world.trace(&mut path, None, &draws, all, &mut radiance);
     let groups = &radiance.groups[..world.groups()];
     let of_lane = |lane| groups.iter().map(|g| g.lane(lane).map(Float::to_f64)).collect();
     (0..L::WIDTH).map(of_lane).collect()

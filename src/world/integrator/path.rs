@@ -24,6 +24,7 @@ pub struct Counts {
 /// A packet of paths at their current vertex.
 #[derive(Clone, Copy)]
 pub struct Path<L> {
+    /// Rays from the vertices.
     pub ray: Ray<L>,
     /// Factor by which radiance along the ray contributes to the radiance of the sample (beta).
     pub throughput: Vec3<L>,
