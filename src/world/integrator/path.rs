@@ -44,8 +44,8 @@ impl<L: SimdFloat> Path<L> {
         Self { ray, throughput: Vec3::of([1.0; 3]), lobe_density: L::from_f64(L::MAX) }
     }
 
-    /// Returns `throughput`, limited to [`Self::MAX_THROUGHPUT`]. Mirrors that amplify light would
-    /// let it grow without limit.
+    /// Returns `throughput`, limited to 2^60. Mirrors that amplify light would let it grow without
+    /// limit.
     #[inline(always)]
     pub fn bounded(throughput: Vec3<L>) -> Vec3<L> {
         let max = L::from_f64(Self::MAX_THROUGHPUT);
