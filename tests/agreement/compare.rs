@@ -8,6 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::fmt;
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use zerkalo::camera::ViewAngle;
 use zerkalo::film::Replicates;
 use zerkalo::sampling::{SampleSettings, SamplerKind};
@@ -47,6 +48,34 @@ impl fmt::Display for Verdict {
     }
 }
 
+/// Results by their inputs. Tests that compare the same pictures share them.
+pub struct Memo<K, V>(Mutex<Vec<(K, Slot<V>)>>);
+
+/// A result that is computed when a test first asks for it.
+type Slot<V> = Arc<OnceLock<V>>;
+
+impl<K: PartialEq, V: Clone> Memo<K, V> {
+    pub const fn new() -> Self {
+        Self(Mutex::new(Vec::new()))
+    }
+
+    /// Returns the result of `compute` for `key`, which it must depend on alone.
+    pub fn get(&self, key: K, compute: impl FnOnce() -> V) -> V {
+        let slot = {
+            // A failed test leaves the table valid.
+            let mut slots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            match slots.iter().find(|(known, _)| *known == key) {
+                Some((_, slot)) => slot.clone(),
+                None => {
+                    slots.push((key, Slot::default()));
+                    slots[slots.len() - 1].1.clone()
+                }
+            }
+        };
+        slot.get_or_init(compute).clone()
+    }
+}
+
 /// Picture by the program, with estimates of its noise.
 pub struct Picture {
     size: [u32; 2],
@@ -60,10 +89,13 @@ pub struct Picture {
 
 impl Picture {
     /// Renders with `samples` samples per pixel and replicate.
-    pub fn new(scene: &Scene, samples: u32) -> Self {
-        let (mean, half) = rendered(scene, samples, SamplerKind::Sobol);
-        let (_, random) = rendered(scene, samples, SamplerKind::Random);
-        Self { size: scene.film.size, mean, half, random, samples }
+    pub fn new(scene: &Scene, samples: u32) -> Arc<Self> {
+        static PICTURES: Memo<(Scene, u32), Arc<Picture>> = Memo::new();
+        PICTURES.get((scene.clone(), samples), || {
+            let (mean, half) = rendered(scene, samples, SamplerKind::Sobol);
+            let (_, random) = rendered(scene, samples, SamplerKind::Random);
+            Arc::new(Self { size: scene.film.size, mean, half, random, samples })
+        })
     }
 
     /// Compares block means with a reference of `samples` samples per pixel, which is far noisier.
@@ -124,12 +156,21 @@ pub fn zoomed(scene: &Scene, point: [f64; 3], degrees: f64) -> Scene {
     scene
 }
 
+/// Picture by the reference tracer.
+pub type Reference = Result<Arc<Vec<Estimate>>, String>;
+
 /// Estimates every pixel with the reference tracer.
 ///
 /// # Errors
 ///
 /// Names a feature of the scene that the reference tracer does not support.
-pub fn reference(scene: &Scene, samples: u32, mutation: Mutation) -> Result<Vec<Estimate>, String> {
+pub fn reference(scene: &Scene, samples: u32, mutation: Mutation) -> Reference {
+    static REFERENCES: Memo<(Scene, u32, Mutation), Reference> = Memo::new();
+    let key = (scene.clone(), samples, mutation);
+    REFERENCES.get(key, || traced(scene, samples, mutation).map(Arc::new))
+}
+
+fn traced(scene: &Scene, samples: u32, mutation: Mutation) -> Result<Vec<Estimate>, String> {
     let tracer = Tracer::new(scene, mutation)?;
     let [width, height] = scene.film.size;
     let row = |y: u32| {

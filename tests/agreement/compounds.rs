@@ -14,9 +14,12 @@ pub struct Leaf {
     pub pieces: Vec<Piece>,
     pub mesh: Option<Triangles>,
     pub canvas: Canvas,
+    /// Centre and radius of a ball around all pieces; `None` for an infinite shape or a mesh.
+    ball: Option<(DVec3, f64)>,
     own_from_scene: DAffine3,
     /// Inverse transpose, which maps normals.
     scene_from_own_normals: DMat3,
+    own_from_scene_normals: DMat3,
     /// Name of the material.
     pub material: String,
 }
@@ -42,7 +45,7 @@ const ASIDE: f64 = 1e-7;
 type Meeting = (f64, DVec3, usize, usize);
 
 impl Leaf {
-    /// Distances, normals and triangle indices of all crossings.
+    /// Distances, normals in the coordinates of the description, and triangle indices of all crossings.
     fn crossings(
         &self,
         origin: DVec3,
@@ -50,10 +53,16 @@ impl Leaf {
     ) -> impl Iterator<Item = (f64, DVec3, usize)> {
         let origin = self.own_from_scene.transform_point3(origin);
         let direction = self.own_from_scene.transform_vector3(direction);
-        let hits = self.pieces.iter().flat_map(move |piece| piece.meet(origin, direction));
+        let missed = self.ball.is_some_and(|(center, radius)| {
+            // Squared distance of the line from the centre.
+            let (a, f) = (direction.length_squared(), center - origin);
+            f.length_squared() - f.dot(direction).powi(2) / a > radius * radius
+        });
+        let pieces = if missed { &[][..] } else { &self.pieces[..] };
+        let hits = pieces.iter().flat_map(move |piece| piece.meet(origin, direction));
         let hits = hits.flatten().map(|(t, n)| (t, n, 0));
         let mesh_hits = self.mesh.iter().flat_map(move |mesh| mesh.meet(origin, direction));
-        hits.chain(mesh_hits).map(|(t, n, i)| (t, self.scene_normal(n), i))
+        hits.chain(mesh_hits)
     }
 
     /// Interpolated normal of triangle `i` at `point`; `None` for flat shading.
@@ -81,7 +90,7 @@ impl Leaf {
 
     /// Converts a normal of the scene to the coordinates of the leaf's description.
     pub fn own_normal(&self, normal: DVec3) -> DVec3 {
-        (self.scene_from_own_normals.inverse() * normal).normalize()
+        (self.own_from_scene_normals * normal).normalize()
     }
 
     /// Converts a normal of the leaf's description to scene coordinates.
@@ -115,6 +124,7 @@ impl Body {
                 if t <= from || nearest.is_some_and(|n| n.0 <= t) {
                     continue;
                 }
+                let normal = leaf.scene_normal(normal);
                 if matches!(self.tree, Tree::Leaf(_)) {
                     nearest = Some((t, normal, i, facet));
                     continue;
@@ -140,6 +150,12 @@ impl Body {
         self.leaves[0].mesh.is_some()
     }
 
+    /// Returns `true` if a leaf is a torus.
+    pub fn has_torus(&self) -> bool {
+        let mut pieces = self.leaves.iter().flat_map(|leaf| &leaf.pieces);
+        pieces.any(|piece| matches!(piece, Piece::Torus(..)))
+    }
+
     /// Returns `true` if the body is flat.
     pub fn is_open(&self) -> bool {
         let pieces = &self.leaves[0].pieces;
@@ -161,6 +177,15 @@ impl Body {
             Tree::Difference(list) => inside(&list[0]) && !list[1..].iter().any(inside),
         }
     }
+}
+
+/// Centre and radius of a ball around all `pieces`; `None` without pieces or with an infinite one.
+fn ball(pieces: &[Piece]) -> Option<(DVec3, f64)> {
+    let balls = pieces.iter().map(Piece::ball).collect::<Option<Vec<_>>>()?;
+    let center = balls.iter().map(|ball| ball.0).sum::<DVec3>() / balls.len() as f64;
+    let reaches = balls.iter().map(|ball| center.distance(ball.0) + ball.1);
+    // Rounding of the line's distance is far below the margin.
+    reaches.reduce(f64::max).map(|radius| (center, 1.001 * radius))
 }
 
 fn grow(
@@ -190,12 +215,15 @@ fn grow(
                 _ => None,
             };
             let pieces = if mesh.is_some() { Vec::new() } else { pieces(simple)? };
+            let scene_from_own_normals = scene_from_own.matrix3.inverse().transpose();
             leaves.push(Leaf {
                 canvas: Canvas::new(simple, mesh.as_ref()),
+                ball: ball(&pieces),
                 pieces,
                 mesh,
                 own_from_scene: scene_from_own.inverse(),
-                scene_from_own_normals: scene_from_own.matrix3.inverse().transpose(),
+                scene_from_own_normals,
+                own_from_scene_normals: scene_from_own_normals.inverse(),
                 material: material.to_string(),
             });
             Tree::Leaf(leaves.len() - 1)

@@ -93,6 +93,25 @@ impl Piece {
 }
 
 impl Piece {
+    /// Centre and radius of a ball that contains the piece; `None` for an infinite piece.
+    pub fn ball(&self) -> Option<(DVec3, f64)> {
+        match self {
+            Self::Plane(..) => None,
+            Self::Sphere(center, radius) | Self::Disc(center, _, radius) => {
+                Some((*center, *radius))
+            }
+            Self::Polygon(corners, _) => {
+                let center = corners.iter().sum::<DVec3>() / corners.len() as f64;
+                let distances = corners.iter().map(|corner| corner.distance(center));
+                Some((center, distances.fold(0.0, f64::max)))
+            }
+            Self::Side(base, axis, height, [r0, r1]) => {
+                Some((*base + *axis * (0.5 * height), (0.5 * height).hypot(r0.max(*r1))))
+            }
+            Self::Torus(center, _, [ring, tube], _) => Some((*center, ring + tube)),
+        }
+    }
+
     /// Returns `true` if a point is on the inner side of this piece of a convex solid.
     pub fn is_behind(&self, point: DVec3) -> bool {
         match self {

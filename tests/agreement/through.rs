@@ -9,7 +9,7 @@ use crate::agreement::tracer::{Hit, Mutation, Tracer};
 use crate::common::Numbers;
 use glam::DVec3;
 use zerkalo::material::{Fresnel, Material};
-use zerkalo::scene::{BelowHorizon, RayTypes};
+use zerkalo::scene::{BelowHorizon, RayTypes, Scene};
 use zerkalo::value::Color;
 
 /// Distance of the tested points from the surface.
@@ -36,12 +36,13 @@ fn polarised(i: f64, t: Option<f64>, n_i: f64, n_t: f64) -> [f64; 2] {
     [((i - t).sin() / (i + t).sin()).powi(2), ((i - t).tan() / (i + t).tan()).powi(2)]
 }
 
-impl Tracer<'_> {
-    fn transparent<'a>(&'a self, body: &'a Body) -> Option<&'a Material> {
-        let materials = body.leaves.iter().map(|leaf| self.material(&leaf.material));
-        if body.is_open() { None } else { materials.into_iter().find(|m| m.transmission > 0.0) }
-    }
+/// Transmitting material that fills `body`; `None` for an opaque body and for a surface without a volume.
+pub fn medium<'a>(scene: &'a Scene, body: &Body) -> Option<&'a Material> {
+    let mut materials = body.leaves.iter().filter_map(|leaf| scene.materials.get(&leaf.material));
+    if body.is_open() { None } else { materials.find(|m| m.transmission > 0.0) }
+}
 
+impl Tracer<'_> {
     /// Index and index of refraction of the solid that fills the space at `point`: the one listed
     /// last.
     fn medium(&self, point: DVec3) -> (Option<usize>, f64) {
@@ -50,9 +51,9 @@ impl Tracer<'_> {
 
     /// Index and material of the solid that fills the space at `point`.
     fn filling(&self, point: DVec3) -> Option<(usize, &Material)> {
-        let bodies = self.bodies.iter().enumerate().rev();
+        let bodies = self.bodies.iter().zip(&self.media).enumerate().rev();
         bodies
-            .filter_map(|(i, body)| Some((i, body, self.transparent(body)?)))
+            .filter_map(|(i, (body, medium))| Some((i, body, (*medium)?)))
             .find(|(_, body, _)| body.holds(point))
             .map(|(i, _, material)| (i, material))
     }

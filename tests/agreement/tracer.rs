@@ -6,7 +6,7 @@ use crate::agreement::emission::Shine;
 use crate::agreement::lamps::Lamp;
 use crate::agreement::meshes;
 use crate::agreement::paint::Pixels;
-use crate::agreement::through::Way;
+use crate::agreement::through::{Way, medium};
 use crate::common::Numbers;
 use glam::DVec3;
 use std::collections::HashMap;
@@ -72,6 +72,8 @@ pub struct Tracer<'a> {
     lamps: Vec<Option<Lamp>>,
     /// Emissive surface of each body; `None` for a body of which no points are sampled.
     shines: Vec<Option<Shine>>,
+    /// Transmitting material of each body; `None` for an opaque body and for a surface without a volume.
+    pub media: Vec<Option<&'a Material>>,
     /// Images by file name.
     pub images: HashMap<String, Pixels>,
     plain: Material,
@@ -111,7 +113,8 @@ impl<'a> Tracer<'a> {
         let (images, plain) = (HashMap::new(), Material::default());
         let lamps = scene.lights.iter().map(Lamp::new).collect();
         let shines = bodies.iter().map(Shine::new).collect();
-        let mut tracer = Self { scene, bodies, lamps, shines, images, plain, mutation };
+        let media = bodies.iter().map(|body| medium(scene, body)).collect();
+        let mut tracer = Self { scene, bodies, lamps, shines, media, images, plain, mutation };
         if scene.lights.iter().any(|l| l.environment.as_ref().is_some_and(|e| e.file().is_some())) {
             return Err("an image around the scene".to_string());
         }
@@ -131,9 +134,10 @@ impl<'a> Tracer<'a> {
         Ok(tracer)
     }
 
-    /// Returns `true` if the scene has meshes, whose triangles are tested one by one.
+    /// Returns `true` if the scene has meshes, whose triangles are tested one by one, or tori, whose crossings
+    /// are found by bisection.
     pub fn is_slow(&self) -> bool {
-        self.bodies.iter().any(Body::is_mesh)
+        self.bodies.iter().any(|body| body.is_mesh() || body.has_torus())
     }
 
     /// Estimates the pixel `x`, `y` from `samples` samples.
@@ -445,8 +449,11 @@ impl<'a> Tracer<'a> {
             sum += irradiance * (color * (m.diffuse * cos / PI) + shine);
         }
         for (body, shine) in self.bodies.iter().zip(&self.shines) {
+            let Some(shine) = shine else { continue };
             let material = self.material(&body.leaves[0].material);
-            let Some(shine) = shine.as_ref().filter(|_| material.emits()) else { continue };
+            if !material.emits() {
+                continue;
+            }
             let (point, normal, area) = shine.point(numbers);
             let distance = point.distance(hit.point);
             let towards = (point - hit.point) / distance;

@@ -290,7 +290,8 @@ fn scenes_and_meshes_that_do_not_fit_are_refused() {
         let mut fits = false;
         for megabytes in (30..=150).step_by(20) {
             let limit = format!("ulimit -v {}", 1000 * megabytes);
-            let command = format!("exec \"$0\" render {scene} -o a.png --spp 2 --threads 2");
+            let command =
+                format!("exec \"$0\" render {scene} -o a.png --spp 2 --size 64x48 --threads 2");
             let mut shell = Command::new("sh");
             shell.args(["-c", &format!("{limit}; {command}"), env!("CARGO_BIN_EXE_zerkalo")]);
             let output = shell.current_dir(desk.0.path()).output().unwrap();

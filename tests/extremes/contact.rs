@@ -6,6 +6,7 @@ use crate::support::{parsed, picture, rendered};
 use glam::{DAffine3, DQuat, DVec3};
 use std::fs;
 use std::path::Path;
+use tempfile::TempDir;
 use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
@@ -57,6 +58,15 @@ fn slab(low: DVec3, high: DVec3) -> String {
         }
     }
     out + "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n"
+}
+
+/// A folder with the two mesh files.
+fn meshes() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let write_file = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write_file("upper.obj", &slab(DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 1.0, 1.0)));
+    write_file("lower.obj", &slab(DVec3::new(-2.5, -1.0, -2.5), DVec3::new(2.5, 0.0, 2.5)));
+    folder
 }
 
 struct Setting<'a> {
@@ -111,11 +121,8 @@ impl Setting<'_> {
             self.lower,
             transform_text(0.0),
         );
-        let write_file = |name: &str, text: &str| fs::write(self.folder.join(name), text).unwrap();
-        write_file("upper.obj", &slab(DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 1.0, 1.0)));
-        write_file("lower.obj", &slab(DVec3::new(-2.5, -1.0, -2.5), DVec3::new(2.5, 0.0, 2.5)));
-        write_file("scene.toml", &text);
-        let scene = Scene::read(&self.folder.join("scene.toml"));
+        let name = self.folder.join("scene.toml");
+        let scene = Scene::parse(&text, &name.display().to_string());
         Traced::new(&scene.unwrap_or_else(|e| panic!("{e}\n{text}")), precision)
     }
 
@@ -179,7 +186,7 @@ fn is_solid(shape: &str) -> bool {
 /// Covers every pair of shapes with every pair of materials, in both precisions.
 #[test]
 fn contact_is_the_limit_of_a_gap() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = meshes();
     for upper in UPPER {
         for lower in LOWER {
             for materials in MATERIALS {
@@ -199,7 +206,7 @@ fn contact_is_the_limit_of_a_gap() {
 /// Contact tilted, far from the origin, small and large.
 #[test]
 fn transformed_contact_is_the_limit_of_a_gap() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = meshes();
     let mut numbers = Numbers::new(9);
     for scale in [1e-4, 1.0, 1e4] {
         for far in [0.0, 1.0, 1e5] {
@@ -233,7 +240,7 @@ fn transformed_contact_is_the_limit_of_a_gap() {
 /// opaque one, and the last one listed outside of other transparent ones.
 #[test]
 fn common_faces_of_nested_solids_have_an_order() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = meshes();
     for (upper, lower, materials, gap) in [
         (OUTER, INNER, ("glass", "water"), GAP),
         (INNER, OUTER, ("water", "glass"), GAP),

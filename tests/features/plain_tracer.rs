@@ -1,5 +1,6 @@
 //! Comparison of the program's pictures with those of the plain tracer of tests/agreement.
 
+use crate::agreement::SAMPLES;
 use crate::agreement::compare::{Picture, reference, small};
 use crate::agreement::tracer::{Mutation, Tracer};
 use crate::common::Numbers;
@@ -11,15 +12,12 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::Precision;
 
-/// Samples that the program takes per pixel and replicate.
-const PROGRAM_SAMPLES: u32 = 256;
-
 /// Statistical comparison of the program's picture of `tested` with the plain tracer's picture of `original`.
 /// The plain tracer takes `samples` samples per pixel.
 pub fn agrees(original: &Scene, tested: &Scene, samples: u32) -> Verdict {
     let reference = reference(&small(original.clone()), samples, Mutation::None);
     let reference = reference.expect("the plain tracer supports the scene");
-    let verdict = Picture::new(&small(tested.clone()), PROGRAM_SAMPLES).beside(&reference, samples);
+    let verdict = Picture::new(&small(tested.clone()), SAMPLES / 2).beside(&reference, samples);
     if verdict.agree() { Ok(()) } else { Err(verdict.to_string()) }
 }
 
