@@ -1,6 +1,7 @@
 //! Tests of pictures: what is traced, sampled, accumulated and written.
 //!
-//! They are one program, so that the kernels are compiled once for all of them.
+//! They are one program, so that the kernels are compiled once for all of them, in a package of its own, which is
+//! optimised.
 
 mod acceleration;
 mod agreement;

@@ -89,7 +89,7 @@ const STONE_COLORS: &str = "newmtl crown\nKd 0.55 0.75 0.85\nnewmtl pavilion\nKd
 
 #[test]
 fn mesh_files_match_generators() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/meshes");
+    let folder = Path::new(env!("ZERKALO_ROOT")).join("scenes/meshes");
     for (name, made) in [
         ("knot.ply", knot()),
         ("stone.obj", stone().into_bytes()),
@@ -107,7 +107,7 @@ fn mesh_files_match_generators() {
 #[test]
 fn shipped_meshes_face_outwards() {
     for (name, volume) in [("knot.ply", 18.0..18.2), ("stone.obj", 1.0..2.0)] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/meshes").join(name);
+        let path = Path::new(env!("ZERKALO_ROOT")).join("scenes/meshes").join(name);
         let mesh = Assets::default().mesh(&path).unwrap();
         let corner = |i: &u32| DVec3::from(mesh.mesh().positions[*i as usize].map(f64::from));
         let cone = |t: &[u32; 3]| corner(&t[0]).dot(corner(&t[1]).cross(corner(&t[2]))) / 6.0;

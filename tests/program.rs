@@ -8,6 +8,7 @@ mod fuzz;
 mod kills;
 mod link;
 mod live_session;
+mod picture_files;
 mod prose;
 mod pty;
 mod scene_editing;

@@ -30,7 +30,7 @@ const REFERENCE_SEEDS: std::ops::Range<u64> = 1..65;
 const DECIMALS: usize = 6;
 
 fn golden(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name)
+    PathBuf::from(env!("ZERKALO_ROOT")).join("tests/golden").join(name)
 }
 
 /// Returns the expected text; writes it first if `ZERKALO_BLESS` is set.

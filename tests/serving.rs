@@ -105,7 +105,7 @@ fn base() -> Scene {
         let finish = finishes[i % finishes.len()];
         write!(text, "\n[[object]]\nmaterial = \"{finish}\"\n{example}\n{transform}\n").unwrap();
     }
-    Scene::parse(&text, "test").unwrap_or_else(|e| panic!("{e}"))
+    Scene::parse(&text, common::NAME).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn rendered(scene: &Scene, pool: &rayon::ThreadPool) -> RenderState {

@@ -13,7 +13,7 @@ use zerkalo::world;
 const THREADS: usize = 2;
 
 fn scene(name: &str, size: Option<[u32; 2]>) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(format!("{name}.toml"));
+    let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(format!("{name}.toml"));
     let mut scene = Scene::read(&path).unwrap_or_else(|e| panic!("{e}"));
     scene.film.size = size.unwrap_or(scene.film.size);
     scene

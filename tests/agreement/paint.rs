@@ -30,7 +30,7 @@ pub struct Pixels {
 impl Pixels {
     /// Opens a file by its name in a shipped scene.
     pub fn open(file: &str) -> Result<Self, String> {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
+        let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(file);
         let image = image::open(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         let image = image.to_rgb32f();
         let (width, height) = image.dimensions();

@@ -8,6 +8,9 @@ pub mod tables;
 
 use glam::DVec3;
 
+/// Name of scenes that are no files. Files that they name are relative to the workspace.
+pub const NAME: &str = concat!(env!("ZERKALO_ROOT"), "test");
+
 /// SplitMix64 (Steele, Lea, Flood 2014).
 pub struct Numbers(u64);
 

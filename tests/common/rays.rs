@@ -99,7 +99,7 @@ pub fn every_kind() -> Vec<(&'static str, Form)> {
 
 /// The scene in `text`; panics if it has faults.
 pub fn scene(text: &str) -> Scene {
-    Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}\n{text}"))
+    Scene::parse(text, super::NAME).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
 /// Centre and radius of the sphere around the bounding box of `form`; `None` for an unbounded form.

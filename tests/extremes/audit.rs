@@ -203,7 +203,7 @@ fn rust_files(folder: &Path, out: &mut Vec<PathBuf>) {
 
 /// Returns the names and files of all tests that begin with `extreme_`, except ignored ones.
 fn extreme_tests() -> Vec<(String, String)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = Path::new(env!("ZERKALO_ROOT"));
     let mut paths = Vec::new();
     for folder in ["src", "tests"] {
         rust_files(&root.join(folder), &mut paths);

@@ -65,7 +65,7 @@ fn ply_triangles(bytes: &[u8]) -> Vec<[DVec3; 3]> {
 #[test]
 fn b8_mesh_objects() {
     let file = |name: &str| {
-        let path = format!("{}/scenes/meshes/{name}", env!("CARGO_MANIFEST_DIR"));
+        let path = format!("{}/scenes/meshes/{name}", env!("ZERKALO_ROOT"));
         fs::read(&path).unwrap_or_else(|e| panic!("{path}: {e}"))
     };
     let knot = ply_triangles(&file("knot.ply"));

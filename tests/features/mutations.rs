@@ -20,7 +20,7 @@ pub struct Mutation {
 /// All mutations by file name. Each file begins with a description after `#` and has one line for each of
 /// `test`, `file`, `replace` and `by`.
 pub fn all() -> BTreeMap<String, Mutation> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/features/mutations");
+    let folder = Path::new(env!("ZERKALO_ROOT")).join("tests/features/mutations");
     let read = |path: std::path::PathBuf| {
         let name = path.file_name().unwrap().to_str().unwrap().to_string();
         let text = fs::read_to_string(&path).unwrap();
@@ -42,7 +42,7 @@ fn every_mutation_applies_to_the_source() {
     let all = all();
     assert!(all.len() >= 30, "only {}", all.len());
     for (name, m) in all {
-        let source = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(&m.file));
+        let source = fs::read_to_string(Path::new(env!("ZERKALO_ROOT")).join(&m.file));
         let source = source.unwrap_or_else(|e| panic!("{name}: {}: {e}", m.file));
         let parts: Vec<&str> = m.replace.split(['«', '»']).collect();
         assert_eq!(parts.len(), 3, "{name}: `{}` needs one pair of guillemets", m.replace);

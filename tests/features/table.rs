@@ -13,7 +13,7 @@ fn expected() -> BTreeSet<String> {
 }
 
 fn root() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+    PathBuf::from(env!("ZERKALO_ROOT"))
 }
 
 /// Texts between backticks.

@@ -292,7 +292,9 @@ fn rough_glass_in_white_furnace() {
 /// With a vanishing alpha the picture converges to that of clear glass, and below 0.001 it is the same.
 #[test]
 fn rough_glass_converges_to_clear_glass() {
-    let mut scene = scene(&std::fs::read_to_string("scenes/rough-glass.toml").unwrap());
+    let mut scene = scene(
+        &std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/rough-glass.toml")).unwrap(),
+    );
     scene.film.size = [24, 16];
     let with = |alpha: f64| {
         let mut scene = scene.clone();
@@ -391,7 +393,10 @@ fn fixed_coefficients_reflect_outside_only() {
 #[test]
 fn glass_packets_equal_scalar_samples() {
     for file in ["glass", "transmission", "water-glass"] {
-        let mut scene = scene(&std::fs::read_to_string(format!("scenes/{file}.toml")).unwrap());
+        let mut scene = scene(
+            &std::fs::read_to_string(format!("{}scenes/{file}.toml", env!("ZERKALO_ROOT")))
+                .unwrap(),
+        );
         scene.film.size = [24, 20];
         let (wide, one) = (samples::<Double>(&scene, 8), samples::<f64>(&scene, 8));
         assert_eq!(wide.len(), one.len());

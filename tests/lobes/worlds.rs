@@ -44,7 +44,9 @@ fn closed_form_7_a_white_furnace_is_exact() {
 /// At roughness 0 every lobe equals the mirror in every bit; near 0 the square converges to it.
 #[test]
 fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
-    let mut scene = scene(&std::fs::read_to_string("scenes/lobe-square.toml").unwrap());
+    let mut scene = scene(
+        &std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/lobe-square.toml")).unwrap(),
+    );
     scene.film.size = [40, 30];
     let with = |scene: &mut Scene, lobe: Lobe, roughness: f64| {
         for material in scene.materials.values_mut().filter(|m| m.reflection > 0.0) {
@@ -152,7 +154,9 @@ fn compare<One: SimdFloat, Many: SimdFloat>(scene: &Scene) -> [f64; 4] {
 }
 
 fn physical() -> Scene {
-    let text = std::fs::read_to_string("scenes/mirror-room-physical.toml").unwrap();
+    let text =
+        std::fs::read_to_string(concat!(env!("ZERKALO_ROOT"), "scenes/mirror-room-physical.toml"))
+            .unwrap();
     let mut scene = scene(&text);
     scene.film.size = [96, 72];
     scene

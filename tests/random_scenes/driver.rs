@@ -104,7 +104,7 @@ fn write_scenes() {
 /// Creates the folder for scenes, with copies of the files to which scenes refer.
 fn folder() -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("random_scenes");
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = Path::new(env!("ZERKALO_ROOT"));
     for files in ["scenes/meshes", "scenes/textures", "tests/random_scenes"] {
         fs::create_dir_all(folder.join(files)).unwrap();
         for file in fs::read_dir(root.join(files)).unwrap().map(|entry| entry.unwrap()) {

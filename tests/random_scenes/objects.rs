@@ -1,5 +1,6 @@
 //! Random materials, shapes of every registered kind, and objects.
 
+use crate::common::NAME;
 use crate::common::Numbers;
 use crate::random_scenes::words::{chance, direction, list, log, pick, table};
 use glam::DVec3;
@@ -33,7 +34,7 @@ const IMAGES: &[&str] = &[
 /// Files that scenes refer to, shared by all scenes.
 pub fn library() -> AssetResolver {
     static ASSETS: OnceLock<Arc<Assets>> = OnceLock::new();
-    AssetResolver::new(Path::new("test"), ASSETS.get_or_init(Arc::default).clone())
+    AssetResolver::new(Path::new(NAME), ASSETS.get_or_init(Arc::default).clone())
 }
 
 /// Random coefficient: 0, 1, between, and rarely above.

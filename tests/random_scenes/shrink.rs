@@ -1,6 +1,7 @@
 //! Reduction of failing scenes: removes keys and list entries and rounds numbers in the text, as
 //! long as it is a valid scene that fails.
 
+use crate::common::NAME;
 use std::time::{Duration, Instant};
 use toml::{Table, Value};
 use zerkalo::scene::Scene;
@@ -26,7 +27,7 @@ enum Change {
 pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> String {
     let end = Instant::now() + Duration::from_secs(seconds);
     let mut best: Table = text.parse().expect("a scene");
-    let size = Scene::parse(text, "test").map_or([u32::MAX, 1], |scene| scene.film.size);
+    let size = Scene::parse(text, NAME).map_or([u32::MAX, 1], |scene| scene.film.size);
     let pixels = size.iter().product::<u32>();
     let mut changed = true;
     while changed {
@@ -49,7 +50,7 @@ pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> String 
             let text = written(&candidate);
             // A scene without a size would have the preset one, which is larger.
             let small = |scene: Scene| scene.film.size.iter().product::<u32>() <= pixels;
-            let sound = candidate != best && Scene::parse(&text, "test").is_ok_and(small);
+            let sound = candidate != best && Scene::parse(&text, NAME).is_ok_and(small);
             if sound && fails(&text) {
                 best = candidate;
                 changed = true;

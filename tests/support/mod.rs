@@ -1,6 +1,7 @@
 //! Renderings that tests drive wave by wave, without a clock or channels.
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
+use crate::common::NAME;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -15,13 +16,13 @@ use zerkalo::world::{self, Precision};
 
 /// The shipped scene `name` of the folder `scenes`.
 pub fn shipped(name: &str) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+    let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name);
     Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Every shipped scene of the folder `scenes`, sorted by file name.
 pub fn all_shipped() -> Vec<(String, Scene)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let folder = Path::new(env!("ZERKALO_ROOT")).join("scenes");
     let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let mut paths: Vec<PathBuf> =
         files.filter(|p| p.extension().is_some_and(|e| e == "toml")).collect();
@@ -39,7 +40,7 @@ pub fn sized(mut scene: Scene, size: [u32; 2]) -> Scene {
 
 /// The scene in `text`; panics if it has faults.
 pub fn parsed(text: &str) -> Scene {
-    Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}"))
+    Scene::parse(text, NAME).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Render state without samples.

@@ -159,7 +159,7 @@ fn vase() -> Vec<u8> {
 }
 
 fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
+    Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name)
 }
 
 /// Pixels are compared instead of files, because the compression may change. Sines differ between machines

@@ -88,7 +88,11 @@ fn textures_without_effect_are_not_compiled() {
     let scene = |material: &str| {
         let object =
             "[[object]]\nmaterial = \"m\"\nshape.sphere = { center = [0, 0, 0], radius = 1 }";
-        Scene::parse(&format!("[materials.m]\n{material}\n{object}"), "scenes/none.toml").unwrap()
+        Scene::parse(
+            &format!("[materials.m]\n{material}\n{object}"),
+            concat!(env!("ZERKALO_ROOT"), "scenes/none.toml"),
+        )
+        .unwrap()
     };
     let plain = inventory(&scene(""));
     for nothing in [
