@@ -10,6 +10,10 @@ use crate::material::microfacet::{MicrofacetDistribution, MicrofacetEval};
 use crate::material::refraction::Interface;
 use crate::sampling::warp;
 
+/// Relative difference of the indices of refraction below which transmitted rays of microfacets are
+/// regarded as parallel. The half vector has few valid digits there, in single precision three.
+const MIN_REFRACTION: f64 = 1e-3;
+
 /// Media on both sides of an interface, and the side from which rays arrive.
 #[derive(Clone, Copy, Debug)]
 pub struct InterfaceMedia<L: SimdFloat> {
@@ -142,28 +146,102 @@ impl<S: Float> Bsdf<S> {
                 warp::square_pdf(local, L::splat(*side))
             }
             ReflectionLobe::MicrofacetDistribution(facets) => {
-                microfacet_density(facets, media, (incident, n), direction)
+                facet(facets, media, (incident, n), (direction, L::mask(true))).density
             }
         };
         L::select(media.same(), L::from_f64(L::MAX), density)
     }
+
+    /// Returns the value [1/sr] of an interface in `direction`, times the cosine of the light, and
+    /// the density [1/sr] with which [`Bsdf::sample_interface`] draws `direction`: as the
+    /// transmitted ray in the lanes of `behind`, as the reflected ray elsewhere. The weight of a
+    /// sample is the first divided by the second. Both are zero for directions on the wrong side.
+    /// Where all transmitted rays have about the same direction, the value is zero and the density
+    /// the largest finite number. The other parameters are those of [`Bsdf::sample_interface`].
+    #[inline(always)]
+    pub fn evaluate_interface<L: SimdFloat<Scalar = S>>(
+        &self,
+        transmission: &Transmission<S>,
+        media: &InterfaceMedia<L>,
+        (incident, n): (Vec3<L>, Vec3<L>),
+        (direction, behind): (Vec3<L>, L::Mask),
+        (reflecting, fold): (L::Mask, bool),
+    ) -> (Vec3<L>, L) {
+        let strength = self.reflection.map_or(S::default(), |(strength, _)| strength);
+        let gray = |x: L| Vec3::new(x, x, x);
+        if let ReflectionLobe::MicrofacetDistribution(facets) = &transmission.lobe {
+            let Facet { normal, nh, nv, vh, no, oh, density } =
+                facet(facets, media, (incident, n), (direction, behind));
+            let interface = Interface::new(incident, normal, media.n_i, media.n_t);
+            let shares = interface.split_at(transmission, media.outer, media.thin);
+            let shadowing: L = facets.shadowing(nh, nv, no, vh);
+            let k_r = L::splat(strength).masked(reflecting);
+            let reflected =
+                self.reflection_fresnel.times(|| vh, k_r * shares.reflected * shadowing)
+                    + gray(shares.tir * shadowing);
+            let through: L = facets.shadowing_behind((nh, nv, vh), (no, oh));
+            let passed = shares.transmitted * L::select(media.thin, shadowing, through);
+            let value = Vec3::select(behind, gray(passed), reflected) * density;
+            // The half vector is the difference of two nearly equal vectors.
+            let same = behind.and_not(media.thin)
+                & (media.n_t - media.n_i).abs().le(media.n_i * L::from_f64(MIN_REFRACTION));
+            let possible = density.gt(L::zero()).and_not(same);
+            return (value.masked(possible), L::select(same, L::from_f64(L::MAX), density));
+        }
+        let interface = Interface::new(incident, n, media.n_i, media.n_t);
+        let shares = interface.split_at(transmission, media.outer, media.thin);
+        let (value, density) =
+            self.evaluate_lobe(strength, &transmission.lobe, incident, n, direction, fold);
+        let reflected = value.masked(reflecting) * shares.reflected + gray(shares.tir * density);
+        let density_of = |direction: Vec3<L>| {
+            self.transmission_density(transmission, media, (incident, n), direction)
+        };
+        let mut through = density_of(direction);
+        if fold {
+            through += density_of(direction.reflect(n));
+        }
+        let (is_behind, same) = (direction.dot(n).lt(L::zero()), media.same());
+        let through = L::select(same, L::from_f64(L::MAX), through.masked(is_behind));
+        let passed = gray((shares.transmitted * through).masked(is_behind.and_not(same)));
+        (Vec3::select(behind, passed, reflected), L::select(behind, through, density))
+    }
 }
 
-/// Returns the density [1/sr] of rays that visible microfacets transmit into `direction`.
+/// Microfacet that reflects or transmits an incident ray into a direction.
+struct Facet<L> {
+    /// Unit normal on the viewer's side.
+    normal: Vec3<L>,
+    /// Cosine of `normal` and the surface normal.
+    nh: L,
+    /// Cosine of the viewer and the surface normal.
+    nv: L,
+    /// Cosine of the viewer and `normal`.
+    vh: L,
+    /// Cosine of the direction and the surface normal, which is reversed for transmitted rays.
+    no: L,
+    /// Cosine of the direction and `normal`, which is reversed for transmitted rays.
+    oh: L,
+    /// Density [1/sr] of the direction, if visible microfacets are sampled.
+    density: L,
+}
+
+/// Returns the microfacet that transmits (in the lanes of `behind`) or reflects rays into
+/// `direction`. The density is 0 for directions on the wrong side.
 ///
 /// The half vector of refraction is n_i V + n_t L, and its solid angle per solid angle of L is n_t^2 L.h /
 /// |n_i V + n_t L|^2 (Walter et al. 2007, eq. 16 and 17). Thin surfaces mirror the reflected ray to the
 /// other side.
 #[inline(always)]
-fn microfacet_density<L: SimdFloat>(
+fn facet<L: SimdFloat>(
     facets: &MicrofacetDistribution<L::Scalar>,
     media: &InterfaceMedia<L>,
     (incident, n): (Vec3<L>, Vec3<L>),
-    direction: Vec3<L>,
-) -> L {
+    (direction, behind): (Vec3<L>, L::Mask),
+) -> Facet<L> {
+    let refracts = behind.and_not(media.thin);
+    let reflected = Vec3::select(behind, direction.reflect(n), direction) - incident;
     let refracted = direction * media.n_t - incident * media.n_i;
-    let reflected = direction.reflect(n) - incident;
-    let half = Vec3::select(media.thin, reflected, refracted);
+    let half = Vec3::select(refracts, refracted, reflected);
     // Towards the viewer's side.
     let half = half * L::one().copysign(half.dot(n));
     let length2 = half.length_squared();
@@ -171,11 +249,14 @@ fn microfacet_density<L: SimdFloat>(
     let (nh, tan2) = along_tan2(half, n);
     let nh = nh / length2.sqrt();
     let (vh, nv) = (-incident.dot(h), -incident.dot(n));
-    let lh = -direction.dot(h);
+    let (no, oh) = (direction.dot(n), direction.dot(h));
+    let (no, oh) = (L::select(behind, -no, no), L::select(behind, -oh, oh));
     let (d, visible): (L, L) = (facets.density(tan2), facets.visibility(nh, nv, vh));
     let jacobian =
-        L::select(media.thin, L::from_f64(0.25) / vh, media.n_t * media.n_t * lh / length2);
-    let behind = direction.dot(n).lt(L::zero());
-    let valid = vh.gt(L::zero()) & nv.gt(L::zero()) & behind & (media.thin | lh.gt(L::zero()));
-    (d * visible * vh / nv * jacobian).masked(valid)
+        L::select(refracts, media.n_t * media.n_t * oh / length2, L::from_f64(0.25) / vh);
+    let zero = L::zero();
+    let valid = vh.gt(zero) & nv.gt(zero) & no.gt(zero);
+    let valid = valid.and_not(refracts.and_not(oh.gt(zero)));
+    let density = (d * visible * vh / nv * jacobian).masked(valid);
+    Facet { normal: h, nh, nv, vh, no, oh, density }
 }

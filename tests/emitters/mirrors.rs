@@ -42,6 +42,36 @@ fn camera_and_mirror_see_visible_lights_only() {
     assert!((mean - 1.0).abs() < 1e-8 && error < 1e-8, "{mean} ± {error}");
 }
 
+/// A rough pane with a cone lobe transmits and reflects the fraction of its solid angle that the
+/// light covers. Points of the light are sampled: rays alone would find the smallest lights in a few
+/// of a million samples.
+#[test]
+fn rough_panes_find_small_lights_on_both_sides() {
+    let mut cases = Vec::new();
+    for (roughness, radius) in [(0.1, 1e-3), (0.5, 1e-4), (0.5, 0.05), (0.5, 0.8f64)] {
+        for (coefficient, below) in [("transmission", true), ("reflection", false)] {
+            let material = format!(
+                "reflection = 0.0\ntransmission = 1e-6\n{coefficient} = 0.7\nlobe = \"cone\"\n\
+                 roughness = {roughness:?}"
+            );
+            let material = match below {
+                true => material.replace("transmission = 1e-6\n", ""),
+                false => material.replace("reflection = 0.0\n", ""),
+            };
+            let y = if below { -1.0 } else { 1.0 };
+            let light = format!("sphere = {{ center = [0.0, {y:?}, 0.0], radius = {radius:?} }}");
+            let cone = TAU * (1.0 - f64::atan(roughness).cos());
+            let expected = 0.7 * (solid_angle(radius) / cone).min(1.0);
+            let name = format!("{coefficient}, roughness {roughness}, radius {radius}");
+            let pane = mirror(&material, &light);
+            let (_, error) = radiance::<Double>(&pane, 1 << 12, 1);
+            assert!(error < 0.02 * expected, "{name}: {error}, expected {expected}");
+            cases.push((name, pane, expected));
+        }
+    }
+    check(&cases, 1 << 14, [2e-3, 1e-6]);
+}
+
 /// A cone lobe reflects the fraction of its solid angle that the light covers.
 #[test]
 fn cone_lobe_reflects_the_covered_fraction_of_its_solid_angle() {

@@ -3,6 +3,7 @@
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{material, row};
 use crate::support::shipped;
+use zerkalo::light::SphereLight;
 use zerkalo::material::Lobe;
 use zerkalo::value::Color;
 
@@ -20,6 +21,13 @@ fn d6_rough_transmission() {
             ("microfacets for the cone", &|s| material(s, "spread").lobe = Lobe::Beckmann),
         ],
     );
+    // A lamp instead of the sun: points of it are sampled through the pane and from inside of solids.
+    let mut lit = original;
+    let lamp = &mut lit.lights[0];
+    lamp.clear_kind();
+    lamp.sphere = Some(SphereLight { center: [1.0, 1.2, -3.0], radius: 0.5 });
+    lamp.intensity = 4.0;
+    agrees(&lit, &lit, 384).unwrap();
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::lobes::setup::*;
 use std::f64::consts::{PI, TAU};
-use zerkalo::lanes::{Double, SimdFloat, Single, Vec3};
+use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo::material::{Bsdf, Lobe, Masking, ReflectionLobe};
 
 fn glossy_lobes() -> impl Iterator<Item = (Lobe, Masking)> {
@@ -288,4 +288,70 @@ fn smooth_glass_is_clear() {
         let transmission = Bsdf::<f64>::new(&material, true).transmission.unwrap();
         assert!(matches!(transmission.lobe, ReflectionLobe::Mirror), "{lobe:?}");
     }
+}
+
+/// Checks that the value of an interface, divided by the density, is the weight of the sampled rays.
+fn check_evaluation<L: SimdFloat>(tolerance: f64) {
+    let sides = [(1.0, 1.5, false), (1.5, 1.0, false), (1.0, 1.5, true), (1.0, 1.0, false)];
+    let n = [0.0, 0.0, 1.0];
+    let mut compared = 0;
+    for (lobe, masking) in glossy_lobes() {
+        for (alpha, (n_i, n_t, thin), degrees, fold) in [0.05, 0.3, 1.0]
+            .into_iter()
+            .flat_map(|alpha| sides.map(|side| (alpha, side)))
+            .flat_map(|(alpha, side)| [0.0, 35.0, 80.0].map(|degrees| (alpha, side, degrees)))
+            .flat_map(|(alpha, side, degrees)| {
+                [false, true].map(|fold| (alpha, side, degrees, fold))
+            })
+        {
+            let bsdf = Bsdf::<L::Scalar>::new(&rough_glass(lobe, masking, alpha, 1.5), true);
+            let transmission = bsdf.transmission.unwrap();
+            let media = Sides { n_i, n_t, thin }.media::<L>();
+            let (sin, cos) = f64::to_radians(degrees).sin_cos();
+            let directions = (Vec3::<L>::of([sin, 0.0, -cos]), Vec3::<L>::of(n));
+            let how = (L::mask(true), fold);
+            for i in 0..256 {
+                let (u, v) =
+                    ((f64::from(i) + 0.5) / 256.0, (f64::from(i) * 0.618_034 + 0.3).fract());
+                let uv = (L::from_f64(u), L::from_f64(v));
+                let s = bsdf.sample_interface(&transmission, &media, directions, uv, how);
+                let passed = s.transmitted_weight;
+                for (behind, direction, weight) in [
+                    (false, s.reflected, s.reflected_weight),
+                    (true, s.transmitted, Vec3::new(passed, passed, passed)),
+                ] {
+                    let (value, density) = bsdf.evaluate_interface(
+                        &transmission,
+                        &media,
+                        directions,
+                        (direction, L::mask(behind)),
+                        how,
+                    );
+                    let number = |x: L| x.lane(0).to_f64();
+                    let (value, density) = (number(value.x), number(density));
+                    let weight = number(weight.x);
+                    let name = format!(
+                        "{lobe:?} {masking:?}, alpha {alpha}, {n_i} to {n_t}, thin {thin}, \
+                         {degrees} degrees, fold {fold}, u {u}, v {v}, behind {behind}"
+                    );
+                    if behind && n_i == n_t && !thin {
+                        assert_eq!((value, density), (0.0, L::MAX), "{name}");
+                    } else if weight > 1e-3 {
+                        let off = value / density / weight - 1.0;
+                        assert!(off.abs() < tolerance, "{name}: {value} / {density}, {weight}");
+                        compared += 1;
+                    } else if (number(direction.z) > 0.0) == behind {
+                        assert_eq!((value, density), (0.0, 0.0), "{name}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(compared > 100_000, "{compared}");
+}
+
+#[test]
+fn value_of_an_interface_is_weight_times_density() {
+    check_evaluation::<f64>(1e-9);
+    check_evaluation::<f32>(2e-3);
 }

@@ -10,6 +10,7 @@
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
+use crate::light::EmitterSample;
 use crate::material::ReflectionLobe;
 use crate::sampling::PacketSampler;
 use crate::world::culling::tile::TileCandidates;
@@ -17,7 +18,7 @@ use crate::world::integrator::environment_lighting::{environment_lighting, visib
 use crate::world::integrator::interaction::SurfaceInteraction;
 use crate::world::integrator::nested_dielectrics::Media;
 use crate::world::integrator::path::{Counts, Path, Radiance};
-use crate::world::world::World;
+use crate::world::world::{LightSource, World};
 use std::f64::consts::FRAC_1_PI;
 
 /// Weight of a sample by the power heuristic: p^2 / (p^2 + q^2) for its density `p` and the density
@@ -127,13 +128,7 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
     let occluders = &candidates.occluders[world.sources.len()..world.first_stratum()];
     for (index, occluders) in occluders.iter().enumerate() {
         let numbers = sampler.light_2d(bounce, index as u32);
-        let source = match world.emitters.get(index) {
-            Some(source) => source.with_light(source.light.sample(origin, numbers)),
-            None => match world.emission.sampled(index - world.emitters.len()) {
-                Some((light, source)) => source.with_light(light.sample(origin, numbers)),
-                None => break,
-            },
-        };
+        let Some(source) = sample_emitter(world, index, origin, numbers) else { break };
         let light = &source.light;
         let arrives = light.irradiance.gt(L::zero());
         let arrives = arrives & interaction.geometric.dot(light.wi).gt(L::zero());
@@ -182,6 +177,24 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
             radiance = radiance.component_mul(left);
         }
         out.groups[source.group] += source.emitted(radiance).masked(lit);
+    }
+}
+
+/// Samples a point of emitter `index`: a light with a size or, after these, an emissive object.
+/// Returns `None` if there is no such emitter. `numbers` are uniform in [0, 1).
+#[inline(always)]
+pub(crate) fn sample_emitter<L: SimdFloat>(
+    world: &World<L>,
+    index: usize,
+    origin: Vec3<L>,
+    numbers: (L, L),
+) -> Option<LightSource<EmitterSample<L>, L::Scalar>> {
+    match world.emitters.get(index) {
+        Some(source) => Some(source.with_light(source.light.sample(origin, numbers))),
+        None => {
+            let (light, source) = world.emission.sampled(index - world.emitters.len())?;
+            Some(source.with_light(light.sample(origin, numbers)))
+        }
     }
 }
 

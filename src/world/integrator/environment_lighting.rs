@@ -18,7 +18,7 @@ use crate::world::world::{EnvironmentSource, World};
 use std::f64::consts::FRAC_1_PI;
 
 /// Index of the first environment's random numbers. Emitters have smaller indices.
-const ENVIRONMENT_SALT: u32 = 1 << 30;
+pub(crate) const ENVIRONMENT_SALT: u32 = 1 << 30;
 
 /// Adds the radiance of the visible environments to the rays of `lanes`, which hit no surface.
 /// `transmittance` is the fraction of light that the medium around the rays lets through; `None`

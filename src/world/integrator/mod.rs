@@ -8,6 +8,7 @@ pub(crate) mod environment_lighting;
 pub(crate) mod first_hit;
 pub(crate) mod indirect_diffuse;
 pub(crate) mod interaction;
+pub(crate) mod interface_lighting;
 pub(crate) mod nested_dielectrics;
 pub(crate) mod opaque;
 pub(crate) mod path;

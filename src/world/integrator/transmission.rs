@@ -14,6 +14,7 @@ use crate::world::integrator::emitter_lighting::{
 };
 use crate::world::integrator::indirect_diffuse::DiffuseReservoir;
 use crate::world::integrator::interaction::{SurfaceInteraction, interact};
+use crate::world::integrator::interface_lighting::{RoughInterface, interface_lighting};
 use crate::world::integrator::nested_dielectrics::{
     InterfaceHit, Media, MediumStack, NestedDielectrics,
 };
@@ -59,6 +60,8 @@ struct SplitDirections<L> {
     transmitted: Vec3<L>,
     /// Throughput of the transmitted paths.
     transmitted_weight: Vec3<L>,
+    /// Densities \[1/sr\] of the transmitted directions; see [`Path::lobe_density`].
+    transmitted_density: L,
 }
 
 /// Integrator with the inputs that all branches of a packet share.
@@ -222,8 +225,17 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         if bounce == depth {
             return false;
         }
+        let rough = interface_hit.as_ref().map(|hit| {
+            let coincident = coincident.as_ref().map_or(L::mask(false), |state| state.lanes);
+            RoughInterface::new(world, &interaction, hit, coincident)
+        });
+        if let Some(rough) = &rough {
+            let random = (self.sampler, bounce);
+            let rough = (rough, self.nested_dielectrics);
+            interface_lighting(world, path, &interaction, rough, random, (out, counts));
+        }
         let bounce = bounce + 1;
-        let Some(interface_hit) = &interface_hit else {
+        let Some(rough) = &rough else {
             let random = (self.sampler, bounce - 1);
             branch.lanes = sample_reflection::<_, false>(
                 world,
@@ -237,7 +249,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             branch.coincident = coincident.as_ref().map(CoincidentState::reversed);
             return branch.lanes.any();
         };
-        let split = self.split_directions(path, &interaction, interface_hit, bounce - 1, counts);
+        let interface_hit = rough.hit;
+        let split = self.split_directions(path, &interaction, rough, bounce - 1, counts);
         let reaches_min_weight = |throughput: Vec3<L>| {
             let max_throughput = throughput.max_element();
             max_throughput.gt(L::zero()) & max_throughput.ge(L::from_f64(world.min_weight))
@@ -281,7 +294,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         path.ray.origin = Vec3::select(transmitted, interaction.ray_origin_behind(), origin);
         path.ray.direction = Vec3::select(transmitted, split.transmitted, split.reflected);
         path.throughput = Vec3::select(transmitted, transmitted_weight, reflected_weight);
-        path.lobe_density = L::select(transmitted, L::from_f64(L::MAX), split.reflected_density);
+        path.lobe_density =
+            L::select(transmitted, split.transmitted_density, split.reflected_density);
         branch.lanes = reflects | transmits;
         branch.media =
             MediumStack::select(transmitted, &interface_hit.medium_transmitted, &medium_reflected);
@@ -371,7 +385,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     }
 
     /// Returns the lanes whose reflected rays are followed, and the fraction of the light that the
-    /// surfaces reflect. Rough interfaces are excluded, because only their rays find the emitters.
+    /// surfaces reflect. Rough interfaces are excluded; see [`interface_lighting`].
     fn reflecting_lobes(
         &self,
         path: &Path<L>,
@@ -402,10 +416,11 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         &self,
         path: &Path<L>,
         interaction: &SurfaceInteraction<L>,
-        interface_hit: &InterfaceHit<L>,
+        rough: &RoughInterface<'_, L>,
         bounce: u32,
         counts: &mut Counts,
     ) -> SplitDirections<L> {
+        let interface_hit = rough.hit;
         let incident = path.ray.direction;
         let interface = smooth_interface(incident, interaction, interface_hit);
         let straight = interface_hit.thin | interface_hit.suppressed;
@@ -415,6 +430,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             reflected_density: L::from_f64(L::MAX),
             transmitted: Vec3::select(straight, incident, interface.refracted),
             transmitted_weight: Vec3::zero(),
+            transmitted_density: L::from_f64(L::MAX),
         };
         let mut lobe_sample = None;
         for (index, lanes) in interaction.bsdfs(interaction.reflecting | interface_hit.lanes) {
@@ -473,6 +489,19 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             // Transmitted directions that stay in front of the surface are mirrored to the other
             // side.
             directions.transmitted = -interaction.reflect_into_hemisphere(-directions.transmitted);
+        }
+        for (behind, lanes) in [(false, rough.reflecting), (true, rough.transmitting)] {
+            if lanes.none() {
+                continue;
+            }
+            let (direction, density) = if behind {
+                (&directions.transmitted, &mut directions.transmitted_density)
+            } else {
+                (&directions.reflected, &mut directions.reflected_density)
+            };
+            let (_, lobe_density) =
+                rough.evaluate(self.world, &incident, interaction, direction, behind);
+            *density = L::select(lanes, lobe_density, *density);
         }
         directions.reflected_weight = Path::bounded(directions.reflected_weight);
         directions.transmitted_weight = Path::bounded(directions.transmitted_weight);

@@ -1,0 +1,167 @@
+//! Light of emitters and environments that rough interfaces reflect and transmit, by multiple
+//! importance sampling.
+//!
+//! Two samples find this light: a point of the emitter, and the direction of the reflected or
+//! transmitted ray. Glass casts shadows: of rays that enter a solid, the far side of the solid
+//! occludes the emitter. Points are therefore sampled for the reflected rays, for rays that leave a
+//! solid, and for thin surfaces. Rays that enter a solid find emitters by themselves.
+
+use crate::bvh::Ray;
+use crate::lanes::{Mask, SimdFloat, Vec3};
+use crate::material::{InterfaceMedia, ReflectionLobe};
+use crate::sampling::PacketSampler;
+use crate::world::integrator::emitter_lighting::{power_heuristic, sample_emitter};
+use crate::world::integrator::environment_lighting::ENVIRONMENT_SALT;
+use crate::world::integrator::interaction::SurfaceInteraction;
+use crate::world::integrator::nested_dielectrics::{InterfaceHit, Media, NestedDielectrics};
+use crate::world::integrator::path::{Counts, Path, Radiance};
+use crate::world::world::World;
+
+/// Hits on rough interfaces.
+pub(crate) struct RoughInterface<'a, L: SimdFloat> {
+    pub hit: &'a InterfaceHit<L>,
+    /// Lanes whose reflected rays have a density.
+    pub reflecting: L::Mask,
+    /// Lanes whose transmitted rays have a density.
+    pub transmitting: L::Mask,
+}
+
+impl<'a, L: SimdFloat> RoughInterface<'a, L> {
+    /// Selects the rough interfaces out of `hit`. Surfaces that coincide with another one, in the
+    /// lanes of `coincident`, are left out: their transmitted rays start on the other surface.
+    pub fn new(
+        world: &World<L>,
+        interaction: &SurfaceInteraction<L>,
+        hit: &'a InterfaceHit<L>,
+        coincident: L::Mask,
+    ) -> Self {
+        let mut rough = L::mask(false);
+        // Without shadows, light reaches points that the rays do not see.
+        if world.has_emitters() && world.shadows {
+            for (index, lanes) in interaction.bsdfs(hit.lanes) {
+                if let Some(transmission) = &world.bsdfs[index].transmission
+                    && !matches!(transmission.lobe, ReflectionLobe::Mirror)
+                {
+                    rough = rough | lanes;
+                }
+            }
+        }
+        let reflecting = rough.and_not(hit.suppressed | coincident | interaction.shaded);
+        Self { hit, reflecting, transmitting: reflecting & (hit.thin | !hit.outer) }
+    }
+
+    /// Returns the value [1/sr] of the interfaces in `direction`, times the cosine of the light, and
+    /// the density [1/sr] of the ray in this direction: of the transmitted ray if `behind` is
+    /// `true`, otherwise of the reflected one. In lanes whose rays have no density, the value is
+    /// zero and the density the largest finite number.
+    #[inline(never)]
+    pub fn evaluate(
+        &self,
+        world: &World<L>,
+        incident: &Vec3<L>,
+        interaction: &SurfaceInteraction<L>,
+        direction: &Vec3<L>,
+        behind: bool,
+    ) -> (Vec3<L>, L) {
+        let InterfaceHit { n_i, n_t, outer, thin, .. } = *self.hit;
+        let media = InterfaceMedia { n_i, n_t, outer, thin };
+        let (mut value, mut density) = (Vec3::zero(), L::from_f64(L::MAX));
+        let wanted = if behind { self.transmitting } else { self.reflecting };
+        for (index, lanes) in interaction.bsdfs(wanted) {
+            let bsdf = &world.bsdfs[index];
+            let Some(transmission) = &bsdf.transmission else { continue };
+            let evaluate = |direction: Vec3<L>| {
+                bsdf.evaluate_interface(
+                    transmission,
+                    &media,
+                    (*incident, interaction.normal),
+                    (direction, L::mask(behind)),
+                    (interaction.reflecting, world.fold),
+                )
+            };
+            let (mut lobe, mut pdf) = evaluate(*direction);
+            if world.smooth {
+                // Rays on the wrong side of the geometric surface are mirrored to the right one.
+                let height = direction.dot(interaction.geometric);
+                let mirrored =
+                    interaction.geometric.mul_add(height * L::from_f64(-2.0), *direction);
+                let (mirrored_lobe, mirrored_pdf) = evaluate(mirrored);
+                lobe += mirrored_lobe;
+                pdf = (pdf + mirrored_pdf).min(L::from_f64(L::MAX));
+            }
+            value = Vec3::select(lanes, lobe, value);
+            density = L::select(lanes, pdf, density);
+        }
+        (value, density)
+    }
+}
+
+/// Adds the light of all visible emitters and environments that rough interfaces reflect and
+/// transmit. `bounce` is the number of earlier surfaces of the path.
+#[inline(never)]
+pub(crate) fn interface_lighting<L: SimdFloat>(
+    world: &World<L>,
+    path: &Path<L>,
+    interaction: &SurfaceInteraction<L>,
+    (rough, nested_dielectrics): (&RoughInterface<'_, L>, &NestedDielectrics<L>),
+    (sampler, bounce): (&PacketSampler<'_, L>, u32),
+    (out, counts): (&mut Radiance<L>, &mut Counts),
+) {
+    let hit = rough.hit;
+    let sides = [
+        (false, rough.reflecting, interaction.ray_origin(), &hit.medium_reflected),
+        (true, rough.transmitting, interaction.ray_origin_behind(), &hit.medium_transmitted),
+    ];
+    for (behind, lanes, origin, stack) in sides {
+        if lanes.none() {
+            continue;
+        }
+        counts.glossy = true;
+        let media = Media { nested_dielectrics, stack };
+        // Radiance of light from the directions `wi`, sampled with a density, in the lanes whose
+        // shadow ray reaches the distance.
+        let mut lit_radiance = |wi: Vec3<L>, distance: L, density: L, irradiance: Vec3<L>| {
+            let height = wi.dot(interaction.geometric);
+            let is_behind = height.lt(L::zero());
+            let arrives = if behind { is_behind } else { height.gt(L::zero()) };
+            let (value, pdf) = rough.evaluate(world, &path.ray.direction, interaction, &wi, behind);
+            let value = value.component_mul(irradiance) * power_heuristic(density, pdf);
+            let mut lit = lanes & arrives & value.max_element().gt(L::zero());
+            if lit.none() {
+                return None;
+            }
+            counts.rays += u64::from(lit.bits().count_ones());
+            let ray = Ray { origin, direction: wi };
+            lit = lit.and_not(world.geometry.occluded(&ray, distance, lit, world.geometry.all()));
+            let mut radiance = path.throughput.component_mul(value);
+            if let Some(left) = media.transmittance(distance) {
+                radiance = radiance.component_mul(left);
+            }
+            Some(radiance.masked(lit))
+        };
+        for index in 0.. {
+            let numbers = sampler.light_2d(bounce, index);
+            let Some(source) = sample_emitter(world, index as usize, origin, numbers) else {
+                break;
+            };
+            let light = &source.light;
+            if source.visible
+                && let irradiance = Vec3::new(light.irradiance, light.irradiance, light.irradiance)
+                && let Some(radiance) =
+                    lit_radiance(light.wi, light.distance, light.density, irradiance)
+            {
+                out.groups[source.group] += source.emitted(radiance);
+            }
+        }
+        for (index, source) in (0..).zip(&world.environments) {
+            let numbers = sampler.light_2d(bounce, ENVIRONMENT_SALT + 2 * index);
+            let light = source.light.sample(numbers, lanes);
+            if source.visible
+                && let Some(radiance) =
+                    lit_radiance(light.wi, L::from_f64(L::MAX), light.density, light.irradiance)
+            {
+                out.groups[source.group] += source.emitted(radiance);
+            }
+        }
+    }
+}
