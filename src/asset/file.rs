@@ -71,10 +71,9 @@ impl FileContents {
         }
     }
 
-    /// Resolves `name`, a file name that occurs in this file, relative to the folder of this file, by
-    /// the rule in docs/scene-format.md.
-    /// Returns `None` if `name` leads out of this folder: an absolute path, a path with `..`, or a
-    /// URL.
+    /// Resolves `name`, a file name that occurs in this file, relative to the folder of this file,
+    /// by the rule in docs/scene-format.md. Returns `None` if `name` leads out of this folder: an
+    /// absolute path, a path with `..`, or a URL.
     pub fn resolve_relative(&self, name: &str) -> Option<PathBuf> {
         let name = name.replace('\\', "/");
         let inside = Path::new(&name)

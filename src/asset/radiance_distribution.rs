@@ -1,8 +1,9 @@
 //! Distribution of directions by the luminance of an equirectangular image.
 //!
 //! The density is constant over the solid angle of each pixel. A row is chosen by the marginal
-//! distribution, a column by the conditional one; both are inverted, so that stratified numbers give
-//! stratified directions (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed., A.5.6).
+//! distribution, a column by the conditional one; both are inverted, so that stratified numbers
+//! give stratified directions (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed.,
+//! A.5.6).
 
 use std::f64::consts::{PI, TAU};
 
@@ -93,8 +94,8 @@ impl RadianceDistribution {
         size_of_val(&self.rows[..]) + size_of_val(&self.columns_of_rows[..])
     }
 
-    /// Samples a direction. `u` and `v` are uniform in [0, 1). Returns the column, from 0 to 1, the cosine
-    /// of the polar angle, and the density \[1/sr\].
+    /// Samples a direction. `u` and `v` are uniform in [0, 1). Returns the column, from 0 to 1, the
+    /// cosine of the polar angle, and the density \[1/sr\].
     pub fn sample(&self, u: f64, v: f64) -> (f64, f64, f64) {
         let row = interval(&self.rows, |x| *x <= v);
         let t = (v - self.rows[row]) / (self.rows[row + 1] - self.rows[row]);

@@ -1,7 +1,8 @@
 //! Images of radiance for environment lights: Radiance HDR, OpenEXR, PNG and JPEG.
 //!
-//! The images are equirectangular. Rows have equal polar angles, from +y at the top to -y at the bottom.
-//! The middle of the image is in the direction -z, and +x is a quarter of the image to its right.
+//! The images are equirectangular. Rows have equal polar angles, from +y at the top to -y at the
+//! bottom. The middle of the image is in the direction -z, and +x is a quarter of the image to its
+//! right.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
@@ -197,8 +198,8 @@ fn decode(
     Ok(RadianceMap::new([width, height], pixels))
 }
 
-/// Checks the size of all layers of an OpenEXR file, because the decoder allocates memory for a block
-/// of rows of a layer before it reads the block.
+/// Checks the size of all layers of an OpenEXR file, because the decoder allocates memory for a
+/// block of rows of a layer before it reads the block.
 fn check_layers(source: &FileContents) -> Result<(), AssetError> {
     let data = MetaData::read_from_buffered(&source.bytes[..], false).map_err(|error| {
         let found = format!("the header cannot be read: {error}");

@@ -3,8 +3,8 @@
 //!
 //! A pass over the nodes, in the order of the Morton curve, merges each two nodes that are nearest
 //! to each other. With many equal distances, such as between coincident boxes, boxes in a row or
-//! the triangles of a fan, a pass finds a single such pair, and n passes would be needed. Neighbours
-//! on the curve are then merged instead.
+//! the triangles of a fan, a pass finds a single such pair, and n passes would be needed.
+//! Neighbours on the curve are then merged instead.
 
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -13,7 +13,8 @@ use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
 /// Number of node visits per primitive before slow passes are shortened: they then merge each two
-/// neighbours on the Morton curve. Boxes at random positions need 3 visits per primitive altogether.
+/// neighbours on the Morton curve. Boxes at random positions need 3 visits per primitive
+/// altogether.
 const PATIENT_VISITS: usize = 8;
 
 /// Limit of a slow pass: fewer than one pair per this number of nodes would be merged.

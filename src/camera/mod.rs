@@ -27,7 +27,8 @@ description! {
         up: [f64; 3] => "up" "[0.0, 1.0, 0.0]", as Direction;
         /// Opening angle, across the height or across the width of the picture.
         view_angle: ViewAngle => "view_angle" "{ vertical = 40.0 }";
-        /// Near plane: its distance along the view direction; surfaces in front of it are invisible.
+        /// Near plane: its distance along the view direction; surfaces in front of it are
+        /// invisible.
         near: f64 = 0.0, in closed(0.0, 1e9) "scene units";
         /// Opening of the lens, for depth of field.
         aperture: Option<Aperture>, or "a pinhole: everything is in focus";

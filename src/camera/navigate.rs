@@ -107,7 +107,8 @@ impl Camera {
         self.valid_or_self(Self { up, ..self.clone() })
     }
 
-    /// Multiplies the width of the field of view at unit distance by `factor`; less than 1 is narrower.
+    /// Multiplies the width of the field of view at unit distance by `factor`; less than 1 is
+    /// narrower.
     pub fn zoom(&self, factor: f64) -> Self {
         if !(factor > 0.0 && factor.is_finite()) {
             return self.clone();

@@ -5,8 +5,9 @@ use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::value::unit;
 use glam::DVec3;
 
-/// A perspective camera with its raster. Directions of pixel corners are computed in double precision and
-/// rounded once; only the offset inside the pixel is computed in the precision of the kernel.
+/// A perspective camera with its raster. Directions of pixel corners are computed in double
+/// precision and rounded once; only the offset inside the pixel is computed in the precision of the
+/// kernel.
 #[derive(Clone, Copy, Debug)]
 pub struct PerspectiveCamera {
     eye: DVec3,
@@ -135,8 +136,8 @@ impl PerspectiveCamera {
         self.dx_axis.length().min(self.dy_axis.length())
     }
 
-    /// Returns the vectors from the eye to the corners of a rectangle of pixels, on the picture plane at
-    /// unit distance.
+    /// Returns the vectors from the eye to the corners of a rectangle of pixels, on the picture
+    /// plane at unit distance.
     pub fn corners(&self, [x, y]: [usize; 2], [width, height]: [usize; 2]) -> [DVec3; 4] {
         let (x0, y0) = (x as f64, y as f64);
         let (x1, y1) = (x0 + width as f64, y0 + height as f64);
@@ -158,9 +159,10 @@ impl PerspectiveCamera {
         corner.to_array().map(S::from_f64)
     }
 
-    /// Returns origins and unit directions of rays through the eye and through points of pixels. The
-    /// origins are on the near plane. `base` is the result of [`PerspectiveCamera::pixel_corner_direction`]; `(dx, dy)` is
-    /// the offset from the corner to the right and downward \[pixels\].
+    /// Returns origins and unit directions of rays through the eye and through points of pixels.
+    /// The origins are on the near plane. `base` is the result of
+    /// [`PerspectiveCamera::pixel_corner_direction`]; `(dx, dy)` is the offset from the corner to
+    /// the right and downward \[pixels\].
     #[inline(always)]
     pub fn rays<L: SimdFloat>(&self, base: Vec3<L>, (dx, dy): (L, L)) -> (Vec3<L>, Vec3<L>) {
         let dx_axis = Vec3::of(self.dx_axis.to_array());

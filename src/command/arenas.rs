@@ -1,9 +1,9 @@
 //! Number of the allocator's arenas under a limit on address space.
 //!
 //! The allocator of glibc reserves an arena of 64 MB of address space for each thread. Under
-//! `ulimit -v` the arenas of a few threads take all of it, and allocations of a few bytes fail while
-//! most of the memory is free. With one arena no address space is lost. The number of arenas is read
-//! from the environment at the start of a process.
+//! `ulimit -v` the arenas of a few threads take all of it, and allocations of a few bytes fail
+//! while most of the memory is free. With one arena no address space is lost. The number of arenas
+//! is read from the environment at the start of a process.
 
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const VARIABLE: &str = "MALLOC_ARENA_MAX";

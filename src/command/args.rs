@@ -247,7 +247,8 @@ pub struct MeasureArgs {
     /// Noise targets, in 8-bit levels
     #[arg(long, value_name = "LEVELS,..", value_parser = positive, value_delimiter = ',', default_value = "2,1,0.5,0.25")]
     pub noise: Vec<f64>,
-    /// Compare only these settings, such as: adaptivity,precision,threads,sampler,lobe,ray-types,max-depth,min-throughput,rays-per-pixel,acceleration
+    /// Compare only these settings, such as:
+    /// adaptivity,precision,threads,sampler,lobe,ray-types,max-depth,min-throughput,rays-per-pixel,acceleration
     #[arg(long, value_name = "SETTING,..", value_delimiter = ',', conflicts_with = "full")]
     pub only: Vec<Experiment>,
     /// Compare all settings, which takes about five minutes
@@ -259,7 +260,7 @@ pub struct MeasureArgs {
     /// Least number of timed runs of each setting
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub repetitions: u16,
-    /// Reference picture, instead of one rendered with another seed
+    /// Picture to measure errors against, instead of one rendered with another seed
     #[arg(long, value_name = "FILE.exr")]
     pub reference: Option<PathBuf>,
     #[command(flatten)]

@@ -1,5 +1,5 @@
-//! `zerkalo doctor`: reports the capabilities of the terminal and of the connection, how the dashboard
-//! uses them, and how to improve them.
+//! `zerkalo doctor`: reports the capabilities of the terminal and of the connection, how the
+//! dashboard uses them, and how to improve them.
 
 use crate::command::args::DoctorArgs;
 use crate::command::{Failure, print_line};

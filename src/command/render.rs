@@ -135,7 +135,7 @@ struct Job<'a> {
     started: Instant,
 }
 
-/// Result of a render whose picture has been written.
+/// Results of a render whose picture has been written, for the closing line and `--stats`.
 struct Rendered {
     report: Report,
     end: End,

@@ -20,8 +20,8 @@ impl Signals {
         let armed = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
             // Handlers run in the order of registration. `caught` comes first, so that no signal is
-            // lost during the registration. The shutdown comes before the handler that sets `armed`,
-            // so that the first signal does not end the program.
+            // lost during the registration. The shutdown comes before the handler that sets
+            // `armed`, so that the first signal does not end the program.
             flag::register_usize(signal, Arc::clone(&caught), signal as usize)?;
             flag::register_conditional_shutdown(signal, SIGNALLED + signal, Arc::clone(&armed))?;
             flag::register(signal, Arc::clone(&armed))?;

@@ -55,7 +55,7 @@ pub struct Replacement {
     target: PathBuf,
     folder: PathBuf,
     existing: Existing,
-    /// `true` if there was a file at the beginning.
+    /// `true` if the path named a file when the replacement began.
     exists: bool,
     temporary: NamedTempFile,
 }

@@ -268,8 +268,8 @@ fn noise_combines_the_tiles() {
     assert!((noise.rmse_linear - 0.1).abs() < 1e-14);
     assert!((noise.rmse_codes - 143.5f64.sqrt()).abs() < 1e-12);
     assert_eq!((noise.p95_codes, noise.worst_codes), (19.0, 20.0));
-    // If the numbers of samples differ, the larger of the estimates from half of the pixels and from all
-    // pixels is reported; otherwise the second one.
+    // If the numbers of samples differ, the larger of the estimates from half of the pixels and
+    // from all pixels is reported; otherwise the second one.
     let rmse = |reported: f64, allocation: f64, samples: [u32; 2]| {
         let mse = |x: f64| Mse { linear: x, codes: x };
         let tile = |samples| {

@@ -120,9 +120,9 @@ impl Film {
         Ok(film)
     }
 
-    /// Returns the memory of the sums of a film in bytes. For each pixel the film holds a 64-bit sum
-    /// for each of two replicates (halves of the samples), each of `groups` light groups, and each
-    /// of three channels. Tiles at the edge of the picture are complete.
+    /// Returns the memory of the sums of a film in bytes. For each pixel the film holds a 64-bit
+    /// sum for each of two replicates (halves of the samples), each of `groups` light groups, and
+    /// each of three channels. Tiles at the edge of the picture are complete.
     pub fn memory_bytes(size: [u32; 2], groups: usize) -> u64 {
         let [columns, rows] = size.map(|n| u64::from(n).div_ceil(TILE as u64));
         columns * rows * (Tile::sums_len(groups) * size_of::<i64>()) as u64
@@ -352,20 +352,21 @@ impl Film {
         Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }
 
-    /// Number and positions of the samples since the last restart that were NaN or negative.
+    /// Number and positions of the samples that were NaN or negative, since the film was last
+    /// cleared.
     pub fn bad_samples(&self) -> InvalidSamples {
         let mut all = InvalidSamples::default();
         self.touched().for_each(|(_, tile)| all.merge(tile.bad()));
         all
     }
 
-    /// Number of samples since the last restart that were above the film's limit.
+    /// Number of samples above the film's limit, since the film was last cleared.
     pub fn saturated_samples(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_samples()).sum()
     }
 
-    /// Number of sums that have reached their limit. There is one sum for each pixel, group, channel
-    /// and replicate.
+    /// Number of sums that have reached their limit. There is one sum for each pixel, group,
+    /// channel and replicate.
     pub fn saturated(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated()).sum()
     }

@@ -257,7 +257,7 @@ pub trait SimdFloat:
     /// [`SimdFloat::le`] order ids below 2^31 - 2^23 like integers, because positive floats have
     /// the order of their bits.
     fn from_id(id: u32) -> Self;
-    /// Returns the id in lane `i`.
+    /// Returns the id that [`SimdFloat::from_id`] has stored in lane `i`.
     fn id_lane(self, i: usize) -> u32;
     /// Mask of lanes whose id is `id`.
     fn id_eq(self, id: u32) -> Self::Mask;

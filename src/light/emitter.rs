@@ -29,7 +29,8 @@ enum Surface<S> {
     },
 }
 
-/// A compiled light with a size, white and with intensity 1.
+/// A light of finite size, compiled for the kernels. It emits white light of intensity 1; the
+/// weights of its light group add colour and intensity.
 #[derive(Clone, Copy, Debug)]
 pub struct Emitter<S> {
     surface: Surface<S>,

@@ -24,8 +24,8 @@ description! {
     pub struct Light: Default {
         /// Name. Every light has a different one.
         name: String, or "a number";
-        /// Light from one point. A light has exactly one of `point`, `directional`, `spot`, `sphere`,
-        /// `rectangle`, `disk` and `environment`.
+        /// Light from one point. A light has exactly one of `point`, `directional`, `spot`,
+        /// `sphere`, `rectangle`, `disk` and `environment`.
         point: Option<Point>, or "another kind is needed";
         /// Light from infinitely far away.
         directional: Option<Directional>, or "another kind is needed";
@@ -41,17 +41,17 @@ description! {
         environment: Option<Environment>, or "another kind is needed";
         /// Colour, by which the intensity is multiplied.
         color: Color = [1.0, 1.0, 1.0], in LIGHT;
-        /// Radiance or power of a sphere, rectangle or disk, by `unit`. Factor of the radiance of an
-        /// environment. Radiant intensity [W/sr] of
-        /// a point, or of a spot inside its inner cone, with falloff `inverse-square`. With `none`,
-        /// and for a directional light, the brightness of a white matt surface that faces the light.
+        /// Radiance or power of a sphere, rectangle or disk, by `unit`. Factor of the radiance of
+        /// an environment. Radiant intensity [W/sr] of a point, or of a spot inside its inner cone,
+        /// with falloff `inverse-square`. With `none`, and for a directional light, the brightness
+        /// of a white matt surface that faces the light.
         intensity: f64 = 1.0, in LIGHT "W/(sr m²), W, W/sr, or irradiance / π";
         /// Unit of the intensity of a sphere, rectangle or disk.
         unit: LightUnit = "radiance";
         /// Falloff of a point or spot light with the distance.
         falloff: Falloff = "none";
-        /// `false` hides an environment, or the surface of a sphere, rectangle or disk, from the camera
-        /// and from mirrors. It still lights matt surfaces and makes highlights.
+        /// `false` hides an environment, or the surface of a sphere, rectangle or disk, from the
+        /// camera and from mirrors. It still lights matt surfaces and makes highlights.
         visible: bool = true;
         /// `false` switches the light off.
         on: bool = true;

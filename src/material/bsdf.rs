@@ -1,4 +1,5 @@
-//! Compiled BSDF: its construction from a material, evaluation of highlights, sampling of reflections.
+//! Compiled BSDF: its construction from a material, evaluation of highlights, sampling of
+//! reflections.
 
 use crate::lanes::{Float, Frame, SimdFloat, Vec3};
 use crate::material::fresnel::Reflectance;
@@ -100,7 +101,8 @@ pub fn one_minus_cos_of_tan(r: f64) -> f64 {
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Compiles `material`. `reflects` is `true` if the scene traces reflected and transmitted rays.
+    /// Compiles `material`. `reflects` is `true` if the scene traces reflected and transmitted
+    /// rays.
     pub fn new(material: &Material, reflects: bool) -> Self {
         let alpha = material.microfacet_alpha().max(SMOOTH_ALPHA);
         let facets = |ggx| MicrofacetDistribution::new(ggx, alpha, material.masking);

@@ -12,8 +12,8 @@ pub fn index_from_f0(f0: f64) -> f64 {
     (1.0 + root) / (1.0 - root)
 }
 
-/// Returns the reflectance of a dielectric of index `n` at normal incidence, ((n - 1) / (n + 1))^2: the
-/// inverse of [`index_from_f0`].
+/// Returns the reflectance of a dielectric of index `n` at normal incidence, ((n - 1) / (n + 1))^2:
+/// the inverse of [`index_from_f0`].
 pub fn f0_from_index(n: f64) -> f64 {
     ((n - 1.0) / (n + 1.0)).powi(2)
 }

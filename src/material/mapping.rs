@@ -1,8 +1,8 @@
 //! Texture coordinates of surface points and their gradients, in SIMD lanes.
 //!
-//! A projection is a function of space, so that one formula serves every shape. Its gradient along the
-//! surface is equivalent to Blinn's partial derivatives of the surface (Blinn 1978, *Simulation of
-//! Wrinkled Surfaces*; Mikkelsen 2010, *Bump Mapping Unparametrized Surfaces on the GPU*).
+//! A projection is a function of space, so that one formula serves every shape. Its gradient along
+//! the surface is equivalent to Blinn's partial derivatives of the surface (Blinn 1978, *Simulation
+//! of Wrinkled Surfaces*; Mikkelsen 2010, *Bump Mapping Unparametrized Surfaces on the GPU*).
 
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::material::texture::{Axis, Mapping, Placement};
@@ -14,9 +14,11 @@ use std::f64::consts::{FRAC_1_PI, TAU};
 pub enum Projection {
     /// u = x, v = y.
     Planar,
-    /// u is the angle around y in turns, 1/2 at the front; v the angle from the lower pole in half turns.
+    /// u is the angle around y in turns, 1/2 at the front; v the angle from the lower pole in half
+    /// turns.
     Spherical,
-    /// u is the angle around y in turns, 1/2 at the front; v the height divided by the shape's height.
+    /// u is the angle around y in turns, 1/2 at the front; v the height divided by the shape's
+    /// height.
     Cylindrical,
     /// Planar projection of each side of a box, seen from outside.
     Box,
@@ -33,11 +35,12 @@ const RIM: f64 = 1.0 / 16_384.0;
 /// errors do not decide between axes at equal angles to the normal.
 const TIE: f64 = 1.001;
 
-/// Largest error of a projection of a surface point, in rounding errors of the point's largest coordinate.
+/// Largest error of a projection of a surface point, in rounding errors of the point's largest
+/// coordinate.
 const POINT_ROUNDINGS: f64 = 16.0;
 
-/// Angle \[rounding errors\] between the normal of a surface and the gradient of a texture coordinate
-/// up to which the coordinate is constant along the surface.
+/// Angle \[rounding errors\] between the normal of a surface and the gradient of a texture
+/// coordinate up to which the coordinate is constant along the surface.
 const ANGLE_ROUNDINGS: f64 = 64.0;
 
 /// Texture coordinates and their gradients in texture space. The unit of the coordinates is one
@@ -93,8 +96,8 @@ fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
 impl<S: Float> TextureMapping<S> {
     /// Compiles `placement` for one part of an object. `projection` is the projection that
     /// `placement` selects for the part. `low` and `high` are opposite corners of the part's
-    /// bounding box, in texture space. `input_error` is the rounding error of the coordinates of the
-    /// scene file.
+    /// bounding box, in texture space. `input_error` is the rounding error of the coordinates of
+    /// the scene file.
     pub fn new(
         placement: &Placement,
         projection: Projection,
@@ -186,8 +189,8 @@ impl<S: Float> TextureMapping<S> {
         }
     }
 
-    /// Returns u and v for textures whose colour jumps at edges, such as checkers. `coordinates` are
-    /// those of `point` with the outer normal `normal`. `rounding` is the rounding error of the
+    /// Returns u and v for textures whose colour jumps at edges, such as checkers. `coordinates`
+    /// are those of `point` with the outer normal `normal`. `rounding` is the rounding error of the
     /// point's largest coordinate.
     ///
     /// A flat face may lie in an edge: the lid of a box whose height is a whole number of squares.

@@ -79,11 +79,12 @@ pub trait MicrofacetEval<L: SimdFloat> {
 /// 3e-10.
 const STEEP: f64 = 4.0;
 
-/// Returns Beckmann's Lambda (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)) for 0 < a < [`STEEP`] (Heitz
-/// 2014, eq. 57); undefined for larger `a`.
+/// Returns Beckmann's Lambda (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)) for 0 < a < [`STEEP`]
+/// (Heitz 2014, eq. 57); undefined for larger `a`.
 ///
-/// Computed as exp(-a^2) k(a) / (2 a sqrt(pi) (1 + 2 a^2)) with a smooth k between 0.6 and 1, approximated
-/// by a Chebyshev fit of degree 10 in 2 - 6 / (a + 2). The error is below 1e-8 (1 + Lambda).
+/// Computed as exp(-a^2) k(a) / (2 a sqrt(pi) (1 + 2 a^2)) with a smooth k between 0.6 and 1,
+/// approximated by a Chebyshev fit of degree 10 in 2 - 6 / (a + 2). The error is below 1e-8 (1 +
+/// Lambda).
 #[inline(always)]
 fn beckmann_lambda<L: SimdFloat>(a: L) -> L {
     const K: [f64; 11] = [
@@ -152,8 +153,8 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
     }
 
     /// Returns the separable G_1 of Smith (Walter et al. 2007, eq. 23), or that of V-cavities: the
-    /// sides of a groove that are visible from above and from below overlap in G_1 + G_1' - 1 (Heitz
-    /// and d'Eon 2014).
+    /// sides of a groove that are visible from above and from below overlap in G_1 + G_1' - 1
+    /// (Heitz and d'Eon 2014).
     #[inline(always)]
     fn shadowing_behind(&self, (nh, nv, vh): (L, L, L), (nt, lh): (L, L)) -> L {
         match self.masking {

@@ -42,20 +42,21 @@ description! {
         highlight: Highlight = "phong";
         /// Weight k_r of the traced reflection; not energy-conserving with the other coefficients.
         reflection: f64 = 0.0, in COEFFICIENT;
-        /// Weight k_t of the transmitted light, not energy-conserving with the other coefficients; 0 is
-        /// opaque.
+        /// Weight k_t of the transmitted light, not energy-conserving with the other coefficients;
+        /// 0 is opaque.
         transmission: f64 = 0.0, in COEFFICIENT;
         /// Index of refraction n of the inside; outside of everything it is 1.
         ior: f64 = 1.5, in closed(0.1, 1e4);
-        /// Share of the light in each channel that is left after `attenuation_distance` inside of a solid with
-        /// `transmission`, by Beer's law; white absorbs nothing.
+        /// Share of the light in each channel that is left after `attenuation_distance` inside of a
+        /// solid with `transmission`, by Beer's law; white absorbs nothing.
         attenuation_color: Color = [1.0, 1.0, 1.0], in SHARE;
         /// Distance inside of a solid after which `attenuation_color` is left of white light.
         attenuation_distance: f64 = 1.0, in SIZE;
-        /// Tangent of the half-angle of the cone of reflected and of transmitted rays, not a microfacet
-        /// alpha; 0 is a perfect mirror and clear glass.
+        /// Tangent of the half-angle of the cone of reflected and of transmitted rays, not a
+        /// microfacet alpha; 0 is a perfect mirror and clear glass.
         roughness: f64 = 0.0, in closed(0.0, 1e6);
-        /// Distribution of reflected and transmitted rays; the same roughness means a comparable blur in each.
+        /// Distribution of reflected and transmitted rays; the same roughness means a comparable
+        /// blur in each.
         lobe: Lobe = "cone";
         /// Roughness parameter alpha of the microfacet distribution.
         alpha: Option<f64>, or "roughness / (2 √2)", in closed(0.0, 1e6);
@@ -68,12 +69,14 @@ description! {
         /// A metal, for its reflectance. Not together with `f0`.
         metal: Option<Metal>, or "no metal";
         /// Radiance that the surface emits, the same at every point and in every direction; 0 emits
-        /// nothing. It is added to the light that the surface reflects, and illuminates other objects.
+        /// nothing. It is added to the light that the surface reflects, and illuminates other
+        /// objects.
         emission: f64 = 0.0, in LIGHT "W/(sr m²)";
         /// Colour of the emitted light; multiplies `emission`.
         emission_color: Color = [1.0, 1.0, 1.0], in LIGHT;
-        /// The back of a surface has the same material as its front; otherwise the back is black: only
-        /// `transmission` remains there, and total internal reflection unless `fresnel` is `dielectric`.
+        /// The back of a surface has the same material as its front; otherwise the back is black:
+        /// only `transmission` remains there, and total internal reflection unless `fresnel` is
+        /// `dielectric`.
         two_sided: bool = true;
         /// Texture that multiplies `color`.
         texture: Option<Texture>, or "a uniform colour";

@@ -39,8 +39,8 @@ impl<L: SimdFloat> Interface<L> {
     /// the boundary on the side of the rays. `n_i` and `n_t` are the indices of refraction on this
     /// side and on the other one.
     ///
-    /// sin t = (n_i / n_t) sin i is computed from the part of the direction along the boundary, so that
-    /// grazing rays keep full precision. With equal indices the direction is unchanged.
+    /// sin t = (n_i / n_t) sin i is computed from the part of the direction along the boundary, so
+    /// that grazing rays keep full precision. With equal indices the direction is unchanged.
     #[inline(always)]
     pub fn new(incident: Vec3<L>, n: Vec3<L>, n_i: L, n_t: L) -> Self {
         let cos_i = -incident.dot(n);
@@ -115,7 +115,8 @@ impl<L: SimdFloat> Interface<L> {
         }
     }
 
-    /// Returns the weights of reflected and transmitted rays at a thin pane, which does not refract.
+    /// Returns the weights of reflected and transmitted rays at a thin pane, which does not
+    /// refract.
     #[inline(always)]
     pub fn split_thin(&self, transmission: &Transmission<L::Scalar>) -> FresnelSplit<L> {
         let k_t = L::splat(transmission.strength);

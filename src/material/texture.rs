@@ -1,5 +1,5 @@
-//! Textures and bump maps. A texture's colour multiplies that of the material; a bump perturbs the shading
-//! normal.
+//! Textures and bump maps. A texture's colour multiplies that of the material; a bump perturbs the
+//! shading normal.
 //!
 //! ```toml
 //! texture.image = { file = "wood.png", mapping = "box", scale = [2.0, 2.0] }
@@ -42,7 +42,8 @@ description! {
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
         /// Repeats per unit of u and of v: the larger, the smaller the picture.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
-        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it left and down.
+        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it
+        /// left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
         /// Continuation of the image beyond its edges.
         wrap: Wrap = "repeat";
@@ -65,7 +66,8 @@ description! {
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
         /// Repeats per unit of u and of v: the larger, the smaller the picture.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
-        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it left and down.
+        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it
+        /// left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
     }
 }
@@ -83,7 +85,8 @@ description! {
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
         /// Repeats per unit of u and of v: the larger, the smaller the picture.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
-        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it left and down.
+        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it
+        /// left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
         /// Continuation of the image beyond its edges.
         wrap: Wrap = "repeat";

@@ -141,8 +141,8 @@ impl BumpMap {
     /// Returns the gradient of the height along u and v, in scene units per repetition, in the
     /// lanes whose bits are set in `bits`.
     ///
-    /// Central differences at the pixels are interpolated bilinearly. The gradient is continuous; that of
-    /// bilinear heights would jump at pixel boundaries.
+    /// Central differences at the pixels are interpolated bilinearly. The gradient is continuous;
+    /// that of bilinear heights would jump at pixel boundaries.
     pub fn gradient<L: SimdFloat>(&self, (u, v): (L, L), bits: u32) -> (L, L) {
         let slopes: Vec3<L> = gathered(bits, |lane| {
             let [du, dv] = self.slope_at(u.lane(lane).to_f64(), v.lane(lane).to_f64());

@@ -26,7 +26,8 @@ pub struct TimeToTarget {
 pub struct Expected {
     /// The noise target, in 8-bit levels.
     pub codes: f64,
-    /// Lower and upper estimate of the seconds, extrapolated from the convergence so far.
+    /// Lower and upper estimate of the time to the target in seconds, extrapolated from the
+    /// convergence so far.
     pub seconds: (f64, f64),
 }
 

@@ -10,13 +10,13 @@ use std::io;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Progress of a measurement.
+/// Progress of a measurement, which consists of timed renders.
 pub struct Progress<'a> {
-    /// Name of the current step.
+    /// Name of the current render.
     pub step: &'a str,
-    /// Number of steps done.
+    /// Number of renders that have ended.
     pub done: usize,
-    /// Expected number of steps altogether.
+    /// Expected number of renders of the whole measurement.
     pub total: usize,
 }
 
@@ -174,7 +174,8 @@ struct RenderedReference {
     seconds: f64,
 }
 
-/// Renders a reference with another seed until its noise is at most `codes` or `seconds` have passed.
+/// Renders a reference with another seed until its noise is at most `codes` or `seconds` have
+/// passed.
 fn render_reference(default: &Variant, codes: f64, seconds: f64) -> io::Result<RenderedReference> {
     let mut other = default.clone();
     other.options.sampling.seed = other.options.sampling.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);

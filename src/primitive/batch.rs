@@ -113,7 +113,8 @@ macro_rules! batches {
     };
 }
 
-// The list of compiled primitives, in the order in which items are numbered: a new one is a line here.
+// The list of compiled primitives, in the order in which items are numbered: a new one is a line
+// here.
 batches! {
     /// Parallelograms.
     Parallelograms(Parallelogram),

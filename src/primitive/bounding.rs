@@ -12,7 +12,7 @@ pub const F32_RAY_ERROR: f64 = 1e-5;
 /// A ball.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundingSphere {
-    /// Centre.
+    /// Centre, in scene coordinates.
     pub center: DVec3,
     /// Radius; infinite for forms without finite bounds.
     pub radius: f64,

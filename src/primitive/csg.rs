@@ -76,8 +76,8 @@ macro_rules! leaves {
     };
 }
 
-// The list of solids that can be parts of compounds, with the largest number of spans of one line: a new
-// one is a line here.
+// The list of solids that can be parts of compounds, with the largest number of spans of one line:
+// a new one is a line here.
 leaves! {
     Sphere(1),
     Ellipsoid(1),
@@ -88,7 +88,7 @@ leaves! {
     Plane(1),
 }
 
-/// One part of a compound.
+/// One part of a compound: a solid that the compound's expression combines with others.
 struct Part<S> {
     solid: CsgLeaf<S>,
     /// `true` if the part is subtracted: the inside of its solid is outside of the compound.

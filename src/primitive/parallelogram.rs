@@ -17,9 +17,9 @@ use glam::{DAffine3, DVec3};
 pub struct ParallelogramForm {
     /// Corner at which both edges start.
     pub corner: DVec3,
-    /// First edge.
+    /// Edge from the corner for which the coordinate a goes from 0 to 1.
     pub u: DVec3,
-    /// Second edge.
+    /// Edge from the corner for which the coordinate b goes from 0 to 1.
     pub v: DVec3,
 }
 

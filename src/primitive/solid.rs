@@ -19,7 +19,7 @@ pub struct Span<L: SimdFloat> {
     pub meets: L::Mask,
 }
 
-/// Primitive that bounds a solid, so that a compound can have it as a part.
+/// Primitive with a closed surface, which encloses a solid. Only these can be parts of a compound.
 pub trait SolidPrimitive<L: SimdFloat>: Primitive<L> {
     /// Spans of one packet of lines, in ascending order and without overlap.
     type Spans: IntoIterator<Item = Span<L>>;

@@ -238,8 +238,9 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         self.pair_2d(bounce, hash_scalar(light + 1))
     }
 
-    /// Returns a number in [0, 1) for the choice of point lights at the surface that a path hits after
-    /// `bounce` reflections. It is a number of [`Self::light_2d`] under a scrambling of its own.
+    /// Returns a number in [0, 1) for the choice of point lights at the surface that a path hits
+    /// after `bounce` reflections. It is a number of [`Self::light_2d`] under a scrambling of its
+    /// own.
     #[inline(always)]
     pub fn light_choice_1d(&self, bounce: u32) -> L {
         self.light_2d(bounce, u32::MAX - 1).0

@@ -71,8 +71,8 @@ pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     Vec3::new(x * scale, y * scale, L::one() - drop)
 }
 
-/// Samples a direction in the hemisphere around z with the density cos / pi \[1/sr\] (Malley's method:
-/// a uniform point of the disk, lifted to the hemisphere).
+/// Samples a direction in the hemisphere around z with the density cos / pi \[1/sr\] (Malley's
+/// method: a uniform point of the disk, lifted to the hemisphere).
 #[inline(always)]
 pub fn cosine_hemisphere<L: SimdFloat>(u: L, v: L) -> Vec3<L> {
     let (x, y, r2) = disk(u, v);
@@ -104,8 +104,8 @@ pub fn square_pdf<L: SimdFloat>(direction: Vec3<L>, side: L) -> L {
     (L::one() / (side * side * z * z * z)).masked(inside)
 }
 
-/// Returns the azimuth of `view` as a unit vector (x, y), and the sine of its angle to z. The azimuth of
-/// a view along z is the x axis.
+/// Returns the azimuth of `view` as a unit vector (x, y), and the sine of its angle to z. The
+/// azimuth of a view along z is the x axis.
 #[inline(always)]
 fn azimuth<L: SimdFloat>(view: Vec3<L>) -> (L, L, L) {
     let sin = view.x.mul_add(view.x, view.y * view.y).sqrt();
@@ -176,8 +176,8 @@ const SMALL_R: f64 = 0.25;
 
 /// Returns (t - x) / r of the slopes in [`visible_slope`], given r t and r^2, for r <= [`SMALL_R`].
 ///
-/// The polynomial is a fit for the smallest error of the quantile, which is 3e-6. The masked microfacets,
-/// 1e-9 of all, are neglected.
+/// The polynomial is a fit for the smallest error of the quantile, which is 3e-6. The masked
+/// microfacets, 1e-9 of all, are neglected.
 #[inline(always)]
 fn small_r_shift<L: SimdFloat>(rt: L, r2: L) -> L {
     let constant = polynomial(&[0.499_993, -0.083_186_5, 0.034_474], r2);
@@ -188,18 +188,20 @@ fn small_r_shift<L: SimdFloat>(rt: L, r2: L) -> L {
 }
 
 /// Returns the slope x, away from the view, of the visible microfacets at the quantile that `t` has
-/// among all microfacets. Slopes are in units of alpha; r = alpha tan(theta) in [[`SMALL_R`], 1e6], with the
-/// angle theta of the view; a smaller r counts as [`SMALL_R`]. The quantiles of x and t differ by 3e-5 at most.
+/// among all microfacets. Slopes are in units of alpha; r = alpha tan(theta) in [[`SMALL_R`], 1e6],
+/// with the angle theta of the view; a smaller r counts as [`SMALL_R`]. The quantiles of x and t
+/// differ by 3e-5 at most.
 ///
-/// All microfacets have the density exp(-t^2) / sqrt(pi). With Smith's masking the visible ones have a
-/// density in proportion to (1 - r x) exp(-x^2), for x < 1 / r (Heitz and d'Eon 2014, *Importance Sampling
-/// Microfacet-Based BSDFs using the Distribution of Visible Normals*). With V-cavities it is 2 exp(-x^2)
-/// instead for x < -1 / r, where the other side of the groove is invisible.
+/// All microfacets have the density exp(-t^2) / sqrt(pi). With Smith's masking the visible ones
+/// have a density in proportion to (1 - r x) exp(-x^2), for x < 1 / r (Heitz and d'Eon 2014,
+/// *Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible Normals*). With
+/// V-cavities it is 2 exp(-x^2) instead for x < -1 / r, where the other side of the groove is
+/// invisible.
 ///
-/// The distribution function is erfc(-x) + r exp(-x^2) / sqrt(pi), up to constants. Newton's method is
-/// applied to its logarithm below the median. Above, where its derivative falls to 0 at x = 1 / r, it is
-/// applied to the square root of the complement. It starts at a value that is exact to first order in r.
-/// It takes two steps for r <= 2, else three.
+/// The distribution function is erfc(-x) + r exp(-x^2) / sqrt(pi), up to constants. Newton's method
+/// is applied to its logarithm below the median. Above, where its derivative falls to 0 at x = 1 /
+/// r, it is applied to the square root of the complement. It starts at a value that is exact to
+/// first order in r. It takes two steps for r <= 2, else three.
 #[inline(always)]
 fn visible_slope<L: SimdFloat>(t: L, r: L, v_cavity: bool) -> L {
     let (one, two) = (L::one(), L::from_f64(2.0));
@@ -320,15 +322,15 @@ pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L>
     Vec3::new(h.x * alpha, h.y * alpha, h.z.max(L::zero())).normalize()
 }
 
-/// Samples a microfacet normal of the GGX distribution in V-cavities that is visible from `view` (unit
-/// vector with a positive z), with the density of [`beckmann_visible`].
+/// Samples a microfacet normal of the GGX distribution in V-cavities that is visible from `view`
+/// (unit vector with a positive z), with the density of [`beckmann_visible`].
 ///
-/// The microfacets with the slopes s / sqrt(1 - |s|^2), in units of alpha, are uniform in the unit disk of
-/// s. On the chord along the azimuth of the view, in units of its half length, the visible ones have the
-/// distribution function s + sqrt(1 - s^2) tan(theta) up to a constant, where both sides of the
-/// groove are visible, and twice that of all microfacets where one side is. theta is the angle of the
-/// stretched view. Both functions are inverted in closed form: with s = sin(a) the first one is sin(a +
-/// theta) / cos(theta).
+/// The microfacets with the slopes s / sqrt(1 - |s|^2), in units of alpha, are uniform in the unit
+/// disk of s. On the chord along the azimuth of the view, in units of its half length, the visible
+/// ones have the distribution function s + sqrt(1 - s^2) tan(theta) up to a constant, where both
+/// sides of the groove are visible, and twice that of all microfacets where one side is. theta is
+/// the angle of the stretched view. Both functions are inverted in closed form: with s = sin(a) the
+/// first one is sin(a + theta) / cos(theta).
 #[inline(always)]
 pub fn ggx_visible_v_cavity<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
     let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();

@@ -122,8 +122,8 @@ impl FirstDiagnostics {
 const MAX_SHOWN: usize = 20;
 
 impl SceneErrors {
-    /// Creates the errors from `messages`, which must not be empty and are sorted by location.
-    /// `more` is the number of further errors.
+    /// Creates the errors from `messages`, at least one, sorted by location. Removes messages that
+    /// equal the previous one. `more` is the number of errors that `messages` leaves out.
     pub(super) fn new((mut messages, more): (Vec<Diagnostic>, usize)) -> Self {
         debug_assert!(!messages.is_empty(), "errors without a message");
         messages.dedup();

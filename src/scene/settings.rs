@@ -31,11 +31,14 @@ description! {
     pub struct IntegratorSettings: Default {
         /// Kinds of rays that are traced.
         ray_types: RayTypes = "full";
-        /// Largest number of surfaces that a path hits after the first, or after a diffuse bounce; 0: no reflection, no transmission.
+        /// Largest number of surfaces that a path hits after the first, or after a diffuse bounce;
+        /// 0: no reflection, no transmission.
         max_depth: u32 = 16, in closed(0.0, 10000.0) "surfaces";
-        /// Largest number of diffuse bounces of a path; 0: no indirect diffuse light. Ambient light stands for further bounces.
+        /// Largest number of diffuse bounces of a path; 0: no indirect diffuse light. Ambient light
+        /// stands for further bounces.
         max_diffuse_depth: u32 = 0, in closed(0.0, 100.0) "bounces";
-        /// Mirrors reflect and glass transmits after a diffuse bounce, too; false leaves this light out.
+        /// Mirrors reflect and glass transmits after a diffuse bounce, too; false leaves this light
+        /// out.
         caustics: bool = true;
         /// Paths whose throughput is smaller end.
         min_throughput: f64 = 0.0, in SHARE;

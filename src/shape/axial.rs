@@ -1,5 +1,5 @@
-//! Solids of revolution around an axis between two points: shared code of cylinder, cone and tapered
-//! cylinder.
+//! Solids of revolution around an axis between two points: shared code of cylinder, cone and
+//! tapered cylinder.
 
 use crate::primitive::Form;
 use crate::shape::texture_space::around_axis;

@@ -1,7 +1,7 @@
 //! Compound objects: union, intersection and difference of solids, nested up to 64 deep.
 //!
-//! A part is written like an object, with `shape` and optionally `material` and `transform`, so that
-//! objects and parts can be copied into each other.
+//! A part is written like an object, with `shape` and optionally `material` and `transform`, so
+//! that objects and parts can be copied into each other.
 
 use crate::primitive::Form;
 use crate::primitive::csg_tree::{CsgSolid, CsgTree};

@@ -18,7 +18,8 @@ description! {
         side: f64, in SIZE "scene units";
         /// Height.
         height: f64, in SIZE "scene units";
-        /// Rotation about the vertical through the base's centroid, counter-clockwise seen from above.
+        /// Rotation about the vertical through the base's centroid, counter-clockwise seen from
+        /// above.
         rotation: f64 = 0.0, in FINITE "degrees";
     }
 }

@@ -7,12 +7,12 @@ use glam::{DVec2, DVec3};
 /// A convex solid over a horizontal base.
 ///
 /// `base` is the list of the base's corners as (x, z) offsets from `corner`, in order around it.
-/// `top_over_base` is the size of the top relative to the base, from 0 (an apex) to 1 (upright sides).
-/// `rotation` is the angle in degrees about the vertical through the base's centroid,
+/// `top_over_base` is the size of the top relative to the base, from 0 (an apex) to 1 (upright
+/// sides). `rotation` is the angle in degrees about the vertical through the base's centroid,
 /// counter-clockwise seen from above.
 ///
-/// The normals of the sides are computed from the base and the height instead of from differences of
-/// corners, so that they keep full precision with a tiny top or far from the origin.
+/// The normals of the sides are computed from the base and the height instead of from differences
+/// of corners, so that they keep full precision with a tiny top or far from the origin.
 pub(super) fn prismoid(
     corner: DVec3,
     base: &[DVec2],

@@ -10,8 +10,8 @@ use crate::value::{Description, ValidationError, description};
 use glam::{DMat3, DVec3};
 
 description! {
-    /// A regular pyramid on a square base, truncated at `height`. If `apex_height` is not larger than
-    /// `height`, it is an ordinary pyramid whose height is the smaller of the two.
+    /// A regular pyramid on a square base, truncated at `height`. If `apex_height` is not larger
+    /// than `height`, it is an ordinary pyramid whose height is the smaller of the two.
     pub struct Pyramid {
         /// Lower left near corner of the base, before the rotation (near is +z).
         corner: [f64; 3], in COORDINATE "scene units";
@@ -21,7 +21,8 @@ description! {
         apex_height: f64, in SIZE "scene units";
         /// Height of the truncated pyramid.
         height: f64, in SIZE "scene units";
-        /// Rotation about the vertical through the base's centre, counter-clockwise seen from above.
+        /// Rotation about the vertical through the base's centre, counter-clockwise seen from
+        /// above.
         rotation: f64 = 0.0, in FINITE "degrees";
     }
 }

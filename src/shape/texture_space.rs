@@ -32,8 +32,8 @@ impl TextureSpace {
         Self { shape_from_texture, corners: corners.into(), default_mapping }
     }
 
-    /// Returns `true` if the shape has texture coordinates: a mesh whose file has them, or a flat shape
-    /// with edges.
+    /// Returns `true` if the shape has texture coordinates: a mesh whose file has them, or a flat
+    /// shape with edges.
     pub fn has_uv(&self) -> bool {
         let [low, high] = self.corners;
         match self.default_mapping {

@@ -8,8 +8,8 @@ use crate::value::description;
 use glam::{DAffine3, DMat3, DVec3};
 
 description! {
-    /// The canonical tapered cylinder, to be placed by `transform`: its axis runs from the origin to
-    /// z = 1; its radius is 1 at z = 0 and `s` at z = 1.
+    /// The canonical tapered cylinder, to be placed by `transform`: its axis runs from the origin
+    /// to z = 1; its radius is 1 at z = 0 and `s` at z = 1.
     pub struct UnitFrustum {
         /// Radius at z = 1: 0 makes a cone, 1 a cylinder, more than 1 widens.
         s: f64, in closed(0.0, 1e6);

@@ -1,4 +1,5 @@
-//! Input of the terminal, read and decoded with timeouts.
+//! Reading and decoding of what the terminal sends: keys, mouse events and replies. A timeout ends
+//! a sequence of bytes that is not complete.
 
 use crate::terminal::decode::Decoder;
 use crate::terminal::{Environment, Event};

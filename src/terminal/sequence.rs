@@ -1,5 +1,6 @@
 //! Interpretation of characters and escape sequences: ECMA-48 and the extensions of xterm and kitty
-//! ("Control Sequences", invisible-island.net/xterm/ctlseqs; sw.kovidgoyal.net/kitty/keyboard-protocol).
+//! ("Control Sequences", invisible-island.net/xterm/ctlseqs;
+//! sw.kovidgoyal.net/kitty/keyboard-protocol).
 
 use crate::terminal::event::{Button, Code, Key, Mouse, MouseKind};
 use crate::terminal::{Event, Reply};

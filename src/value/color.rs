@@ -1,4 +1,4 @@
-//! Linear colours with red, green and blue.
+//! Linear RGB colours with the primaries of sRGB.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;

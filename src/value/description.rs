@@ -231,9 +231,9 @@ pub(crate) use choices;
 /// ```
 ///
 /// Ranges are those of [`NumberRange`]. If every key may be left out, the struct is declared as
-/// `Example: Default` and gets the declared defaults. Otherwise a default has to be that of the Rust
-/// type, unless it is declared as `up: [f64; 3] => "up" "[0.0, 1.0, 0.0]"`: the function that serde
-/// calls, and its result as TOML.
+/// `Example: Default` and gets the declared defaults. Otherwise a default has to be that of the
+/// Rust type, unless it is declared as `up: [f64; 3] => "up" "[0.0, 1.0, 0.0]"`: the function that
+/// serde calls, and its result as TOML.
 macro_rules! description {
     ($(#[doc = $doc:literal])+ pub struct $name:ident: Default { $($fields:tt)+ }) => {
         $crate::value::description!(@struct any all [$($doc)+] [] $name $($fields)+);

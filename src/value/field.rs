@@ -71,7 +71,8 @@ pub enum ValueType {
     ListOf(&'static [Field]),
     /// `[[name]]` tables with these keys.
     Tables(&'static [Field]),
-    /// `[name.ANY]` tables with these keys.
+    /// Tables `[name.NAME]` with these keys. The scene file chooses each NAME, as in
+    /// `[materials.gold]`.
     Named(&'static [Field]),
 }
 

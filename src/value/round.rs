@@ -39,8 +39,8 @@ pub fn round_nice(x: f64, scale: f64) -> f64 {
 
 /// Rotates the direction `v` by `degrees` about the vertical, counter-clockwise seen from above.
 ///
-/// Components are rounded to about a millionth of the length. The heading is rounded to thousandths of
-/// a degree, so that rounding errors do not add up over repeated rotations.
+/// Components are rounded to about a millionth of the length. The heading is rounded to thousandths
+/// of a degree, so that rounding errors do not add up over repeated rotations.
 pub fn turned(v: [f64; 3], degrees: f64) -> [f64; 3] {
     let [x, y, z] = v;
     let horizontal = x.hypot(z);

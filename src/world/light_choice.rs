@@ -61,7 +61,7 @@ pub(super) struct LightChoice<S> {
     any_constant: bool,
 }
 
-/// The light sets that the lanes of a packet have chosen.
+/// For each lane of a packet, the set of lights to which it traces shadow rays.
 pub(super) struct ChosenSets<'a, S> {
     choice: &'a LightChoice<S>,
     /// Set of each lane.
@@ -123,7 +123,8 @@ impl<S: Float> LightChoice<S> {
         self.strata.len()
     }
 
-    /// Number of sets: as many successive samples of a pixel ask each light once.
+    /// Number of light sets. As many successive samples of a pixel use each set once, and so trace
+    /// a shadow ray to each light once.
     pub fn period(&self) -> u32 {
         self.sets.len() as u32
     }

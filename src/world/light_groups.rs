@@ -1,6 +1,6 @@
 //! Light groups. A light group is the part of the picture that comes from one light, one emissive
-//! material, ambient light or the background, and is linear in its colour and intensity. The film stores each group
-//! separately, so that colour and intensity can change without new samples.
+//! material, ambient light or the background, and is linear in its colour and intensity. The film
+//! stores each group separately, so that colour and intensity can change without new samples.
 
 use crate::lanes::Float;
 use crate::light::{DeltaLight, Emitter, EnvironmentLight, Light};
@@ -35,7 +35,8 @@ pub enum LightGroupSource {
     Light(usize),
     /// Emission of all objects with one material, by its name.
     Material(String),
-    /// Several lights and materials. Their samples already contain the colour and intensity of each.
+    /// Several lights and materials. Their samples already contain the colour and intensity of
+    /// each.
     Shared(Vec<LightGroupSource>),
 }
 

@@ -4,11 +4,11 @@
 //! Light is sampled from spheres, flat shapes, convex polyhedra, and meshes of up to
 //! [`MAX_TRIANGLES`] triangles. The emission of other shapes is found only by rays that hit them.
 //!
-//! Sampled points are lifted off their surface. Where the object touches another one, a lifted point is
-//! beyond the other's surface: below the floor that a box stands on, or inside of the glass that
-//! stands on a shining floor. Shadow rays from there would reach it. Compilation lists the objects
-//! that touch an emissive one and behind whose surfaces rays can start; shadow rays are tested
-//! against them a second time, up to the surface from which the point was lifted.
+//! Sampled points are lifted off their surface. Where the object touches another one, a lifted
+//! point is beyond the other's surface: below the floor that a box stands on, or inside of the
+//! glass that stands on a shining floor. Shadow rays from there would reach it. Compilation lists
+//! the objects that touch an emissive one and behind whose surfaces rays can start; shadow rays are
+//! tested against them a second time, up to the surface from which the point was lifted.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, next_distinct};

@@ -80,7 +80,8 @@ pub struct World<L: SimdFloat> {
     pub(super) bsdf_of: Vec<u32>,
     pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
     pub(super) sources: Vec<DeltaSource<L::Scalar>>,
-    /// Point lights of which a few are asked at each hit; `sources` holds the others. `None` if all are asked.
+    /// Point lights of which a few are asked at each hit; `sources` holds the others. `None` if all
+    /// are asked.
     pub(super) light_choice: Option<LightChoice<L::Scalar>>,
     /// Lights with a size.
     pub(super) emitters: Vec<EmitterSource<L::Scalar>>,

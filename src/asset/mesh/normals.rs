@@ -3,8 +3,8 @@
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Returns the mean normal of the adjacent triangles for each vertex, weighted by their angles at the
-/// vertex (Thürmer and Wüthrich 1998, *Computing Vertex Normals from Polygonal Facets*).
+/// Returns the mean normal of the adjacent triangles for each vertex, weighted by their angles at
+/// the vertex (Thürmer and Wüthrich 1998, *Computing Vertex Normals from Polygonal Facets*).
 ///
 /// Vertices with equal positions count as one, so that shading is smooth where a mesh is cut only
 /// for its texture coordinates. Each result is a unit vector. It is the z axis if there are no

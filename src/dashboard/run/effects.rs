@@ -92,8 +92,8 @@ pub trait Effects {
     ) -> (Vec<Message>, Result<Option<PathBuf>, String>);
 }
 
-/// Executor of effects that edits and renders a scene. It owns the renderer, the thread of the scene
-/// file and the exports.
+/// Executor of effects that edits and renders a scene. It owns the renderer, the thread of the
+/// scene file and the exports.
 pub struct EffectRunner {
     session: Session,
     files: Files,

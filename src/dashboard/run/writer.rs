@@ -53,7 +53,8 @@ impl Writer {
         std::mem::take(&mut self.spare)
     }
 
-    /// Takes back the buffer of a frame that was not sent.
+    /// Takes back the buffer of a frame that was not sent, so that the next frame reuses its
+    /// memory.
     pub fn keep(&mut self, buffer: Vec<u8>) {
         self.spare = buffer;
     }

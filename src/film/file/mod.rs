@@ -16,9 +16,9 @@
 //! | `DONE` | number of tiles (u64), and the CRC-32 (u32) of all bytes before the first `TILE` chunk and the checksums of the `TILE` chunks; the end of the file |
 //!
 //! A text has its length in bytes (u32) before it. A tile record begins with the sample counts of A
-//! and B (u32 each) and ends there if both are 0. Then follow the number of samples above the film's
-//! limit (u64), the number of invalid samples (u64), the number of remembered ones (u8) with index,
-//! x, y (u32 each) and replicate (u8), and the sums. Sums are stored in planes, in the order
+//! and B (u32 each) and ends there if both are 0. Then follow the number of samples above the
+//! film's limit (u64), the number of invalid samples (u64), the number of remembered ones (u8) with
+//! index, x, y (u32 each) and replicate (u8), and the sums. Sums are stored in planes, in the order
 //! replicate, group, channel. A plane has the number of bytes of its largest sum (u8, 0 to 8), then
 //! the low bytes of the sum of each pixel inside the picture, row by row. This takes about 60 % of
 //! the memory of the film, and less time than writing the rest would take.

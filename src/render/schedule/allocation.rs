@@ -31,8 +31,8 @@ const DECISION_SHARE: f64 = 0.1;
 /// 1/16, by 16 % with 1/8, by 13 % with 1/4. The physical mirror room takes 60.7 million rays to an
 /// RMSE of 0.00068 with 1/32, 61.7 million with 1/16, 64.8 million with 1/8.
 pub(super) const EXPLORATION: f64 = 0.0625;
-/// Smallest number of sample blocks in a decision, unless there are fewer tiles. It gives every
-/// thread work until the end of the wave.
+/// Smallest number of blocks of samples that one decision allocates. If there are fewer tiles, it
+/// is the number of tiles. It gives every thread work until the end of the wave.
 const MIN_BLOCKS: usize = 64;
 /// Smallest gain of further tiles in a decision, as a share of the gain of the tiles that have
 /// already doubled their sample count in it. Those tiles get no more samples in the decision,
@@ -41,12 +41,12 @@ const WORTHWHILE: f64 = 0.25;
 /// Weight of a tile's own allocation estimate, relative to the validation estimate of one tile of
 /// its class.
 const OWN_WEIGHT: f64 = 0.25;
-/// Number of tiles below which a class is widened by the nearest classes. The validation estimate of
-/// a tile then has little weight in its own expected error. In a class of few tiles, those whose
-/// estimate is low by chance would get no samples, and the sum of the validation estimates, which is
-/// reported, would be too low. True over reported error of 40 pictures of balls of a pixel and of
-/// stars (`tests/honesty`, 48 to 64 seeds each): 1.02 to 1.55 without widening, 0.96 to 1.24 with 9
-/// tiles, 0.94 to 1.23 with 17.
+/// Number of tiles below which a class is widened by the nearest classes. The validation estimate
+/// of a tile then has little weight in its own expected error. In a class of few tiles, those whose
+/// estimate is low by chance would get no samples, and the sum of the validation estimates, which
+/// is reported, would be too low. True over reported error of 40 pictures of balls of a pixel and
+/// of stars (`tests/honesty`, 48 to 64 seeds each): 1.02 to 1.55 without widening, 0.96 to 1.24
+/// with 9 tiles, 0.94 to 1.23 with 17.
 const MIN_CLASS_TILES: f64 = 17.0;
 /// Largest distance of a class by which another one is widened: a factor of 4 in the estimate, or
 /// two octaves of the sample count.

@@ -59,13 +59,14 @@ impl ConvergenceFit {
         Some((rays + additional(steep) * (1.0 - SPREAD), rays + additional(flat) * (1.0 + SPREAD)))
     }
 
-    /// Slope over all recorded points, at most three doublings; 0.5 if there are fewer than two
-    /// points.
+    /// Slope p of the fit RMSE ~ rays^-p through the first and the last recorded point, which are
+    /// at most three doublings of the rays apart. It is 0.5, that of independent samples, if there
+    /// are fewer than two points.
     pub fn slope(&self) -> f64 {
         self.fitted_slope().unwrap_or(0.5)
     }
 
-    /// Slope over all recorded points. `None` if there are fewer than two.
+    /// Returns [`ConvergenceFit::slope`] if there are at least two recorded points.
     pub fn fitted_slope(&self) -> Option<f64> {
         let (r0, n0) = *self.points.first()?;
         let (r1, n1) = *self.points.last()?;

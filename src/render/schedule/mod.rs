@@ -114,10 +114,10 @@ impl Schedule {
         }
     }
 
-    /// Returns the schedule of a world in which `light_period` samples of a replicate ask each light
-    /// once; see [`AnyWorld::light_period`](crate::world::AnyWorld::light_period). The error falls
-    /// steeply at this count, and estimates from fewer samples do not show what is left. They are
-    /// discarded as soon as a tile has an estimate from `light_period` samples.
+    /// Returns the schedule of a world in which `light_period` samples of a replicate ask each
+    /// light once; see [`AnyWorld::light_period`](crate::world::AnyWorld::light_period). The error
+    /// falls steeply at this count, and estimates from fewer samples do not show what is left. They
+    /// are discarded as soon as a tile has an estimate from `light_period` samples.
     pub fn with_light_period(self, light_period: u32) -> Self {
         Self { light_period, ..self }
     }

@@ -50,10 +50,10 @@ impl Schedule {
         out
     }
 
-    /// Restores a state into a new schedule of the same film. `counts` has the numbers of samples in
-    /// A and B of each tile of the film. The noise estimates are discarded if the criterion differs.
-    /// Returns `None` if the state is not valid or does not belong to the film; the schedule may
-    /// then have changed.
+    /// Restores a state into a new schedule of the same film. `counts` has the numbers of samples
+    /// in A and B of each tile of the film. The noise estimates are discarded if the criterion
+    /// differs. Returns `None` if the state is not valid or does not belong to the film; the
+    /// schedule may then have changed.
     pub fn restore(&mut self, state: &[u8], counts: &[[u32; 2]]) -> Option<()> {
         let mut fields = Fields::new(state);
         let criterion = match fields.u8()? {

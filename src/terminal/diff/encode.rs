@@ -166,8 +166,8 @@ impl Encoder {
     }
 }
 
-/// Returns the SGR parameters of a colour. `base` is 30 for foreground and 40 for background. RGB and
-/// indexed colours follow ISO 8613-6.
+/// Returns the SGR parameters of a colour. `base` is 30 for foreground and 40 for background. RGB
+/// and indexed colours follow ISO 8613-6.
 fn color_code(color: Color, base: u8) -> String {
     let dark = |n: u8| (base + n).to_string();
     let bright = |n: u8| (base + 60 + n).to_string();

@@ -128,9 +128,9 @@ impl SendQueueEstimate {
             busy.most_drained = drained;
         }
         busy.is_full |= self.bytes >= limit;
-        // Rate since the beginning of the period, which stalls lower but do not raise. The bytes of a
-        // short time prove no rate: a relay, or the buffers of the other host, may have taken them at
-        // once.
+        // Rate since the beginning of the period, which stalls lower but do not raise. The bytes of
+        // a short time prove no rate: a relay, or the buffers of the other host, may have taken
+        // them at once.
         let (start, before) = busy.whole;
         let span = now.saturating_sub(start);
         let whole = (span >= SAMPLE).then(|| (drained - before) / span.as_secs_f64());

@@ -250,8 +250,8 @@ fn send_queue_holds_a_round_trip_and_a_frame() {
         let found = flow.reading().unwrap().rate;
         let what = format!("{rate} B/s, {round_trip} ms: {found:.0} B/s, {waited:?}");
         assert!((0.85..1.2).contains(&(found / rate)), "{what}");
-        // A frame of 0.1 s follows one that waits for at most the excess of the estimated round trip
-        // and the interval of measurements.
+        // A frame of 0.1 s follows one that waits for at most the excess of the estimated round
+        // trip and the interval of measurements.
         assert!(waited < ms(300), "{what}");
     }
 }

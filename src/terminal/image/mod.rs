@@ -39,10 +39,10 @@ pub enum Protocol {
     Blocks,
 }
 
-/// Screen and protocol for which an image is prepared.
+/// Size of the terminal and protocol for which an image is encoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageViewport {
-    /// Protocol.
+    /// Image protocol, or half blocks.
     pub protocol: Protocol,
     /// Columns and rows of the screen. The last row shows the caption.
     pub screen: [u16; 2],

@@ -24,7 +24,7 @@ pub(crate) enum LightProjection<S> {
 }
 
 impl<S: Float> LightProjection<S> {
-    /// Number of faces.
+    /// Number of faces of the projection: 6 for a cube map, otherwise 1.
     pub fn faces(&self) -> usize {
         if matches!(self, Self::CubeMap) { 6 } else { 1 }
     }

@@ -81,10 +81,10 @@ impl CullingMode {
     }
 }
 
-/// Returns one value for each of `forms`: `true` for a convex solid that rays hit only from outside.
-/// Paths are inside of a solid only if they start there or are transmitted. `start` contains the
-/// origins of all camera rays; `None` if they start on a near plane. `entered` is `true` for each
-/// form whose surface transmits.
+/// Returns one value for each of `forms`: `true` for a convex solid that rays hit only from
+/// outside. Paths are inside of a solid only if they start there or are transmitted. `start`
+/// contains the origins of all camera rays; `None` if they start on a near plane. `entered` is
+/// `true` for each form whose surface transmits.
 pub(crate) fn outside_only<'a>(
     forms: impl Iterator<Item = &'a Form>,
     start: Option<BoundingSphere>,

@@ -383,8 +383,8 @@ pub(crate) fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Ve
     out
 }
 
-/// Returns all pairs of forms for which `wanted` is true and whose surfaces may come within `slack` of
-/// each other.
+/// Returns all pairs of forms for which `wanted` is true and whose surfaces may come within `slack`
+/// of each other.
 pub(crate) fn touching_pairs(
     forms: &[Form],
     wanted: impl Fn(usize, usize) -> bool,

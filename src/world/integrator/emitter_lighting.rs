@@ -1,12 +1,13 @@
-//! Light of emitters with a size, by multiple importance sampling (Veach and Guibas 1995, *Optimally
-//! Combining Sampling Techniques for Monte Carlo Rendering*).
+//! Light of emitters with a size, by multiple importance sampling (Veach and Guibas 1995,
+//! *Optimally Combining Sampling Techniques for Monte Carlo Rendering*).
 //!
 //! Two samples find the light that a glossy lobe reflects: a point of the emitter, and the
 //! direction of the reflected ray. Each is weighted by the power heuristic with exponent 2. Matt
 //! surfaces and highlights of lights use the point alone, mirrors and the camera the ray alone.
 //!
-//! Objects that emit light are emitters, too. Rays find the emission of an object where they hit it,
-//! so that its shape may be any; where no points of the shape can be sampled, the rays find all of it.
+//! Objects that emit light are emitters, too. Rays find the emission of an object where they hit
+//! it, so that its shape may be any; where no points of the shape can be sampled, the rays find all
+//! of it.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};

@@ -87,7 +87,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
     ) -> L::Mask {
         let throughput = path.throughput.component_mul(interaction.diffuse);
         let weight = throughput.max_element();
-        // A surface behind a coincident one is shaded from the lights, and has a bounce like others.
+        // A surface behind a coincident one is shaded from the lights, and has a bounce like
+        // others.
         let lanes = interaction.has_bsdf & weight.gt(L::zero());
         if lanes.none() {
             return lanes;

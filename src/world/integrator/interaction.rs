@@ -106,8 +106,8 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
     }
 }
 
-/// Creates the interactions of the active rays. `first` is the first result of [`next_distinct`] for
-/// the primitives that they hit.
+/// Creates the interactions of the active rays. `first` is the first result of [`next_distinct`]
+/// for the primitives that they hit.
 #[inline(always)]
 pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

@@ -50,8 +50,8 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
         Self { hit, reflecting, transmitting: reflecting & (hit.thin | !hit.outer) }
     }
 
-    /// Returns the value [1/sr] of the interfaces in `direction`, times the cosine of the light, and
-    /// the density [1/sr] of the ray in this direction: of the transmitted ray if `behind` is
+    /// Returns the value [1/sr] of the interfaces in `direction`, times the cosine of the light,
+    /// and the density [1/sr] of the ray in this direction: of the transmitted ray if `behind` is
     /// `true`, otherwise of the reflected one. In lanes whose rays have no density, the value is
     /// zero and the density the largest finite number.
     #[inline(never)]

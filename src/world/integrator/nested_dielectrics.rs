@@ -104,8 +104,8 @@ pub(crate) struct Media<'a, L: SimdFloat> {
 
 impl<L: SimdFloat> Media<'_, L> {
     /// Returns the fraction of light that is left after `distance` [scene units], in each channel,
-    /// by Beer's law. `distance` may be the largest finite number. Returns `None` if no solid of the
-    /// world absorbs light.
+    /// by Beer's law. `distance` may be the largest finite number. Returns `None` if no solid of
+    /// the world absorbs light.
     #[inline(always)]
     pub fn transmittance(&self, distance: L) -> Option<Vec3<L>> {
         let absorption = self.nested_dielectrics.absorption.as_ref()?;

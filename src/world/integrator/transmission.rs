@@ -508,8 +508,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         directions
     }
 
-    /// Samples the reflected and transmitted directions of `lanes`, whose surfaces are rough, with the
-    /// numbers `uv`, and stores them in `directions`.
+    /// Samples the reflected and transmitted directions of `lanes`, whose surfaces are rough, with
+    /// the numbers `uv`, and stores them in `directions`.
     #[inline(never)]
     fn sample_rough(
         &self,
