@@ -56,7 +56,7 @@ fn regions_equal_the_picture_as_a_whole() {
                 assert!(peak.is_none_or(|peak| peak <= cap), "{memory}: {peak:?} bytes");
                 assert_eq!(stats["stopped_by"], "spp");
             }
-            // The least memory is rounded up by 1.5 MB at most, which holds up to a third of the film.
+            // The least memory is rounded up by 2 MB at most, which holds up to a third of the film.
             let falls = counts.is_sorted_by(|fewer, more| fewer >= more);
             assert!(counts[0] > 2 && falls && counts[3] == 1, "{counts:?}");
         }

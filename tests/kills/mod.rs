@@ -24,8 +24,9 @@ use zerkalo::terminal::{ENTER, LEAVE};
 
 /// Number of runs.
 const RUNS: usize = 200;
-/// Number of concurrent runs. They mostly sleep.
-const CONCURRENT_RUNS: usize = 16;
+/// Number of concurrent runs per processor. A program with its tracing threads must process keys as
+/// fast as they are typed.
+const RUNS_PER_PROCESSOR: usize = 4;
 /// Period of runs in which one of each kind of end is followed by a start that recovers the edits.
 const RECOVERY_PERIOD: usize = 20;
 /// Age of an edit from which it must not be lost by SIGKILL.
@@ -282,7 +283,9 @@ fn random_ends_damage_no_file_and_lose_no_old_edit() {
                 results.lock().unwrap().push((*number, result));
             }
         };
-        let workers: Vec<_> = (0..CONCURRENT_RUNS).map(|_| scope.spawn(work)).collect();
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        let workers: Vec<_> =
+            (0..RUNS_PER_PROCESSOR * processors).map(|_| scope.spawn(work)).collect();
         workers.into_iter().for_each(|worker| worker.join().expect("a worker ends"));
         over.store(true, Ordering::Relaxed);
     });

@@ -119,8 +119,10 @@ pub(crate) fn interface_lighting<L: SimdFloat>(
         counts.glossy = true;
         let media = Media { nested_dielectrics, stack };
         // Radiance of light from the directions `wi`, sampled with a density, in the lanes whose
-        // shadow ray reaches the distance.
-        let mut lit_radiance = |wi: Vec3<L>, distance: L, density: L, irradiance: Vec3<L>| {
+        // shadow ray reaches the distance. `object` is the index of an emissive object.
+        let mut lit_radiance = |(wi, distance): (Vec3<L>, L),
+                                (irradiance, density): (Vec3<L>, L),
+                                object: Option<usize>| {
             let height = wi.dot(interaction.geometric);
             let is_behind = height.lt(L::zero());
             let arrives = if behind { is_behind } else { height.gt(L::zero()) };
@@ -133,6 +135,10 @@ pub(crate) fn interface_lighting<L: SimdFloat>(
             counts.rays += u64::from(lit.bits().count_ones());
             let ray = Ray { origin, direction: wi };
             lit = lit.and_not(world.geometry.occluded(&ray, distance, lit, world.geometry.all()));
+            if let Some(object) = object {
+                let shadow_ray = (&ray, distance);
+                lit = lit.and_not(world.emission.covered(object, &world.geometry, shadow_ray, lit));
+            }
             let mut radiance = path.throughput.component_mul(value);
             if let Some(left) = media.transmittance(distance) {
                 radiance = radiance.component_mul(left);
@@ -144,21 +150,23 @@ pub(crate) fn interface_lighting<L: SimdFloat>(
             let Some(source) = sample_emitter(world, index as usize, origin, numbers) else {
                 break;
             };
+            if !source.visible {
+                continue;
+            }
             let light = &source.light;
-            if source.visible
-                && let irradiance = Vec3::new(light.irradiance, light.irradiance, light.irradiance)
-                && let Some(radiance) =
-                    lit_radiance(light.wi, light.distance, light.density, irradiance)
-            {
+            let irradiance = Vec3::new(light.irradiance, light.irradiance, light.irradiance);
+            let ray = (light.wi, light.distance);
+            let object = (index as usize).checked_sub(world.emitters.len());
+            if let Some(radiance) = lit_radiance(ray, (irradiance, light.density), object) {
                 out.groups[source.group] += source.emitted(radiance);
             }
         }
         for (index, source) in (0..).zip(&world.environments) {
             let numbers = sampler.light_2d(bounce, ENVIRONMENT_SALT + 2 * index);
             let light = source.light.sample(numbers, lanes);
+            let ray = (light.wi, L::from_f64(L::MAX));
             if source.visible
-                && let Some(radiance) =
-                    lit_radiance(light.wi, L::from_f64(L::MAX), light.density, light.irradiance)
+                && let Some(radiance) = lit_radiance(ray, (light.irradiance, light.density), None)
             {
                 out.groups[source.group] += source.emitted(radiance);
             }
