@@ -34,9 +34,10 @@ impl<L: SimdFloat> Vec3<L> {
     #[inline(always)]
     pub fn from_fn(mut f: impl FnMut(usize) -> [L::Scalar; 3]) -> Self {
         let [mut x, mut y, mut z] = [[L::Scalar::default(); MAX_WIDTH]; 3];
-        let lanes = x.iter_mut().zip(&mut y).zip(&mut z).take(L::WIDTH);
-        for (i, ((x, y), z)) in lanes.enumerate() {
-            [*x, *y, *z] = f(i);
+        // Zipped iterators over the three arrays take longer: 20 % of the time of 64 lights.
+        #[allow(clippy::needless_range_loop, reason = "measured")]
+        for i in 0..L::WIDTH {
+            [x[i], y[i], z[i]] = f(i);
         }
         Self::new(L::from_fn(|i| x[i]), L::from_fn(|i| y[i]), L::from_fn(|i| z[i]))
     }
