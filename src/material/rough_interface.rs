@@ -156,8 +156,8 @@ impl<S: Float> Bsdf<S> {
     /// the density [1/sr] with which [`Bsdf::sample_interface`] draws `direction`: as the
     /// transmitted ray in the lanes of `behind`, as the reflected ray elsewhere. The weight of a
     /// sample is the first divided by the second. Both are zero for directions on the wrong side.
-    /// Where all transmitted rays have about the same direction, the value is zero and the density
-    /// the largest finite number. The other parameters are those of [`Bsdf::sample_interface`].
+    /// Where all transmitted rays have about the same direction, the value is zero, and the density
+    /// is the largest finite number. The other parameters are those of [`Bsdf::sample_interface`].
     #[inline(always)]
     pub fn evaluate_interface<L: SimdFloat<Scalar = S>>(
         &self,
