@@ -1,9 +1,11 @@
-//! Acceleration structures: time per sample of each structure on three scenes (the reflecting
-//! tracks, 300 objects of several kinds, a mesh), and its growth with the number of objects, on the
-//! tracks with fewer and more balls in each row, and in a crowd.
+//! Acceleration structures: time per sample of each structure, and its growth with the number of
+//! objects.
 //!
-//! `cargo bench --bench acceleration`. One core. The structures alternate on each scene; the least
-//! of five times counts.
+//! - The structures are compared on three scenes: the reflecting tracks, 300 objects of several kinds, a mesh.
+//! - The growth is measured on the tracks with fewer and more balls in each row, and on a crowd of objects.
+//!
+//! `cargo bench -p zerkalo-benches --bench acceleration`. One core. The structures alternate on
+//! each scene; the least of five times counts.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -20,12 +22,12 @@ use zerkalo::scene::{Acceleration, Document, Object, Scene};
 use zerkalo::shape::{Shape, Sphere};
 use zerkalo::world::{AnyWorld, Options};
 
-/// Picture size of the tracks with varying numbers of balls.
+/// Picture size, in pixels, of the tracks with varying numbers of balls.
 const SIZE: [u32; 2] = [640, 480];
-/// Size of all other pictures.
+/// Picture size, in pixels, of all scenes but the tracks with varying numbers of balls.
 const SMALL: [u32; 2] = [320, 240];
 
-/// Samples per pixel.
+/// Samples per pixel of each measured render.
 const SAMPLES: u32 = 8;
 
 /// A compiled scene and a film for it.
@@ -51,7 +53,7 @@ impl Bench {
         Self { world, film, estimator, pool }
     }
 
-    /// Traces one wave on this thread, tile by tile.
+    /// Traces the samples of the picture on this thread, tile by tile.
     fn trace(&mut self) {
         let sampling = SampleSettings { seed: 1, kind: SamplerKind::Sobol };
         self.film.restart();
@@ -65,7 +67,8 @@ impl Bench {
     }
 }
 
-/// Nanoseconds per sample of each bench.
+/// Returns the nanoseconds per sample of each bench: the shortest time of several interleaved
+/// renders.
 fn times(mut benches: Vec<Bench>) -> Vec<f64> {
     let samples = benches[0].film.width() * benches[0].film.height() * SAMPLES as usize;
     let mut traces: Vec<_> = benches.iter_mut().map(|b| move || b.trace()).collect();
@@ -87,8 +90,8 @@ diffuse = 0.2
 reflection = 0.7
 "#;
 
-/// Scene with `count` objects in the unit ball. `shapes` are their descriptions, at the origin and
-/// of about unit size.
+/// Returns a scene with `count` objects in the unit ball. `shapes` are their descriptions, each at
+/// the origin and of about unit size.
 fn crowd(count: usize, shapes: &[&str]) -> Scene {
     let mut random = Random(11);
     let mut text = ROOM.to_string();
@@ -113,8 +116,9 @@ fn crowd(count: usize, shapes: &[&str]) -> Scene {
 
 const BALL: &str = "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }";
 
-/// The reflecting tracks with `4 n n` small balls instead of 400: `4 n` rows of `n`, distributed
-/// over the same curves, with a radius that keeps their share of the picture.
+/// Returns the scene of the reflecting tracks with `4 n n` small balls instead of 400: `4 n` rows
+/// of `n`. The rows are distributed over the same curves. The radius keeps the balls' share of the
+/// picture.
 fn tracks(scene: &Scene, n: usize) -> Scene {
     let mut scene = scene.clone();
     let [mirror, ball, ..] = &scene.objects[..] else { panic!("no tracks") };
@@ -132,7 +136,8 @@ fn tracks(scene: &Scene, n: usize) -> Scene {
     scene
 }
 
-/// Prints nanoseconds per sample by number of spheres, with `auto` and in a BVH.
+/// Prints the nanoseconds per sample by number of spheres, for the automatic choice of the
+/// acceleration structure and for a BVH.
 fn growth(scenes: &[(usize, Scene)], size: [u32; 2]) {
     let times_with = |acceleration| {
         times(scenes.iter().map(|(_, s)| Bench::new(s, acceleration, size)).collect())
@@ -152,7 +157,7 @@ fn main() {
         "cone = { base = [0.0, -0.5, 0.0], apex = [0.0, 0.5, 0.0], radius = 0.5 }",
     ];
     let file = |name: &str| {
-        let path = Path::new("scenes").join(name);
+        let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name);
         Document::read(&path).unwrap_or_else(|e| panic!("{e}")).scene().clone()
     };
     let scenes = [

@@ -16,10 +16,10 @@ use zerkalo::scene::BUILT_IN;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 const SIZE: [u16; 2] = [160, 45];
 
-/// Arrow keys whose moves cancel each other.
+/// Escape sequences of arrow keys whose camera moves cancel each other.
 const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[A", "\x1b[D", "\x1b[B"];
 
-/// Event of the trace.
+/// Line of the file that `--trace` writes: a key, the kind of response and the latency.
 struct Event {
     picture: bool,
     milliseconds: f64,
@@ -61,8 +61,8 @@ fn open(folder: &Path, more: &[&str]) -> Terminal {
     terminal
 }
 
-/// Presses `count` arrow keys, one each `interval`, with a key in between that toggles the panels if the
-/// interval is longer than 100 ms. Returns the recorded events.
+/// Presses `count` arrow keys at intervals of `interval`. If the interval is longer than 100 ms,
+/// also presses a key between them that toggles the panels. Returns the recorded events.
 fn press_keys(folder: &Path, count: usize, interval: Duration) -> Vec<Event> {
     let trace = folder.join("trace.csv");
     let mut terminal = open(folder, &["--trace", trace.to_str().unwrap()]);
@@ -87,7 +87,8 @@ fn press_keys(folder: &Path, count: usize, interval: Duration) -> Vec<Event> {
     text.lines().skip(1).map(event).collect()
 }
 
-/// Returns the processor time of the converged program, in percent of one processor.
+/// Returns the processor time that the program uses after the picture has converged, in percent of
+/// one processor.
 fn idle_percent(folder: &Path) -> f64 {
     let mut terminal = open(folder, &[]);
     terminal.send("T");
@@ -104,7 +105,8 @@ fn idle_percent(folder: &Path) -> f64 {
     ticks as f64 / seconds as f64
 }
 
-/// Returns user and system time of a process in ticks (fields 14 and 15 of proc_pid_stat(5)).
+/// Returns user and system time of the process `id` in clock ticks (fields 14 and 15 of
+/// proc_pid_stat(5)).
 fn processor_ticks(id: u32) -> u64 {
     let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap();
     let after_name = stat.rsplit_once(')').unwrap().1;

@@ -1,4 +1,5 @@
-//! Cost of the film besides tracing: noise of a tile, display picture, addition, files.
+//! Cost of film operations other than tracing: noise of a tile, picture for display, addition of
+//! films, files.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -7,7 +8,8 @@ use zerkalo::film::{
     Thumbnail, Tone, WholeFilm,
 };
 
-/// Film of a noisy gradient with `groups` light groups and 64 + 64 samples in every pixel.
+/// Returns a film of a noisy gradient with `groups` light groups. Each pixel has 64 samples in each
+/// of the two replicates (halves of the samples).
 fn film(width: usize, height: usize, groups: usize) -> Film {
     let scales = vec![2f64.powi(28); groups];
     let mut film = Film::new(Header { width, height, scales, seed: 1, precision: "single".into() });

@@ -1,7 +1,14 @@
-//! Kernel: intersection by kind and lane type, linear list against BVH, whole paths of the physical
-//! mirror room by lane type, sampler, compilation of a scene, one wave of the pass.
+//! Tracing kernels:
 //!
-//! `cargo bench --bench kernel`. Throughput counts lanes, so that instances compare directly.
+//! - intersection, by kind of primitive and SIMD type
+//! - a linear list of primitives against a BVH
+//! - whole paths in the physical mirror room, by SIMD type
+//! - the sampler
+//! - compilation of a scene
+//! - one wave (set of concurrent jobs) of samples
+//!
+//! `cargo bench -p zerkalo-benches --bench kernel`. Throughput counts lanes, so that SIMD types
+//! compare directly.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
@@ -24,7 +31,7 @@ fn physical() -> Scene {
     Scene::parse(text, "mirror-room-physical.toml").expect("a shipped scene")
 }
 
-/// Random generator for test geometry (splitmix64), uniform in [0, 1).
+/// Random number generator for test geometry (SplitMix64), uniform in [0, 1).
 struct Random(u64);
 
 impl Random {
@@ -45,7 +52,8 @@ impl Random {
         }
     }
 
-    /// Coherent packet of rays from a sphere of radius 4 towards points within 1 of the origin.
+    /// Returns a coherent packet of rays from a point of the sphere of radius 4 towards points
+    /// within 1 of the origin.
     fn rays<L: SimdFloat>(&mut self) -> Ray<L> {
         let (from, to) = (4.0 * self.direction(), self.direction() * self.next());
         let mut lane = || to + 0.02 * self.direction() - from;
@@ -57,7 +65,7 @@ impl Random {
     }
 }
 
-/// Name of a lane type in bench ids.
+/// Returns the name of a SIMD type in the names of benches.
 fn name<L: SimdFloat>() -> &'static str {
     L::NAME
 }
@@ -88,7 +96,7 @@ fn kinds(c: &mut Criterion) {
     }
 }
 
-/// Spheres in a unit ball, in a linear list and in a BVH.
+/// Measures the intersection of spheres in a unit ball, in a linear list and in a BVH.
 fn list_or_tree(c: &mut Criterion) {
     for n in [8, 16, 24, 32, 64, 256, 4096] {
         let mut random = Random(n as u64);
@@ -115,8 +123,8 @@ fn list_or_tree(c: &mut Criterion) {
     }
 }
 
-/// Sixteen samples per pixel of a small physical mirror room on one thread, into the film: the gain
-/// of the lanes in a whole render.
+/// Measures sixteen samples per pixel of a small physical mirror room on one thread, with
+/// accumulation in the film: the speed-up by SIMD lanes in a whole render.
 fn paths<L: SimdFloat>(c: &mut Criterion) {
     let mut scene = physical();
     scene.film.size = [160, 120];
@@ -166,7 +174,8 @@ fn compile(c: &mut Criterion) {
     c.bench_function("compile the mirror room", |b| b.iter(|| AnyWorld::compile(&scene, &options)));
 }
 
-/// One wave of 8 samples per pixel of 640x480, on one thread.
+/// Measures one wave (set of concurrent jobs): 8 samples per pixel of 640x480 pixels, on one
+/// thread.
 fn wave(c: &mut Criterion) {
     let scene = physical();
     let mut group = c.benchmark_group("wave of 8 samples, 640x480");

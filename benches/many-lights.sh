@@ -35,7 +35,7 @@ scene() {
 # Renders $work/room.toml with the given options. Prints processor seconds, samples per pixel and linear RMSE.
 run() {
     local seconds
-    seconds="$({ time "$zerkalo" render "$work/room.toml" -o "$work/room.exr" --stats "$work/stats.json" "$@" \
+    seconds="$({ time "$zerkalo" render "$work/room.toml" -o "$work/room.png" --stats "$work/stats.json" "$@" \
         > /dev/null 2>&1; } 2>&1 | tail -n 1)"
     awk -v seconds="$seconds" -F '[:,]' '
         /"spp_mean"/ { spp = $2 }

@@ -3,7 +3,7 @@
 //! random points. The last part compares packet traversal with single-ray traversal for packets whose
 //! directions differ more and more.
 //!
-//! `cargo bench --bench mesh`; `-- --short` leaves out the last part.
+//! `cargo bench -p zerkalo-benches --bench mesh`; `-- --short` leaves out the last part.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -22,7 +22,8 @@ const RAYS: usize = 1 << 19;
 /// Width and height in pixels of the picture whose camera rays are traced.
 const SIDE: usize = 1024;
 
-/// A packet whose lanes are calls of `ray`, which returns origin and direction.
+/// Returns a packet of rays. `ray` returns origin and direction of the ray in the lane with the
+/// given index.
 fn packet<L: SimdFloat>(mut ray: impl FnMut(usize) -> ([f64; 3], [f64; 3])) -> Ray<L> {
     let rays: Vec<_> = (0..L::WIDTH).map(&mut ray).collect();
     let vector = |v: [f64; 3]| v.map(L::Scalar::from_f64);
@@ -32,7 +33,7 @@ fn packet<L: SimdFloat>(mut ray: impl FnMut(usize) -> ([f64; 3], [f64; 3])) -> R
     }
 }
 
-/// Camera rays; each packet is a block of pixels two rows high.
+/// Returns camera rays in packets. Each packet is a block of neighbouring pixels, two rows high.
 fn camera<L: SimdFloat>() -> Vec<Ray<L>> {
     let (eye, across) = ([0.0, 0.0, 3.5], L::WIDTH / 2);
     let pixel = |i: usize| 2.2 * (i as f64 / SIDE as f64) - 1.1;
@@ -46,8 +47,8 @@ fn camera<L: SimdFloat>() -> Vec<Ray<L>> {
     corners.map(block).collect()
 }
 
-/// Random rays. `spread` is the largest difference of directions within a packet; above 1 the rays of a
-/// packet are independent.
+/// Returns `rays` random rays in packets. `spread` is the largest difference of directions within a
+/// packet; above 1 the rays of a packet are independent.
 fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
     let mut random = Random(7);
     (0..rays / L::WIDTH)
@@ -65,8 +66,9 @@ fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
         .collect()
 }
 
-/// Millions of rays per second. `as_packet` selects packet traversal (`true`) or single-ray traversal
-/// (`false`); with `None` the traversal chooses by the packet's coherence.
+/// Returns the number of rays, in millions, that are traced per second. `as_packet` selects packet
+/// traversal (`true`) or single-ray traversal (`false`). With `None`, traversal chooses by the
+/// packet's coherence.
 fn speed<L: SimdFloat>(mesh: &Mesh, rays: &[Ray<L>], as_packet: Option<bool>) -> f64 {
     let limit = L::from_f64(L::MAX);
     let seconds = in_turns(

@@ -1,7 +1,7 @@
-//! Packets against single rays: closest hits per second by kind, in packets and with the same
-//! kernel of width 1, and samples per second of whole scenes.
+//! Packets against single rays: closest hits per second by kind of primitive, and samples per
+//! second of whole scenes. The same kernels run with packets and with a width of one lane.
 //!
-//! `cargo bench --bench packets`. One core; the instances of a kind alternate.
+//! `cargo bench -p zerkalo-benches --bench packets`. One core; both widths alternate.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -27,11 +27,11 @@ use zerkalo::world::World;
 /// Number of rays of each measurement.
 const RAYS: usize = 1 << 15;
 
-/// Number of times that they are traced.
+/// Number of times that all rays are traced in a measurement.
 const ROUNDS: usize = 8;
 
-/// Origins and directions from a sphere around the form towards its bounding box, eight neighbours
-/// at a time.
+/// Returns origins and directions of rays from a sphere around `form` towards its bounding box.
+/// Each eight successive rays are neighbours.
 fn rays_towards(form: &Form) -> Vec<([f64; 3], [f64; 3])> {
     let mut random = Random(3);
     let (low, high) = form.bounds().unwrap_or_else(|| (-glam::DVec3::ONE, glam::DVec3::ONE));
@@ -49,7 +49,7 @@ fn rays_towards(form: &Form) -> Vec<([f64; 3], [f64; 3])> {
     out
 }
 
-/// Creates a function that traces the rays.
+/// Creates a function that traces `rays` against `form`.
 fn tracer<L: SimdFloat>(form: &Form, rays: &[([f64; 3], [f64; 3])]) -> impl FnMut() + use<L> {
     let geometry = Aggregate::<L>::with_tree(std::slice::from_ref(form), false);
     let vector = |v: [f64; 3]| v.map(L::Scalar::from_f64);
@@ -67,7 +67,7 @@ fn tracer<L: SimdFloat>(form: &Form, rays: &[([f64; 3], [f64; 3])]) -> impl FnMu
     }
 }
 
-/// Creates a function that traces eight samples per pixel, tile by tile.
+/// Creates a function that traces eight samples per pixel of `scene`, tile by tile.
 fn renderer<L: SimdFloat>(scene: &Scene) -> impl FnMut() + use<L> {
     let world = World::<L>::new(scene);
     let scales = world.scales().to_vec();
@@ -126,7 +126,7 @@ fn main() {
     }
     println!("samples");
     for name in ["mirror-room-physical", "transmission", "water-glass", "reflecting-tracks"] {
-        let path = Path::new("scenes").join(name).with_extension("toml");
+        let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name).with_extension("toml");
         let mut scene = Document::read(&path).unwrap_or_else(|e| panic!("{e}")).scene().clone();
         scene.film.size = [160, 120];
         let mut tracers = (

@@ -1,7 +1,7 @@
 //! Simulation of renders on many machines: time until the picture is written against the number of
 //! shards, with machines of different speed, failures and restarts.
 //!
-//!     cargo bench --bench scaling -- [KEY=VALUE ..]
+//!     cargo bench -p zerkalo-benches --bench scaling -- [KEY=VALUE ..]
 //!
 //! The keys are the fields of [`Setup`], measured as docs/many-machines.md describes. The model:
 //!
@@ -18,42 +18,43 @@
 
 use std::collections::BinaryHeap;
 
-/// Measured and assumed numbers. The defaults are those of gallery-glass in 3840x2160 pixels to a
-/// noise of 0.25 8-bit levels.
+/// Numbers of the simulation, measured or assumed. The defaults are those of the scene
+/// gallery-glass in 3840x2160 pixels, traced to a noise of 0.25 8-bit levels.
 #[derive(Clone, Copy, Debug)]
 struct Setup {
     /// Seconds that the whole picture takes on one machine.
     total: f64,
-    /// Share of the rays in the pilot of a single round, and in pilot and first of two rounds.
+    /// Share of all rays that are traced before the last round of shards: in the pilot of a render
+    /// in one round, in pilot and first round of a render in two rounds.
     pilot: f64,
-    /// Share of the rays in the pilot of two rounds.
+    /// Share of all rays that are traced in the pilot of a render in two rounds.
     first_pilot: f64,
     /// Seconds to start a task: start of the program, reading and compilation of the scene.
     start_seconds: f64,
-    /// Size of a part that holds samples of all tiles \[MB\].
+    /// Size in megabytes of a shard's file that holds samples of all tiles.
     part_mb: f64,
-    /// Mean number of blocks of 16 samples of a tile, after the pilot. With more shards a part
-    /// holds samples of some tiles only.
+    /// Mean number of blocks (16 samples of every pixel of a tile) that the shards together trace
+    /// in a tile. With more shards than blocks, a shard's file holds samples of some tiles only.
     blocks: f64,
-    /// Rate at which a part is written \[MB/s\].
+    /// Rate at which a shard's file is written, in megabytes per second.
     write_mb_s: f64,
-    /// Rate at which parts are merged \[MB/s\].
+    /// Rate at which the shards' files are merged, in megabytes per second.
     merge_mb_s: f64,
-    /// Seconds to write the picture, or the merged film.
+    /// Seconds to write the picture or the merged film.
     picture_seconds: f64,
-    /// Excess of the largest shard over the mean.
+    /// Relative excess of the work of the largest shard over the mean.
     imbalance: f64,
-    /// Tasks that the engine starts per second.
+    /// Number of tasks that the engine starts per second.
     starts_per_second: f64,
-    /// Standard deviation of the logarithm of the speed of machines.
+    /// Standard deviation of the natural logarithm of the machines' speeds.
     spread: f64,
-    /// Share of machines with a third of the speed.
+    /// Share of the machines that have a third of the speed of the others.
     slow: f64,
-    /// Mean time between failures of a machine in hours.
+    /// Mean time between failures of a machine, in hours.
     mtbf_hours: f64,
-    /// Seconds until a failed shard runs again.
+    /// Seconds from the failure of a machine until its shard runs again.
     requeue_seconds: f64,
-    /// Longest interval between checkpoints in seconds.
+    /// Longest interval between two checkpoints of a shard, in seconds.
     checkpoint_seconds: f64,
 }
 
@@ -76,7 +77,7 @@ const SETUP: Setup = Setup {
     checkpoint_seconds: 60.0,
 };
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
+/// Random number generator SplitMix64 (Steele, Lea, Flood 2014).
 struct Random(u64);
 
 impl Random {
@@ -98,7 +99,7 @@ impl Random {
     }
 }
 
-/// Durations of the phases of one render in seconds.
+/// Durations of the phases of one simulated render, in seconds.
 #[derive(Clone, Copy, Default)]
 struct Times {
     pilot: f64,
@@ -113,14 +114,16 @@ impl Times {
 }
 
 impl Setup {
-    /// Size of one of `shards` parts: a full film until every shard has fewer than one block of a
-    /// tile \[MB\].
+    /// Returns the size of the file of one of `shards` shards, in megabytes. `blocks` is the mean
+    /// number of blocks of samples in a tile. With fewer shards than blocks, every file holds
+    /// samples of all tiles.
     fn part(&self, shards: usize, blocks: f64) -> f64 {
         self.part_mb * (blocks / shards as f64).min(1.0)
     }
 
-    /// Time from the start of the first task to the end of the last one. `work` is the sum over
-    /// all shards in seconds of a machine of mean speed.
+    /// Returns the seconds from the start of the first task to the end of the last one. `work` is
+    /// the sum of all shards' seconds on a machine of mean speed. `part` is the size of a shard's
+    /// file in megabytes.
     fn shards(
         &self,
         work: f64,
@@ -166,7 +169,8 @@ impl Setup {
         end
     }
 
-    /// Time of a render in one round (pilot, shards, merge), or in two rounds of shards.
+    /// Simulates a render in one round (pilot, shards, merge), or in two rounds of shards. Returns
+    /// the durations of its phases.
     fn render(&self, rounds: usize, shards: usize, machines: usize, random: &mut Random) -> Times {
         let ends = match rounds {
             1 => vec![self.pilot, 1.0],
@@ -209,7 +213,8 @@ impl Setup {
     }
 }
 
-/// Machine that is free from a time on. The greatest one is free first.
+/// Machine and the time from which it is free. The order is that of a heap: the greatest is free
+/// first.
 #[derive(PartialEq)]
 struct Free {
     at: f64,
@@ -228,10 +233,11 @@ impl Ord for Free {
     }
 }
 
-/// Number of simulated renders of a row.
+/// Number of renders that are simulated for a row of the table.
 const RENDERS: usize = 200;
 
-/// Prints median and 95th percentile of a setup with the given machines and shards per machine.
+/// Prints a row of the table: median and 95th percentile of the render time with `machines`
+/// machines and `per_machine` shards for each of them.
 fn row(setup: &Setup, rounds: usize, machines: usize, per_machine: usize) {
     let mut random = Random(machines as u64 * 1000 + per_machine as u64);
     let mut times: Vec<Times> = (0..RENDERS)

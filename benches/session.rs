@@ -1,7 +1,8 @@
-//! Latency of a session: pictures, edits and tasks on a film of the given size (default: 640x480 and
-//! 3840x2160). Prints milliseconds: median, 99th percentile, maximum.
+//! Latency of a session (background renderer): pictures, edits and tasks on a film of the given
+//! size. Prints median, 99th percentile and maximum in milliseconds. The default sizes are 640x480
+//! and 3840x2160 pixels.
 //!
-//!     cargo bench --bench session -- 3840x2160
+//! cargo bench -p zerkalo-benches --bench session -- 3840x2160
 
 use std::hint::black_box;
 use std::sync::Arc;

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Every folder of `src` and the folders that it may import. A folder imports only folders below it in this
-/// list.
+/// Folders of `src`, each with the folders that it may import. A folder imports only folders below
+/// it in this list.
 const FOLDERS: &[(&str, &[&str])] = &[
     ("main", &["command"]),
     (
@@ -27,6 +27,7 @@ const FOLDERS: &[(&str, &[&str])] = &[
             "value",
             "film",
             "disk",
+            "process_memory",
             "sampling",
             "lanes",
         ],
@@ -42,7 +43,18 @@ const FOLDERS: &[(&str, &[&str])] = &[
     ("measure", &["render", "world", "scene", "material", "film", "sampling"]),
     (
         "render",
-        &["world", "scene", "material", "camera", "value", "film", "disk", "sampling", "lanes"],
+        &[
+            "world",
+            "scene",
+            "material",
+            "camera",
+            "value",
+            "film",
+            "disk",
+            "process_memory",
+            "sampling",
+            "lanes",
+        ],
     ),
     (
         "world",
@@ -60,22 +72,36 @@ const FOLDERS: &[(&str, &[&str])] = &[
             "lanes",
         ],
     ),
-    ("scene", &["shape", "primitive", "material", "asset", "light", "camera", "value", "disk"]),
+    (
+        "scene",
+        &[
+            "shape",
+            "primitive",
+            "material",
+            "asset",
+            "light",
+            "camera",
+            "value",
+            "disk",
+            "process_memory",
+        ],
+    ),
     ("shape", &["primitive", "asset", "value", "lanes"]),
     ("primitive", &["asset", "bvh", "value", "lanes"]),
     ("material", &["asset", "value", "sampling", "lanes"]),
     ("light", &["asset", "value", "sampling", "lanes"]),
-    ("asset", &["bvh", "value", "disk"]),
+    ("asset", &["bvh", "value", "disk", "process_memory"]),
     ("bvh", &["lanes"]),
     ("camera", &["value", "lanes"]),
     ("film", &["value", "disk", "lanes"]),
     ("value", &[]),
     ("disk", &[]),
+    ("process_memory", &[]),
     ("sampling", &["lanes"]),
     ("lanes", &[]),
 ];
 
-/// External crates and the folders that may use them.
+/// External crates, each with the folders that may use it.
 const CRATES: &[(&str, &[&str])] = &[
     ("base64", &["asset", "terminal"]),
     ("clap", &["command"]),
@@ -98,7 +124,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("ratatui", &["dashboard", "terminal"]),
     ("rayon", &["render"]),
     // In `scene` only in tests.
-    ("rustix", &["render", "dashboard", "terminal", "value", "scene", "disk"]),
+    ("rustix", &["render", "dashboard", "terminal", "process_memory", "scene", "disk"]),
     ("safe_arch", &["lanes"]),
     ("serde", &["command", "scene", "shape", "primitive", "material", "light", "camera", "value"]),
     ("serde_json", &["command"]),
@@ -116,7 +142,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("wide", &["lanes"]),
 ];
 
-/// Path and text of every Rust file under `folder`.
+/// Returns path and text of every Rust file under `folder`.
 fn files(folder: &str) -> Vec<(PathBuf, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut folders = vec![root.join(folder)];
@@ -136,7 +162,8 @@ fn files(folder: &str) -> Vec<(PathBuf, String)> {
     files
 }
 
-/// The folder of a file under `src`. `main.rs` is a folder of its own; `lib.rs` belongs to none.
+/// Returns the folder of a file under `src`. `main.rs` counts as a folder of its own; `lib.rs`
+/// belongs to none.
 fn folder_of(path: &Path) -> Option<String> {
     let inside = path.strip_prefix("src").ok()?;
     let first = inside.iter().next()?.to_str()?;
@@ -144,7 +171,7 @@ fn folder_of(path: &Path) -> Option<String> {
     (folder != "lib").then(|| folder.to_string())
 }
 
-/// `text` without comments and string literals, whose contents are no imports.
+/// Returns `text` without comments and string literals, which contain no imports.
 fn code(text: &str) -> String {
     let mut code = String::new();
     let mut chars = text.chars().peekable();
@@ -173,8 +200,8 @@ fn code(text: &str) -> String {
     code
 }
 
-/// The first path segment after each `prefix` (such as `crate::`); for a group in braces, those of all its
-/// members.
+/// Returns the first path segment after each `prefix`, such as `crate::`. For a group in braces,
+/// returns the first segments of all its members.
 fn first_names(code: &str, prefix: &str) -> BTreeSet<String> {
     let name = |text: &str| {
         text.trim_start().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()

@@ -1,4 +1,4 @@
-//! Check of a big picture: single pixels, traced without regions and tiles.
+//! Check of a big picture against single pixels, which are traced without regions and tiles.
 
 use crate::support::{shipped, sized};
 use std::collections::BTreeMap;
@@ -10,15 +10,15 @@ use zerkalo::lanes::{Double, SimdFloat};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::world::{AnyWorld, Options, Radiance, TracedPacket, World};
 
-/// Side of the picture in pixels.
+/// Side of the square picture in pixels.
 const SIDE: u32 = 16384;
-/// Samples of each replicate: half of `--spp`.
+/// Number of samples of a pixel in each replicate (half of the samples): half of `--spp`.
 const SAMPLES: u32 = 4;
-/// Columns in which every row is checked.
+/// Columns of the picture that are checked in every row.
 const COLUMNS: [u32; 16] =
     [0, 1, 15, 16, 1000, 2047, 2048, 5003, 6001, 8191, 8192, 9001, 11003, 13007, 16382, 16383];
 
-/// Displayed pixels of the columns of `COLUMNS` in row `y`, traced without tiles.
+/// Returns the displayed pixels of row `y` in the columns of `COLUMNS`, traced without tiles.
 fn column_pixels(world: &World<Double>, mix: &LightWeights, y: u32) -> Vec<[u8; 3]> {
     let sampling = SampleSettings { seed: 0, kind: SamplerKind::Sobol };
     let tracer = world.camera_tracer(&sampling);
@@ -49,9 +49,8 @@ fn column_pixels(world: &World<Double>, mix: &LightWeights, y: u32) -> Vec<[u8; 
     (0..COLUMNS.len()).map(|x| display.codes_8(film.pixel(x, 0, mix))).collect()
 }
 
-/// Compares 16 columns of the picture at `ZERKALO_PICTURE`, 262,144 pixels, which
-/// `zerkalo render scenes/mirror-room-physical.toml --size 16384x16384 --spp 8 --uniform` has
-/// written.
+/// Compares 16 columns (262,144 pixels) of the picture in the file `ZERKALO_PICTURE`. `zerkalo
+/// render scenes/mirror-room-physical.toml --size 16384x16384 --spp 8 --uniform` writes this file.
 #[test]
 #[ignore = "needs the picture at ZERKALO_PICTURE, see docs/big-pictures.md"]
 fn big_picture_has_the_pixels_of_single_rays() {

@@ -1,5 +1,6 @@
-//! A sample is a pure function of seed, pixel, replicate and index. The bytes of the film do not depend on
-//! thread, order, packet layout or division into parts.
+//! Determinism: a sample is a pure function of seed, pixel, replicate (half of the samples) and
+//! index. The bytes of the film do not depend on threads, order, packet layout or division into
+//! parts.
 
 use crate::common;
 use crate::common::report;
@@ -17,11 +18,12 @@ use zerkalo::world::Precision;
 
 const PRECISIONS: [Precision; 2] = [Precision::Single, Precision::Double];
 const SEED: u64 = 29;
-/// Film size that is not a multiple of the tile size; tiles at the edges are narrower than a packet.
+/// Film size that is not a multiple of the tile size, so that tiles at the edges are narrower than
+/// a packet.
 const SIZE: [u32; 2] = [37, 35];
 
-/// Scenes that together contain every lobe, highlight and kind of light, several light groups, a lens,
-/// and paths that branch.
+/// Returns scenes that together contain every lobe, highlight and kind of light, several light
+/// groups, a lens, and paths that branch.
 fn scenes() -> Vec<(String, Scene)> {
     [
         "mirror-room.toml",
@@ -36,12 +38,12 @@ fn scenes() -> Vec<(String, Scene)> {
     .into()
 }
 
-/// The film of samples `0..count` of both replicates.
+/// Returns the film of the samples `0..count` of both replicates (halves of the samples).
 fn film_of_samples(scene: &Scene, precision: Precision, count: u32) -> Film {
     film_of_ranges(scene, precision, &[(0, count), (0, count)])
 }
 
-/// The film of one range (first, count) of each replicate.
+/// Returns the film of the given ranges of samples, one for each replicate: first index and count.
 fn film_of_ranges(scene: &Scene, precision: Precision, ranges: &[(u32, u32)]) -> Film {
     let mut rendering = begin(scene, SEED, precision);
     let pool = pool(2);
@@ -97,8 +99,9 @@ fn extreme_29_sum_of_parts_does_not_depend_on_order() {
     report(29, "both", "parts in 6 orders: the same bytes");
 }
 
-/// A render is stopped within a wave, and a second, restarted one traces the remaining jobs. This stands
-/// for a killed process and its successor; both films live in this process, and their bytes are compared.
+/// Checks that a render that is stopped within a wave can be resumed. A second, restarted render
+/// traces the remaining jobs, as the successor of a killed process would. The bytes of both films
+/// are compared.
 #[test]
 fn extreme_29_stopped_and_resumed() {
     let pool = pool(2);
@@ -154,14 +157,15 @@ fn sum_of_films_with_disjoint_tiles_is_the_whole_film() {
     assert!(sum.bytes() == expected);
 }
 
-/// Packets of one pixel and of several pixels trace the same samples. Waves of one sample make packets
-/// of several pixels, a wave of sixteen samples makes packets of one pixel.
+/// Checks that packets of one pixel and of several pixels trace the same samples. Waves of one
+/// sample make packets of several pixels; a wave of sixteen samples makes packets of one pixel.
 #[test]
 fn film_does_not_depend_on_pixels_per_packet_in_any_scene() {
     let pool = pool(2);
     let mut differing = Vec::new();
     for (name, scene) in all_shipped() {
-        let scene = sized(scene, SIZE);
+        // Four tiles, three of them narrower or lower than a whole one.
+        let scene = sized(scene, [21, 19]);
         for precision in PRECISIONS {
             let expected = film_of_samples(&scene, precision, 16).bytes();
             for counts in [&[1u32; 16] as &[u32], &[1, 1, 2, 4, 8], &[8, 8], &[5, 11]] {

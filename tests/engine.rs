@@ -1,7 +1,7 @@
-//! Tests of pictures: what is traced, sampled, accumulated and written.
+//! Tests of pictures: tracing, sampling, accumulation and files.
 //!
-//! They are one program, so that the kernels are compiled once for all of them, in a package of its own, which is
-//! optimised.
+//! They are one program, so that the kernels are compiled once for all of them. The program is in a
+//! package of its own, which is optimised.
 
 mod acceleration;
 mod agreement;
@@ -10,11 +10,11 @@ mod common;
 mod determinism;
 mod emitters;
 mod environment;
+mod error_estimates;
 mod extremes;
 mod features;
 mod film;
 mod geometry;
-mod honesty;
 mod limits;
 mod linearity;
 mod lobes;

@@ -1,4 +1,4 @@
-//! Environment lights: furnaces, very bright pixels, scaled and turned images, hostile files.
+//! Environment lights: white furnaces, very bright pixels, scaled and turned images, hostile files.
 
 use crate::common::normal;
 use crate::support;
@@ -12,8 +12,8 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Mean of a channel over the picture, and its standard error from the difference of the replicates,
-/// whose pixels are independent.
+/// Returns the mean of each channel over the picture, and its standard error. The error comes from
+/// the difference of the two replicates (halves of the samples), whose pixels are independent.
 fn mean(scene: &Scene, seed: u64, precision: Precision, count: u32) -> [(f64, f64); 3] {
     let rendering = rendered(scene, seed, precision, count);
     assert_eq!(rendering.film.bad_samples().count, 0, "{:?}", rendering.film.bad_samples().first);
@@ -26,7 +26,8 @@ fn mean(scene: &Scene, seed: u64, precision: Precision, count: u32) -> [(f64, f6
     })
 }
 
-/// A ball of the material in front of `light`, filling most of the picture.
+/// Returns the scene of a ball of the material `material` in front of `light`. The ball fills most
+/// of the picture.
 fn ball(material: &str, trace: &str, light: &str) -> Scene {
     parsed(&format!(
         "[film]
@@ -50,7 +51,7 @@ fn ball(material: &str, trace: &str, light: &str) -> Scene {
 
 const WHITE_SKY: &str = "[[light]]\nenvironment = {}";
 
-/// Materials that reflect all light that arrives.
+/// Materials that reflect all light that arrives, as texts of a scene file.
 const WHITE: &[&str] = &[
     "diffuse = 1.0",
     "diffuse = 0.0\nreflection = 1.0",
@@ -60,7 +61,7 @@ const WHITE: &[&str] = &[
     "diffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\nfresnel = \"dielectric\"\nior = 1.5",
 ];
 
-/// Inside a white environment white objects are white, at every depth that the paths need.
+/// Checks that white objects in a white environment are white, at every depth that the paths need.
 #[test]
 fn white_objects_in_a_white_environment_are_white() {
     let threshold = two_sided_z(1e-4 / (WHITE.len() * 3 * 2) as f64);
@@ -83,8 +84,8 @@ fn white_objects_in_a_white_environment_are_white() {
     }
 }
 
-/// A diffuse bounce that escapes adds no light of an environment a second time: a white convex body in a white
-/// environment is white at every diffuse depth.
+/// Checks that a white convex body in a white environment is white at every diffuse depth. A
+/// diffuse bounce that escapes must not add the environment's light a second time.
 #[test]
 fn white_ball_in_a_white_environment_is_white_at_every_diffuse_depth() {
     let threshold = two_sided_z(1e-4 / (2 * 2 * 3 * 2) as f64);
@@ -113,10 +114,11 @@ fn white_ball_in_a_white_environment_is_white_at_every_diffuse_depth() {
     }
 }
 
-/// A floor beside a wall that is 1 high, both endless, in a white environment. From the floor the wall has the
-/// form factor F = (1 - cos phi) / 2, where phi is the angle of its upper edge above the horizon. The wall sees
-/// the environment in half of its hemisphere, the floor in the share 1 - F. With the albedo rho the radiance
-/// of the floor is rho (1 - F) from the environment, and F rho^2 / 2 after one bounce.
+/// Checks the light of one diffuse bounce between a floor and a wall that is 1 high, both endless,
+/// in a white environment. From the floor the wall has the form factor F = (1 - cos phi) / 2, where
+/// phi is the angle of its upper edge above the horizon. The wall sees the environment in half of
+/// its hemisphere, the floor in the share 1 - F. With the albedo rho the radiance of the floor is
+/// rho (1 - F) from the environment, and F rho^2 / 2 after one bounce.
 #[test]
 fn diffuse_bounce_between_floor_and_wall_in_an_environment_has_its_form_factor() {
     let rho = 0.8;
@@ -161,8 +163,8 @@ fn diffuse_bounce_between_floor_and_wall_in_an_environment_has_its_form_factor()
     }
 }
 
-/// Lobes that lose light lose the same share of a white environment as of a white background, which no
-/// light is sampled for.
+/// Checks lobes that lose light. They lose the same share of a white environment as of a white
+/// background, whose light is not sampled.
 #[test]
 fn lobes_reflect_a_white_environment_like_a_white_background() {
     let background = "[background]\ncolor = [1.0, 1.0, 1.0]";
@@ -189,7 +191,8 @@ fn lobes_reflect_a_white_environment_like_a_white_background() {
     assert_eq!(compared, 24.0);
 }
 
-/// Writes a Radiance file without compression; `texel` returns mantissas and exponent.
+/// Writes a Radiance file without compression. `texel` returns the mantissas and the exponent of a
+/// pixel.
 fn write_hdr(path: &Path, [width, height]: [usize; 2], texel: impl Fn(usize, usize) -> [u8; 4]) {
     let mut bytes =
         format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes();
@@ -199,7 +202,8 @@ fn write_hdr(path: &Path, [width, height]: [usize; 2], texel: impl Fn(usize, usi
     fs::write(path, bytes).unwrap();
 }
 
-/// A scene file beside the image `sky.hdr`, with a white floor that faces up and fills the picture.
+/// Returns the scene of a white floor that faces up, fills the picture, and is lit by the image
+/// `sky.hdr` in `folder`.
 fn floor(folder: &Path, environment: &str) -> Scene {
     let path = folder.join("scene.toml");
     let text = format!(
@@ -222,8 +226,9 @@ fn floor(folder: &Path, environment: &str) -> Scene {
     Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// A pixel that is 1e6 times as bright as the others: no invalid sample, and the radiance of a white floor
-/// is the irradiance of the image divided by pi, integrated over the directions.
+/// Checks an image with a pixel 1e6 times as bright as the others. No sample is invalid. The
+/// radiance of a white floor is the irradiance of the image, integrated over the directions,
+/// divided by pi.
 #[test]
 fn image_with_a_very_bright_pixel_gives_its_irradiance() {
     let folder = tempfile::tempdir().unwrap();
@@ -265,7 +270,7 @@ fn image_with_a_very_bright_pixel_gives_its_irradiance() {
     }
 }
 
-/// Twice the intensity is twice the picture, sample by sample.
+/// Checks that twice the intensity of an environment gives twice the picture, sample by sample.
 #[test]
 fn intensity_scales_the_picture_of_an_environment() {
     let sky = "[[light]]\nenvironment = { zenith = [0.2, 0.5, 1.0] }\nintensity = ";
@@ -281,7 +286,8 @@ fn intensity_scales_the_picture_of_an_environment() {
     }
 }
 
-/// A hidden environment lights surfaces, but neither the camera nor mirrors see it.
+/// Checks that an invisible environment lights surfaces, but that neither the camera nor mirrors
+/// see it.
 #[test]
 fn invisible_environment_lights_but_is_not_seen() {
     let hidden = format!("{WHITE_SKY}\nvisible = false");

@@ -35,7 +35,8 @@ fn random_bits(seed: u64) -> u64 {
     Numbers::new(seed).bits()
 }
 
-/// Sample `index` of a pixel, a pure function: `[group][channel]`; one in about 2000 is invalid.
+/// Returns sample `index` of a pixel, a pure function of its arguments. The order of values is
+/// `[group][channel]`. About one sample in 2000 is invalid: `None`.
 fn sample(x: usize, y: usize, replicate: usize, index: u32) -> Option<[f64; 6]> {
     let seed = ((x * 64 + y) * 2 + replicate) as u64 * 1_000_003 + u64::from(index);
     let value = |c: u64| random_bits(seed * 8 + c) as f64 / 1.8e19;
@@ -56,7 +57,8 @@ fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: u
     }
 }
 
-/// Adds samples `range` of one replicate to `tiles`, in that order.
+/// Adds the samples `range` of one replicate (half of the samples) to the tiles `tiles`, in that
+/// order.
 fn trace(film: &mut Film, tiles: &[usize], replicate: usize, range: Range<u32>) {
     for slot in film.slots(tiles) {
         trace_slot(slot, replicate, range.clone());
@@ -98,7 +100,8 @@ fn threads_do_not_change_the_bytes() {
     }
 }
 
-/// Adds the first sample of replicate A by lattices.
+/// Adds the first sample of replicate A to each pixel, by lattices of pixels with the steps
+/// `steps`.
 fn trace_lattices(film: &mut Film, steps: &[usize]) {
     let all = all_tiles(film);
     let mut before = 0;
@@ -198,7 +201,7 @@ fn extreme_28_milliard_samples() {
         (0..3).for_each(|c| assert_eq!(tile.pixel(0, 0)[c] - before[c], values[c]));
     }
     tile.advance(0, 1_000_000_000);
-    assert_eq!(tile.saturated(), 0);
+    assert_eq!(tile.saturated_pixels(), 0);
     let [red, green, blue] = film.pixel(0, 0, &white);
     assert!((red / 0.7 - 1.0).abs() < 1e-8, "{red}");
     assert!((green / 0.6993 - 1.0).abs() < 1e-8, "{green}");
@@ -216,10 +219,10 @@ fn extreme_28_saturation_is_flagged() {
     tile.advance(0, 50);
     for _ in 0..49 {
         tile.add(0, 0, &[(7e8 * scale) as i64, 0, 0]);
-        assert_eq!(tile.saturated(), 0);
+        assert_eq!(tile.saturated_pixels(), 0);
     }
     tile.add(0, 0, &[(7e8 * scale) as i64, 0, 0]);
-    assert_eq!((tile.saturated(), film.saturated()), (1, 1));
+    assert_eq!((tile.saturated_pixels(), film.saturated_pixels()), (1, 1));
     assert_eq!(film.pixel(0, 0, &white)[0], i64::MAX as f64 / scale / 50.0);
     // The flag survives addition to a film, in either order.
     let mut other = film_of(1, 1, &[scale]);
@@ -231,7 +234,7 @@ fn extreme_28_saturation_is_flagged() {
     sums[0].add(&other).unwrap();
     sums[1].add(&other).unwrap();
     sums[1].add(&film).unwrap();
-    assert_eq!(sums.each_ref().map(Film::saturated), [1, 1]);
+    assert_eq!(sums.each_ref().map(Film::saturated_pixels), [1, 1]);
     assert!(sums[0].bytes() == sums[1].bytes());
     report::report(28, "both", "saturation flagged");
 }

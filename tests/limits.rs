@@ -1,4 +1,5 @@
-//! Reported truncation bias of `depth` and `min_weight`, against pictures without these limits.
+//! Reported truncation bias of `max_depth` and `min_throughput`, against pictures without these
+//! limits.
 
 use crate::common;
 use crate::support;
@@ -13,14 +14,14 @@ use zerkalo::world::{self, AnyWorld, Precision};
 
 const SAMPLES: u32 = 4;
 
-/// Reported bias of a limit.
+/// Bias that the program reports for a limit of paths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Bias {
-    /// Not reported.
+    /// The program reports no bias for the limit.
     Zero,
-    /// At most this radiance, for surfaces of unit radiance.
+    /// The bias is at most this radiance, if surfaces have unit radiance.
     AtMost(f64),
-    /// Reported without a bound.
+    /// The program reports a bias, but no bound of it.
     Unbounded,
 }
 
@@ -33,7 +34,7 @@ fn reported_bias(scene: &Scene, limit: &str) -> Bias {
     }
 }
 
-/// Draws a random scene, and returns it with the largest radiance of its surfaces.
+/// Returns a random scene, and the largest radiance of its surfaces.
 fn random(seed: u64) -> (Scene, f64) {
     let mut numbers = Numbers::new(seed);
     let n = &mut numbers;
@@ -108,8 +109,9 @@ fn values(scene: &Scene) -> Vec<f64> {
     values_and_rounding(scene).0
 }
 
-/// The values of the picture, and the largest error by which the film rounds them. The film's scale, and with it the
-/// rounding, depends on the largest radiance that paths of the greatest depth can carry.
+/// Returns the values of a scene's picture, and the largest error by which the film rounds them.
+/// The film's scale, and with it the rounding, depends on the largest radiance that paths of the
+/// greatest depth can carry.
 fn values_and_rounding(scene: &Scene) -> (Vec<f64>, f64) {
     let rendering = rendered(scene, 3, Precision::Single, SAMPLES);
     let rounding = rendering.film.scales().iter().map(|scale| 0.5 / scale).sum();
@@ -120,7 +122,7 @@ fn max_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Returns the scene with a larger depth.
+/// Returns the scene with a larger `max_depth`.
 fn deeper(scene: &Scene) -> Scene {
     let mut deeper = scene.clone();
     deeper.trace.max_depth = 2 * scene.trace.max_depth + 7;
@@ -174,8 +176,8 @@ fn reported_truncation_bias_holds_in_many_scenes() {
     checked(400..6000);
 }
 
-/// Light stays inside a single glass ball because of bumps, and because of rounding at its
-/// silhouette.
+/// Checks a single glass ball. Light can stay inside of it because of bumps, and because of
+/// rounding at its silhouette.
 #[test]
 fn single_glass_ball_has_unbounded_depth_bias() {
     let text = |more: &str, camera: &str| {
@@ -221,7 +223,7 @@ fn single_glass_ball_has_unbounded_depth_bias() {
     assert!(cut > rounds as u32 / 10, "rounding at the silhouette is reported, but does not occur");
 }
 
-/// A path hits a single flat or convex mirror once, at any angle.
+/// Checks a single flat or convex mirror, which a path hits once at any angle.
 #[test]
 fn single_mirror_has_no_depth_bias() {
     let mut numbers = Numbers::new(9);

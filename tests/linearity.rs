@@ -1,5 +1,7 @@
-//! Invariances of pictures (light weights, unit of light, translation) and effects of the tracing limits
-//! (ray types, depth, least weight, horizon, cap on glossy tiles).
+//! Invariances of pictures, and effects of the limits of tracing.
+//!
+//! - The invariances are those under changes of light weights, of the unit of light, and of place.
+//! - The limits are ray types, depth, smallest throughput, horizon, and the cap on samples of glossy tiles.
 
 use crate::support;
 
@@ -20,12 +22,12 @@ fn small(name: &str) -> Scene {
     sized(shipped(name), SIZE)
 }
 
-/// Radiance of a picture with a few samples, `[row][column][channel]`.
+/// Returns the radiance of a picture with a few samples, in the order `[row][column][channel]`.
 fn values(scene: &Scene, precision: Precision) -> Vec<f64> {
     picture(&rendered(scene, 4, precision, 8), Replicates::Both).concat()
 }
 
-/// Largest difference, relative to the largest value.
+/// Returns the largest difference between two pictures, relative to the largest value.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let largest = a.iter().chain(b).fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -34,10 +36,10 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
 
 fn has(scene: &Scene, part: &str) -> bool {
     let world = AnyWorld::compile(scene, &world::Options::default());
-    world.inventory().parts().iter().any(|p| p == part)
+    world.inventory().split(", ").any(|p| p == part)
 }
 
-/// Scene of three lights with a background.
+/// Returns the scene of three lights with a background.
 fn lit() -> Scene {
     let mut scene = small("light-groups.toml");
     scene.background.color = Color([0.1, 0.2, 0.3]);
@@ -86,7 +88,8 @@ fn light_weights_replace_retracing() {
     }
 }
 
-/// Ball under lights of different colours and strengths, more than there are light groups.
+/// Returns the scene of a ball under lights of different colours and intensities. There are more
+/// lights than light groups.
 fn many_lights() -> Scene {
     let mut scene = lit();
     let light = scene.lights[0].clone();
@@ -129,7 +132,7 @@ fn unit_of_light_does_not_change_the_picture() {
     }
 }
 
-/// `scene`, translated by `by`.
+/// Returns `scene`, translated by `by`.
 fn translated(scene: &Scene, by: [f64; 3]) -> Scene {
     let mut scene = scene.clone();
     let shift = |p: &mut [f64; 3]| (0..3).for_each(|i| p[i] += by[i]);
@@ -255,7 +258,8 @@ fn ray_types_add_shadows_and_reflections() {
     assert!(!has(&Scene { lights: Vec::new(), ..shadows }, "shadows only"));
 }
 
-/// Paths deeper than K add at most rho^(K+1) / (1 - rho) of the brightest surface.
+/// Checks the bound of the bias by a limit of depth. Paths deeper than K surfaces add at most
+/// rho^(K+1) / (1 - rho) of the radiance of the brightest surface.
 #[test]
 fn depth_limits_paths_and_its_bias_is_bounded() {
     const RHO: f64 = 0.9;

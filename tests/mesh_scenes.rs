@@ -16,7 +16,7 @@ use zerkalo::scene::edit::{Target, add_object, set};
 use zerkalo::scene::{Scene, SceneFile};
 use zerkalo::world::{AnyWorld, FirstHit, Options, Precision};
 
-/// Tube around a trefoil knot, of quadrilaterals, as binary PLY.
+/// Returns a tube around a trefoil knot, made of quadrilaterals, as binary PLY.
 fn knot() -> Vec<u8> {
     const ALONG: usize = 240;
     const AROUND: usize = 24;
@@ -58,7 +58,7 @@ fn knot() -> Vec<u8> {
     out
 }
 
-/// Cut stone as OBJ: table and crown of one colour, pavilion of another.
+/// Returns a cut stone as OBJ: table and crown have one colour, the pavilion another.
 fn stone() -> String {
     let mut out = String::from("# A cut stone.\nmtllib stone.mtl\n");
     let ring = |out: &mut String, radius: f64, y: f64, turn: f64| {
@@ -103,7 +103,8 @@ fn mesh_files_match_generators() {
     }
 }
 
-/// The signed volume of a closed mesh is positive if its fronts face outwards.
+/// Checks that the signed volume of each shipped closed mesh is positive, that is, its fronts face
+/// outwards.
 #[test]
 fn shipped_meshes_face_outwards() {
     for (name, volume) in [("knot.ply", 18.0..18.2), ("stone.obj", 1.0..2.0)] {
@@ -116,7 +117,7 @@ fn shipped_meshes_face_outwards() {
     }
 }
 
-/// Ball of radius 1 around the origin as OBJ, with corners on the sphere.
+/// Returns a ball of radius 1 around the origin as OBJ, with corners on the sphere.
 fn ball(rings: usize, sides: usize) -> String {
     let mut text = String::from("v 0 1 0\n");
     for ring in 1..rings {
@@ -141,7 +142,7 @@ fn ball(rings: usize, sides: usize) -> String {
     text
 }
 
-/// Folder with mesh files and scenes that name them.
+/// Temporary folder with mesh files and scenes that use them.
 struct Desk(tempfile::TempDir);
 
 impl Desk {
@@ -223,8 +224,8 @@ fn sphere_mesh_hits_converge_to_sphere() {
     assert!(apart < 1e-3, "{apart}");
 }
 
-/// The blue background is visible in no pixel whose neighbours all show the mesh, and the red mesh is never
-/// lit from inside.
+/// Checks a closed red mesh in front of a blue background. No pixel whose neighbours all show the
+/// mesh shows the background, and the mesh is never lit from inside.
 #[test]
 fn closed_mesh_has_no_holes() {
     let desk = Desk::new();
@@ -255,7 +256,8 @@ fn closed_mesh_has_no_holes() {
     }
 }
 
-/// A light inside a closed mesh lights no surface outside of it; one behind it lights no smooth front.
+/// Checks that a light inside of a closed mesh lights no surface outside of it, and that a light
+/// behind the mesh lights no smooth front.
 #[test]
 fn closed_mesh_leaks_no_light() {
     let desk = Desk::new();
@@ -270,7 +272,8 @@ fn closed_mesh_leaks_no_light() {
     }
 }
 
-/// A large triangle in grazing light does not shadow itself, near and far from the origin.
+/// Checks that a large triangle in grazing light does not shadow itself, near and far from the
+/// origin.
 #[test]
 fn triangles_do_not_shadow_themselves() {
     let desk = Desk::new();

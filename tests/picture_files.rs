@@ -1,9 +1,10 @@
-//! Picture files that the program writes: the same bytes for any number of threads and of lanes.
+//! Picture files that the program writes, which have the same bytes for any number of threads and
+//! of SIMD lanes.
 
 use std::fs;
 use std::process::Command;
 
-/// Picture files written by `zerkalo render`.
+/// Compares picture files that `zerkalo render` writes with different numbers of threads.
 #[test]
 fn extreme_29_picture_files_are_the_same_for_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
@@ -28,8 +29,9 @@ fn extreme_29_picture_files_are_the_same_for_any_number_of_threads() {
     }
 }
 
-/// Golden hashes of pictures written by `zerkalo render`, mostly with adaptive sampling. They hold for 8 and for 16
-/// lanes. Without fused multiply-add the last bits differ.
+/// Compares pictures that `zerkalo render` writes, mostly with adaptive sampling, with known
+/// hashes. The hashes are valid for 8 and for 16 lanes. Without fused multiply-add the last bits
+/// differ.
 #[cfg(all(target_arch = "x86_64", target_feature = "fma"))]
 #[test]
 fn golden_pictures_do_not_depend_on_lane_count() {

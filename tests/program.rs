@@ -1,5 +1,5 @@
-//! Tests of the program around the pictures: scene files, editing, sessions, the command line, the dashboard,
-//! and the rules for the source.
+//! Tests of the program other than those of pictures: scene files, editing, sessions, the command
+//! line, the dashboard, and the rules for the source.
 
 mod architecture;
 mod command_line;

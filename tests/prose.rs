@@ -1,21 +1,21 @@
-//! Guards the prose of comments: first words and words that the project avoids.
+//! Check of the prose of comments: first words, and words that the project avoids.
 //!
-//! A doc comment begins with a noun, or with a verb in the third person. The avoided words have a
-//! plain word of the field in their place: programs report or print, terminals reply, rays intersect
-//! primitives.
+//! A doc comment begins with a noun, or with a verb in the third person. In place of the avoided
+//! words, comments use the plain word of the field: programs report or print, terminals reply, rays
+//! intersect primitives.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// First words of clauses without a noun.
+/// Words that begin a clause without a noun; a doc comment must not begin with one of them.
 const FIRST_WORDS: &[&str] =
     &["What", "Who", "Whose", "Whom", "Of", "How", "Whether", "Where", "When", "Which"];
 
-/// Words to avoid in any comment.
+/// Words that no comment may contain.
 const AVOIDED: &[&str] =
     &["told", "tell", "tells", "thing", "things", "somebody", "nobody", "anybody"];
 
-/// Doc comments that may keep an avoided word: file and word.
+/// Exceptions: doc comments that may contain an avoided word, each given by file and word.
 const EXCEPTIONS: &[(&str, &str)] = &[];
 
 /// Returns every Rust file under `folder`.
@@ -33,7 +33,8 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Returns the text of a comment line: a doc comment (`true`) or a plain one, alone on its line.
+/// Returns the text of a line that is a comment: `true` for a doc comment, `false` for a plain one.
+/// Returns `None` for other lines.
 fn comment(line: &str) -> Option<(bool, &str)> {
     let line = line.trim_start();
     let doc = line.strip_prefix("///").or_else(|| line.strip_prefix("//!"));

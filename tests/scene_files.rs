@@ -1,5 +1,7 @@
 //! The scene files in `scenes`, and the invalid ones in `tests/bad-scenes`.
 
+mod format_manual;
+
 use std::path::{Path, PathBuf};
 use zerkalo::primitive::{ConvexPolyhedronForm, Form, SphereForm};
 use zerkalo::scene::{Document, Scene};
@@ -14,7 +16,8 @@ fn files(folder: &str) -> Vec<PathBuf> {
     paths
 }
 
-/// Compares `text` with the file at `path`; writes it there instead if `ZERKALO_BLESS` is set.
+/// Compares `text` with the file at `path`. If `ZERKALO_BLESS` is set, writes it to the file
+/// instead.
 fn golden(path: &Path, text: &str) {
     if std::env::var_os("ZERKALO_BLESS").is_some() {
         std::fs::write(path, text).unwrap();
@@ -45,7 +48,7 @@ fn every_bad_scene_gives_its_expected_errors() {
     }
 }
 
-/// Scenes with an intended warning, and a part of its text.
+/// Scene files with an intended warning, each with a part of the warning's text.
 const WARNED: &[(&str, &str)] = &[
     ("brighter-than-its-light.toml", "more than the light"),
     // Colours up to 7, as its formula gives them.
@@ -79,10 +82,10 @@ fn every_scene_reads_and_has_a_title_comment() {
 
 #[test]
 fn scene_format_reference_is_up_to_date() {
-    golden(Path::new("docs/scene-format.md"), &zerkalo::scene::reference());
+    golden(Path::new("docs/scene-format.md"), &format_manual::format_manual());
 }
 
-/// Returns the corners of an object of the mirror room.
+/// Returns the corners of the object `name` of the mirror room.
 fn corners(scene: &Scene, name: &str) -> Vec<[f64; 3]> {
     let object = scene.objects.iter().find(|o| o.name == name).unwrap();
     match object.shape.form() {

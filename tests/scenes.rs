@@ -1,7 +1,8 @@
-//! Every scene of the folder `scenes`: its inventory and its picture.
+//! Every scene of the folder `scenes`: its inventory and its picture are compared with expected
+//! ones.
 //!
-//! `ZERKALO_BLESS=1 cargo test --test engine scenes::` writes the expected values, `ZERKALO_BLESS=NAME.toml` those of
-//! one scene and the stored ones of all others.
+//! `ZERKALO_BLESS=1 cargo test --test engine scenes::` writes the expected values.
+//! `ZERKALO_BLESS=NAME.toml` writes those of one scene, and keeps the stored ones of all others.
 
 use crate::common::normal;
 use crate::support;
@@ -19,21 +20,22 @@ use zerkalo::render::RenderState;
 use zerkalo::scene::Scene;
 use zerkalo::world::{self, AnyWorld, Precision};
 
-/// Size and samples per replicate of the compared pictures.
+/// Width and height in pixels of the compared pictures.
 const SIZE: [u32; 2] = [48, 32];
 const COUNT: u32 = 32;
-/// Side of the blocks whose mean colours are compared, in pixels.
+/// Side in pixels of the blocks whose mean colours are compared.
 const BLOCK: usize = 8;
-/// Seeds of the renderings whose mean is the reference.
+/// Seeds of the renders whose mean is the reference.
 const REFERENCE_SEEDS: std::ops::Range<u64> = 1..65;
-/// Decimals of the stored means.
+/// Number of decimals of the stored means.
 const DECIMALS: usize = 6;
 
 fn golden(name: &str) -> PathBuf {
     PathBuf::from(env!("ZERKALO_ROOT")).join("tests/golden").join(name)
 }
 
-/// Returns the expected text; writes it first if `ZERKALO_BLESS` is set.
+/// Returns the expected text for the scene `name`. If `ZERKALO_BLESS` is set, first writes `actual`
+/// as the expected text.
 fn expected(name: &str, actual: impl FnOnce() -> String) -> String {
     if std::env::var_os("ZERKALO_BLESS").is_some() {
         fs::write(golden(name), actual()).unwrap();
@@ -59,8 +61,8 @@ fn every_scene_compiles_to_its_inventory() {
 }
 
 /// Returns the mean colour of each block and the squared standard error of that mean, row by row.
-/// The pixels are independent, and half the difference of the replicates has the variance of their
-/// mean.
+/// Pixels are independent. Half the difference of the two replicates (halves of the samples) has
+/// the variance of their mean.
 fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     let [columns, rows] = SIZE.map(|n| n as usize / BLOCK);
     let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(rendering, part));
@@ -77,8 +79,8 @@ fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     blocks
 }
 
-/// Returns the reference of a scene: for each block a line with three means and the three standard
-/// errors of the means of one rendering.
+/// Returns the reference of a scene as text. Each block has a line with the means of the three
+/// channels, and their standard errors in a single render.
 fn reference(scene: &Scene) -> String {
     let pool = pool(2);
     let seeds = REFERENCE_SEEDS.count() as f64;
@@ -102,7 +104,7 @@ fn reference(scene: &Scene) -> String {
     text
 }
 
-/// Means and standard errors of the blocks of each scene.
+/// Means and standard errors of the blocks of each scene, by the scene's file name.
 type References = BTreeMap<String, Vec<[(f64, f64); 3]>>;
 
 fn parse_references(text: &str) -> References {
@@ -160,7 +162,7 @@ fn every_scene_renders_its_golden_picture() {
         let rendering = rendered(scene, 0, Precision::Auto, COUNT);
         let bad = rendering.film.bad_samples();
         assert_eq!(bad.count, 0, "{name}: {:?}", bad.first);
-        assert_eq!(rendering.film.saturated(), 0, "{name}");
+        assert_eq!(rendering.film.saturated_pixels(), 0, "{name}");
         let reference = references.get(name).unwrap_or_else(|| panic!("no reference of {name}"));
         let blocks = blocks(&rendering);
         assert_eq!(blocks.len(), reference.len(), "{name}");
@@ -197,7 +199,8 @@ fn furnace_radiance_is_exactly_1() {
     }
 }
 
-/// Without anti-aliasing and lobes no sample is random.
+/// Checks that both replicates (halves of the samples) are equal in scenes without anti-aliasing
+/// and lobes, where no sample is random.
 #[test]
 fn deterministic_scenes_have_equal_replicates() {
     for (name, mut scene) in all_shipped() {

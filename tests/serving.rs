@@ -1,5 +1,6 @@
-//! Relighting: if a film can be reused for an edited scene, its samples mixed for that scene are
-//! the picture of a fresh render. Every key of every description, from the field tables, is edited.
+//! Relighting. If a film can be reused for an edited scene, its samples, mixed for that scene, must
+//! be the picture of a fresh render. The test edits every key of every description, from the field
+//! tables.
 
 use crate::common;
 use crate::common::tables;
@@ -9,7 +10,7 @@ use common::Numbers;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::sync::Arc;
-use support::{begin, picture, pool, uniform};
+use support::{Pool, begin, picture, pool, uniform};
 use tables::{Key, keys, put, scene, table, value_at};
 use toml::{Table, Value};
 use zerkalo::film::Replicates;
@@ -22,7 +23,7 @@ use zerkalo::world::Precision;
 const SEED: u64 = 11;
 const SAMPLES: u32 = 2;
 
-/// Returns a scene with one object of each kind on a grid before the camera, with all kinds of
+/// Returns a scene with one object of each kind on a grid in front of the camera, with all kinds of
 /// material, under all kinds of light.
 fn base() -> Scene {
     let mut text = "
@@ -233,10 +234,11 @@ fn edit(changed: &mut Table, key: &Key, numbers: &mut Numbers) {
 struct Bench {
     base: Scene,
     film: RenderState,
-    pool: rayon::ThreadPool,
+    pool: Pool,
     tried: usize,
     served: usize,
-    /// Last parts of the keys whose edits the film was reused for, and of the others.
+    /// Last components of the keys in two sets: those whose edits the film was reused for, and the
+    /// others.
     by_key: [BTreeSet<String>; 2],
 }
 
@@ -247,8 +249,8 @@ impl Bench {
         Self { base, film, pool, tried: 0, served: 0, by_key: Default::default() }
     }
 
-    /// Returns `true` if the film is reused for the edited scene, after a check of its picture;
-    /// `None` if the edit is invalid.
+    /// Checks the picture if the film is reused for the edited scene. Returns `true` if it is
+    /// reused, and `None` if the edit is invalid.
     fn holds(&mut self, changed: &Table, what: &str) -> Option<bool> {
         let edited = scene(changed, &self.base.resolver)?;
         self.tried += 1;
@@ -315,7 +317,7 @@ fn relit_film_equals_render_of_the_edited_scene() {
     }
 }
 
-/// A material that only a part of a compound names.
+/// Checks edits of a material that only a part of a compound uses.
 #[test]
 fn material_of_a_compound_part_prevents_relighting() {
     let mut bench = Bench::new();

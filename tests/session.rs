@@ -1,8 +1,9 @@
-//! The film of a session is independent of threads, interruptions and earlier scenes.
+//! Films of sessions, which do not depend on threads, interruptions or earlier scenes.
 
 use crate::support;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zerkalo::disk::Existing;
 use zerkalo::render::Checkpoint;
 use zerkalo::render::export::Provenance;
 use zerkalo::render::schedule::Stop;
@@ -40,7 +41,8 @@ fn scene() -> Arc<Scene> {
     Arc::new(Scene::parse(SCENE, "test").unwrap())
 }
 
-/// Waits for the end of the render of `generation`.
+/// Waits for the end of the render of the scene with the generation (version number) `generation`.
+/// Returns its report.
 fn finished(session: &Session, generation: u64) -> Report {
     let end = Instant::now() + Duration::from_secs(60);
     while Instant::now() < end {
@@ -103,8 +105,8 @@ fn interruptions_and_earlier_scenes_do_not_change_the_film() {
     }
 }
 
-/// Prints the cost of a checkpoint of 1920x1080 pixels: seconds in which no samples are traced, and
-/// speed of writing and reading.
+/// Prints the cost of a checkpoint of 1920x1080 pixels: the seconds during which no samples are
+/// traced, and the speed of writing and reading.
 #[test]
 #[ignore = "prints figures: cargo test --test program session:: -- --ignored --nocapture checkpoint_cost"]
 fn checkpoint_cost() {
@@ -131,7 +133,7 @@ fn checkpoint_cost() {
         let checkpoint = receiver.recv().unwrap().expect("a picture");
         let encoded = start.elapsed();
         let start = Instant::now();
-        checkpoint.write(&path).unwrap();
+        checkpoint.write(&path, Existing::Replace).unwrap();
         let written = start.elapsed();
         let megabytes = std::fs::metadata(&path).unwrap().len() as f64 * 1e-6;
         let start = Instant::now();
@@ -145,6 +147,6 @@ fn checkpoint_cost() {
             megabytes / written.as_secs_f64(),
             megabytes / seconds
         );
-        assert_eq!(read.film().width(), 1920);
+        assert_eq!(read.header().film.width, 1920);
     }
 }

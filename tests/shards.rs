@@ -1,5 +1,5 @@
-//! Renders that are divided among shards: equality with one process, interruption, and the noise
-//! that a plan promises.
+//! Renders that are divided into shards (parts, each for one process): equality with a render by
+//! one process, interruption, and the noise that a plan promises.
 
 use std::path::Path;
 use zerkalo::film::{Display, Film, Noise};
@@ -32,14 +32,14 @@ fn until(noise: f64) -> Settings {
     Settings { adaptive: true, criterion: Criterion::Codes, rays_per_pixel: 0, stop }
 }
 
-/// Renders adaptively to `noise`.
+/// Renders a scene adaptively until its noise is at most `noise` 8-bit levels.
 fn adaptive(scene: &Scene, seed: u64, noise: f64) -> SyncRender {
     let mut render = SyncRender::new(scene, &options(seed), until(noise), THREADS).unwrap();
     while render.step().is_none() {}
     render
 }
 
-/// Plans `shards` shards from a pilot that ended at twice the target `noise`.
+/// Plans a render by `shards` shards, from a pilot that ended at twice the noise target `noise`.
 fn plan(scene: &Scene, pilot: &SyncRender, seed: u64, noise: f64, shards: u32) -> Plan {
     let settings = PlanSettings {
         source: "test".into(),
@@ -59,17 +59,18 @@ fn plan(scene: &Scene, pilot: &SyncRender, seed: u64, noise: f64, shards: u32) -
     Plan::of_schedule(&schedule, [USUAL_SLOPE; 2], settings).unwrap()
 }
 
-/// Film and rays of one shard.
+/// Traces shard `number` of `plan`. Returns its film and its number of rays.
 fn shard(scene: &Scene, plan: &Plan, number: u32) -> (RenderState, u64) {
     let state = RenderState::new(scene, &options(plan.settings.seed), None);
     let mut render = ShardRender::new(state, &plan.ranges(number), 0, THREADS).unwrap();
     while render.step() {}
     assert_eq!(render.progress(), 1.0);
     let rays = render.rays();
-    (render.into_state(), rays)
+    (render.state, rays)
 }
 
-/// Sum of pilot and shards, with the number of rays of each shard.
+/// Returns the sum of the films of the pilot and of all shards, and the number of rays of each
+/// shard.
 fn merged(scene: &Scene, plan: &Plan, pilot: SyncRender) -> (RenderState, Vec<u64>) {
     let mut state = RenderState::new(scene, &options(plan.settings.seed), None);
     state.film.add(&pilot.rendering().film).unwrap();
@@ -97,14 +98,14 @@ fn merged_film_equals_one_process_and_is_the_expected_one() {
     while one.step() {}
     let pilot_rays = pilot.schedule().rays();
     let (sum, rays) = merged(&scene, &plan, pilot);
-    assert!(sum.film.bytes() == one.state().film.bytes());
+    assert!(sum.film.bytes() == one.state.film.bytes());
     assert_eq!(pilot_rays + rays.iter().sum::<u64>(), one.rays());
     let all: Vec<u32> = (0..=5).collect();
     assert_eq!(plan.differing_tile(&sum.film, &all), None);
     assert!(plan.differing_tile(&sum.film, &all[1..]).is_some());
 }
 
-/// Interrupts a shard after every step and continues it from a copy of its film.
+/// Checks a shard that is interrupted after every step and continued from a copy of its film.
 #[test]
 fn interrupted_shard_equals_uninterrupted() {
     let scene = scene("reflecting-tracks", Some([96, 64]));
@@ -122,7 +123,7 @@ fn interrupted_shard_equals_uninterrupted() {
         }
         starts += 1;
         rays = render.rays();
-        film = render.into_state().film;
+        film = render.state.film;
     }
     assert!(starts > 1, "the shard ended in its first step");
     assert!(film.bytes() == whole.film.bytes());
@@ -133,7 +134,8 @@ fn interrupted_shard_equals_uninterrupted() {
     assert!(ShardRender::new(state, &plan.ranges(0), rays, THREADS).is_err());
 }
 
-/// Noise and rays of a plan of eight shards, relative to its target and to an adaptive render.
+/// Noise and rays of a render planned for eight shards, divided by its noise target and by the rays
+/// of an adaptive render.
 struct Planned {
     noise: f64,
     rays: f64,
@@ -179,8 +181,8 @@ fn planned_noise_is_near_the_target() {
     }
 }
 
-/// The acceptance of plans, in some minutes:
-/// `cargo test --test engine shards:: -- --ignored --nocapture planned`
+/// Checks planned renders of eight shards, in some minutes: `cargo test --test engine shards:: --
+/// --ignored --nocapture planned`
 #[test]
 #[ignore = "takes minutes"]
 fn planned_runs_of_eight_shards_meet_their_target() {

@@ -4,8 +4,8 @@
 use std::time::Instant;
 use zerkalo::asset::TriangleMesh;
 
-/// Processor time of this thread in seconds, which other load disturbs little. On systems without
-/// `/proc/thread-self/schedstat`: wall-clock time since `start`.
+/// Returns the processor time of this thread in seconds, which other load disturbs little. On
+/// systems without `/proc/thread-self/schedstat`, returns the wall-clock time since `start`.
 pub fn seconds(start: Instant) -> f64 {
     // Yielding makes the kernel update the counter.
     std::thread::yield_now();
@@ -14,7 +14,8 @@ pub fn seconds(start: Instant) -> f64 {
     nanoseconds.map_or_else(|| start.elapsed().as_secs_f64(), |n| n * 1e-9)
 }
 
-/// Shortest time in seconds of each of `candidates` over `rounds` interleaved rounds.
+/// Returns the shortest time in seconds of each of `candidates`, over `rounds` rounds in which all
+/// candidates take turns.
 pub fn in_turns(rounds: usize, candidates: &mut [&mut dyn FnMut()]) -> Vec<f64> {
     let clock = Instant::now();
     let mut best = vec![f64::INFINITY; candidates.len()];
@@ -32,7 +33,7 @@ pub fn in_turns(rounds: usize, candidates: &mut [&mut dyn FnMut()]) -> Vec<f64> 
 pub struct Random(pub u64);
 
 impl Random {
-    /// Uniform number in [0, 1).
+    /// Returns a uniform random number in [0, 1).
     pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -41,7 +42,7 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Point, uniform on the sphere of radius `r`.
+    /// Returns a random point, uniform on the sphere of radius `r` around the origin.
     pub fn point(&mut self, r: f64) -> [f64; 3] {
         let (z, around) = (2.0 * self.next() - 1.0, std::f64::consts::TAU * self.next());
         let across = (1.0 - z * z).sqrt();
@@ -49,14 +50,14 @@ impl Random {
     }
 }
 
-/// Unit vector from `a` to `b`.
+/// Returns the unit vector from `a` to `b`.
 pub fn towards(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     let d: [f64; 3] = std::array::from_fn(|i| b[i] - a[i]);
     let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
     d.map(|x| x / length)
 }
 
-/// A bumpy ball of about `2 x rings x sides` triangles.
+/// Returns the mesh of a bumpy ball of about `2 x rings x sides` triangles.
 pub fn ball(rings: usize, sides: usize) -> TriangleMesh {
     let mut positions = Vec::new();
     for ring in 0..=rings {

@@ -1,8 +1,12 @@
-//! Latency from a key to the first change of the picture over a slow connection. The program runs behind
-//! an OpenSSH server, plain and inside tmux and screen. A relay on loopback limits the rate and delays
-//! all bytes; with `--tunnel` a pair of TUN devices does so, and the server's TCP connection has the
-//! round trip. `benches/link.sh` installs the requirements. Arguments: a part of the names of rows, and
-//! the number of keys. `ZERKALO_PROGRAM` is the path of another build of the program, for comparison.
+//! Latency from a key to the first change of the picture over a slow connection. The program runs
+//! behind an OpenSSH server: directly, in tmux, and in screen.
+//!
+//! A relay on loopback limits the rate and delays all bytes. With `--tunnel` a pair of TUN devices
+//! does so, and the server's TCP connection has the round trip. `benches/link.sh` installs the
+//! requirements.
+//!
+//! Arguments: a part of the names of measured rows, and the number of keys. `ZERKALO_PROGRAM` is
+//! the path of another build of the program, for comparison.
 
 #[path = "../../tests/pty/terminal.rs"]
 mod terminal;
@@ -27,14 +31,14 @@ use zerkalo::terminal::cells::Oklab;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 const SIZE: [u16; 2] = [160, 45];
-/// Connections: name, bytes per second, delay of each direction.
+/// Simulated connections, each as name, bytes per second, and delay of each direction.
 const LINKS: [(&str, f64, Duration); 2] = [
     ("1 Mbit/s, 100 ms", 125e3, Duration::from_millis(50)),
     ("256 kbit/s, 300 ms", 32e3, Duration::from_millis(150)),
 ];
-/// Number of keys without argument.
+/// Number of keys that are pressed unless an argument gives another one.
 const KEYS: usize = 40;
-/// Arrow keys whose moves cancel each other.
+/// Escape sequences of arrow keys whose camera moves cancel each other.
 const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[C", "\x1b[D", "\x1b[D"];
 
 fn main() {
@@ -80,11 +84,11 @@ fn main() {
     }
 }
 
-/// Program inside which the dashboard runs.
+/// Terminal multiplexer in which the dashboard runs, if any.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Host {
     None,
-    /// With `allow-passthrough on` or `off`.
+    /// tmux, with this value of its option `allow-passthrough`: `on` or `off`.
     Tmux(&'static str),
     Screen,
 }
@@ -99,7 +103,7 @@ impl Host {
         Command::new(program).arg("-V").output().is_err()
     }
 
-    /// Returns the command that runs `program` inside this host.
+    /// Returns the command that runs `program` in this multiplexer.
     fn command(self, folder: &Path, program: &str) -> String {
         let settings = folder.join("settings");
         let name = format!("zerkalo-bench-{}", std::process::id());
@@ -121,7 +125,7 @@ impl Host {
         command
     }
 
-    /// Ends the host.
+    /// Ends the multiplexer.
     fn end(self) {
         let name = format!("zerkalo-bench-{}", std::process::id());
         let (program, arguments): (_, &[&str]) = match self {
@@ -133,16 +137,16 @@ impl Host {
     }
 }
 
-/// Terminal's replies.
+/// Replies of the simulated terminal to requests of the dashboard.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Replies {
     Always,
-    /// Until the dashboard is open.
+    /// The terminal replies until the dashboard is open; later replies are lost.
     Lost,
     Never,
 }
 
-/// Setting of a measurement.
+/// Setting of a measurement, a row of the printed table.
 #[derive(Clone, Copy)]
 struct Row {
     name: &'static str,
@@ -177,7 +181,8 @@ const ROWS: [Row; 7] = [
     Row { name: "screen", host: Host::Screen, options: "--color 256", replies: Replies::Always },
 ];
 
-/// Measures one row: opens the dashboard, lets it converge, presses keys.
+/// Measures the latency of a row of the printed table: opens the dashboard, lets the picture
+/// converge, presses keys.
 fn measure(
     name: &str,
     row: &Row,
@@ -229,7 +234,7 @@ fn measure(
     );
 }
 
-/// Presses a key. Returns the seconds until the picture has clearly changed.
+/// Presses key number `i`. Returns the seconds until the picture has clearly changed.
 fn press_key(terminal: &mut Terminal, i: usize) -> f64 {
     // Irregular pauses.
     std::thread::sleep(Duration::from_millis(1500 + 37 * (i as u64 % 11)));
@@ -247,7 +252,7 @@ fn press_key(terminal: &mut Terminal, i: usize) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
-/// Returns the colours of the picture's cells.
+/// Returns the colours of the picture's cells on the screen, by row and column.
 fn colors(screen: &vt100::Screen) -> BTreeMap<(u16, u16), [u8; 3]> {
     let (rows, columns) = screen.size();
     let cells = (0..rows.get()).flat_map(|row| (0..columns.get()).map(move |column| (row, column)));
@@ -267,7 +272,8 @@ fn colors(screen: &vt100::Screen) -> BTreeMap<(u16, u16), [u8; 3]> {
     cells.filter_map(color).collect()
 }
 
-/// Returns the colour with this index in xterm's palette of 256. The first 16 are all black here.
+/// Returns the colour with this index in xterm's palette of 256 colours. The first 16 are all black
+/// here.
 fn indexed(index: u8) -> [u8; 3] {
     const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
     match index {
@@ -277,7 +283,7 @@ fn indexed(index: u8) -> [u8; 3] {
     }
 }
 
-/// Returns the part of the status line about the connection.
+/// Returns the part of the dashboard's status line that describes the connection.
 fn status(terminal: &Terminal) -> String {
     terminal.screen(|screen| {
         let text = screen.contents();

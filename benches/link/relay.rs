@@ -10,17 +10,18 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Size of the receive buffer at the server's side, in bytes. The kernel acknowledges what is in it.
+/// Size in bytes of the receive buffer of the relay's socket to the server. The kernel acknowledges
+/// bytes as soon as they are in the buffer.
 const RECEIVE_BUFFER: usize = 4 << 10;
-/// Bytes of a piece of the transmission.
+/// Largest number of bytes that the relay forwards at once.
 const PIECE: usize = 700;
 
-/// Listening relay. It forwards each connection to the server.
+/// Relay that listens at an address and forwards each connection to the server.
 pub struct Relay {
     pub address: SocketAddr,
 }
 
-/// Bytes in transmission with their times of arrival.
+/// Bytes that the relay holds back until their times of arrival.
 #[derive(Default)]
 struct Pipe {
     pieces: VecDeque<(Instant, Vec<u8>)>,
@@ -28,8 +29,8 @@ struct Pipe {
 }
 
 impl Relay {
-    /// Starts a relay to the server at `target`. Its output is limited to `rate` bytes per second; both
-    /// directions are delayed by `one_way`.
+    /// Starts a relay to the server at `target`. The rate of the server's output is limited to
+    /// `rate` bytes per second. Both directions are delayed by `one_way`.
     pub fn start(target: SocketAddr, rate: f64, one_way: Duration) -> io::Result<Self> {
         let listener = TcpListener::bind("127.0.0.1:0")?;
         let address = listener.local_addr()?;
@@ -46,7 +47,7 @@ impl Relay {
     }
 }
 
-/// Connects to the server with a small receive buffer.
+/// Connects to the server at `target` with a small receive buffer.
 fn connected(target: SocketAddr) -> io::Result<TcpStream> {
     let socket = socket(AddressFamily::INET, SocketType::STREAM, None)?;
     set_socket_recv_buffer_size(&socket, RECEIVE_BUFFER)?;
@@ -54,7 +55,8 @@ fn connected(target: SocketAddr) -> io::Result<TcpStream> {
     Ok(TcpStream::from(socket))
 }
 
-/// Forwards one direction.
+/// Forwards one direction of a connection, from `from` to `to`, at most at `rate` bytes per second
+/// and delayed by `one_way`.
 fn forward(mut from: TcpStream, mut to: TcpStream, rate: f64, one_way: Duration) {
     let pipe = Arc::new((Mutex::new(Pipe::default()), Condvar::new()));
     let other = Arc::clone(&pipe);

@@ -1,4 +1,4 @@
-//! OpenSSH server.
+//! OpenSSH server for measurements over a connection.
 
 use crate::tunnel::{NAMESPACE, SERVER_IP, Tunnel};
 use std::fs;
@@ -19,7 +19,7 @@ impl Server {
     /// tunnel.
     ///
     /// # Errors
-    /// If a program is missing or the server does not start.
+    /// Fails if a program is missing or the server does not start.
     pub fn start(folder: &Path, tunnel: Option<&Tunnel>) -> Result<Self, String> {
         let daemon = ["/usr/sbin/sshd", "/usr/local/sbin/sshd", "/usr/bin/sshd"]
             .into_iter()

@@ -6,12 +6,13 @@ use std::net::Ipv4Addr;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-/// Network namespace of the server.
+/// Name of the network namespace in which the server runs.
 pub const NAMESPACE: &str = "zerkalo-bench";
-/// Address of the server in the namespace.
+/// Address of the server in its network namespace.
 pub const SERVER_IP: Ipv4Addr = Ipv4Addr::new(10, 77, 0, 2);
 
-/// Tunnel, a process. Dropping it removes the namespace.
+/// Process that connects a network namespace to the host by a tunnel. Dropping it removes the
+/// namespace.
 pub struct Tunnel {
     child: Child,
 }
@@ -21,7 +22,7 @@ impl Tunnel {
     /// directions.
     ///
     /// # Errors
-    /// If a program or the permission is missing.
+    /// Fails if a program or the permission is missing.
     pub fn start(rate: f64, one_way: Duration) -> Result<Self, String> {
         let added = Command::new("ip").args(["netns", "add", NAMESPACE]).status();
         if !added.is_ok_and(|status| status.success()) {

@@ -4,8 +4,8 @@
 //! that paths are the same in every part.
 
 pub use zerkalo_world::{
-    asset, bvh, camera, disk, lanes, light, material, primitive, sampling, scene, shape, value,
-    world,
+    asset, bvh, camera, disk, lanes, light, material, primitive, process_memory, sampling, scene,
+    shape, value, world,
 };
 
 #[path = "../../src/film/mod.rs"]

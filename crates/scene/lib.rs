@@ -34,6 +34,9 @@ pub mod material;
 #[path = "../../src/primitive/mod.rs"]
 pub mod primitive;
 #[cfg(unix)]
+#[path = "../../src/process_memory.rs"]
+pub mod process_memory;
+#[cfg(unix)]
 #[path = "../../src/sampling/mod.rs"]
 pub mod sampling;
 #[cfg(unix)]

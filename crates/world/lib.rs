@@ -4,7 +4,8 @@
 //! paths are the same in every part.
 
 pub use zerkalo_scene::{
-    asset, bvh, camera, disk, lanes, light, material, primitive, sampling, scene, shape, value,
+    asset, bvh, camera, disk, lanes, light, material, primitive, process_memory, sampling, scene,
+    shape, value,
 };
 
 #[path = "../../src/world/mod.rs"]

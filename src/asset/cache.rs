@@ -1,11 +1,11 @@
 //! Cache of asset files (meshes and images), shared between compilations of scenes.
 
-use crate::asset::error::{AssetError, FileLocation};
+use crate::asset::error::AssetError;
 use crate::asset::file::{FileContents, MAX_BYTES, read_error};
 use crate::asset::image::Image;
 use crate::asset::mesh::{Mesh, TriangleMesh};
 use crate::asset::radiance_map::RadianceMap;
-use crate::value::missing_memory;
+use crate::process_memory::missing_memory;
 use std::collections::HashMap;
 use std::fmt;
 use std::hash::Hash;
@@ -17,27 +17,28 @@ use std::time::SystemTime;
 /// because an undo may bring them back.
 const UNUSED_BYTES: usize = 256 << 20;
 
-/// Largest size of an image file in bytes: 512 MiB.
+/// Largest size in bytes of an image file for a texture or an environment: 512 MiB.
 const MAX_IMAGE_BYTES: u64 = 512 << 20;
 
-/// Peak memory per triangle during the build of a mesh's BVH \[bytes\].
+/// Estimated peak memory per triangle while the BVH of a mesh is built \[bytes\].
 const BUILD_BYTES: u64 = 400;
 
-/// Stage of loading a file that can take a noticeable time.
+/// Stage of loading an asset file, for progress messages: reading the file, or building the BVH of
+/// a mesh.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LoadProgress {
-    /// The file is being read.
+    /// Stage of loading: a file is being read.
     Reading {
-        /// Path of the file.
+        /// Path of the asset file that is being read.
         file: PathBuf,
-        /// Length of the file in bytes.
+        /// Length in bytes of the file that is being read.
         bytes: u64,
     },
-    /// The BVH of a mesh is being built.
+    /// Stage of loading: the BVH of a mesh is being built.
     Building {
         /// Path of the mesh file.
         file: PathBuf,
-        /// Number of triangles.
+        /// Number of triangles of the mesh.
         triangles: usize,
     },
 }
@@ -57,8 +58,8 @@ impl fmt::Display for LoadProgress {
     }
 }
 
-/// Cache key of a file. A file with the same path and another modification time or length has
-/// another key.
+/// Cache key of an asset file. A file with the same path and another modification time or length
+/// has another key.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Key {
     path: PathBuf,
@@ -66,12 +67,13 @@ struct Key {
     bytes: u64,
 }
 
-/// Cache entry: the content of a file or the error of reading it. Empty until the file has been
-/// read.
+/// Cache entry of an asset file: its content or the error of reading it. Empty until the file has
+/// been read.
 type CacheEntry<T> = Arc<OnceLock<Result<Arc<T>, AssetError>>>;
 
-/// LRU cache of files of one type. The second value of each entry is the use counter at its last
-/// use.
+/// Cache of asset files of one type; the least recently used ones are evicted. The map holds two
+/// values for a key: its cache entry, and the number of the last use of this entry. Uses of the
+/// cache are numbered from 1.
 struct Cache<T> {
     files: HashMap<Key, (CacheEntry<T>, u64)>,
     last_used: u64,
@@ -84,7 +86,8 @@ impl<T> Default for Cache<T> {
 }
 
 impl<T> Cache<T> {
-    /// Returns the entry for `key`. Removes entries for older content of the same file.
+    /// Returns the cache entry for `key`, a new one if there is none. Removes the entries of the
+    /// same file with another modification time or length.
     fn entry(&mut self, key: &Key) -> CacheEntry<T> {
         self.last_used += 1;
         self.files.retain(|k, _| k.path != key.path || k == key);
@@ -93,8 +96,8 @@ impl<T> Cache<T> {
         entry.clone()
     }
 
-    /// Evicts unused files, the least recently used first, until the remaining unused files take at
-    /// most [`UNUSED_BYTES`].
+    /// Evicts files that no scene uses, the least recently used first, until the remaining unused
+    /// files take at most [`UNUSED_BYTES`]. `bytes_of` returns the memory of a file's content.
     fn evict(&mut self, bytes_of: impl Fn(&T) -> usize) {
         let mut unused: Vec<(u64, usize, Key)> = self
             .files
@@ -184,7 +187,7 @@ impl Assets {
         load(&self.images, path, read, Image::bytes)
     }
 
-    /// Returns the image of radiance in the file at `path`.
+    /// Returns the environment image (radiance from all directions) in the file at `path`.
     ///
     /// # Errors
     /// Fails if the file cannot be read or is not a valid image.
@@ -199,31 +202,28 @@ impl Assets {
     }
 }
 
-/// Checks that `needed` bytes of memory are available. `path` is the file of the mesh, and `what`
-/// names the data that needs the memory.
+/// Checks that `needed` bytes of memory are available. `path` is the asset file, and `what` names
+/// the data that needs the memory.
 ///
 /// # Errors
-/// The error states the needed and the available memory, and a remedy.
+/// Fails if less memory is available. The error states the needed and the available memory, and a
+/// remedy.
 fn check_memory(path: &Path, what: &str, needed: u64) -> Result<(), AssetError> {
-    match missing_memory(needed) {
-        Some(missing) => Err(AssetError {
-            file: path.to_path_buf(),
-            place: FileLocation::Whole,
-            found: format!("{what} {missing}"),
-            expected: "a mesh of fewer triangles, or more free memory".to_string(),
-        }),
-        None => Ok(()),
-    }
+    let expected = "a mesh of fewer triangles, or more free memory";
+    missing_memory(needed).map_or(Ok(()), |missing| {
+        Err(AssetError::of_file(path, format!("{what} {missing}"), expected))
+    })
 }
 
-/// Locks a cache. The cache of a poisoned lock is valid, because no method leaves a cache half
-/// changed.
+/// Locks an asset cache, even if a thread has panicked while it held the lock. The cache is valid
+/// then, because no method leaves it half changed.
 fn locked<T>(cache: &Mutex<Cache<T>>) -> MutexGuard<'_, Cache<T>> {
     cache.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the file at `path` from `cache`. If the cache lacks the file, `read` reads it while the
-/// cache is unlocked.
+/// Returns the content of the asset file at `path` from `cache`. If the cache lacks the file,
+/// `read` reads it. Other threads can use the cache meanwhile. `bytes_of` returns the memory of the
+/// content in bytes.
 fn load<T>(
     cache: &Mutex<Cache<T>>,
     path: &Path,

@@ -1,36 +1,45 @@
-//! Errors in asset files.
+//! Errors in asset files (meshes and images).
 
 use crate::value::sanitized;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Location in a file.
+/// Location of an error in an asset file: a line, a byte offset, a named part, or the whole file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileLocation {
-    /// The file as a whole.
+    /// No location: the error concerns the file as a whole.
     Whole,
-    /// A line, counted from 1.
+    /// Line of the error in a text file, counted from 1.
     Line(usize),
-    /// A byte, counted from 0.
+    /// Offset of the error in the file, in bytes counted from 0.
     Byte(usize),
-    /// A named part, such as `vertex 17` or `accessors[3]`.
+    /// Part of the file with this name, such as `vertex 17` or `accessors[3]`.
     Part(String),
 }
 
 /// Error in an asset file that a scene names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssetError {
-    /// The file.
+    /// Path of the asset file.
     pub file: PathBuf,
     /// Location of the error in the file.
     pub place: FileLocation,
-    /// Phrase that states the error in the file.
+    /// Clause without a full stop that states the error, such as `face names vertex 9, of 8`. The
+    /// message consists of file, location and this clause.
     pub found: String,
-    /// Phrase that states the valid content.
+    /// Phrase that states the valid content at this location, such as `a vertex below 8, their
+    /// number`.
     pub expected: String,
 }
 
 impl AssetError {
+    /// Creates an error about the file at `path` as a whole. `found` and `expected` are as in
+    /// [`AssetError`].
+    pub(super) fn of_file(path: &Path, found: impl Into<String>, expected: &str) -> Self {
+        let (file, expected) = (path.to_path_buf(), expected.to_string());
+        Self { file, place: FileLocation::Whole, found: found.into(), expected }
+    }
+
     /// Returns the file, the location and the error, such as `bunny.obj:12: face names vertex 9, of
     /// 8`.
     pub fn what(&self) -> String {

@@ -1,19 +1,20 @@
-//! Reading of whole files up to a size limit, and resolution of file names that occur inside files.
+//! Asset files in memory: reading of whole files up to a size limit, and resolution of file names
+//! that occur inside files.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::disk::open_regular;
-use crate::value::megabytes;
+use crate::process_memory::megabytes;
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 
-/// Largest size in bytes of a file that is read: 2 GiB.
+/// Largest size in bytes of an asset file that is read: 2 GiB.
 pub const MAX_BYTES: u64 = 2 << 30;
 
-/// A file in memory.
+/// Asset file that has been read into memory.
 pub struct FileContents {
-    /// Path of the file.
+    /// Path of the asset file that was read.
     pub path: PathBuf,
-    /// Content of the file.
+    /// Content of the asset file in bytes.
     pub bytes: Vec<u8>,
 }
 
@@ -23,14 +24,7 @@ impl FileContents {
     /// # Errors
     /// Fails if the file cannot be read, is not a regular file, or has more than `limit` bytes.
     pub fn read(path: &Path, limit: u64) -> Result<Self, AssetError> {
-        let error = |found: String, expected: &str| {
-            Err(AssetError {
-                file: path.to_path_buf(),
-                place: FileLocation::Whole,
-                found,
-                expected: expected.to_string(),
-            })
-        };
+        let error = |found: String, expected: &str| Err(AssetError::of_file(path, found, expected));
         let file = match open_regular(path) {
             Err(e) if e.kind() == ErrorKind::InvalidInput => {
                 return error(e.to_string(), "a regular file");
@@ -56,24 +50,20 @@ impl FileContents {
         Ok(Self { path: path.to_path_buf(), bytes })
     }
 
-    /// Creates an error at location `place` in this file.
+    /// Creates an error at location `place` in this file. `found` is a clause that states the
+    /// error. `expected` is a phrase that states the valid content. Neither ends with a full stop.
     pub fn error(
         &self,
         place: FileLocation,
         found: impl Into<String>,
         expected: &str,
     ) -> AssetError {
-        AssetError {
-            file: self.path.clone(),
-            place,
-            found: found.into(),
-            expected: expected.to_string(),
-        }
+        AssetError { place, ..AssetError::of_file(&self.path, found, expected) }
     }
 
     /// Resolves `name`, a file name that occurs in this file, relative to the folder of this file,
-    /// by the rule in docs/scene-format.md. Returns `None` if `name` leads out of this folder: an
-    /// absolute path, a path with `..`, or a URL.
+    /// by the rule in docs/scene-format.md. Returns `None` if `name` is an absolute path, a path
+    /// with `..` or a URL, because these lead out of the folder.
     pub fn resolve_relative(&self, name: &str) -> Option<PathBuf> {
         let name = name.replace('\\', "/");
         let inside = Path::new(&name)
@@ -95,8 +85,7 @@ pub fn read_error(path: &Path, error: &std::io::Error) -> AssetError {
         }
         _ => (format!("the file cannot be read: {error}"), "a file that can be read"),
     };
-    let expected = expected.to_string();
-    AssetError { file: path.to_path_buf(), place: FileLocation::Whole, found, expected }
+    AssetError::of_file(path, found, expected)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Images for textures: PNG and JPEG.
+//! Images for textures, from PNG and JPEG files.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
@@ -7,25 +7,28 @@ use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Li
 use std::io::Cursor;
 use std::sync::LazyLock;
 
-/// Largest number of pixels in a row or column.
+/// Largest number of pixels in a row or column of a texture image.
 pub const MAX_SIDE: u32 = 32_768;
 
-/// Largest number of pixels: 64 Mi. An image of this size takes at most 402 MB when decoded, and
-/// 940 MB during decoding.
+/// Largest number of pixels of a texture image: 64 Mi. An image of this size takes at most 402 MB
+/// when decoded, and 940 MB during decoding.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
-/// Largest number of pixels per byte of a file. A PNG has at most eight pixels per byte, which
-/// deflate compresses by a factor of at most 1032. A JPEG has at most 64 pixels per bit.
+/// Largest number of pixels per byte of an image file. PNG has the largest ratio: at most eight
+/// pixels per byte of uncompressed data, times the factor of at most 1032 by which deflate
+/// compresses this data. A JPEG has at most 64 pixels per bit, which is 512 per byte. A Radiance
+/// file in the old encoding has at most 65536 pixels per 8 bytes, which is 8192 per byte.
 const PIXELS_PER_BYTE: u64 = 8 * 1032;
 
-/// Pixels in the bit depth of the file. A grey pixel is one number, a coloured one three.
+/// Pixels of a texture image with 8 or 16 bits per channel, as in the file. A grey pixel is one
+/// number, a coloured pixel three.
 #[derive(Clone, Debug, PartialEq)]
 enum Texels {
     Bytes(Vec<u8>),
     Words(Vec<u16>),
 }
 
-/// A decoded image in the bit depth of its file: 1 to 6 bytes per pixel.
+/// Texture image, decoded in the bit depth of its file: 1 to 6 bytes per pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     size: [u32; 2],
@@ -33,7 +36,7 @@ pub struct Image {
     texels: Texels,
 }
 
-/// Returns a table of the linear light, 0..=1, of the sRGB levels from 0 to `last`.
+/// Returns a table of linear light, 0..=1, for the sRGB levels from 0 (black) to `last` (white).
 fn linear_table(last: u16) -> Vec<f32> {
     let linear = |level| linear_from_srgb(f64::from(level) / f64::from(last)) as f32;
     (0..=last).map(linear).collect()
@@ -43,7 +46,7 @@ static BYTES: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(255));
 static WORDS: LazyLock<Vec<f32>> = LazyLock::new(|| linear_table(65535));
 
 impl Image {
-    /// Adds size and pixels to `hash`.
+    /// Adds the size and the pixels of the image to `hash`.
     pub fn hash_contents(&self, hash: &mut Fnv1a64) {
         self.size.iter().for_each(|n| hash.update(&n.to_le_bytes()));
         hash.update(&[self.channels as u8]);
@@ -53,7 +56,7 @@ impl Image {
         }
     }
 
-    /// Decodes a file in memory. The format is determined by the first bytes of the file.
+    /// Decodes an image file in memory. The format is determined by the first bytes of the file.
     ///
     /// # Errors
     /// Fails if the file is not a valid image.
@@ -68,17 +71,7 @@ impl Image {
         limits.max_alloc = Some(MAX_PIXELS * 8);
         reader.limits(limits);
         let mut decoder = reader.into_decoder().map_err(|e| decode_error(source, &e))?;
-        let (width, height) = decoder.dimensions();
-        let pixels = u64::from(width) * u64::from(height);
-        let size = format!("the image has {width} x {height} pixels");
-        if width > MAX_SIDE || height > MAX_SIDE || pixels > MAX_PIXELS {
-            let expected = format!("at most {MAX_SIDE} a side and {MAX_PIXELS} altogether");
-            return Err(source.error(FileLocation::Whole, size, &expected));
-        }
-        if pixels > PIXELS_PER_BYTE * source.bytes.len() as u64 {
-            let found = format!("{size}, more than its {} bytes can hold", source.bytes.len());
-            return Err(source.error(FileLocation::Whole, found, "a whole image"));
-        }
+        check_size(source, decoder.dimensions().into(), MAX_SIDE, MAX_PIXELS)?;
         let orientation = decoder.orientation().map_err(|e| decode_error(source, &e))?;
         let mut image =
             DynamicImage::from_decoder(decoder).map_err(|e| decode_error(source, &e))?;
@@ -115,7 +108,7 @@ impl Image {
     /// top. The numbers of the file are interpreted as sRGB levels.
     ///
     /// # Panics
-    /// If the image has no such pixel.
+    /// Panics if the image has no such pixel.
     pub fn color(&self, x: u32, y: u32) -> [f32; 3] {
         let index = self.index(x, y);
         let channel = |c: usize| match &self.texels {
@@ -125,12 +118,12 @@ impl Image {
         if self.channels == 1 { [channel(0); 3] } else { [channel(0), channel(1), channel(2)] }
     }
 
-    /// Returns the height, 0..=1, of the pixel in column `x` and row `y`, counted from the top, if
-    /// the image is a height map. It is the number in the file, without sRGB decoding. For a colour
-    /// image it is the mean of the channels.
+    /// Returns the height, 0..=1, at the pixel in column `x` and row `y`, counted from the top, of
+    /// an image that is used as a height map. The numbers of the file are interpreted without sRGB
+    /// decoding. The height of a coloured pixel is the mean of its channels.
     ///
     /// # Panics
-    /// If the image has no such pixel.
+    /// Panics if the image has no such pixel.
     pub fn height(&self, x: u32, y: u32) -> f32 {
         let index = self.index(x, y);
         let sum: f32 = match &self.texels {
@@ -148,6 +141,29 @@ impl Image {
         assert!(x < self.size[0] && y < self.size[1], "no pixel {x}, {y}");
         (y as usize * self.size[0] as usize + x as usize) * self.channels
     }
+}
+
+/// Checks the size of an image of `width` x `height` pixels in the file `source`. Valid are at most
+/// `max_side` pixels per side, and 1 to `max_pixels` pixels altogether, but at most
+/// [`PIXELS_PER_BYTE`] per byte of the file.
+pub(super) fn check_size(
+    source: &FileContents,
+    [width, height]: [u32; 2],
+    max_side: u32,
+    max_pixels: u64,
+) -> Result<(), AssetError> {
+    let pixels = u64::from(width) * u64::from(height);
+    let size = format!("the image has {width} x {height} pixels");
+    if width.max(height) > max_side || pixels > max_pixels || pixels == 0 {
+        let least = if pixels == 0 { "at least one, " } else { "" };
+        let expected = format!("{least}at most {max_side} a side and {max_pixels} altogether");
+        return Err(source.error(FileLocation::Whole, size, &expected));
+    }
+    if pixels > PIXELS_PER_BYTE * source.bytes.len() as u64 {
+        let found = format!("{size}, more than its {} bytes can hold", source.bytes.len());
+        return Err(source.error(FileLocation::Whole, found, "a whole image"));
+    }
+    Ok(())
 }
 
 fn decode_error(source: &FileContents, error: &ImageError) -> AssetError {
@@ -195,8 +211,8 @@ mod tests {
         assert!((r - BYTES[200]).abs() < 0.02 && r > g && g > b);
     }
 
-    /// Returns a PNG file whose header declares `side` x `side` pixels with a valid checksum. The
-    /// data has only one pixel.
+    /// Returns a PNG file of one pixel whose header declares `side` x `side` pixels. The checksum
+    /// of the header is valid.
     fn png_declaring(side: u32) -> FileContents {
         let mut source = file(image::GrayImage::new(1, 1).into(), ImageFormat::Png);
         source.bytes[16..20].copy_from_slice(&side.to_be_bytes());

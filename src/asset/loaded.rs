@@ -1,11 +1,12 @@
-//! Content of a file that a description names.
+//! Lazily loaded content of an asset file that a scene description names.
 
 use crate::asset::error::AssetError;
 use crate::value::ValidationError;
 use std::fmt;
 use std::sync::Arc;
 
-/// Content of a file, or the error of reading it. `None` before the first attempt to read it.
+/// Content of an asset file, or the error of reading it. `None` before the first attempt to read
+/// it.
 #[derive(Clone)]
 pub struct Loaded<T>(Option<Result<Arc<T>, AssetError>>);
 
@@ -15,7 +16,8 @@ impl<T> Default for Loaded<T> {
     }
 }
 
-/// Two values with the same allocation are equal without a comparison of the pixels.
+/// Two values are equal if both are not loaded, or have equal contents or equal errors. Contents in
+/// the same allocation are equal without a comparison of their data.
 impl<T: PartialEq> PartialEq for Loaded<T> {
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
@@ -27,7 +29,7 @@ impl<T: PartialEq> PartialEq for Loaded<T> {
     }
 }
 
-/// Prints the state of loading, not the pixels.
+/// Formats the state of loading: `not loaded`, `loaded`, or the error. The content is omitted.
 impl<T> fmt::Debug for Loaded<T> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match &self.0 {
@@ -39,7 +41,8 @@ impl<T> fmt::Debug for Loaded<T> {
 }
 
 impl<T> Loaded<T> {
-    /// Returns the content; `None` if no readable file has been loaded.
+    /// Returns the content of the file. Returns `None` if the file has not been read yet or cannot
+    /// be read.
     pub fn content(&self) -> Option<&Arc<T>> {
         self.0.as_ref()?.as_ref().ok()
     }
@@ -49,7 +52,8 @@ impl<T> Loaded<T> {
         self.0.get_or_insert_with(load);
     }
 
-    /// Returns the error of reading the file as a fault of the key `file`.
+    /// Returns the error of reading the file as a validation error of the key `file`. Returns
+    /// `None` if the file was read, or has not been read yet.
     pub fn fault(&self) -> Option<ValidationError> {
         let error = self.0.as_ref()?.as_ref().err()?;
         Some(ValidationError::new("file", error.what(), error.expected.clone()))

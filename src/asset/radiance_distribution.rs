@@ -1,22 +1,22 @@
-//! Distribution of directions by the luminance of an equirectangular image.
+//! Sampling distribution of directions, in proportion to the luminance of an equirectangular image.
 //!
-//! The density is constant over the solid angle of each pixel. A row is chosen by the marginal
-//! distribution, a column by the conditional one; both are inverted, so that stratified numbers
-//! give stratified directions (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed.,
-//! A.5.6).
+//! The density per solid angle is constant inside of each pixel. One random number selects a row, a
+//! second one selects a column of this row. Both are mapped by inverse cumulative distributions, so
+//! that stratified numbers give stratified directions (Pharr, Jakob, Humphreys, *Physically Based
+//! Rendering*, 4th ed., A.5.6).
 
 use std::f64::consts::{PI, TAU};
 
-/// Radiance added to every pixel of the distribution, in multiples of the mean radiance. It limits
-/// the variance where the bright part of the image is occluded: the weight of a sample is at most
-/// 17 times the mean.
+/// Luminance that the sampling distribution adds to every pixel, as a fraction of the image's mean
+/// luminance. The density is thus at least about 1/17 of the uniform one in all directions. This
+/// limits the variance at points from which the bright part of the image is occluded.
 const FLOOR: f64 = 1.0 / 16.0;
 
-/// Distribution of directions over the pixels of an image.
+/// Sampling distribution of directions over the pixels of an equirectangular image.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RadianceDistribution {
     columns: usize,
-    /// Cosines of the polar angles between the rows, from 1 to -1.
+    /// Cosines of the polar angles at the boundaries of the image's rows, from 1 to -1.
     cosines: Vec<f64>,
     /// Cumulative distribution of the rows, from 0 to 1. It has one number more than there are
     /// rows.
@@ -26,7 +26,8 @@ pub(super) struct RadianceDistribution {
 }
 
 impl RadianceDistribution {
-    /// Creates the distribution over an image with the given columns and rows.
+    /// Creates the distribution over an equirectangular image with the given numbers of columns and
+    /// rows.
     pub fn new([columns, rows]: [usize; 2], pixels: &[[f32; 3]]) -> Self {
         let cosine = |row: usize| (PI * row as f64 / rows as f64).cos();
         let cosines: Vec<f64> = (0..=rows).map(cosine).collect();
@@ -77,7 +78,7 @@ impl RadianceDistribution {
         out
     }
 
-    /// Mean of `pixels` over all directions.
+    /// Returns the mean of `pixels` over all directions, weighted by solid angle.
     pub fn mean(&self, pixels: &[[f32; 3]]) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for (row, pixels) in pixels.chunks(self.columns).enumerate() {
@@ -89,13 +90,14 @@ impl RadianceDistribution {
         sum
     }
 
-    /// Returns the memory in bytes.
+    /// Returns the memory of the distribution in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.rows[..]) + size_of_val(&self.columns_of_rows[..])
     }
 
-    /// Samples a direction. `u` and `v` are uniform in [0, 1). Returns the column, from 0 to 1, the
-    /// cosine of the polar angle, and the density \[1/sr\].
+    /// Samples a direction from the distribution. `u` and `v` are uniform in [0, 1); `u` selects
+    /// the column and `v` the row. Returns three values: the horizontal position in the image, from
+    /// 0 to 1; the cosine of the polar angle; and the density \[1/sr\] of the direction.
     pub fn sample(&self, u: f64, v: f64) -> (f64, f64, f64) {
         let row = interval(&self.rows, |x| *x <= v);
         let t = (v - self.rows[row]) / (self.rows[row + 1] - self.rows[row]);
@@ -109,7 +111,8 @@ impl RadianceDistribution {
         (x, cos, self.density_in(row, column))
     }
 
-    /// Returns the density \[1/sr\] at a position of the image: column and row, each from 0 to 1.
+    /// Returns the density \[1/sr\] of the direction at the position `[x, y]` of the image: 0 to 1
+    /// from left to right, and 0 to 1 from top to bottom.
     pub fn density(&self, [x, y]: [f64; 2]) -> f64 {
         let rows = self.rows.len() - 1;
         // The conversion to integers saturates.
@@ -118,7 +121,8 @@ impl RadianceDistribution {
         self.density_in(row, column)
     }
 
-    /// Density \[1/sr\] in a pixel: its probability divided by its solid angle.
+    /// Returns the density \[1/sr\] of directions in a pixel: its probability divided by its solid
+    /// angle.
     fn density_in(&self, row: usize, column: usize) -> f64 {
         let columns = self.columns_of_row(row);
         let share = f64::from(columns[column + 1]) - f64::from(columns[column]);
@@ -132,7 +136,8 @@ impl RadianceDistribution {
     }
 }
 
-/// Returns the partial sums of `weights`, divided by `total`, their sum: from 0 to 1.
+/// Returns the cumulative sums of `weights`, divided by `total`, the sum of all weights. The
+/// results ascend from 0 to 1.
 fn cumulative(weights: &[f64], total: f64) -> impl Iterator<Item = f64> {
     let mut sum = 0.0;
     let last = weights.len() - 1;
@@ -143,8 +148,8 @@ fn cumulative(weights: &[f64], total: f64) -> impl Iterator<Item = f64> {
     std::iter::once(0.0).chain(weights.iter().enumerate().map(partial))
 }
 
-/// Returns the index of the interval between ascending `numbers` that begins with the last number
-/// for which `is_below` holds.
+/// Returns the index `i` of the interval between `numbers[i]` and `numbers[i + 1]`, where
+/// `numbers[i]` is the last number for which `is_below` returns `true`. `numbers` must ascend.
 fn interval<T>(numbers: &[T], is_below: impl Fn(&T) -> bool) -> usize {
     numbers.partition_point(is_below).clamp(1, numbers.len() - 1) - 1
 }
@@ -185,10 +190,10 @@ mod tests {
         }
     }
 
-    /// Checks that a regular grid of random numbers gives stratified directions. The number of
-    /// samples in a row of pixels differs from its expectation by at most one row of the grid. The
-    /// number in one pixel differs by at most the rows and columns of the grid that the edges of
-    /// the pixel cut.
+    /// Checks that a regular grid of 256 x 256 points (u, v) gives stratified directions. The
+    /// number of directions in a row of pixels differs from its expectation by at most 256, which
+    /// is one row of the grid. The number in a pixel that covers r x c points of the grid differs
+    /// from r c by at most r + c + 1.
     #[test]
     fn grid_of_numbers_gives_stratified_directions() {
         let n = 256;
@@ -217,8 +222,8 @@ mod tests {
         }
     }
 
-    /// Compares pseudo-random samples with the density by Pearson's chi-square test, against the
-    /// 99.9 % quantile (approximation by Wilson and Hilferty).
+    /// Checks by Pearson's chi-square test that pseudo-random samples follow the density. The limit
+    /// is the 99.9 % quantile, in the approximation by Wilson and Hilferty.
     #[test]
     fn samples_follow_the_density() {
         for bright in [1.0, 1e3] {
@@ -252,8 +257,8 @@ mod tests {
         }
     }
 
-    /// Checks that interpolated luminance divided by density is bounded, also beside a bright
-    /// pixel.
+    /// Checks that the weight of a sample, interpolated luminance divided by sampling density, is
+    /// bounded, also beside a bright pixel.
     #[test]
     fn weights_are_bounded_beside_a_bright_pixel() {
         let dark = [0.01f32; 3];

@@ -1,12 +1,12 @@
 //! Images of radiance for environment lights: Radiance HDR, OpenEXR, PNG and JPEG.
 //!
-//! The images are equirectangular. Rows have equal polar angles, from +y at the top to -y at the
-//! bottom. The middle of the image is in the direction -z, and +x is a quarter of the image to its
-//! right.
+//! The images are equirectangular. All pixels of a row have the same polar angle, from +y at the
+//! top to -y at the bottom. The middle of the image is in the direction -z, and +x is a quarter of
+//! the image to its right.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
-use crate::asset::image::Image;
+use crate::asset::image::{Image, check_size};
 use crate::asset::radiance_distribution::RadianceDistribution;
 use crate::value::Fnv1a64;
 use exr::meta::MetaData;
@@ -16,34 +16,31 @@ use image::{ImageDecoder, ImageError, ImageFormat};
 use std::f64::consts::{PI, TAU};
 use std::io::Cursor;
 
-/// Largest number of pixels in a row or column.
+/// Largest number of pixels in a row or column of an environment image.
 const MAX_MAP_SIDE: u32 = 16_384;
 
-/// Largest number of pixels: 32 Mi, such as 8192 x 4096. They take 403 MB.
+/// Largest number of pixels of an environment image: 32 Mi, such as 8192 x 4096. They take 403 MB.
 const MAX_MAP_PIXELS: u64 = 1 << 25;
 
-/// Largest number of pixels per byte of a file. A run of old Radiance files repeats a pixel up to
-/// 65536 times in 8 bytes. Deflate, in OpenEXR, compresses by a factor of at most 1032.
-const PIXELS_PER_BYTE: u64 = 8 * 1032;
-
-/// Largest radiance of a pixel; that of the sun is about 2e9 W/(sr m^2).
+/// Largest radiance of a pixel in an environment image; that of the sun is about 2e9 W/(sr m^2).
 const MAX_RADIANCE: f32 = 1e15;
 
-/// A decoded image of radiance. Numbers are linear, finite and at least 0.
+/// Decoded image of radiance from all directions, for environment lights. Its values are linear,
+/// finite and at least 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadianceMap {
     size: [u32; 2],
-    /// Red, green and blue of the pixels, row by row from the top.
+    /// Radiance (red, green, blue) of the image's pixels, row by row from the top.
     pixels: Vec<[f32; 3]>,
     distribution: RadianceDistribution,
     mean: [f64; 3],
 }
 
 impl RadianceMap {
-    /// Creates the map with the given pixels, row by row from the top.
+    /// Creates the image with the given pixels, row by row from the top.
     ///
     /// # Panics
-    /// If the number of pixels is not the product of the sides, or is 0.
+    /// Panics if the number of pixels is not the product of the sides, or is 0.
     pub fn new(size: [u32; 2], pixels: Vec<[f32; 3]>) -> Self {
         assert_eq!(pixels.len(), size[0] as usize * size[1] as usize);
         assert!(!pixels.is_empty());
@@ -52,9 +49,9 @@ impl RadianceMap {
         Self { size, pixels, distribution, mean }
     }
 
-    /// Decodes a file in memory. The format is determined by the first bytes of the file. Values of
-    /// Radiance files are divided by the product of the `EXPOSURE` lines; values of PNG and JPEG
-    /// files are sRGB levels. Negative values are replaced by 0.
+    /// Decodes an environment image file in memory. The format is determined by the first bytes of
+    /// the file. Values of Radiance files are divided by the product of the `EXPOSURE` lines;
+    /// values of PNG and JPEG files are sRGB levels. Negative values are replaced by 0.
     ///
     /// # Errors
     /// Fails if the file is not a valid image.
@@ -77,7 +74,7 @@ impl RadianceMap {
             }
             Ok(ImageFormat::Png | ImageFormat::Jpeg) => {
                 let image = Image::parse(source)?;
-                check_size(source, image.size())?;
+                check_size(source, image.size(), MAX_MAP_SIDE, MAX_MAP_PIXELS)?;
                 let [width, height] = image.size();
                 let row = |y| (0..width).map(move |x| (x, y));
                 let pixels = (0..height).flat_map(row).map(|(x, y)| image.color(x, y)).collect();
@@ -90,33 +87,29 @@ impl RadianceMap {
         }
     }
 
-    /// Adds size and pixels to `hash`.
+    /// Adds the size and the pixels of the image to `hash`.
     pub fn hash_contents(&self, hash: &mut Fnv1a64) {
         self.size.iter().for_each(|n| hash.update(&n.to_le_bytes()));
         self.pixels.iter().flatten().for_each(|x| hash.update(&x.to_le_bytes()));
     }
 
-    /// Returns width and height in pixels, each at least 1.
-    pub fn size(&self) -> [u32; 2] {
-        self.size
-    }
-
-    /// Returns the memory of pixels and distribution in bytes.
+    /// Returns the memory of the pixels and the sampling distribution in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.pixels[..]) + self.distribution.bytes()
     }
 
-    /// Mean radiance over all directions.
+    /// Returns the mean radiance of the image over all directions, weighted by solid angle.
     pub fn mean(&self) -> [f64; 3] {
         self.mean
     }
 
-    /// Largest channel of any pixel.
+    /// Returns the largest number of all pixels and channels (R, G, B) of the image.
     pub fn max(&self) -> f64 {
         self.pixels.iter().flatten().copied().fold(0.0, f32::max).into()
     }
 
-    /// Smallest channel of any pixel above 0; `None` if the image is black.
+    /// Returns the smallest number above 0 of all pixels and channels (R, G, B) of the image.
+    /// Returns `None` if the image is black.
     pub fn min(&self) -> Option<f64> {
         let channels = self.pixels.iter().flatten().copied().filter(|x| *x > 0.0);
         channels.reduce(f32::min).map(f64::from)
@@ -146,8 +139,9 @@ impl RadianceMap {
         std::array::from_fn(|c| above[c] + t * (below[c] - above[c]))
     }
 
-    /// Samples a direction in proportion to luminance. `u` and `v` are uniform in [0, 1). Returns
-    /// the unit vector and its density \[1/sr\].
+    /// Samples a direction with a density that follows the luminance of the image. `u` and `v` are
+    /// uniform in [0, 1). Returns two values: the unit vector of the direction, and the density
+    /// \[1/sr\] with which it is sampled.
     pub fn sample(&self, u: f64, v: f64) -> ([f64; 3], f64) {
         let (x, cos, density) = self.distribution.sample(u, v);
         let (sin_phi, cos_phi) = (TAU * x).sin_cos();
@@ -162,7 +156,8 @@ impl RadianceMap {
     }
 }
 
-/// Returns the position of a direction in the image: column and row, each from 0 to 1.
+/// Returns the position of a direction in the image: 0 to 1 from left to right, and 0 to 1 from top
+/// to bottom.
 fn position([x, y, z]: [f64; 3]) -> [f64; 2] {
     let turns = (-x).atan2(z) / TAU;
     let column = if turns < 0.0 { turns + 1.0 } else { turns };
@@ -171,15 +166,15 @@ fn position([x, y, z]: [f64; 3]) -> [f64; 2] {
 
 const EXPECTED: &str = "a Radiance HDR, OpenEXR, PNG or JPEG image";
 
-/// Decodes a floating-point image and multiplies it by `factor`. The size is checked before memory
-/// for the pixels is allocated.
+/// Decodes a floating-point image file and multiplies its values by `factor`. The size is checked
+/// before memory for the pixels is allocated.
 fn decode(
     source: &FileContents,
     decoder: impl ImageDecoder,
     factor: f32,
 ) -> Result<RadianceMap, AssetError> {
     let (width, height) = decoder.dimensions();
-    check_size(source, [width, height])?;
+    check_size(source, [width, height], MAX_MAP_SIDE, MAX_MAP_PIXELS)?;
     let mut bytes = vec![0; decoder.total_bytes() as usize];
     decoder.read_image(&mut bytes).map_err(|e| decode_error(source, &e))?;
     let float = |b: &[u8]| f32::from_ne_bytes([b[0], b[1], b[2], b[3]]);
@@ -207,23 +202,9 @@ fn check_layers(source: &FileContents) -> Result<(), AssetError> {
     })?;
     let side = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     data.headers.iter().try_for_each(|header| {
-        check_size(source, [side(header.layer_size.0), side(header.layer_size.1)])
+        let size = [side(header.layer_size.0), side(header.layer_size.1)];
+        check_size(source, size, MAX_MAP_SIDE, MAX_MAP_PIXELS)
     })
-}
-
-fn check_size(source: &FileContents, [width, height]: [u32; 2]) -> Result<(), AssetError> {
-    let pixels = u64::from(width) * u64::from(height);
-    let size = format!("the image has {width} x {height} pixels");
-    if width.max(height) > MAX_MAP_SIDE || pixels > MAX_MAP_PIXELS || pixels == 0 {
-        let expected =
-            format!("at least one, at most {MAX_MAP_SIDE} a side and {MAX_MAP_PIXELS} altogether");
-        return Err(source.error(FileLocation::Whole, size, &expected));
-    }
-    if pixels > PIXELS_PER_BYTE * source.bytes.len() as u64 {
-        let found = format!("{size}, more than its {} bytes can hold", source.bytes.len());
-        return Err(source.error(FileLocation::Whole, found, "a whole image"));
-    }
-    Ok(())
 }
 
 fn decode_error(source: &FileContents, error: &ImageError) -> AssetError {
@@ -241,7 +222,8 @@ mod tests {
         FileContents { path: PathBuf::from("sky.hdr"), bytes }
     }
 
-    /// Returns an image of powers of two, which every format stores exactly.
+    /// Returns a test image of 9 x 5 pixels with values from 0 to 2048, which OpenEXR stores
+    /// exactly.
     fn floats() -> Rgb32FImage {
         Rgb32FImage::from_fn(9, 5, |x, y| Rgb([f32::exp2(x as f32 + 3.0), 0.5, y as f32]))
     }
@@ -264,7 +246,7 @@ mod tests {
     fn radiance_is_decoded_from_every_format() {
         let exr = encoded(floats().into(), ImageFormat::OpenExr);
         let map = RadianceMap::parse(&source(exr)).unwrap();
-        assert_eq!(map.size(), [9, 5]);
+        assert_eq!(map.size, [9, 5]);
         assert_eq!(map.pixels[2 * 9 + 4], [128.0, 0.5, 2.0]);
         // The channels of a Radiance file share an exponent.
         let simple = Rgb32FImage::from_fn(9, 5, |x, _| Rgb([f32::exp2(x as f32); 3]));

@@ -13,20 +13,21 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::leaf_collapser::collapse;
 use obvhs::bvh2::node::Bvh2Node;
 
-/// Number of children of a node.
+/// Number of children of a node of the BVH.
 pub const BVH_WIDTH: usize = 8;
 
 /// Bit of a child index that marks a leaf.
 pub const LEAF_FLAG: u32 = 1 << 31;
 
-/// Inner node: bounds of up to eight children. Unused slots hold empty boxes, which no ray
-/// intersects.
+/// Inner node of a BVH8: bounds of up to eight children. Unused slots hold empty boxes, which no
+/// ray intersects.
 #[derive(Clone, Debug)]
 #[repr(align(32))]
 pub struct Bvh8Node {
-    /// Bounds of the children: smallest x, y and z of the boxes, then largest x, y and z.
+    /// Bounds of the eight children: smallest x, y and z of their boxes, then largest x, y and z.
     pub bounds: [[f32; BVH_WIDTH]; 6],
-    /// Index of each child. It is the index of a node, or of a leaf if [`LEAF_FLAG`] is set.
+    /// Index of each child in the node array. If [`LEAF_FLAG`] is set, the other bits are the index
+    /// of a leaf.
     pub child: [u32; BVH_WIDTH],
 }
 
@@ -43,7 +44,7 @@ const EMPTY_NODE: Bvh8Node = Bvh8Node {
 };
 
 impl Bvh8Node {
-    /// Iterates over the slots in use.
+    /// Iterates over the slots of this node that hold a child, 0 to 7.
     pub fn children(&self) -> impl Iterator<Item = usize> {
         (0..BVH_WIDTH).filter(|i| self.bounds[0][*i] <= self.bounds[3][*i])
     }
@@ -56,29 +57,32 @@ pub struct Bvh8 {
     depth: usize,
 }
 
-/// Effort of a build: a higher effort takes longer and gives a tree with faster traversal.
+/// Effort of a BVH build. A higher effort takes longer and gives a tree with faster traversal.
 #[derive(Clone, Copy, Debug)]
 pub struct BuildQuality {
-    /// Search window of the clustering.
+    /// Window in which the bottom-up clustering of the build searches for the nearest node.
     pub window: SearchWindow,
-    /// Share of the nodes that reinsertion may move before leaves are merged.
+    /// Share of the binary BVH's nodes, 0 to 1, that reinsertion may move before small leaves are
+    /// merged.
     pub reinsertion: f32,
-    /// Share of the nodes that reinsertion may move after leaves are merged.
+    /// Share of the binary BVH's nodes, 0 to 1, that reinsertion may move after small leaves are
+    /// merged.
     pub second_reinsertion: f32,
-    /// Cost of a node visit divided by the cost of a primitive's intersection test. A higher cost
-    /// gives larger leaves.
+    /// Cost of a node visit divided by the cost of a primitive's intersection test, in the surface
+    /// area heuristic. A higher cost gives larger leaves.
     pub traversal_cost: f32,
 }
 
 impl BuildQuality {
-    /// Short build, for a million primitives and more.
+    /// Build settings for a BVH of a million primitives and more: a short build, but slower ray
+    /// queries.
     pub const FAST: Self = Self {
         window: SearchWindow { narrow_passes: 2, distance: 6 },
         reinsertion: 0.02,
         second_reinsertion: 0.0,
         traversal_cost: 3.0,
     };
-    /// Thorough build, for primitives with expensive intersection tests.
+    /// Settings of a thorough build, for primitives with expensive intersection tests.
     pub const MEDIUM: Self = Self {
         window: SearchWindow { narrow_passes: 3, distance: 14 },
         reinsertion: 0.05,
@@ -87,19 +91,19 @@ impl BuildQuality {
     };
 }
 
-/// Result of a build: the hierarchy and the primitives of its leaves.
+/// Result of a BVH build: the hierarchy, and the primitives of its leaves.
 pub struct Bvh8Build {
-    /// The hierarchy.
+    /// Eight-wide hierarchy. Its leaf indices refer to `leaves`.
     pub bvh: Bvh8,
-    /// Indices of the primitives, sorted by leaf.
+    /// Indices of all primitives of the BVH, sorted by leaf.
     pub order: Vec<u32>,
-    /// Range of each leaf in `order`: first position, and number of primitives.
+    /// Range of each leaf's primitives in `order`: first position, and number of primitives.
     pub leaves: Vec<(u32, u32)>,
 }
 
 impl Bvh8 {
-    /// Builds the hierarchy of `count` primitives, at least one. `corners(i)` is the low and the
-    /// high corner of the bounding box of primitive `i`. A leaf holds at most `in_leaf` primitives.
+    /// Builds the BVH of `count` primitives, at least one. `corners(i)` is the low and the high
+    /// corner of the bounding box of primitive `i`. A leaf holds at most `in_leaf` primitives.
     pub fn build(
         count: usize,
         corners: impl Fn(usize) -> [[f32; 3]; 2],
@@ -126,24 +130,25 @@ impl Bvh8 {
         built
     }
 
-    /// Inner nodes; the first one is the root.
+    /// Returns the inner nodes of the hierarchy; the first one is the root.
     pub fn nodes(&self) -> &[Bvh8Node] {
         &self.nodes
     }
 
-    /// Largest number of inner nodes on a path from the root to a leaf.
+    /// Returns the largest number of inner nodes on a path from the root to a leaf.
     pub fn depth(&self) -> usize {
         self.depth
     }
 
-    /// Memory size of the nodes \[bytes\].
+    /// Returns the memory size of the inner nodes in bytes.
     pub fn bytes(&self) -> usize {
         size_of::<Bvh8Node>() * self.nodes.len()
     }
 }
 
 impl Bvh8Build {
-    /// Collapses a binary BVH into nodes and leaves.
+    /// Collapses the binary BVH `binary` into eight-wide nodes and leaves, which it appends to
+    /// `self`.
     fn collapse(&mut self, binary: &Bvh2) {
         let binary_nodes = &binary.nodes;
         let plan = CollapsePlan::new(binary_nodes);
@@ -182,10 +187,10 @@ impl Bvh8Build {
 /// Laine 2017, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*). Unlike
 /// in that paper, the leaves are those of the binary BVH.
 struct CollapsePlan {
-    /// Optimal distribution of slots for each binary node. Entry `n - 1` is for `n` slots, 1 to
-    /// [`BVH_WIDTH`]: the number of slots for the subtree of each child; `[0, 0]` means that the
-    /// node itself takes one slot. Entry 0 distributes all slots of the wide node that the binary
-    /// node becomes.
+    /// Best division of the slots of wide nodes; a slot holds one of the eight children. If the
+    /// binary node `i` may take `n` slots, 2 to 8, `splits[i][n - 1]` has the numbers of slots for
+    /// its two children, or `[0, 0]` if the node itself takes a single slot. If the binary node `i`
+    /// becomes a wide node, `splits[i][0]` divides the eight slots between its two children.
     splits: Vec<[[u8; 2]; BVH_WIDTH]>,
 }
 
@@ -234,7 +239,8 @@ impl CollapsePlan {
         Self { splits }
     }
 
-    /// Collects the binary nodes that become children of the wide node made from `node`.
+    /// Appends indices of binary nodes to `out`: the children of a wide node that replaces the
+    /// binary node `node`.
     fn children(&self, nodes: &[Bvh2Node], node: usize, out: &mut Vec<usize>) {
         let mut todo = Vec::with_capacity(BVH_WIDTH);
         let split = |todo: &mut Vec<(usize, u8)>, node: usize, [left, right]: [u8; 2]| {
@@ -259,21 +265,23 @@ impl CollapsePlan {
 mod tests {
     use super::*;
 
-    /// Returns the corners of box `i`. Boxes have about the side `size` and form a spiral; every
-    /// three of them are concentric.
+    /// Returns the low and the high corner of test box `i`. Its sides are 2 to 6 times `size`.
+    /// Boxes 3k, 3k + 1 and 3k + 2 contain the same point of a spiral.
     fn corners(i: usize, size: f32) -> [[f32; 3]; 2] {
         let angle = (i - i % 3) as f32;
         let center = [angle.sin() * angle, angle.cos() * angle, 0.3 * angle];
         [center.map(|x| x - size), center.map(|x| x + size * (1.0 + (i % 5) as f32))]
     }
 
-    /// Checks that every primitive is in exactly one leaf, and inside of all boxes on the path to
-    /// that leaf.
+    /// Builds the hierarchy of `count` boxes with sides of 2 to 6 times `size`, and at most
+    /// `in_leaf` boxes in a leaf. Checks that every box is in exactly one leaf, and inside of all
+    /// nodes on the path to that leaf.
     fn check_build(count: usize, size: f32, in_leaf: usize) {
         check_family(|i| corners(i, size), count, in_leaf, BuildQuality::FAST);
     }
 
-    /// Checks the hierarchy of the first `count` boxes of a family, as [`check_build`] does.
+    /// Checks the hierarchy of `count` boxes as [`check_build`] does. `corners(i)` is the low and
+    /// the high corner of box `i`. `quality` is the effort of the build.
     fn check_family(
         corners: impl Fn(usize) -> [[f32; 3]; 2],
         count: usize,
@@ -320,11 +328,11 @@ mod tests {
         }
     }
 
-    /// Family of boxes: function from the index of a box to its low and high corner.
+    /// Family of boxes: a function from the number of a box to its low and its high corner.
     type Family = fn(usize) -> [[f32; 3]; 2];
 
-    /// Families of boxes with equal or steadily growing distances between neighbours, the slow
-    /// cases of the clustering.
+    /// Families of boxes, each with a name, for which the clustering is slow: the distances between
+    /// neighbours are equal or grow steadily.
     const FAMILIES: [(&str, Family); 8] = [
         ("one box", |_| [[0.0; 3], [1.0; 3]]),
         ("one point", |_| [[0.5; 3]; 2]),
@@ -347,8 +355,9 @@ mod tests {
         (0..count).map(aabb).collect()
     }
 
-    /// A pass takes time proportional to the number of nodes, so that the number of passes bounds
-    /// the time. Without the merging of neighbours there are 4,000 passes, or half as many.
+    /// Checks that the clustering of 4,000 boxes of each family takes at most 95 passes. Each pass
+    /// takes time proportional to the number of remaining nodes. Without merges of neighbours on
+    /// the Morton curve, 2,000 to 4,000 passes would be needed.
     #[test]
     fn clustering_of_coincident_boxes_takes_few_passes() {
         for (name, family) in FAMILIES {
@@ -374,9 +383,9 @@ mod tests {
         times.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-9
     }
 
-    /// Checks that twice the boxes take at most 2.3 times the time, up to a million, and that a
-    /// million equal boxes take less than two seconds. The previous builder took over a minute for
-    /// 100,000 boxes of most families.
+    /// Checks that a build with twice as many boxes takes at most 2.3 times as long, up to a
+    /// million boxes, and that a million equal boxes take less than two seconds. The previous
+    /// builder took over a minute for 100,000 boxes of most families.
     ///
     /// cargo test --release --lib -- --ignored --nocapture builds_of_coincident_boxes
     #[test]

@@ -1,10 +1,11 @@
 //! Binary BVH by locally ordered clustering (Meister and Bittner 2018, *Parallel Locally-Ordered
 //! Clustering for Bounding Volume Hierarchy Construction*), in O(n log n) for every input.
 //!
-//! A pass over the nodes, in the order of the Morton curve, merges each two nodes that are nearest
-//! to each other. With many equal distances, such as between coincident boxes, boxes in a row or
-//! the triangles of a fan, a pass finds a single such pair, and n passes would be needed.
-//! Neighbours on the curve are then merged instead.
+//! A pass over the nodes, in the order of the Morton curve, merges every pair of nodes that are
+//! nearest to each other. If many distances are equal, such as between coincident boxes, boxes in a
+//! row or the triangles of a fan, a pass may find a single such pair. The number of passes would
+//! then be proportional to the number of boxes. In this case the passes merge neighbours on the
+//! curve instead.
 
 use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
@@ -12,32 +13,34 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
-/// Number of node visits per primitive before slow passes are shortened: they then merge each two
-/// neighbours on the Morton curve. Boxes at random positions need 3 visits per primitive
-/// altogether.
+/// Number of node visits per primitive after which slow clustering passes (see [`SLOW`]) are
+/// shortened. A shortened pass merges the 1st and 2nd node on the Morton curve, the 3rd and 4th,
+/// and so on. Boxes at random positions need 3 visits per primitive altogether.
 const PATIENT_VISITS: usize = 8;
 
-/// Limit of a slow pass: fewer than one pair per this number of nodes would be merged.
+/// Number of nodes per merged pair above which a clustering pass counts as slow.
 const SLOW: usize = 16;
 
-/// Index in [`Nearest`] of a node without a nearest node.
+/// Index in [`Nearest`] that means "no nearest node found".
 const NONE: u32 = u32::MAX;
 
-/// Window of the search for the nearest node: nodes before and after a node on the Morton curve.
+/// Window in which a clustering pass searches for the nearest node of each node: the nodes before
+/// and after it on the Morton curve.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchWindow {
-    /// Number of first passes with a window of one node on each side.
+    /// Number of passes, at the start, that search only the node before and the node after each
+    /// node.
     pub narrow_passes: usize,
-    /// Number of nodes on each side in later passes.
+    /// Number of nodes before and after each node that the other passes search.
     pub distance: usize,
 }
 
-/// Nearest node of a node: the area of the box that encloses both, and the index of the nearest
-/// node.
+/// Search result for one node. The index is that of its nearest node, and the number before it is
+/// half the surface area of the box around the two nodes.
 type Nearest = (f32, u32);
 
-/// Builds the binary BVH of primitives with the bounding boxes `bounds`, at least one. Each leaf
-/// has one primitive.
+/// Builds the binary BVH of primitives with the bounding boxes `bounds`, at least one, by
+/// clustering. Each leaf has one primitive. `window` limits the search for the nearest node.
 pub fn cluster(bounds: &[Aabb], window: SearchWindow) -> Bvh2 {
     let count = bounds.len();
     let mut nodes = sorted_leaves(bounds);
@@ -92,8 +95,9 @@ fn sorted_leaves(bounds: &[Aabb]) -> Vec<Bvh2Node> {
     codes.iter().map(|(_, i)| Bvh2Node::new(bounds[*i as usize], 1, *i as u32)).collect()
 }
 
-/// Writes to `nearest` the nearest node of each node among the `distance` nodes before and after
-/// it. Of equally near nodes the last is taken.
+/// Finds the nearest node of each node among the `distance` nodes before and after it, and writes
+/// it to `nearest`. The nearest node is the one for which the box around both nodes has the
+/// smallest surface area; of several such nodes, the last.
 fn find_nearest(nodes: &[Bvh2Node], distance: usize, nearest: &mut [Nearest]) {
     nearest.fill((f32::INFINITY, NONE));
     for (i, node) in nodes.iter().enumerate() {
@@ -120,8 +124,8 @@ fn mutual_pairs(nearest: &[Nearest]) -> usize {
     nearest.iter().enumerate().filter(ends_pair).count()
 }
 
-/// Pairs the nodes in order: each two neighbours become nearest to each other. The last of an odd
-/// number of nodes has no partner.
+/// Overwrites `nearest` with pairs of successive nodes: 0 and 1, 2 and 3, and so on. The last of an
+/// odd number of nodes has no partner.
 fn pair_neighbours(nearest: &mut [Nearest]) {
     let paired = nearest.len() & !1;
     for (i, (_, partner)) in nearest.iter_mut().enumerate() {

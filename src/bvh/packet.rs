@@ -3,27 +3,27 @@
 //! A coherent packet is tested against the eight boxes of a node at once, by interval bounds: the
 //! smallest and the largest origin and inverse direction of its rays on each axis (Boulos, Wald and
 //! Shirley 2006, *Geometric and Arithmetic Culling Methods for Entire Ray Packets*). The individual
-//! rays are tested only against the boxes that the bounds may enter. Single-ray traversal
+//! rays are tested only against the boxes that pass this first test. Single-ray traversal
 //! (`single.rs`) uses the same test, with bounds that contain one ray.
 
 use crate::bvh::Ray;
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3, array_from_fn};
 
-/// Ray packet with precomputed values for slab tests.
+/// Ray packet with values precomputed for slab tests against bounding boxes.
 #[derive(Clone, Copy)]
 pub struct SlabPacket<L> {
-    /// Ray origins plus the padding of the boxes.
+    /// Ray origins plus the padding by which boxes are enlarged.
     pub above: Vec3<L>,
-    /// Ray origins minus the padding of the boxes.
+    /// Ray origins minus the padding by which boxes are enlarged.
     pub below: Vec3<L>,
-    /// Reciprocals of the directions. They are finite also for axis-parallel rays.
+    /// Reciprocals of the ray directions. They are finite also for axis-parallel rays.
     pub inverse: Vec3<L>,
 }
 
 impl<L: SimdFloat> SlabPacket<L> {
-    /// Prepares the rays of `ray`. Tests enlarge boxes by `pad` on both sides of each axis, which
-    /// covers the rounding errors of the primitives' own intersection tests.
+    /// Prepares the packet `ray` for slab tests. The tests enlarge boxes by `pad` on both sides of
+    /// each axis, which covers the rounding errors of the primitives' own intersection tests.
     #[inline(always)]
     pub fn new(ray: &Ray<L>, pad: Vec3<L>) -> Self {
         let safe = |d: L| L::one() / d.abs().max(L::from_f64(1e-30)).copysign(d);
@@ -32,7 +32,8 @@ impl<L: SimdFloat> SlabPacket<L> {
         Self { above: ray.origin + pad, below: ray.origin - pad, inverse }
     }
 
-    /// Returns the rays that enter child box `i` of a node at a distance of at most `limit`.
+    /// Returns the mask of rays that enter child box `i` of `node` at a distance of at most
+    /// `limit`.
     #[inline(always)]
     fn enters_child(&self, node: &Bvh8Node, i: usize, limit: L) -> L::Mask {
         let corner = |k: usize| {
@@ -42,8 +43,8 @@ impl<L: SimdFloat> SlabPacket<L> {
         self.enters(corner(0), corner(3), limit)
     }
 
-    /// Returns the rays that enter the box between the corners `low` and `high` at a distance of at
-    /// most `limit`.
+    /// Returns the mask of rays that enter the box between the corners `low` and `high` at a
+    /// distance of at most `limit`.
     #[inline(always)]
     pub fn enters(&self, low: Vec3<L>, high: Vec3<L>, limit: L) -> L::Mask {
         let a = (low - self.above).component_mul(self.inverse);
@@ -54,25 +55,27 @@ impl<L: SimdFloat> SlabPacket<L> {
     }
 }
 
-/// Interval bounds of one or several rays. The directions of all rays have equal signs on each
-/// axis.
+/// Interval bounds of the origins and inverse directions of one or several rays. The directions of
+/// all rays have equal signs on each axis.
 #[derive(Clone, Copy, Default)]
 pub struct PacketBounds<S> {
-    /// Indices into [`Bvh8Node::bounds`] of the near side of a box, for each axis.
+    /// For each axis, the row of [`Bvh8Node::bounds`] with the box sides that the rays pass first.
     pub near: [usize; 3],
-    /// Indices into [`Bvh8Node::bounds`] of the far side of a box, for each axis.
+    /// For each axis, the row of [`Bvh8Node::bounds`] with the box sides that the rays pass last.
     pub far: [usize; 3],
-    /// Padded origin that is subtracted from the near sides.
+    /// For each axis, the number that is subtracted from the near sides of boxes: the largest ray
+    /// origin plus the padding if the directions ascend, otherwise the smallest minus the padding.
     pub near_origin: [S; 3],
-    /// Padded origin that is subtracted from the far sides.
+    /// For each axis, the number that is subtracted from the far sides of boxes: the smallest ray
+    /// origin minus the padding if the directions ascend, otherwise the largest plus the padding.
     pub far_origin: [S; 3],
-    /// Smallest and largest reciprocals of the directions, for each axis.
+    /// Smallest and largest reciprocals of the ray directions, for each axis.
     pub inverse: [[S; 3]; 2],
 }
 
 impl<S: Float> PacketBounds<S> {
-    /// Computes the bounds of the rays in the lanes of the bit mask `lanes`, at least one. Returns
-    /// `None` if the signs of their directions differ.
+    /// Computes the interval bounds of the rays in the lanes of the bit mask `lanes`, at least one.
+    /// Returns `None` if the directions of two rays have different signs on an axis.
     #[inline(always)]
     pub fn around<L: SimdFloat<Scalar = S>>(packet: &SlabPacket<L>, lanes: u32) -> Option<Self> {
         let d = packet.inverse;
@@ -99,13 +102,13 @@ impl<S: Float> PacketBounds<S> {
         })
     }
 
-    /// Returns two results for each box of a node: the smallest distance at which a ray may enter
-    /// it, and whether a ray may enter it at a distance of at most `limit`. `side` returns a side
-    /// of all boxes, numbered as in [`Bvh8Node::bounds`]. `ONE` is `true` if the bounds contain a
-    /// single ray.
+    /// Tests one child box of a node per lane. Returns two values for each box: the smallest
+    /// distance at which a ray may enter it, and `true` if a ray may enter it within the distance
+    /// `limit`. `side(k)` returns numbers of row k of [`Bvh8Node::bounds`]: one side of each tested
+    /// box. `ONE` is `true` if the bounds contain a single ray.
     ///
-    /// The result is conservative for [`SlabPacket::enters`], because rounded differences and
-    /// products are monotonic.
+    /// A box that a ray enters by [`SlabPacket::enters`] is always accepted, because rounded
+    /// differences and products are monotonic.
     #[inline(always)]
     pub fn enters<const ONE: bool, L: SimdFloat<Scalar = S>>(
         &self,
@@ -128,8 +131,8 @@ impl<S: Float> PacketBounds<S> {
     }
 }
 
-/// Returns the smallest and the largest coordinates over the lanes of `mask`. `first` is the index
-/// of one of these lanes.
+/// Returns the smallest and the largest coordinate of `v` on each axis, over the lanes of `mask`.
+/// `first` is the index of one of these lanes.
 #[inline(always)]
 fn min_max<L: SimdFloat>(
     v: Vec3<L>,
@@ -141,41 +144,44 @@ fn min_max<L: SimdFloat>(
     ([x.0, y.0, z.0], [x.1, y.1, z.1])
 }
 
-/// Returns the factor by which far distances are enlarged to cover rounding, so that no hit is lost
-/// (Ize 2013, *Robust BVH Ray Traversal*).
+/// Returns the factor, slightly above 1, by which the slab test enlarges exit distances of boxes to
+/// cover rounding, so that no hit is lost (Ize 2013, *Robust BVH Ray Traversal*).
 #[inline(always)]
 fn far_scale<L: SimdFloat>() -> L {
     L::from_f64(1.0 + 8.0 * L::EPSILON)
 }
 
-/// Returns `x` in all lanes.
+/// Returns a packet with `x` in all lanes.
 #[inline(always)]
 pub fn broadcast<L: SimdFloat>(x: f32) -> L {
     L::splat(L::Scalar::from_f64(f64::from(x)))
 }
 
-/// Loads `WIDTH` of the eight numbers of a node, from position `part * WIDTH` on. If there are more
-/// lanes than numbers, the numbers are repeated from the start.
+/// Loads `WIDTH` of the eight numbers that a BVH8 node stores for its children. The first one is at
+/// position `part * WIDTH`. If there are more lanes than numbers, the numbers are repeated from the
+/// start.
 #[inline(always)]
 pub fn load_wide<L: SimdFloat>(numbers: &[f32; BVH_WIDTH], part: usize) -> L {
     L::from_fn(|i| L::Scalar::from_f64(f64::from(numbers[(part * L::WIDTH + i) % BVH_WIDTH])))
 }
 
-/// Mask bits of the lanes that hold no repeated numbers after [`load_wide`].
+/// Returns the bit mask of the lanes in which [`load_wide`] loads numbers without repetition.
 #[inline(always)]
 pub const fn valid_lanes() -> u32 {
     (1 << BVH_WIDTH) - 1
 }
 
-/// Child on the traversal stack, with the distance at which rays may enter it.
+/// Entry of the packet traversal stack: the index of a child, and the smallest distance at which
+/// rays may enter its box.
 #[derive(Clone, Copy, Default)]
 pub struct StackEntry<S> {
     child: u32,
     near: S,
 }
 
-/// Calls `traverse` with a stack of `per_level` entries for each level of the hierarchy. A stack of
-/// up to `LARGE` entries is on the call stack, a larger one on the heap.
+/// Calls `traverse` with a traversal stack of at least `per_level` entries for each level of the
+/// hierarchy. The stack is an array of `SMALL` or `LARGE` entries, or on the heap if `LARGE`
+/// entries do not suffice.
 #[inline(always)]
 pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     per_level: usize,
@@ -192,8 +198,9 @@ pub fn with_stack<T: Copy + Default, R, const SMALL: usize, const LARGE: usize>(
     }
 }
 
-/// Pushes an entry to the stack. The entries from index `base` on stay sorted by descending
-/// distance.
+/// Pushes `entry` to the traversal stack, which has `top` entries. The entries from index `base`
+/// on, which are children of the same node, stay sorted by descending distance. The nearest child
+/// is thus visited first.
 #[inline(always)]
 fn push_sorted<S: Float>(
     stack: &mut [StackEntry<S>],
@@ -210,10 +217,11 @@ fn push_sorted<S: Float>(
     *top += 1;
 }
 
-/// Traverses the hierarchy with a packet. Calls `leaf(index, limit)` for each leaf whose box a ray
-/// may enter at a distance of at most the ray's limit, ordered by the smallest possible entry
-/// distance. `leaf` returns the new limits of the rays. A ray with a negative limit is inactive.
-/// `bounds` are the interval bounds of the active rays; `None` if these rays are incoherent.
+/// Traverses the hierarchy with a ray packet. Calls `leaf(index, limit)` for each leaf whose box a
+/// ray may enter at a distance of at most the ray's limit. `leaf` returns the new limits of the
+/// rays. A ray with a negative limit is inactive. `bounds` are the interval bounds of the active
+/// rays; `None` if the directions of two rays have different signs on an axis. With bounds, the
+/// children of a node are visited in the order of their smallest possible entry distances.
 #[inline(always)]
 pub fn traverse_packet<L: SimdFloat>(
     bvh: &Bvh8,

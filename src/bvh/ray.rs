@@ -2,12 +2,12 @@
 
 use crate::lanes::{Mask, SimdFloat, Vec3};
 
-/// A packet of rays.
+/// Packet of rays, one per SIMD lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray<L> {
-    /// Origins.
+    /// Origins of the rays.
     pub origin: Vec3<L>,
-    /// Directions, of unit length.
+    /// Directions of the rays, of unit length.
     pub direction: Vec3<L>,
 }
 
@@ -18,9 +18,9 @@ impl<L: SimdFloat> Ray<L> {
         self.direction.mul_add(t, self.origin)
     }
 
-    /// Returns `true` if the rays of `lanes`, at least one, are coherent. Their directions differ
-    /// by at most `max_turn` (length of the difference of unit vectors), and each coordinate of
-    /// their origins by at most `max_shift`.
+    /// Returns `true` if the rays in the bit mask `lanes`, at least one, are coherent. Coherent
+    /// rays differ from the first of them by at most `max_turn` (length of the difference of the
+    /// unit directions) and by at most `max_shift` in each coordinate of the origin.
     #[inline(always)]
     pub fn is_coherent(&self, lanes: u32, max_turn: f64, max_shift: f64) -> bool {
         let lane = lanes.trailing_zeros() as usize;
@@ -32,33 +32,28 @@ impl<L: SimdFloat> Ray<L> {
     }
 }
 
-/// Closest hits of a packet found so far.
+/// Closest hits that the rays of a packet have found so far.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit<L> {
     /// Distance along the ray; `L::MAX` for a miss.
     pub t: L,
-    /// Id of the primitive. Undefined for a miss.
+    /// Id of the primitive that the ray hits. Undefined for a miss.
     pub item: L,
-    /// Id of the triangle if the primitive is a mesh. Undefined for other primitives and for a
-    /// miss.
+    /// Id of the triangle that the ray hits, if the primitive is a mesh. Undefined for other
+    /// primitives and for a miss.
     pub triangle: L,
 }
 
 impl<L: SimdFloat> Hit<L> {
-    /// Returns misses in all lanes.
-    #[inline(always)]
-    pub fn none() -> Self {
-        Self::with_t_max(L::from_f64(L::MAX))
-    }
-
-    /// Returns misses that accept only hits at distances below `t`, in [`Hit::keep_closer`] and
-    /// [`Hit::merge`]. Inactive lanes have a negative `t`.
+    /// Creates a packet without hits whose distance limits are `t`: [`Hit::keep_closer`] and
+    /// [`Hit::merge`] accept only hits closer than `t`. A negative `t` marks an inactive lane.
     #[inline(always)]
     pub fn with_t_max(t: L) -> Self {
         Self { t, item: L::from_id(0), triangle: L::from_id(0) }
     }
 
-    /// Replaces distance, primitive id and triangle id in `lanes`.
+    /// Replaces the distance, the primitive id and the triangle id in the lanes of the mask
+    /// `lanes`.
     #[inline(always)]
     pub fn take_in(&mut self, lanes: L::Mask, t: L, (item, triangle): (L, L)) {
         self.t = L::select(lanes, t, self.t);
@@ -66,8 +61,8 @@ impl<L: SimdFloat> Hit<L> {
         self.triangle = L::select(lanes, triangle, self.triangle);
     }
 
-    /// Accepts a hit on `item` at distance `t` in the lanes of `mask` where `t` is positive and
-    /// smaller than the current distance.
+    /// Accepts a hit on primitive `item` at distance `t` in the lanes of `mask` where `t` is
+    /// positive and smaller than the current distance.
     #[inline(always)]
     pub fn keep_closer(&mut self, mask: L::Mask, t: L, item: u32) {
         let nearer = mask & t.gt(L::zero()) & t.lt(self.t);
@@ -75,7 +70,8 @@ impl<L: SimdFloat> Hit<L> {
         self.item = L::select(nearer, L::from_id(item), self.item);
     }
 
-    /// Accepts the hits of `other` that are closer, or equally close with a smaller primitive id.
+    /// Accepts the hits of `other` that are closer than those of `self`, or equally close with a
+    /// smaller primitive id.
     #[inline(always)]
     pub fn merge(&mut self, other: &Self) {
         let mut nearer = other.t.lt(self.t);

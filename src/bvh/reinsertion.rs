@@ -2,37 +2,40 @@
 //! Bounding Volume Hierarchy Optimization*), with a bound on the time.
 //!
 //! A subtree moves to the place where the sum of all surface areas becomes smallest. The search for
-//! this place skips subtrees that cannot improve the sum. Nested boxes allow no skipping, and the
-//! search of each node would visit all others; the optimisation then ends early.
+//! this place skips subtrees that cannot improve the sum. If boxes are nested, no subtree can be
+//! skipped, and the search for each node would visit all others; the optimisation then ends early.
 
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::reinsert_node;
 
-/// Number of node visits, for each node of the tree, after which the optimisation ends. Boxes at
-/// random positions need 1 to 3, boxes that overlap heavily up to 50.
+/// Largest total number of node visits of the optimisation by reinsertion, per node of the tree.
+/// The optimisation ends when this number is reached. Boxes at random positions need 1 to 3 visits
+/// per node, boxes that overlap heavily up to 50.
 const MAX_VISITS: usize = 64;
 
-/// Move of the subtree `from`: it becomes the sibling of the node `to`.
+/// Move of a subtree in a binary BVH: the subtree `from` becomes the sibling of the node `to`.
 struct Reinsertion {
     from: u32,
     to: u32,
-    /// Decrease of the sum of the surface areas of all nodes, halved; positive.
+    /// Decrease of the sum of all nodes' surface areas by this move, divided by 2; greater than 0.
     saved: f32,
 }
 
-/// Search for the best new position of a subtree, with the number of its node visits limited.
+/// Search for the best new position of a BVH subtree, with a limited number of node visits.
 struct Search {
-    /// Number of visits left before the search gives up.
+    /// Number of node visits left, over all searches, before the optimisation ends.
     visits_left: usize,
-    /// Stack of nodes to visit, each with the half area that removing the subtree and descending to
-    /// the node saves.
+    /// Nodes to visit, the last one first. The number before a node is half the surface area saved
+    /// so far: the decrease by the removal of the subtree, less the growth of the nodes above this
+    /// node.
     stack: Vec<(f32, u32)>,
 }
 
-/// Moves subtrees of `tree` in 16 rounds. The first round considers the share `ratio` of the nodes,
-/// those of the largest areas. Round n considers 1/(2n - 1) of this share.
+/// Optimises a binary BVH by moving subtrees in 16 rounds. The first round considers the share
+/// `ratio` (0 to 1) of the nodes, those with the largest areas. Round n considers 1/(2n - 1) of
+/// this share.
 pub fn optimize(tree: &mut Bvh2, ratio: f32) {
     if ratio <= 0.0 || tree.nodes[0].is_leaf() {
         return;
@@ -66,8 +69,8 @@ pub fn optimize(tree: &mut Bvh2, ratio: f32) {
     }
 }
 
-/// Returns the `count` nodes with the largest areas among the first `2 * count + 1` after the root.
-/// The order of the nodes puts those near the root first.
+/// Returns the indices of the `count` nodes with the largest surface areas among nodes 1 to `2 *
+/// count + 1`. Node 0 is the root, and the next nodes are those near the root.
 fn largest_nodes(tree: &Bvh2, count: usize) -> Vec<usize> {
     let end = tree.nodes.len().min(2 * (count + 1));
     let area = |node: usize| tree.nodes[node].aabb().half_area();
@@ -77,14 +80,14 @@ fn largest_nodes(tree: &Bvh2, count: usize) -> Vec<usize> {
 }
 
 impl Search {
-    /// Counts a visit. Returns `false` if the limit of visits is reached.
+    /// Counts a node visit. Returns `false` if the limit of visits is reached.
     fn visit(&mut self) -> bool {
         self.visits_left = self.visits_left.saturating_sub(1);
         self.visits_left > 0
     }
 
     /// Returns the best move of the subtree `node`, which is not the root. Returns `None` if no
-    /// move saves area, or if the limit of visits is reached.
+    /// move saves surface area, or if the limit of node visits is reached.
     fn best_reinsertion(&mut self, tree: &Bvh2, node: usize) -> Option<Reinsertion> {
         let nodes = &tree.nodes;
         let area = |aabb: &Aabb| aabb.half_area();

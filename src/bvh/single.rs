@@ -10,39 +10,42 @@ use crate::bvh::packet::{PacketBounds, SlabPacket, load_wide, valid_lanes};
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn, prefetch};
 
-/// Stack frame: children of a node that the ray enters and has not visited yet.
+/// Stack frame of single-ray BVH traversal: children of a node that the ray enters and has not
+/// visited yet.
 #[derive(Clone, Copy, Default)]
 pub struct StackFrame {
-    /// Keys of the slots. A key is the bits of the distance at which the ray enters the child, with
-    /// the slot number in the last three bits. The smallest key belongs to the nearest child. Slots
-    /// without a child to visit have [`NO_KEY`] or a larger key.
+    /// Sort keys of the node's eight children. A key is the bits of the distance at which the ray
+    /// enters the child, with the slot number in the last three bits. The smallest key belongs to
+    /// the nearest child. Slots without a child to visit have [`NO_KEY`] or a larger key.
     keys: [u32; BVH_WIDTH],
     node: u32,
-    /// Number of children that have not been visited.
+    /// Number of children in this frame that have not been visited.
     remaining: u32,
 }
 
-/// Key of an empty slot: the bits of infinity in single precision.
+/// Sort key of a slot without a child to visit: the bits of infinity in single precision.
 const NO_KEY: u32 = 0x7f80_0000;
 
-/// Mask of the bits of a key that hold the slot number.
+/// Mask of the low bits of a sort key, which hold the slot number of the child.
 const SLOT_MASK: u32 = BVH_WIDTH as u32 - 1;
 
-/// Traversal state of one ray.
+/// State of one ray in single-ray BVH traversal.
 #[derive(Clone, Copy, Default)]
 struct RayTraversal<S> {
     bounds: PacketBounds<S>,
     limit: S,
-    /// Index of the next node or leaf, as in [`Bvh8Node::child`].
+    /// Index of the node or leaf to visit next, as in [`Bvh8Node::child`].
     child: u32,
-    /// Number of frames on the ray's stack.
+    /// Number of frames on the ray's traversal stack. A frame holds the children of one node that
+    /// wait for a visit.
     frames: usize,
 }
 
-/// Traverses the hierarchy with each ray of `lanes` (a bit mask) separately. Calls `leaf(lane,
+/// Traverses the hierarchy with each ray of the bit mask `lanes` separately. Calls `leaf(lane,
 /// index, limit)` for each leaf whose box the ray of a lane enters at a distance of at most its
-/// limit, from near to far. `leaf` returns the new limit of the ray. Calls `prefetch_leaf(index)`
-/// some time before it visits the leaf. `frames` has one entry for each lane and level.
+/// limit. The children of a node are visited from near to far. `leaf` returns the new limit of the
+/// ray. Calls `prefetch_leaf(index)` some time before it visits the leaf. `frames` has memory for
+/// one stack frame for each lane and level.
 #[inline(never)]
 pub fn traverse_rays<L: SimdFloat>(
     bvh: &Bvh8,
@@ -88,7 +91,7 @@ pub fn traverse_rays<L: SimdFloat>(
     }
 }
 
-/// Prefetches the cache lines of a node.
+/// Prefetches the cache lines of a BVH node.
 #[inline(always)]
 fn prefetch_node(node: &Bvh8Node) {
     let [a, _, b, _, c, _] = &node.bounds;
@@ -98,7 +101,7 @@ fn prefetch_node(node: &Bvh8Node) {
     prefetch(&node.child);
 }
 
-/// Removes the smallest key and returns it.
+/// Removes the smallest sort key, which is that of the nearest child, and returns it.
 #[inline(always)]
 fn pop_least(keys: &mut [u32; BVH_WIDTH]) -> u32 {
     let least = keys.iter().fold(u32::MAX, |least, key| least.min(*key));
@@ -107,7 +110,7 @@ fn pop_least(keys: &mut [u32; BVH_WIDTH]) -> u32 {
 }
 
 impl<S: Float> RayTraversal<S> {
-    /// Returns the initial states of all lanes, at the root.
+    /// Returns the initial traversal states of all lanes of `packet`, at the root.
     #[inline(always)]
     fn each<L: SimdFloat<Scalar = S>>(packet: &SlabPacket<L>, limit: L) -> [Self; MAX_WIDTH] {
         let d = packet.inverse;
@@ -133,8 +136,9 @@ impl<S: Float> RayTraversal<S> {
         each
     }
 
-    /// Visits the current node. The ray continues with the nearest child that it enters, and a
-    /// frame with its other entered children is pushed. Returns `false` if the ray enters no child.
+    /// Visits the current node of the ray. The ray continues with the nearest child that it enters,
+    /// and a stack frame with its other entered children is pushed. Returns `false` if the ray
+    /// enters no child.
     #[inline(always)]
     fn expand<L: SimdFloat<Scalar = S>>(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         let node = &bvh.nodes()[self.child as usize];
@@ -165,8 +169,8 @@ impl<S: Float> RayTraversal<S> {
         true
     }
 
-    /// Continues with the nearest unvisited child within the limit, from the topmost frame that has
-    /// one. Returns `false` if no frame has one.
+    /// Continues with the nearest unvisited child within the ray's limit, from the topmost stack
+    /// frame that has one. Returns `false` if no frame has one.
     #[inline(always)]
     fn next(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         while self.frames > 0 {

@@ -5,35 +5,38 @@ use crate::value::{Field, FieldValue, NumberRange, ValidationError, Validator, V
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// Aperture of the lens. The blur of objects outside of the plane in focus is in proportion to it.
+/// Aperture of the camera's lens, given by its radius or its f-number. The blur of objects outside
+/// of the plane in focus is in proportion to the radius.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Aperture {
-    /// Radius of the lens; 0 is a pinhole.
+    /// Radius of the lens in scene units; 0 is a pinhole.
     Radius(f64),
-    /// F-number: focal length divided by the diameter of the lens, for film of 36 x 24 mm and scene
-    /// units of one metre.
+    /// F-number: focal length divided by the diameter of the lens. The film has 36 x 24 mm, and a
+    /// scene unit is one metre.
     FNumber(f64),
 }
 
-/// Plane in focus, perpendicular to the view direction.
+/// Plane in focus of the camera's lens, perpendicular to the view direction. It is given by its
+/// distance or by a point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Focus {
-    /// Distance of the plane from the eye, along the view direction.
+    /// Distance of the plane in focus from the eye along the view direction, in scene units.
     Distance(f64),
-    /// A point of the plane.
+    /// Any point of the plane in focus, in scene coordinates.
     Point([f64; 3]),
 }
 
-/// Largest lens radius.
+/// Largest valid lens radius, in scene units.
 const MAX_RADIUS: f64 = 1e9;
 
-/// Smallest distance of the plane in focus, as a fraction of the lens radius.
+/// Smallest distance of the plane in focus from the eye, as a fraction of the lens radius.
 const MIN_FOCUS_PER_RADIUS: f64 = 1e-6;
 
-/// Half the height and half the width of the picture on film \[m\].
+/// Half the height of the picture on film of 36 x 24 mm \[m\].
 const HALF_FILM_HEIGHT: f64 = 0.012;
+/// Half the width of the picture on film of 36 x 24 mm \[m\].
 const HALF_FILM_WIDTH: f64 = 0.018;
 
 const APERTURES: &[Field] = &[
@@ -66,7 +69,8 @@ const FOCI: &[Field] = &[
     ),
 ];
 
-/// Returns the errors of `inner` with the key `outer` before their keys.
+/// Returns the validation errors of `inner` with the name of the field `outer` before each key,
+/// such as `focus.point`.
 pub(super) fn inside(outer: &Field, inner: Validator) -> Vec<ValidationError> {
     let mut errors = inner.errors();
     for error in &mut errors {
@@ -131,7 +135,7 @@ impl Camera {
         }
     }
 
-    /// Returns the focal length of the lens, for film of 36 x 24 mm \[m\].
+    /// Returns the focal length of the lens in metres, for film of 36 x 24 mm.
     pub fn focal_length(&self) -> f64 {
         let half = match self.view_angle {
             ViewAngle::Vertical(_) => HALF_FILM_HEIGHT,
@@ -141,9 +145,10 @@ impl Camera {
     }
 
     /// Returns the distance of the plane in focus from the eye along the view direction, greater
-    /// than 0. Without `focus` the target is in focus. A plane behind the eye is replaced by its
-    /// mirror image in front. The distance is at least a millionth of the lens radius, and of the
-    /// distance of the point in focus.
+    /// than 0. Without `focus`, the plane contains the target. A point in focus behind the eye
+    /// counts as one at the same distance in front. The result is at least a millionth of the lens
+    /// radius. For a point or target in focus, it is also at least a millionth of the distance of
+    /// this point from the eye.
     pub fn focus_depth(&self) -> f64 {
         let point = match (self.focus, self.target) {
             (Some(Focus::Distance(distance)), _) => Err(distance),
@@ -162,8 +167,8 @@ impl Camera {
         depth.max(MIN_FOCUS_PER_RADIUS * self.lens_radius()).max(f64::MIN_POSITIVE)
     }
 
-    /// Returns the error of a point in focus at the eye, or of an aperture without `focus` and
-    /// `target`.
+    /// Returns a validation error if the point in focus is the eye itself, or if the aperture is
+    /// open and neither `focus` nor `target` is given. Otherwise returns `None`.
     pub(super) fn focus_error(&self) -> Option<ValidationError> {
         if self.focus == Some(Focus::Point(self.eye)) {
             return Some(ValidationError::new(

@@ -1,4 +1,4 @@
-//! Camera: description, lens, navigation, compiled form.
+//! Camera: description in scene files, lens, navigation, and compiled form.
 
 mod lens;
 mod navigate;
@@ -19,13 +19,13 @@ description! {
     pub struct Camera {
         /// Position of the camera.
         eye: [f64; 3] => "eye" "[0.0, 1.0, 5.0]", in COORDINATE "scene units";
-        /// The point looked at. Exactly one of `target` and `direction` is given.
+        /// Point that the camera looks at. Exactly one of `target` and `direction` is given.
         target: Option<[f64; 3]>, or "`direction` is needed", in COORDINATE "scene units";
-        /// The direction looked in.
+        /// View direction of the camera.
         direction: Option<[f64; 3]>, or "`target` is needed", as Direction;
         /// Up direction of the picture; not parallel to the view direction.
         up: [f64; 3] => "up" "[0.0, 1.0, 0.0]", as Direction;
-        /// Opening angle, across the height or across the width of the picture.
+        /// Opening angle of the camera, across the height or across the width of the picture.
         view_angle: ViewAngle => "view_angle" "{ vertical = 40.0 }";
         /// Near plane: its distance along the view direction; surfaces in front of it are
         /// invisible.
@@ -37,13 +37,13 @@ description! {
     }
 }
 
-/// Opening angle of the picture in degrees, between 0 and 180.
+/// Opening angle of the camera in degrees, between 0 and 180.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ViewAngle {
-    /// Across the picture's height.
+    /// Opening angle across the picture's height, in degrees.
     Vertical(f64),
-    /// Across the picture's width.
+    /// Opening angle across the picture's width, in degrees.
     Horizontal(f64),
 }
 
@@ -76,7 +76,7 @@ impl Default for Camera {
     }
 }
 
-/// Keys of `[camera]`.
+/// Keys of the `[camera]` table in scene files.
 pub const FIELDS: &[Field] = Camera::FIELDS;
 
 const ANGLE: ValueType = ValueType::Number(NumberRange::between(0.0, 180.0));
@@ -100,7 +100,8 @@ impl FieldValue for ViewAngle {
 }
 
 impl ViewAngle {
-    /// Returns the key of the angle, `vertical` or `horizontal`, and the angle in degrees.
+    /// Returns the key of the opening angle in scene files, `vertical` or `horizontal`, and the
+    /// angle in degrees.
     pub fn key_degrees(&self) -> (&'static str, f64) {
         match *self {
             Self::Vertical(degrees) => ("vertical", degrees),
@@ -110,8 +111,9 @@ impl ViewAngle {
 }
 
 impl Camera {
-    /// Returns the unit vector of the view direction. Returns `None` if `target` is the eye itself,
-    /// if `direction` is zero, or if not exactly one of `target` and `direction` is given.
+    /// Returns the unit vector of the camera's view direction. Returns `None` if `target` is the
+    /// eye itself, if `direction` is zero, or if not exactly one of `target` and `direction` is
+    /// given.
     pub fn view(&self) -> Option<DVec3> {
         let look = match (self.target, self.direction) {
             (Some(target), None) => DVec3::from_array(target) - DVec3::from_array(self.eye),
@@ -143,8 +145,9 @@ impl Camera {
         checks.and(self.orientation_error()).and(self.focus_error()).errors()
     }
 
-    /// Returns the error of a camera whose numbers are all in range but do not define the axes of
-    /// the picture: the target is the eye, or `up` is parallel to the view direction.
+    /// Returns a validation error if the camera does not define the axes of the picture: the target
+    /// is the eye, or `up` is parallel to the view direction. Returns `None` otherwise. All numbers
+    /// of the camera must be in range.
     fn orientation_error(&self) -> Option<ValidationError> {
         let Some(view) = self.view() else {
             return Some(ValidationError::new(

@@ -1,24 +1,25 @@
 //! Interactive camera movements: orbit, pan, dolly, fly, look, roll, zoom, frame.
 //!
-//! Every function returns a moved camera, which has `target` or `direction` as the old one has. The
-//! pivot of a movement is the target; for a camera with a direction it is the point at a given
-//! distance ahead. Numbers are rounded to about a millionth of the distance to the pivot. A
-//! movement to an invalid camera (coordinates out of range, no distance left) returns the old
-//! camera. Rotations are relative to `up`; the view direction stays at least 0.1 degrees away from
-//! `up`.
+//! Every function returns a moved camera. It has a `target` if the old camera has one, otherwise a
+//! `direction`. The pivot of a movement is the target; for a camera with a direction it is the
+//! point ahead at the distance that the caller gives. Coordinates are rounded to about a millionth
+//! of the distance to the pivot. If the moved camera would be invalid (coordinates out of range, or
+//! eye and target equal), the function returns the old camera. Rotations are relative to `up`; the
+//! view direction stays at least 0.1 degrees away from `up`.
 
 use crate::camera::{Camera, ViewAngle};
 use crate::value::{floor_log10, round_significant, rounded_to, unit};
 use glam::DVec3;
 
-/// Steepest view up or down, in degrees above or below the plane perpendicular to `up`.
+/// Steepest view up or down that interactive movements allow, in degrees above or below the plane
+/// perpendicular to `up`.
 const MAX_PITCH: f64 = 89.9;
-/// Narrowest and widest opening angle of a zoom, in degrees.
+/// Smallest and largest opening angle to which interactive zoom goes, in degrees.
 const ZOOM_ANGLES: [f64; 2] = [0.1, 170.0];
 
 impl Camera {
-    /// Returns orthonormal vectors to the right, up in the picture, and forward. They are also
-    /// defined for an invalid camera.
+    /// Returns the camera's axes as orthonormal vectors to the right, up in the picture, and
+    /// forward. They are also defined for an invalid camera.
     pub fn frame(&self) -> [DVec3; 3] {
         let forward = self.view().unwrap_or(DVec3::NEG_Z);
         let up = unit(self.up).unwrap_or(DVec3::Y);
@@ -38,8 +39,9 @@ impl Camera {
         }
     }
 
-    /// Orbits the pivot at constant distance, `right` degrees to the right and `up` degrees
-    /// upwards. The pivot of a camera without a target is the point `distance` ahead.
+    /// Orbits the camera around its pivot (the target) at constant distance, `right` degrees to the
+    /// right and `up` degrees upwards. The pivot of a camera without a target is the point
+    /// `distance` ahead.
     pub fn orbit(&self, right: f64, up: f64, distance: f64) -> Self {
         let distance = self.pivot_distance(distance);
         // The view direction rotates against the movement of the eye.
@@ -49,17 +51,18 @@ impl Camera {
         self.placed(pivot - forward * distance, forward, distance)
     }
 
-    /// Moves across the view direction by `right` and `up`, as fractions of the distance to the
-    /// pivot. The pivot of a camera without a target is the point `distance` ahead.
+    /// Moves the camera across the view direction by `right` and `up`, as fractions of the distance
+    /// to its pivot (the target). The pivot of a camera without a target is the point `distance`
+    /// ahead.
     pub fn pan(&self, right: f64, up: f64, distance: f64) -> Self {
         let distance = self.pivot_distance(distance);
         let [x, y, _] = self.frame();
         self.shifted((x * right + y * up) * distance, distance)
     }
 
-    /// Multiplies the distance to the pivot by `factor`; less than 1 is nearer. The pivot of a
-    /// camera without a target is the point `distance` ahead. The camera stays on its side of the
-    /// pivot.
+    /// Multiplies the camera's distance to its pivot (the target) by `factor`; less than 1 is
+    /// nearer. The pivot of a camera without a target is the point `distance` ahead. The camera
+    /// stays on its side of the pivot.
     pub fn dolly(&self, factor: f64, distance: f64) -> Self {
         let old = self.pivot_distance(distance);
         if !(factor > 0.0 && factor.is_finite()) {
@@ -76,7 +79,7 @@ impl Camera {
         self.placed(pivot - forward * new, forward, new)
     }
 
-    /// Moves eye and target by `right`, `up` (in the picture) and `ahead`, in scene units.
+    /// Moves the eye and the target by `right`, `up` (in the picture) and `ahead`, in scene units.
     pub fn fly(&self, [right, up, ahead]: [f64; 3]) -> Self {
         let [x, y, z] = self.frame();
         let translation = x * right + y * up + z * ahead;
@@ -107,8 +110,8 @@ impl Camera {
         self.valid_or_self(Self { up, ..self.clone() })
     }
 
-    /// Multiplies the width of the field of view at unit distance by `factor`; less than 1 is
-    /// narrower.
+    /// Multiplies the width of the picture plane at unit distance by `factor`, by changing the
+    /// opening angle. A factor less than 1 narrows the view.
     pub fn zoom(&self, factor: f64) -> Self {
         if !(factor > 0.0 && factor.is_finite()) {
             return self.clone();
@@ -147,7 +150,7 @@ impl Camera {
     }
 
     /// Returns the distance from the eye to the target, or `distance` if the camera has no target.
-    /// Returns 1 if the result would not be positive and finite.
+    /// If this distance is not positive and finite, returns 1.
     fn pivot_distance(&self, distance: f64) -> f64 {
         let to_target = self.target.map(|t| DVec3::from_array(t) - DVec3::from_array(self.eye));
         let distance = to_target.map_or(distance, DVec3::length);
@@ -171,16 +174,18 @@ impl Camera {
         Some((level * pitch.cos() + axis * pitch.sin()).normalize())
     }
 
-    /// Returns the camera moved to `eye`, with the view direction `forward`. A target moves to the
-    /// point `distance` ahead. Coordinates of an unchanged eye are not rounded. Returns this camera
-    /// if the result would be invalid.
+    /// Returns the camera moved to `eye`, with the view direction `forward`. If the eye moves, the
+    /// target is kept; otherwise the target moves to the point `distance` ahead of the eye. The
+    /// moved point is rounded to about a millionth of `distance`. Returns this camera if the result
+    /// would be invalid.
     fn placed(&self, eye: DVec3, forward: DVec3, distance: f64) -> Self {
         let eye_stays = DVec3::from_array(self.eye) == eye;
         self.valid_or_self(self.moved_to(eye, forward, distance, eye_stays))
     }
 
-    /// Returns the camera of [`Camera::placed`] without validation. If `eye_stays` is `true`, the
-    /// eye keeps its digits and the target moves; otherwise the eye moves and the target stays.
+    /// Returns the camera moved as by [`Camera::placed`], without a check that it is valid. If
+    /// `eye_stays` is `true`, the eye is kept and the target moves to the point `distance` ahead;
+    /// otherwise the eye moves to `eye` and the target is kept.
     fn moved_to(&self, eye: DVec3, forward: DVec3, distance: f64, eye_stays: bool) -> Self {
         let mut next = self.clone();
         let round = |v: DVec3| v.map(|x| rounded(x, distance)).to_array();
@@ -197,7 +202,8 @@ impl Camera {
         next
     }
 
-    /// Returns the camera with eye and target moved by `translation`.
+    /// Returns the camera with eye and target moved by `translation`. Moved coordinates are rounded
+    /// to about a millionth of `distance`. Returns this camera if the result would be invalid.
     fn shifted(&self, translation: DVec3, distance: f64) -> Self {
         let moved = |point: [f64; 3]| {
             std::array::from_fn(|i| match translation[i] {
@@ -215,7 +221,7 @@ impl Camera {
     }
 }
 
-/// Rounds `x` to a multiple of a power of ten near a millionth of `scale`.
+/// Rounds `x` to a multiple of a power of ten, which is about a millionth of `scale`.
 fn rounded(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 6)
 }

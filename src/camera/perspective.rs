@@ -1,57 +1,60 @@
-//! Compiled camera: rays from pixels.
+//! Compiled perspective camera: rays through pixels.
 
 use crate::camera::{Camera, ViewAngle};
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::value::unit;
 use glam::DVec3;
 
-/// A perspective camera with its raster. Directions of pixel corners are computed in double
-/// precision and rounded once; only the offset inside the pixel is computed in the precision of the
-/// kernel.
+/// Perspective camera compiled for a film size. Directions of pixel corners are computed in double
+/// precision and then rounded to the precision of the rays. Offsets inside of pixels are computed
+/// in the precision of the rays.
 #[derive(Clone, Copy, Debug)]
 pub struct PerspectiveCamera {
     eye: DVec3,
-    /// Orthonormal vectors to the right (`u`), up (`v`) and forward (`w`).
+    /// Unit vector to the right in the picture, perpendicular to `v` and `w`.
     u: DVec3,
+    /// Unit vector up in the picture, perpendicular to `u` and `w`.
     v: DVec3,
+    /// Unit vector forward, the view direction.
     w: DVec3,
-    /// Vectors from a pixel to the next one to the right (`dx_axis`) and to the next one below
-    /// (`dy_axis`), on the picture plane at unit distance.
+    /// Vector from a pixel to the next one to the right, on the picture plane at unit distance.
     dx_axis: DVec3,
+    /// Vector from a pixel to the next one below, on the picture plane at unit distance.
     dy_axis: DVec3,
     /// Vector from the eye to the picture plane's corner at pixel (0, 0).
     raster_corner: DVec3,
     near: f64,
-    /// The lens; `None` for a pinhole.
+    /// Thin lens of the camera; `None` for a pinhole.
     lens: Option<ThinLens>,
 }
 
-/// A thin lens: a disk of uniform transmission around the eye, perpendicular to the view direction.
+/// Thin lens: a disk of uniform transmission around the eye, perpendicular to the view direction.
 /// It refracts rays so that those from one point of the plane in focus meet in one point of the
 /// picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ThinLens {
-    /// Radius of the disk, greater than 0.
+    /// Radius of the lens in scene units, greater than 0.
     pub radius: f64,
-    /// Distance of the plane in focus from the eye along the view direction, greater than 0.
+    /// Distance of the plane in focus from the eye along the view direction, in scene units,
+    /// greater than 0.
     pub focus: f64,
 }
 
 impl ThinLens {
     /// Returns the radius of the circle of confusion on a plane at `depth` from the eye,
-    /// perpendicular to the view direction: the largest distance there between a ray through the
-    /// lens and the ray of the same picture point through the centre of the lens.
+    /// perpendicular to the view direction. It is the distance, on this plane, between two rays of
+    /// the same picture point: one through the edge of the lens, one through its centre.
     pub fn blur(&self, depth: f64) -> f64 {
         self.radius * (1.0 - depth / self.focus).abs()
     }
 }
 
 impl PerspectiveCamera {
-    /// Compiles `camera` for a film of `width` x `height` pixels, in a scene translated by
-    /// -`origin`.
+    /// Compiles `camera` for a film of `width` x `height` pixels. `origin` is the point of the
+    /// scene that is the origin of the compiled coordinates.
     ///
-    /// A coordinate axis replaces an `up` that is parallel to the view direction: the axis least
-    /// parallel to the view direction. Scene files cannot describe such a camera.
+    /// If `up` is parallel to the view direction, it is replaced by the coordinate axis that is
+    /// least parallel to this direction. Scene files cannot describe such a camera.
     pub fn new(camera: &Camera, [width, height]: [u32; 2], origin: DVec3) -> Self {
         let eye = DVec3::from(camera.eye);
         let forward = match (camera.direction, camera.target) {
@@ -103,41 +106,44 @@ impl PerspectiveCamera {
         }
     }
 
-    /// Returns the lens; `None` for a pinhole.
+    /// Returns the camera's thin lens; `None` for a pinhole.
     pub fn lens(&self) -> Option<&ThinLens> {
         self.lens.as_ref()
     }
 
-    /// Returns the radius of the lens; 0 for a pinhole.
+    /// Returns the radius of the camera's lens in scene units; 0 for a pinhole.
     pub fn lens_radius(&self) -> f64 {
         self.lens.map_or(0.0, |lens| lens.radius)
     }
 
-    /// Returns the position of the eye in the translated scene.
+    /// Returns the position of the eye relative to the `origin` of [`PerspectiveCamera::new`].
     pub fn eye(&self) -> DVec3 {
         self.eye
     }
 
-    /// Returns orthonormal vectors to the right, up in the picture, and forward.
+    /// Returns the camera's axes as orthonormal vectors to the right, up in the picture, and
+    /// forward.
     pub fn frame(&self) -> [DVec3; 3] {
         [self.u, self.v, self.w]
     }
 
-    /// Returns the smallest angle between rays through the centres of neighbouring pixels
-    /// \[radians\]. The angle is smallest at the picture's corners.
+    /// Returns the approximate smallest angle \[radians\] between rays through the centres of
+    /// neighbouring pixels. This angle occurs at the picture's corners.
     pub fn pixel_angle(&self) -> f64 {
         // At the distance d from the eye, a step p across the ray rotates the ray by about p / d,
         // and an oblique step by at least p / d^2.
         self.pixel() / self.raster_corner.length_squared()
     }
 
-    /// Returns the shorter side of a pixel on the picture plane at unit distance.
+    /// Returns the length of the shorter side of a pixel on the picture plane at unit distance from
+    /// the eye.
     pub fn pixel(&self) -> f64 {
         self.dx_axis.length().min(self.dy_axis.length())
     }
 
     /// Returns the vectors from the eye to the corners of a rectangle of pixels, on the picture
-    /// plane at unit distance.
+    /// plane at unit distance. Pixel `[x, y]` is the upper left one of the rectangle. The corners
+    /// are in clockwise order, from the upper left one.
     pub fn corners(&self, [x, y]: [usize; 2], [width, height]: [usize; 2]) -> [DVec3; 4] {
         let (x0, y0) = (x as f64, y as f64);
         let (x1, y1) = (x0 + width as f64, y0 + height as f64);
@@ -145,22 +151,24 @@ impl PerspectiveCamera {
             .map(|(x, y)| self.raster_corner + self.dx_axis * x + self.dy_axis * y)
     }
 
-    /// Projects a point in front of the eye to raster coordinates \[pixels\].
+    /// Projects a point in front of the eye to a position in the picture: column and row in pixels,
+    /// with fractions.
     pub fn project(&self, point: DVec3) -> [f64; 2] {
         let from_eye = point - self.eye;
         let on_plane = from_eye / from_eye.dot(self.w) - self.raster_corner;
         [self.dx_axis, self.dy_axis].map(|pixel| on_plane.dot(pixel) / pixel.length_squared())
     }
 
-    /// Returns the vector from the eye to the corner of a pixel, on the plane at unit distance.
+    /// Returns the vector from the eye to the upper left corner of pixel (`x`, `y`), on the picture
+    /// plane at unit distance.
     #[inline(always)]
     pub fn pixel_corner_direction<S: Float>(&self, (x, y): (u32, u32)) -> [S; 3] {
         let corner = self.raster_corner + self.dx_axis * f64::from(x) + self.dy_axis * f64::from(y);
         corner.to_array().map(S::from_f64)
     }
 
-    /// Returns origins and unit directions of rays through the eye and through points of pixels.
-    /// The origins are on the near plane. `base` is the result of
+    /// Returns two values for each lane: the origin and the unit direction of the ray through the
+    /// eye and a point of a pixel. The origins are on the near plane. `base` is the result of
     /// [`PerspectiveCamera::pixel_corner_direction`]; `(dx, dy)` is the offset from the corner to
     /// the right and downward \[pixels\].
     #[inline(always)]
@@ -175,14 +183,15 @@ impl PerspectiveCamera {
         (origin, direction.normalize())
     }
 
-    /// Returns origins and unit directions of rays through points of the lens. `base` and the
-    /// offset are those of [`PerspectiveCamera::rays`]. `(x, y)` is the point of the lens in the
-    /// unit disk, to the right and upward.
+    /// Returns two values for each lane: the origin and the unit direction of the ray through a
+    /// point of the lens. `base` and the offset are those of [`PerspectiveCamera::rays`]. `(x, y)`
+    /// is the point of the lens in the unit disk, to the right and upward.
     ///
-    /// The direction d through the eye has the length 1 along w. The vector from the eye to the
-    /// point of the lens is o. The ray starts at eye + o in the direction d - o / f. At the
-    /// distance f, in the plane in focus, it crosses the ray through the eye (Cook, Porter and
-    /// Carpenter 1984, *Distributed Ray Tracing*, section 4.2).
+    /// Let d be the direction of the ray through the eye, scaled to length 1 along the view
+    /// direction. Let o be the vector from the eye to the point of the lens, and f the distance of
+    /// the plane in focus. The ray starts at eye + o in the direction d - o / f. In the plane in
+    /// focus it crosses the ray through the eye (Cook, Porter and Carpenter 1984, *Distributed Ray
+    /// Tracing*, section 4.2).
     #[inline(never)]
     pub fn lens_rays<L: SimdFloat>(
         &self,

@@ -1,7 +1,7 @@
-//! Command-line arguments.
+//! Command-line arguments, parsed by clap. Doc comments of arguments are their help texts.
 
 use crate::dashboard::run::{Colors, TerminalSetup};
-use crate::film::{Display, Tone};
+use crate::film::{Depth, Display, Tone};
 use crate::measure::Experiment;
 use crate::render::plan::MAX_SHARDS;
 use crate::sampling::SamplerKind;
@@ -21,15 +21,15 @@ use std::path::PathBuf;
                         by a signal (`render` then writes the picture so far)."
 )]
 pub struct Cli {
-    /// The subcommand.
+    /// Subcommand; `None` for the dashboard.
     #[command(subcommand)]
     pub command: Option<Command>,
-    /// Arguments of the dashboard.
+    /// Arguments of the dashboard, which runs without a subcommand.
     #[command(flatten)]
     pub edit: EditArgs,
 }
 
-/// Arguments of `zerkalo` without a command.
+/// Arguments of `zerkalo` without a subcommand.
 #[derive(Clone, Debug, Args)]
 pub struct EditArgs {
     /// A scene file [default: a built-in scene], or a checkpoint to continue
@@ -58,7 +58,7 @@ pub struct TerminalArgs {
     bandwidth: Option<f64>,
 }
 
-/// Options of every command that traces.
+/// Options of every command that renders.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct ComputeArgs {
     /// Number of tracing threads, at most four per processor or 16 [default: one per processor]
@@ -69,7 +69,7 @@ pub struct ComputeArgs {
     pub seed: u64,
 }
 
-/// The option `--precision`.
+/// Arguments of every command that compiles a scene: the option `--precision`.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct PrecisionArgs {
     /// Floating-point precision of the geometry; auto: double where the scene's proportions need it
@@ -77,7 +77,7 @@ pub struct PrecisionArgs {
     precision: PrecisionArg,
 }
 
-/// Size and display of a picture.
+/// Arguments of every command that makes a picture: size and display.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct PictureArgs {
     /// Width and height in pixels, instead of the scene's
@@ -91,7 +91,7 @@ pub struct PictureArgs {
     tone: Tone,
 }
 
-/// Subcommands.
+/// Subcommands of `zerkalo`.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Render a scene to a picture file
@@ -165,7 +165,7 @@ pub struct RenderArgs {
     pub memory: Option<u64>,
     /// Bits per channel of a PNG
     #[arg(long, value_name = "8|16", default_value = "8", value_parser = bits)]
-    pub bits: u8,
+    pub bits: Depth,
     /// Write statistics of the run as JSON
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
@@ -225,7 +225,7 @@ pub struct PlanArgs {
 /// Arguments of `zerkalo merge`.
 #[derive(Clone, Debug, Args)]
 pub struct MergeArgs {
-    /// The parts, in any order
+    /// Film files of the parts, in any order
     #[arg(required = true, value_name = "PART.zk")]
     pub parts: Vec<PathBuf>,
     /// The file to write: a picture (.png, .exr) or a film (.zk)
@@ -236,7 +236,7 @@ pub struct MergeArgs {
     pub partial: bool,
     /// Bits per channel of a PNG
     #[arg(long, value_name = "8|16", default_value = "8", value_parser = bits)]
-    pub bits: u8,
+    pub bits: Depth,
 }
 
 /// Arguments of `zerkalo measure`.
@@ -267,7 +267,7 @@ pub struct MeasureArgs {
     pub picture: PictureArgs,
     #[command(flatten)]
     pub compute: ComputeArgs,
-    /// Write everything as JSON
+    /// Write all results as JSON
     #[arg(long, value_name = "FILE.json")]
     pub json: Option<PathBuf>,
     /// Write errors against samples and seconds as CSV
@@ -326,62 +326,65 @@ pub struct DoctorArgs {
     pub rate: bool,
 }
 
-/// Values of `--precision`.
+/// Floating-point precision that `--precision` selects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum PrecisionArg {
-    /// 32-bit
+    /// 32-bit floats
     Single,
-    /// 64-bit
+    /// 64-bit floats
     Double,
-    /// Chosen by the scene's proportions
+    /// 32-bit or 64-bit floats, chosen by the scene's proportions
     Auto,
 }
 
-/// Values of `--color`.
+/// Number of terminal colours that `--color` selects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ColorArg {
-    /// From the environment and the terminal's replies
+    /// Chosen by the environment and the terminal's replies
     Auto,
-    /// 24-bit
+    /// 24-bit colours
     True,
-    /// The 256 of xterm
+    /// The 256 colours of xterm
     #[value(name = "256")]
     Indexed,
-    /// The 16 of every terminal
+    /// The 16 colours of every terminal
     #[value(name = "16")]
     Sixteen,
-    /// None
+    /// No colours
     None,
 }
 
-/// Values of `--sampler`.
+/// Random number sequence that `--sampler` selects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum SamplerArg {
-    /// Owen-scrambled Sobol
+    /// Owen-scrambled Sobol points
     Sobol,
     /// Independent random numbers
     Random,
 }
 
-/// Largest number of tracing threads for each processor. More threads only wait for each other:
-/// with 4,096 on two processors, a picture of 64 x 48 pixels takes half a minute.
+/// Largest number of tracing threads per processor. More threads only wait for each other: a render
+/// of 64 x 48 pixels with 4,096 threads on two processors takes half a minute.
 const THREADS_PER_PROCESSOR: usize = 4;
 
-/// Number of tracing threads that is always allowed, even on machines with few processors.
+/// Number of tracing threads that `--threads` may always request, even on machines with few
+/// processors.
 const THREADS_ANYWHERE: usize = 16;
 
-/// Returns the number of processors that this process may use.
+/// Returns the number of processors that this process may use, at least 1.
 fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Returns the largest number of tracing threads on this machine.
+/// Returns the largest number of tracing threads on this machine. A larger value of `--threads` is
+/// reduced to it.
 fn max_threads() -> usize {
     THREADS_ANYWHERE.max(THREADS_PER_PROCESSOR * processors())
 }
 
 impl TerminalArgs {
-    /// Returns the terminal settings for these options in `environment`.
+    /// Returns the settings of the terminal for these options and the environment variables
+    /// `environment`.
     pub fn setup(&self, environment: Environment) -> TerminalSetup {
         let colors = match self.color {
             ColorArg::True => Some(Colors::True),
@@ -396,13 +399,13 @@ impl TerminalArgs {
 }
 
 impl ComputeArgs {
-    /// Returns the number of tracing threads: one per processor, or the number of `--threads` up to
-    /// a small multiple of the processors.
+    /// Returns the number of threads that trace rays: the value of `--threads`, but at most
+    /// [`max_threads`]. Without this option, it is the number of processors.
     pub fn threads(&self) -> usize {
         self.threads.map_or_else(processors, |given| usize::from(given).min(max_threads()))
     }
 
-    /// Returns a warning if `--threads` requests more threads than are used.
+    /// Returns a warning if `--threads` requests more threads than are used, otherwise `None`.
     fn warning(&self) -> Option<String> {
         let given = self.threads.map(usize::from).filter(|given| *given > self.threads())?;
         let number = match processors() {
@@ -418,7 +421,8 @@ impl ComputeArgs {
 }
 
 impl Cli {
-    /// Returns a warning about options that are valid but have no effect.
+    /// Returns the warning about `--threads` of the subcommand, or of the dashboard. Returns `None`
+    /// if all requested threads are used.
     pub fn warning(&self) -> Option<String> {
         match &self.command {
             Some(Command::Render(args)) => args.compute.warning(),
@@ -438,7 +442,7 @@ impl Cli {
 }
 
 impl PrecisionArgs {
-    /// Returns the precision as an option of scene compilation.
+    /// Returns the value of `--precision` as an option of scene compilation.
     pub fn get(&self) -> Precision {
         match self.precision {
             PrecisionArg::Single => Precision::Single,
@@ -454,7 +458,7 @@ impl PictureArgs {
         Display { exposure_ev: self.exposure, tone: self.tone }
     }
 
-    /// Sets the size of `scene` to that of `--size`, if this option is given.
+    /// Sets the picture size of `scene` to that of `--size`, if this option is given.
     ///
     /// # Errors
     /// Returns the first validation error of the scene with the new size.
@@ -469,7 +473,7 @@ impl PictureArgs {
 }
 
 impl SamplerArg {
-    /// Returns the kind of sampler as a render option.
+    /// Returns the value of `--sampler` as a render option.
     pub fn kind(self) -> SamplerKind {
         match self {
             Self::Sobol => SamplerKind::Sobol,
@@ -492,10 +496,11 @@ fn acceleration() -> impl TypedValueParser<Value = Acceleration> {
     let names = Acceleration::ALL
         .map(|structure| PossibleValue::new(structure.name()).aliases(structure.former_name()));
     PossibleValuesParser::new(names)
-        .map(|given| Acceleration::from_name(&given).unwrap_or_default())
+        .map(|given| Acceleration::from_name(&given).unwrap_or(Acceleration::Auto))
 }
 
-/// Parses a size such as `640x480` into width and height. The scene checks their range later.
+/// Parses a picture size such as `640x480` into width and height. The scene checks their range
+/// later.
 fn size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     sides.ok_or_else(|| "expected WIDTHxHEIGHT, such as 640x480".to_string())
@@ -516,7 +521,7 @@ fn exposure(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "expected a number from -64 to 64".to_string())
 }
 
-/// Units of memory sizes, each with its number of bytes.
+/// Units of memory sizes on the command line, each with its number of bytes.
 const MEMORY_UNITS: [(&str, f64); 6] = [
     ("KB", 1e3),
     ("MB", 1e6),
@@ -539,10 +544,10 @@ fn memory(text: &str) -> Result<u64, String> {
     bytes.ok_or_else(|| "expected a size with KB, MB, GB, KiB, MiB or GiB, such as 4GB".to_string())
 }
 
-fn bits(text: &str) -> Result<u8, String> {
+fn bits(text: &str) -> Result<Depth, String> {
     match text {
-        "8" => Ok(8),
-        "16" => Ok(16),
+        "8" => Ok(Depth::Eight),
+        "16" => Ok(Depth::Sixteen),
         _ => Err("expected 8 or 16".to_string()),
     }
 }

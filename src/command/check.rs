@@ -1,29 +1,23 @@
 //! `zerkalo check`: validates a scene and prints its contents.
 
 use crate::command::args::CheckArgs;
-use crate::command::load_progress::LoadReporter;
-use crate::command::{Failure, print_line, warn};
-use crate::render::memory;
-use crate::scene::Document;
+use crate::command::{Failure, print_line, read_scene_and_warn, warn};
+use crate::render::memory_budget;
 use crate::world::{self, AnyWorld};
 
 pub fn run(args: &CheckArgs) -> Result<(), Failure> {
-    let document = Document::read_with(&args.scene, LoadReporter::new().assets)
-        .map_err(|e| Failure::Failed(e.to_string()))?;
-    for warning in document.warnings() {
-        warn(&format!("warning: {warning}"));
-    }
+    let document = read_scene_and_warn(&args.scene)?;
     let scene = document.scene();
     let world = AnyWorld::compile(scene, &world::Options::default());
     let [width, height] = scene.film.size;
     let groups = world.group_names();
-    let bytes = memory::needed(scene.film.size, groups.len());
+    let bytes = memory_budget::needed(scene.film.size, groups.len());
     print_line(&format!("{}: valid", args.scene.display()))?;
     print_line(&format!("  contains  {}", world.inventory()))?;
     print_line(&format!("  picture   {width} x {height} pixels"))?;
     print_line(&format!("  lights    {} separate: {}", groups.len(), groups.join(", ")))?;
     print_line(&format!("  memory    {:.0} MB for the samples", (bytes as f64 * 1e-6).max(1.0)))?;
-    if let Err(reason) = memory::check(scene.film.size, groups.len(), 0) {
+    if let Err(reason) = memory_budget::check(scene.film.size, groups.len(), 0) {
         warn(&format!("warning: {reason}."));
     }
     for bias in world.biases() {

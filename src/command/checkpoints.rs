@@ -1,7 +1,7 @@
 //! Checkpoints of `zerkalo render`: written at intervals, on signals and at the end.
 
 use crate::command::{Failure, warn};
-use crate::disk::WriteError;
+use crate::disk::{Existing, WriteError};
 use crate::film::file::is_film_file;
 use crate::render::EncodedCheckpoint;
 use crate::render::export::Provenance;
@@ -26,14 +26,14 @@ pub struct CheckpointWriter {
 }
 
 impl CheckpointWriter {
-    /// Starts the thread. The first checkpoint is due after `interval`.
+    /// Starts the thread that writes checkpoints to `path`. The first one is due after `interval`.
     pub fn new(path: &Path, interval: Duration, provenance: Provenance) -> Self {
         let (encoded, inbox) = channel::<Option<EncodedCheckpoint>>();
         let (outbox, results) = channel();
         let target = path.to_path_buf();
         let thread = std::thread::spawn(move || {
             for checkpoint in inbox {
-                let written = checkpoint.map_or(Ok(()), |checkpoint| checkpoint.write(&target));
+                let written = checkpoint.map_or(Ok(()), |it| it.write(&target, Existing::Replace));
                 // A closed channel means that the render has ended by an error.
                 let _ = outbox.send(written);
             }
@@ -44,7 +44,10 @@ impl CheckpointWriter {
     }
 
     /// Checks that a render may write checkpoints to `path`. `resume` is the checkpoint that the
-    /// render continues.
+    /// render continues, if there is one.
+    ///
+    /// # Errors
+    /// Fails if `path` cannot be written, or if it is an existing file other than `resume`.
     pub fn check(path: &Path, resume: Option<&Path>) -> Result<(), Failure> {
         crate::disk::check_writable(path).map_err(|error| Failure::Failed(error.to_string()))?;
         if resume == Some(path) || !path.exists() {
@@ -61,7 +64,8 @@ impl CheckpointWriter {
         }))
     }
 
-    /// Requests a checkpoint if one is due. The call does not block.
+    /// Requests a checkpoint if the interval since the last one has passed. The call does not
+    /// block.
     pub fn poll(&mut self, session: &Session) {
         match self.results.try_recv() {
             Ok(written) => {
@@ -86,7 +90,7 @@ impl CheckpointWriter {
         });
     }
 
-    /// Writes the last checkpoint, waits until it is complete, and returns its path.
+    /// Writes the last checkpoint, waits until it is complete, and returns the path of its file.
     pub fn finish(self, session: &Session) -> Result<PathBuf, WriteError> {
         self.request(session);
         // The task is dropped with its sender when it has run, so that the thread ends.

@@ -54,7 +54,7 @@ pub fn require() {
     }
 }
 
-/// Does nothing: on other architectures the program is compiled for the baseline processor.
+/// Does nothing. On processors other than x86-64 the program needs no optional features.
 #[cfg(not(target_arch = "x86_64"))]
 pub fn require() {}
 

@@ -15,7 +15,7 @@ use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Width of the report, in columns of the terminal.
+/// Width of the printed report, in columns of the terminal.
 const COLUMNS: usize = 80;
 /// Width of the column of names in the report, in columns of the terminal.
 const NAME: usize = 17;
@@ -50,13 +50,14 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Results of all tests, from which the report is formatted.
+/// Results of all tests of `zerkalo doctor`, from which the report is formatted.
 struct DoctorReport {
     environment: Environment,
-    /// Replies of the terminal, or the reason for which it was not queried.
+    /// Capabilities that the terminal reports, or the reason why the terminal was not queried.
     diagnosis: Result<TerminalReport, &'static str>,
     rate_requested: bool,
-    /// Environment variable that names the character encoding, and its value.
+    /// Name and value of the environment variable that sets the character encoding. `None` if no
+    /// variable sets it.
     locale: Option<(&'static str, String)>,
     state: Option<PathBuf>,
     /// Paths of files with unsaved edits in the state folder.
@@ -94,12 +95,13 @@ impl DoctorReport {
         lines.join("\n")
     }
 
-    /// Returns the capabilities of the terminal. Returns `None` if the terminal was not queried.
+    /// Returns the capabilities of the terminal, as it has reported them. Returns `None` if the
+    /// terminal was not queried.
     fn capabilities(&self) -> Option<&Capabilities> {
         self.diagnosis.as_ref().ok().map(|diagnosis| &diagnosis.terminal)
     }
 
-    /// Returns the number of colours that the dashboard uses.
+    /// Returns the set of colours that the dashboard uses on this terminal.
     fn level(&self) -> Colors {
         self.capabilities().map_or(self.environment.colors(), |terminal| terminal.colors)
     }
@@ -140,8 +142,8 @@ impl DoctorReport {
         }
     }
 
-    /// Describes the number of colours and its source: NO_COLOR, COLORTERM, TERM or the terminal's
-    /// reply.
+    /// Describes the set of colours that the dashboard uses and its source: NO_COLOR, COLORTERM,
+    /// TERM or the terminal's reply.
     fn colors(&self) -> String {
         let Environment { term, color_term, no_color, .. } = &self.environment;
         let level = self.level();
@@ -237,8 +239,8 @@ impl DoctorReport {
     }
 }
 
-/// Returns a line of `name` and `value`. `value` is wrapped with a hanging indent, so that no line
-/// is longer than [`COLUMNS`].
+/// Returns a line of the report with `name` and `value`. `value` is wrapped with a hanging indent,
+/// so that no line is longer than [`COLUMNS`].
 fn indented(name: &str, value: &str) -> String {
     let lines = wrapped(value, (COLUMNS - name.len()) as u16);
     name.to_string() + &lines.join(&format!("\n{:1$}", "", name.len()))

@@ -75,8 +75,8 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
 }
 
 /// Prints the results of a dashboard that has ended: names of written files on `out`, everything
-/// else on stderr. If a signal ended the dashboard, the exit status is that of the signal. This
-/// holds even if `out` cannot be written because the terminal is lost.
+/// else on stderr. If a signal ended the dashboard, the error holds the exit status of that signal,
+/// even if `out` cannot be written because the terminal is lost.
 pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     let mut lines = Vec::new();
     for exported in &ended.exported {
@@ -107,8 +107,8 @@ pub fn conclude(ended: &Ended, mut out: impl Write) -> Result<(), Failure> {
     }
 }
 
-/// Returns the environment if stdin and stdout are a terminal that can show the dashboard,
-/// otherwise the reason against it.
+/// Returns the environment variables that describe the terminal. The error is the reason why stdin
+/// and stdout cannot show the dashboard.
 pub fn terminal_environment() -> Result<Environment, &'static str> {
     let environment = Environment::of(|name| env::var(name).ok());
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
@@ -124,9 +124,9 @@ fn read_checkpoint(path: &Path) -> Result<Checkpoint, Failure> {
     Checkpoint::read(path).map_err(|error| Failure::Failed(error.to_string()))
 }
 
-/// Opens the scene of a checkpoint. It is the scene file from which the checkpoint was rendered, if
-/// the samples are valid for this file; otherwise it is the scene in the checkpoint, without a
-/// file.
+/// Opens the scene of a checkpoint. This is the scene file from which the checkpoint was rendered,
+/// if the samples are still valid for it; otherwise it is the scene stored in the checkpoint,
+/// without a file.
 ///
 /// # Errors
 /// Fails if the scene in the checkpoint is not valid.
@@ -143,8 +143,9 @@ fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, F
         .map_err(|errors| Failure::Failed(errors.to_string()))
 }
 
-/// Opens the scene file. The inner error lists the errors of a readable file that is not a valid
-/// scene; the dashboard shows them until the user has corrected the file.
+/// Opens the scene file at `path`. The inner error means that the file can be read but is not a
+/// valid scene. It has the path and the errors of the file, which the dashboard shows until the
+/// user has corrected the file.
 ///
 /// # Errors
 /// Fails if the file cannot be read.
@@ -167,8 +168,9 @@ fn open(
     }
 }
 
-/// Returns a note about unsaved edits: of a scene file that no longer exists, and of other users.
-/// Returns an empty string if there are none.
+/// Returns a note about unsaved edits of the scene file `path`, which cannot be read. The note has
+/// the path of the recovery file with these edits: a file of this user if there is one, otherwise a
+/// file of another user. Returns an empty string if there are no unsaved edits.
 fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     let found = Recovery::new(Some(path), "", state).find();
     let hint = |path: &Path, of: String| {
@@ -182,8 +184,8 @@ fn orphaned_edits(path: &Path, state: Option<&Path>) -> String {
     }
 }
 
-/// Formats the line about an exported picture, such as `mirror-room-1.png  640x480  212 spp  noise
-/// 0.50 8-bit levels`.
+/// Formats the line that is printed about an exported picture, such as `mirror-room-1.png 640x480
+/// 212 spp noise 0.50 8-bit levels`.
 fn summary(exported: &Exported) -> String {
     let [width, height] = exported.size;
     let noise = match exported.noise_codes {
@@ -198,7 +200,7 @@ fn summary(exported: &Exported) -> String {
 mod tests {
     use super::*;
 
-    /// Closed terminal: every write fails.
+    /// Writer whose writes all fail, such as one to a terminal that was closed.
     struct Gone;
 
     impl Write for Gone {
@@ -228,8 +230,8 @@ mod tests {
         }
     }
 
-    /// Checks that the exit status of a signal is returned even if stdout fails, which happens if
-    /// the connection is lost before the picture is complete.
+    /// Checks that the program returns the exit status of a signal even if writing to standard
+    /// output fails, as it does after the connection was lost.
     #[test]
     fn status_of_a_signal_does_not_depend_on_stdout() {
         let status = |signalled, out: &mut dyn Write| match conclude(&ended(signalled), out) {

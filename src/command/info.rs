@@ -1,13 +1,11 @@
 //! `zerkalo info`: prints the origin of a picture, film or plan file, and compares it with a scene.
 
 use crate::command::args::InfoArgs;
-use crate::command::load_progress::LoadReporter;
-use crate::command::{Failure, part_file, print_line};
+use crate::command::{Failure, part_file, print_line, read_scene};
 use crate::film::FileMetadata;
 use crate::render::SampleInputs;
 use crate::render::export::{scene_hash, settings_text};
 use crate::render::plan::{BASE, Part, Plan, is_plan_file};
-use crate::scene::Document;
 use std::path::Path;
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
@@ -28,23 +26,24 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
 }
 
-/// Origin of a picture or film, or of the films that a plan describes: metadata about scene,
-/// samples and noise.
+/// Origin of a picture, film or plan file: metadata about the scene, the samples and the noise.
 struct Origin {
-    /// Format of the file.
+    /// Format of the file: `PNG`, `OpenEXR`, `film` or `plan`.
     format: &'static str,
-    /// Width and height in pixels.
+    /// Width and height of the picture in pixels.
     size: [usize; 2],
-    /// Metadata keys and values.
+    /// Metadata keys and values of the file.
     entries: Vec<(String, String)>,
-    /// Hash of the scene. `None` if another program wrote the file.
+    /// Hash of the scene from which the file was rendered. `None` if another program wrote the
+    /// file.
     scene_hash: Option<String>,
-    /// Inputs of the samples; `None` except for checkpoints.
+    /// Inputs that determine the samples: scene, sampler and program version. `None` unless the
+    /// file is a checkpoint.
     inputs: Option<SampleInputs>,
 }
 
 impl Origin {
-    /// Reads a PNG, OpenEXR or film file.
+    /// Reads the origin of a PNG, OpenEXR or film file from its metadata.
     fn of_picture(path: &Path) -> Result<Self, Failure> {
         let metadata = FileMetadata::read(path).map_err(Failure::Failed)?;
         let scene_hash = metadata.get("Scene hash").map(str::to_string);
@@ -99,7 +98,8 @@ impl Origin {
     }
 }
 
-/// Formats the number of shards, the samples and the noise target of a plan.
+/// Formats four values of a plan: the number of shards (parts of the render), the samples per
+/// pixel, the noise target and the expected noise.
 fn target(plan: &Plan) -> String {
     let settings = &plan.settings;
     format!(
@@ -111,10 +111,12 @@ fn target(plan: &Plan) -> String {
     )
 }
 
-/// Compares the file's origin with the scene at `path`, and prints the differences.
+/// Compares `origin` with the scene file at `path`, and prints the result.
+///
+/// # Errors
+/// Fails if the file of `origin` shows another scene, or has no scene hash.
 fn compare(origin: &Origin, path: &Path, args: &InfoArgs) -> Result<(), Failure> {
-    let document = Document::read_with(path, LoadReporter::new().assets)
-        .map_err(|e| Failure::Failed(e.to_string()))?;
+    let document = read_scene(path)?;
     let scene = document.scene();
     let [file, shown] = [&args.file, path].map(|path| path.display());
     let Some(hash) = &origin.scene_hash else {

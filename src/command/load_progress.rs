@@ -6,13 +6,14 @@ use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Thresholds of reports: size of a file in bytes (8 MiB), and number of triangles of a BVH.
-/// Smaller loads are not reported.
+/// Limits above which the loading of a file is reported, because it takes a noticeable time. The
+/// first is the length of a file in bytes, 8 MiB. The second is the number of triangles of a mesh
+/// whose BVH is built.
 const LARGE: (u64, usize) = (8 << 20, 200_000);
 
 /// Asset cache with progress messages for large files on stderr, if stderr is a terminal.
 pub struct LoadReporter {
-    /// The cache, shared between all readers of scenes.
+    /// Cache of asset files, shared between all readers of scenes.
     pub assets: Arc<Assets>,
     enabled: Arc<AtomicBool>,
 }
@@ -34,7 +35,7 @@ impl LoadReporter {
         Self { assets: Arc::new(Assets::new(report)), enabled }
     }
 
-    /// Disables the messages. The dashboard calls this before it takes over the terminal.
+    /// Disables the progress messages. The dashboard calls this before it takes over the terminal.
     pub fn mute(&self) {
         self.enabled.store(false, Ordering::Relaxed);
     }

@@ -1,4 +1,5 @@
-//! `zerkalo merge`: adds the parts that the shards of a plan have traced.
+//! `zerkalo merge`: adds the films that the shards of a plan have rendered. A plan divides the
+//! render of a picture among processes, the shards.
 
 use crate::command::args::MergeArgs;
 use crate::command::part_file::{self, FilmOutput};
@@ -35,8 +36,8 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Formats the noise of a merged picture that lacks some shards, and its ratio to the predicted
-/// noise of the complete picture.
+/// Formats two noises in 8-bit levels: that of the merged picture, from which shards (parts of the
+/// render) are missing, and `predicted_codes`, the noise predicted for the complete picture.
 fn cost(report: &Report, predicted_codes: f64) -> String {
     match report.noise {
         Some(noise) => format!(

@@ -1,6 +1,5 @@
-//! The command line: parses arguments and runs subcommands.
+//! Command line of the program: parses arguments and runs subcommands.
 
-mod arenas;
 mod args;
 mod check;
 mod checkpoints;
@@ -9,6 +8,7 @@ mod doctor;
 mod edit;
 mod info;
 mod load_progress;
+mod malloc_arenas;
 mod measure;
 mod merge;
 mod new;
@@ -22,14 +22,16 @@ mod signals;
 mod stats;
 mod watch;
 
-pub use arenas::limit as limit_arenas;
 pub use cpu::require as require_cpu;
+pub use malloc_arenas::limit as limit_arenas;
 
 use crate::disk;
+use crate::scene::Document;
 use crate::value::sanitized;
 use args::{Cli, Command};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
+use load_progress::LoadReporter;
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::Path;
@@ -39,7 +41,7 @@ use std::time::Instant;
 /// Exit status for an invalid command line. clap uses the same status.
 const WRONG_USAGE: u8 = 2;
 
-/// Result of a command that did not succeed.
+/// Reason why a command did not succeed: a failure, an invalid command line, or a signal.
 enum Failure {
     /// The command failed (exit status 1). The value is the message.
     Failed(String),
@@ -50,7 +52,7 @@ enum Failure {
     Signalled(u8),
 }
 
-/// Runs the command line of the process.
+/// Runs the command line of the process. Returns its exit status.
 #[inline(never)]
 pub fn main() -> ExitCode {
     let started = Instant::now();
@@ -125,8 +127,7 @@ fn print_line(message: &str) -> Result<(), Failure> {
     write_line(std::io::stdout().lock(), message)
 }
 
-/// Writes `message` and a line break to `out`, which is stdout. A closed pipe, such as that of
-/// `head`, is ignored.
+/// Writes `message` and a line break to `out`. A closed pipe, as after `| head`, is not an error.
 fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
     let printed = writeln!(out, "{}", sanitized_lines(message)).and_then(|()| out.flush());
     match printed {
@@ -137,7 +138,22 @@ fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
     }
 }
 
-/// Writes a file of results, such as statistics. An existing file is replaced atomically.
+/// Reads the scene file at `path` and reports the progress of large meshes and images on stderr.
+fn read_scene(path: &Path) -> Result<Document, Failure> {
+    Document::read_with(path, LoadReporter::new().assets)
+        .map_err(|errors| Failure::Failed(errors.to_string()))
+}
+
+/// Reads the scene file at `path` as [`read_scene`] does, and prints its warnings.
+fn read_scene_and_warn(path: &Path) -> Result<Document, Failure> {
+    let document = read_scene(path)?;
+    for warning in document.warnings() {
+        warn(&format!("warning: {warning}"));
+    }
+    Ok(document)
+}
+
+/// Writes `bytes` to a file of results, such as statistics. Replaces an existing file atomically.
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     disk::write(path, bytes).map_err(|error| Failure::Failed(error.to_string()))
 }

@@ -1,7 +1,8 @@
-//! Output of films that belong to a plan: film files of shards, and pictures of complete films.
+//! Output of films that belong to a plan (a render divided among shards): film files of shards, and
+//! pictures of complete films.
 
 use crate::command::{Failure, check_file};
-use crate::disk::WriteError;
+use crate::disk::{Existing, WriteError};
 use crate::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
 use crate::film::{Depth, Film, ImageData, ImageOutput, WholeFilm};
 use crate::render::RenderState;
@@ -10,18 +11,18 @@ use crate::render::plan::{Part, Plan};
 use crate::render::session::Report;
 use std::path::{Path, PathBuf};
 
-/// Output of a film: a film file or a picture.
+/// Output of a film: a film file or a picture file.
 pub enum FilmOutput {
-    /// Film file.
+    /// Path of a film file (`.zk`).
     Film(PathBuf),
-    /// Picture file, with the bits per channel of a PNG.
+    /// Picture file (PNG or OpenEXR), with the bits per channel of a PNG.
     Picture(ImageOutput, Depth),
 }
 
 impl FilmOutput {
     /// Chooses the format by the extension of `path`, and checks that the file can be written.
-    /// `bits` is the number of bits per channel of a PNG.
-    pub fn new(path: &Path, bits: u8) -> Result<Self, Failure> {
+    /// `depth` is the number of bits per channel of a PNG.
+    pub fn new(path: &Path, depth: Depth) -> Result<Self, Failure> {
         let failed = |error: WriteError| Failure::Failed(error.to_string());
         if is_film(path) {
             check_file(path)?;
@@ -30,11 +31,12 @@ impl FilmOutput {
         let output = ImageOutput::from_path(path)
             .map_err(|error| Failure::Usage(format!("{error}; a film has the extension .zk")))?;
         output.check_writable().map_err(failed)?;
-        Ok(Self::Picture(output, if bits == 16 { Depth::Sixteen } else { Depth::Eight }))
+        Ok(Self::Picture(output, depth))
     }
 
-    /// Writes `film`. A picture is written with the light weights, the display transform and the
-    /// metadata of `header`.
+    /// Writes `film` to the output file. `header` is the header of a film file. A picture file uses
+    /// only a part of it: the weights by which the light groups (separately stored parts of the
+    /// picture) are added, the names of these groups, the display transform and the metadata.
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), Failure> {
         let written = match self {
             Self::Film(path) => write_film(path, film, header),
@@ -58,8 +60,8 @@ pub fn is_film(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zk"))
 }
 
-/// Creates the header of a film file with the film of `state`. `part` lists the shards that the
-/// film holds, and `report` describes the film.
+/// Creates the header of a film file. `state` has the film, `part` has the plan and the shards
+/// (parts of a divided render) that the film holds, and `report` describes the film.
 pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHeader {
     let settings = &part.plan.settings;
     let provenance = Provenance {
@@ -80,7 +82,8 @@ pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHead
     header
 }
 
-/// Formats sample counts and noise: `212 spp (32-900)  noise 0.250 8-bit levels`.
+/// Formats sample counts and noise of a film, such as `212 spp (32-900) noise 0.250 8-bit levels`:
+/// the mean, smallest and largest number of samples per pixel, and the RMSE.
 pub fn summary(report: &Report) -> String {
     let spp = &report.spp;
     let noise = match report.noise {
@@ -90,15 +93,15 @@ pub fn summary(report: &Report) -> String {
     format!("{:.0} spp ({}-{})  {noise}", spp.mean, spp.min, spp.max)
 }
 
-/// Reads a plan file.
+/// Reads the plan file at `path`.
 pub fn read_plan(path: &Path) -> Result<Plan, Failure> {
     Plan::read(path).map_err(|error| Failure::Failed(error.to_string()))
 }
 
-/// Writes a film file.
+/// Writes `film` and `header` to the film file at `path`.
 pub fn write_film(path: &Path, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
     let mut pieces = vec![header.encode()];
     pieces.extend((0..tile_chunks(film)).map(|chunk| encode_tiles(film, chunk)));
     pieces.push(encode_end(film, &pieces));
-    write_film_file(path, &pieces)
+    write_film_file(path, &pieces, Existing::Replace)
 }

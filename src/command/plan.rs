@@ -1,9 +1,8 @@
-//! `zerkalo plan`: divides a render among shards.
+//! `zerkalo plan`: divides a render among shards, which other processes or machines trace.
 
 use crate::command::args::PlanArgs;
-use crate::command::load_progress::LoadReporter;
 use crate::command::part_file;
-use crate::command::{Failure, check_file, print_line, warn, write_file};
+use crate::command::{Failure, check_file, print_line, read_scene_and_warn, write_file};
 use crate::film::file::FilmReader;
 use crate::film::{Estimator, Noise};
 use crate::render::export::scene_hash;
@@ -17,8 +16,9 @@ use crate::world;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 
-/// Noise of the pilot divided by the noise target, if `--pilot` is not given. At 2, the pilot takes
-/// a third to a half of the rays of the whole picture and predicts the noise within 10 %.
+/// Noise at which the pilot ends by default, divided by the noise target. The pilot is a first
+/// render of the picture, which predicts the sample counts. With a ratio of 2, it takes a third to
+/// a half of the rays of the whole picture and predicts the noise within 10 %.
 const PILOT: f64 = 2.0;
 
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {
@@ -53,7 +53,8 @@ pub fn hash(document: &Document) -> String {
     scene_hash(document.text(), document.scene())
 }
 
-/// Renders the pilot, writes its film, and plans the remaining samples.
+/// Renders a pilot (an adaptive render to a coarser noise), writes its film, and plans the
+/// remaining samples.
 fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let pilot_noise = args.pilot.unwrap_or(PILOT * args.noise);
     if pilot_noise < args.noise {
@@ -64,11 +65,7 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     }
     let base_file = args.base.clone().unwrap_or_else(|| default_base(&args.output));
     check_file(&base_file)?;
-    let document = Document::read_with(path, LoadReporter::new().assets)
-        .map_err(|e| Failure::Failed(e.to_string()))?;
-    for warning in document.warnings() {
-        warn(&format!("warning: {warning}"));
-    }
+    let document = read_scene_and_warn(path)?;
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     let options = Options {
@@ -77,11 +74,8 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         display: args.picture.display(),
     };
     let threads = args.compute.threads();
-    let mut pilot =
-        SyncRender::new(&scene, &options, settings(pilot_noise), threads).map_err(|error| {
-            let what = format!("cannot start {threads} threads: {error}; try fewer by --threads");
-            Failure::Failed(what)
-        })?;
+    let mut pilot = SyncRender::new(&scene, &options, settings(pilot_noise), threads)
+        .map_err(|error| Failure::Failed(error.to_string()))?;
     let bar = spinner();
     while pilot.step().is_none() {
         if let Some(noise) = pilot.noise_codes() {
@@ -126,8 +120,8 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     Ok(part.plan)
 }
 
-/// Plans the samples that are added to those of the merged film at `path` to reach the new noise
-/// target.
+/// Plans further samples, which are added to those of the merged film at `path`, to reach the new
+/// noise target.
 fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let failed =
         |reason: &str| Failure::Failed(format!("cannot plan from {}: {reason}", path.display()));
@@ -160,7 +154,7 @@ fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         .ok_or_else(|| failed("it has no estimate of its noise"))
 }
 
-/// Returns the default path of the pilot's film: `job-0.zk` for the plan `job.plan`.
+/// Returns the default path of the pilot render's film: `job-0.zk` for the plan `job.plan`.
 fn default_base(plan: &Path) -> PathBuf {
     let mut name = plan.file_stem().unwrap_or_default().to_os_string();
     name.push("-0.zk");

@@ -5,27 +5,28 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
 
-/// Seconds before the first output. Shorter renders show no progress.
+/// Seconds before the first output of progress. Shorter renders show none.
 const QUIET_SECONDS: f64 = 0.25;
-/// Seconds before the first line in a log. Each later interval is twice the previous one, up to
-/// [`LONGEST_INTERVAL_SECONDS`].
+/// Seconds before the first line of progress in a log. Each later interval is twice the previous
+/// one, up to [`LONGEST_INTERVAL_SECONDS`].
 const FIRST_LINE_SECONDS: f64 = 1.0;
-/// Longest interval between lines in a log, in seconds.
+/// Longest interval between lines of progress in a log, in seconds.
 const LONGEST_INTERVAL_SECONDS: f64 = 60.0;
 
-/// Number of steps of the bar.
+/// Number of steps into which the progress bar divides a whole render.
 const STEPS: u64 = 1000;
 
-/// Display of the progress: a bar or lines of a log.
+/// Display of a render's progress: a bar or lines of a log.
 pub enum Progress {
-    /// A bar in a terminal, created at the first output.
+    /// Progress bar in a terminal; `None` before the first output.
     Bar(Option<ProgressBar>),
-    /// Lines in a log. The value is the rendering time in seconds at which the next line is due.
+    /// Lines of progress in a log. The value is the rendering time in seconds at which the next
+    /// line is due.
     Lines(f64),
 }
 
 impl Progress {
-    /// Creates a bar if stderr is a terminal, otherwise lines.
+    /// Creates a progress bar if stderr is a terminal, otherwise lines of a log.
     pub fn on_stderr() -> Self {
         if std::io::stderr().is_terminal() {
             Self::Bar(None)
@@ -34,7 +35,7 @@ impl Progress {
         }
     }
 
-    /// Shows `report` if the next output is due.
+    /// Shows the progress of `report` if the next output is due.
     pub fn show(&mut self, report: &Report) {
         if report.seconds < QUIET_SECONDS {
             return;
@@ -57,7 +58,7 @@ impl Progress {
         }
     }
 
-    /// Removes the bar from the terminal.
+    /// Removes the progress bar from the terminal.
     pub fn finish(self) {
         if let Self::Bar(Some(bar)) = self {
             bar.finish_and_clear();
@@ -73,8 +74,9 @@ fn new_bar() -> ProgressBar {
     bar.with_style(style)
 }
 
-/// Formats a report, such as `33 spp (32-210)  41.2 Msamples/s  noise 0.81  3-5 s left`. The noise
-/// is in 8-bit levels.
+/// Formats the progress of a render, such as
+/// `33 spp (32-210) 41.2 Msamples/s noise 0.81 3-5 s left`. The first numbers are the mean,
+/// smallest and largest number of samples per pixel. The noise is in 8-bit levels.
 fn status(report: &Report) -> String {
     let spp = &report.spp;
     let mut text = if spp.min == spp.max {

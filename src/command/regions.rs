@@ -6,37 +6,39 @@ use crate::command::progress::Progress;
 use crate::command::signals::Signals;
 use crate::command::{Failure, warn};
 use crate::film::{Depth, ImageOutput};
+use crate::process_memory::{available_memory, megabytes, resident_memory};
 use crate::render::export::Provenance;
-use crate::render::memory::{Regions, check, divide};
+use crate::render::memory_budget::{Regions, check, divide};
 use crate::render::schedule::{Settings, StoppedBy};
 use crate::render::session::Report;
 use crate::render::{Options, RegionRender};
 use crate::scene::Scene;
-use crate::value::{available_memory, megabytes, resident_memory};
 use crate::world::{self, AnyWorld};
 use std::io;
 use std::sync::Arc;
 
-/// Name of the limit in messages if `--memory` is the tightest limit.
+/// Name of the memory limit in messages if `--memory` allows less than the available memory.
 const OPTION: &str = "--memory";
 
-/// Division of a picture into regions that fit into the given memory.
+/// Division of a picture into regions (bands of rows) that fit into the given memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Division {
-    /// `true` if all lights share one light group, to save memory.
+    /// `true` if all lights share one light group (part of the picture that the film stores
+    /// separately), to save memory.
     pub merge_lights: bool,
-    /// The regions. A picture that fits as a whole is one region.
+    /// Regions of the picture. A picture that fits as a whole is one region.
     pub regions: Regions,
 }
 
 impl Division {
     /// Divides the picture of `scene` so that the process uses at most `cap` bytes, and prints the
-    /// expected memory. If separate light groups do not fit, all lights share one group. If that
-    /// does not fit either, the picture is divided.
+    /// expected memory. If a film that stores the part of the picture due to each light separately
+    /// does not fit, all lights share one part. If that does not fit either, the picture is divided
+    /// into regions.
     ///
     /// # Errors
-    /// Fails if the smallest regions do not fit, or if a checkpoint is requested for a picture that
-    /// has to be divided.
+    /// Fails if the smallest regions do not fit, or if a checkpoint is requested and the film with
+    /// a separate part for each light does not fit.
     pub fn new(scene: &Scene, args: &RenderArgs, cap: u64) -> Result<Self, Failure> {
         let options =
             world::Options { precision: args.precision.get(), ..world::Options::default() };
@@ -94,8 +96,9 @@ impl Division {
     }
 }
 
-/// Returns the number of bytes that the process may use, and the name of the limit for messages.
-/// The number is `cap`, or the available memory if that is less.
+/// Returns two values: the number of bytes that the process may use, and the name of the memory
+/// limit for messages. The number is `cap`, the value of `--memory`, or the available memory if
+/// that is less.
 fn usable(cap: u64) -> (u64, &'static str) {
     let now = resident_memory().map_or(0, |resident| resident.now);
     match available_memory() {
@@ -106,8 +109,9 @@ fn usable(cap: u64) -> (u64, &'static str) {
     }
 }
 
-/// Returns a function that creates the error message. Its argument is the least memory of the
-/// picture in bytes.
+/// Returns a function that creates the error about too little memory. Its argument is the least
+/// number of bytes with which the picture can be rendered. `limit` is the name of the memory limit,
+/// and `cap` the number of bytes that it allows.
 fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
     move |least| {
         // The resident memory of the program differs by up to a megabyte from run to run.
@@ -128,12 +132,13 @@ fn small(bytes: u64) -> String {
     if bytes < 1_000_000 { format!("{} KB", bytes / 1000) } else { megabytes(bytes) }
 }
 
-/// Result of a render in regions, for the summary and the statistics.
+/// Result of a render in regions (bands of rows), for the summary and the statistics.
 pub struct Rendered {
     pub report: Report,
     pub stopped_by: StoppedBy,
     pub precision: &'static str,
-    /// One sentence for each limit that ends paths early.
+    /// One sentence for each limit of the scene that ends paths early, such as `max_depth`. The
+    /// sentence has an upper bound of the light that is lost.
     pub biased: Vec<String>,
 }
 

@@ -2,31 +2,30 @@
 
 use crate::command::args::RenderArgs;
 use crate::command::checkpoints::CheckpointWriter;
-use crate::command::load_progress::LoadReporter;
 use crate::command::progress::Progress;
 use crate::command::regions::{self, Division};
 use crate::command::signals::Signals;
 use crate::command::stats::Stats;
-use crate::command::{Failure, check_file, print_line, shard, warn, write_file};
+use crate::command::{Failure, check_file, print_line, read_scene, shard, warn, write_file};
 use crate::disk::WriteError;
-use crate::film::{Depth, ImageOutput};
+use crate::film::ImageOutput;
+use crate::process_memory::resident_memory;
 use crate::render::export::{Provenance, scene_hash};
 use crate::render::schedule::{Criterion, Settings, Stop, StoppedBy};
 use crate::render::session::{Report, Session, State};
 use crate::render::{Checkpoint, Options};
 use crate::sampling::SampleSettings;
-use crate::scene::{Document, Scene};
-use crate::value::resident_memory;
+use crate::scene::Scene;
 use crate::world;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Noise target of a render without stop options, in 8-bit levels: half a quantisation step of an
-/// 8-bit file.
+/// Default noise target of a render without stop options, in 8-bit levels: half a quantisation step
+/// of an 8-bit file.
 const DEFAULT_NOISE_CODES: f64 = 0.5;
 
-/// Interval at which signals and progress are polled.
+/// Interval at which signals and progress are polled during a render.
 const POLL: Duration = Duration::from_millis(50);
 
 pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
@@ -35,8 +34,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
     let output =
         ImageOutput::from_path(&args.output).map_err(|error| Failure::Usage(error.to_string()))?;
-    let document = Document::read_with(&args.scene, LoadReporter::new().assets)
-        .map_err(|e| Failure::Failed(e.to_string()))?;
+    let document = read_scene(&args.scene)?;
     let warnings = document.warnings().to_vec();
     let hash = scene_hash(document.text(), document.scene());
     let scene = sized(document.into_scene(), args)?;
@@ -123,7 +121,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     }
 }
 
-/// Inputs of a render to a picture file.
+/// Inputs of a render to a picture file: arguments, scene, output, signals.
 struct Job<'a> {
     args: &'a RenderArgs,
     scene: Scene,
@@ -131,21 +129,23 @@ struct Job<'a> {
     output: &'a ImageOutput,
     provenance: Provenance,
     signals: Signals,
-    /// Start of the program.
+    /// Time at which the program started.
     started: Instant,
 }
 
-/// Results of a render whose picture has been written, for the closing line and `--stats`.
+/// Results of a render whose picture has been written, for the printed summary and `--stats`.
 struct Rendered {
     report: Report,
     end: End,
     precision: &'static str,
-    /// One sentence for each limit that ends paths early.
+    /// One sentence for each limit of the scene that ends paths early, such as `max_depth`. The
+    /// sentence has an upper bound of the light that is lost.
     biased: Vec<String>,
-    /// Time from the start of the program to the start of compiling the scene.
+    /// Time from the start of the program to the start of compiling the scene. It includes the time
+    /// of reading the scene file.
     set_after: Duration,
     write_seconds: f64,
-    /// Result of writing the last checkpoint; `None` without `--checkpoint`.
+    /// Path of the last checkpoint, or the error of writing it; `None` without `--checkpoint`.
     kept: Option<Result<PathBuf, WriteError>>,
 }
 
@@ -153,9 +153,8 @@ struct Rendered {
 fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Failure> {
     let Job { args, scene, options, output, provenance, signals, started } = job;
     let threads = args.compute.threads();
-    let mut session = Session::new(threads, options, schedule_settings(args)).map_err(|error| {
-        Failure::Failed(format!("cannot start {threads} threads: {error}; try fewer by --threads"))
-    })?;
+    let mut session = Session::new(threads, options, schedule_settings(args))
+        .map_err(|error| Failure::Failed(error.to_string()))?;
     match checkpoint {
         Some(checkpoint) => resume(&mut session, Arc::new(scene), checkpoint),
         None => drop(session.set_scene(Arc::new(scene))),
@@ -181,7 +180,7 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
     let Job { args, scene, options, output, provenance, signals, started } = job;
     let set_after = started.elapsed();
     let how = (&options, schedule_settings(args));
-    let file = (output, depth(args));
+    let file = (output, args.bits);
     let rendered = regions::render(args, scene, how, rows, file, provenance, &signals)?;
     let regions::Rendered { report, stopped_by, precision, biased } = rendered;
     let traced = report.seconds + report.compile_seconds;
@@ -190,20 +189,17 @@ fn in_regions(job: Job, rows: u32) -> Result<Rendered, Failure> {
     Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept: None })
 }
 
-fn depth(args: &RenderArgs) -> Depth {
-    if args.bits == 16 { Depth::Sixteen } else { Depth::Eight }
-}
-
-/// Reason for the end of a render.
+/// Reason for the end of a render: a stop criterion or a signal.
 #[derive(Clone, Copy)]
 enum End {
-    /// A stop criterion was reached.
+    /// A stop criterion of the render, such as a noise target, was reached.
     Done(StoppedBy),
-    /// A signal ended the render. The value is the exit status.
+    /// A signal ended the render early. The value is the exit status of the program.
     Signal(u8),
 }
 
-/// Shows the progress until the render ends or a signal arrives.
+/// Shows the progress of the render until it ends or a signal arrives. Returns the reason for the
+/// end.
 fn watch(
     session: &Session,
     signals: &Signals,
@@ -228,25 +224,27 @@ fn watch(
     end
 }
 
-/// Result of a finished render: its report, the name of the precision, a sentence for each limit
-/// that ends paths early, and the result of writing the picture.
+/// Results of a finished render: its report, the name of the precision, a sentence for each limit
+/// that ends paths early (such as `max_depth`), and the result of writing the picture.
 type Written = (Report, &'static str, Vec<String>, Result<(), WriteError>);
 
-/// Writes the picture, on the thread of the session. Returns `None` if there is no film yet.
+/// Writes the picture to `output`, on the thread of `session`, and returns the results of the
+/// render. Returns `None` if the session has no film yet.
 fn write(
     session: &Session,
     args: &RenderArgs,
     output: &ImageOutput,
     provenance: Provenance,
 ) -> Option<Written> {
-    let (display, depth, output) = (args.picture.display(), depth(args), output.clone());
+    let (display, depth, output) = (args.picture.display(), args.bits, output.clone());
     session.with(move |state, report| {
         let written = state.write(report, &provenance, display, depth, &output);
         (report.clone(), state.world.precision(), state.world.biases(), written)
     })
 }
 
-/// Reads the checkpoint of `--resume`. Returns `None` if a new render is to start.
+/// Reads the checkpoint that `--resume` names. Returns `None` without this option, or if
+/// `--checkpoint` names the same file and the file does not exist yet.
 fn read_checkpoint(args: &RenderArgs) -> Result<Option<Checkpoint>, Failure> {
     let Some(path) = &args.resume else { return Ok(None) };
     if args.checkpoint.as_ref() == Some(path) && !path.exists() {
@@ -255,8 +253,8 @@ fn read_checkpoint(args: &RenderArgs) -> Result<Option<Checkpoint>, Failure> {
     Checkpoint::read(path).map(Some).map_err(|error| Failure::Failed(error.to_string()))
 }
 
-/// Continues `checkpoint`. Prints a note if the lights of `scene` differ from those of the
-/// checkpoint.
+/// Continues the render of `checkpoint`. Prints a note if the lights of `scene` differ from those
+/// of the checkpoint.
 fn resume(session: &mut Session, scene: Arc<Scene>, checkpoint: Checkpoint) {
     let weights = checkpoint.weights().clone();
     session.continue_from(scene, checkpoint);

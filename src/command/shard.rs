@@ -5,11 +5,10 @@
 //! failed command.
 
 use crate::command::args::RenderArgs;
-use crate::command::load_progress::LoadReporter;
 use crate::command::part_file::{self, FilmOutput};
 use crate::command::progress::Progress;
 use crate::command::signals::Signals;
-use crate::command::{Failure, print_line, warn};
+use crate::command::{Failure, print_line, read_scene, warn};
 use crate::film::Film;
 use crate::film::file::FilmReader;
 use crate::render::plan::{BASE, Part, PartShard, Plan, ShardRender};
@@ -21,15 +20,17 @@ use crate::world::{self, Precision};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Time from the start of a shard to its first checkpoint. Each later interval is twice the
-/// previous one, up to [`LONGEST_INTERVAL`].
+/// Time from the start of a shard's render to its first checkpoint. A shard is one process's part
+/// of a divided render. Each later interval is twice the previous one, up to [`LONGEST_INTERVAL`].
 const FIRST_CHECKPOINT: Duration = Duration::from_secs(5);
-/// Longest interval between checkpoints.
+/// Longest interval between two checkpoints of a shard, one process's part of a divided render.
 const LONGEST_INTERVAL: Duration = Duration::from_secs(60);
-/// Smallest interval between two checkpoints, as a multiple of the time to write one.
+/// Smallest interval between two checkpoints of a shard (one process's part of a render), as a
+/// multiple of the time that writing a checkpoint takes. Writing checkpoints thus takes at most a
+/// fiftieth of the render time.
 const WRITES_PER_INTERVAL: u32 = 50;
 
-/// Traces the plan at `plan_path`, or only the shard that `--shard` names.
+/// Renders all shards of the plan in the file `plan_path`, or only the one that `--shard` names.
 pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     let plan = part_file::read_plan(plan_path)?;
     let numbers = match args.shard {
@@ -40,8 +41,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
         None => (BASE..=plan.settings.shards).collect(),
     };
     let output = FilmOutput::new(&args.output, args.bits)?;
-    let document = Document::read_with(&args.scene, LoadReporter::new().assets)
-        .map_err(|e| Failure::Failed(e.to_string()))?;
+    let document = read_scene(&args.scene)?;
     let found = crate::command::plan::hash(&document);
     if found != plan.settings.scene_hash {
         return Err(Failure::Failed(format!(
@@ -69,7 +69,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     let unfinished = signal.is_some() && render.progress() < 1.0;
     part.shards.iter_mut().for_each(|shard| shard.complete = !unfinished);
     part.rays = render.rays();
-    let state = render.state();
+    let state = &render.state;
     let report = Report::of_film(&state.film, &state.mix, &part.plan.settings.display);
     output.write(&state.film, &part_file::header(state, &part, &report))?;
     let share = match unfinished {
@@ -117,8 +117,9 @@ fn check_shard(args: &RenderArgs, plan: &Plan, path: &Path, shard: u32) -> Resul
     Ok(())
 }
 
-/// Reads the film file of an earlier run of the same shard. Returns film, number of rays, and
-/// `true` if the shard is complete. Returns `None` if there is no such file, or if it is damaged.
+/// Reads the film file of an earlier run of the same shard, one process's part of a divided render.
+/// Returns three values: film, number of rays, and `true` if the shard is complete. Returns `None`
+/// if there is no such file, or if it is damaged.
 fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure> {
     if !path.exists() {
         return Ok(None);
@@ -154,8 +155,8 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
     }
 }
 
-/// Compiles the scene and creates the render of the shards `numbers`. `saved` is the film and the
-/// number of rays of an earlier run.
+/// Compiles the scene and creates the render of the shards with the given `numbers`; a shard is a
+/// part of the plan. `saved` has two values of an earlier run: the film and the number of rays.
 fn start(
     args: &RenderArgs,
     document: &Document,
@@ -198,8 +199,10 @@ fn start(
     ShardRender::new(state, &ranges, rays, threads).map_err(Failure::Failed)
 }
 
-/// Traces all samples of `render`. Stops at a signal and returns its exit status. Writes
-/// checkpoints if a single shard is traced.
+/// Traces samples of `render` until its shards are complete or a signal arrives. Returns two
+/// values: the render, and the exit status for the signal (`None` without a signal). Writes
+/// checkpoints to `output` if it is a film file. `part` is the plan with the shards (parts of the
+/// divided render) that the film holds.
 fn trace(
     mut render: ShardRender,
     part: &mut Part,
@@ -221,7 +224,7 @@ fn trace(
             let start = Instant::now();
             part.shards.iter_mut().for_each(|shard| shard.complete = false);
             part.rays = render.rays();
-            let state = render.state();
+            let state = &render.state;
             let report = Report::of_film(&state.film, &state.mix, &part.plan.settings.display);
             output.write(&state.film, &part_file::header(state, part, &report))?;
             interval =

@@ -10,11 +10,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// Number that is added to the number of a signal to form the exit status, as in shells.
 const SIGNALLED: i32 = 128;
 
-/// Number of the last signal that was received; 0 before the first one.
+/// Number of the last signal that was received (SIGINT or SIGTERM); 0 before the first one.
 pub struct Signals(Arc<AtomicUsize>);
 
 impl Signals {
-    /// Installs the signal handlers.
+    /// Installs the handlers of SIGINT and SIGTERM.
     pub fn watch() -> io::Result<Self> {
         let caught = Arc::new(AtomicUsize::new(0));
         let armed = Arc::new(AtomicBool::new(false));

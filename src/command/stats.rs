@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Contents of the JSON file. The keys must not change, because scripts rely on them.
+/// Contents of the statistics file (JSON). The keys must not change, because scripts rely on them.
 #[derive(Debug, Serialize)]
 pub struct Stats {
     /// Path of the scene file as given on the command line.
@@ -13,17 +13,17 @@ pub struct Stats {
     pub output: String,
     /// Version of the program.
     pub version: &'static str,
-    /// Width and height in pixels.
+    /// Width and height of the picture in pixels.
     pub size: [u32; 2],
     pub seed: u64,
     pub sampler: &'static str,
-    /// Precision of the geometry: `single` or `double`.
+    /// Floating-point precision of the render: `single` or `double`.
     pub precision: &'static str,
     /// Number type and width of SIMD lanes, such as `f32x8`.
     pub lanes: &'static str,
     pub threads: usize,
     pub adaptive: bool,
-    /// Number of samples over all pixels.
+    /// Number of samples of the picture, summed over all pixels.
     pub samples: u64,
     pub spp_min: u32,
     pub spp_mean: f64,
@@ -38,32 +38,34 @@ pub struct Stats {
     /// Seconds from the start of the program to the end of writing.
     pub total_seconds: f64,
     pub samples_per_second: f64,
-    /// Seconds from the start of the program until every pixel has a sample.
+    /// Seconds from the start of the program until every pixel has a sample. Null if some pixel has
+    /// none.
     pub first_picture_seconds: Option<f64>,
-    /// Estimated RMSE of the displayed picture, in 8-bit levels. Null if the replicates A and B,
-    /// from whose difference it is estimated, never had equal numbers of samples.
+    /// Estimated RMSE of the displayed picture, in 8-bit levels. It is estimated from the
+    /// difference between two halves of the samples, the replicates A and B. Null if these have
+    /// never had equal numbers of samples.
     pub noise_codes: Option<f64>,
-    /// 95th percentile over the tiles of their estimated RMSE, in 8-bit levels.
+    /// 95th percentile of the tiles' estimated RMSE, in 8-bit levels.
     pub noise_codes_p95: Option<f64>,
     pub rmse_linear: Option<f64>,
     /// Number of samples that are not in the picture because they were NaN or negative.
     pub bad_samples: u64,
     /// Number of samples that were clamped to the largest value that the film can hold.
     pub saturated_samples: u64,
-    /// Number of pixels whose sum was clamped to the largest value of the film.
+    /// Number of pixels whose sum of samples was clamped to the largest value of the film.
     pub saturated_pixels: u64,
-    /// One sentence for each limit that ends paths early, as in the picture's metadata. Empty if no
-    /// path ends early, so that the picture is unbiased.
+    /// One sentence for each limit that ends paths early, such as `max_depth`, as in the picture's
+    /// metadata. Empty if no path ends early, so that the picture is unbiased.
     pub biased: Vec<String>,
     /// Peak resident memory in bytes. Null on systems that do not report it.
     pub peak_rss_bytes: Option<u64>,
     /// Stop criterion that ended the render: `spp`, `noise`, `rmse`, `time`, `rays_per_pixel`,
-    /// `full` or `signal`.
+    /// `full` (the film can hold no more samples) or `signal`.
     pub stopped_by: &'static str,
 }
 
 impl Stats {
-    /// Returns the statistics as JSON.
+    /// Serialises the statistics as JSON.
     pub fn json(&self) -> String {
         serde_json::to_string_pretty(self).expect("plain numbers and strings") + "\n"
     }

@@ -1,37 +1,32 @@
-//! History of the estimated error, for the convergence plot.
+//! History of the picture's estimated error, for the convergence plot.
 
 use crate::render::session::Report;
 
-/// Noise of the picture at one time, from a report.
+/// Point of the convergence plot: render time, and noise of the picture at this time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Seconds of tracing until the report.
+    /// Seconds that the renderer has spent on tracing rays until this time.
     pub seconds: f64,
-    /// Mean samples per pixel.
-    pub spp: f64,
     /// Estimated RMSE of the displayed picture in 8-bit levels, greater than 0.
     pub noise_codes: f64,
 }
 
-/// Noise of one picture over time, from its reports. Older reports are thinned out to limit their
-/// number.
+/// History of the noise of one picture, from the renderer's reports. If it has too many points,
+/// some are removed.
 #[derive(Clone, Debug, Default)]
 pub struct Convergence {
-    points: Vec<Point>,
+    /// Points of the convergence plot in order of increasing time.
+    pub points: Vec<Point>,
     generation: u64,
     samples: u64,
 }
 
-/// Maximum number of points. It exceeds the number of columns of a plot.
+/// Largest number of stored points of the convergence plot, more than a plot has columns. Points
+/// are removed when it is exceeded.
 const MOST: usize = 400;
 
 impl Convergence {
-    /// Returns the points in order of increasing time.
-    pub fn points(&self) -> &[Point] {
-        &self.points
-    }
-
-    /// Returns the seconds of tracing after which the noise fell to `codes` 8-bit levels,
+    /// Returns the render time in seconds after which the noise fell to `codes` 8-bit levels,
     /// interpolated between two reports by a power law. Returns `None` if the noise is still
     /// higher, or if it was lower in the first report already.
     pub fn seconds_at(&self, codes: f64) -> Option<f64> {
@@ -43,7 +38,8 @@ impl Convergence {
         Some(before.seconds * (after.seconds / before.seconds).powf(part))
     }
 
-    /// Adds a report. The report of a new or restarted picture clears the history first.
+    /// Adds the noise in a report of the renderer. The report of a new or restarted picture clears
+    /// the history first.
     pub fn add(&mut self, report: &Report) {
         if report.generation != self.generation || report.samples < self.samples {
             self.points.clear();
@@ -53,7 +49,7 @@ impl Convergence {
         let Some(noise_codes) = report.noise.map(|n| n.rmse_codes).filter(|n| *n > 0.0) else {
             return;
         };
-        let point = Point { seconds: report.seconds, spp: report.spp.mean, noise_codes };
+        let point = Point { seconds: report.seconds, noise_codes };
         match self.points.last_mut() {
             // The error estimate has not been updated since the last report.
             Some(last) if last.noise_codes == point.noise_codes => {}
@@ -67,8 +63,8 @@ impl Convergence {
         }
     }
 
-    /// Removes every second point among the later three quarters, which are the densest on a
-    /// logarithmic axis. The newest point is kept.
+    /// Removes every second point of the convergence plot after the first quarter of the points,
+    /// because these are the densest on the logarithmic time axis. The newest point stays.
     fn thin(&mut self) {
         let (early, newest) = (MOST / 4, self.points.len() - 1);
         let mut index = 0;
@@ -90,7 +86,7 @@ mod tests {
         for i in 1..100_000u64 {
             convergence.add(&report(1, i, Some(100.0 / (i as f64).sqrt())));
         }
-        let points = convergence.points();
+        let points = &convergence.points;
         assert!((MOST / 2..=MOST).contains(&points.len()), "{}", points.len());
         assert!(points.is_sorted_by(|a, b| a.seconds < b.seconds));
         assert_eq!(points[0].noise_codes, 100.0);
@@ -103,11 +99,11 @@ mod tests {
         convergence.add(&report(1, 10, Some(3.0)));
         convergence.add(&report(1, 20, Some(2.0)));
         convergence.add(&report(1, 20, Some(2.5)));
-        assert_eq!(convergence.points().len(), 2, "the same moment seen twice");
-        assert_eq!(convergence.points()[1].noise_codes, 2.5);
+        assert_eq!(convergence.points.len(), 2, "the same moment seen twice");
+        assert_eq!(convergence.points[1].noise_codes, 2.5);
         convergence.add(&report(1, 5, Some(4.0)));
-        assert_eq!(convergence.points().len(), 1, "restarted");
+        assert_eq!(convergence.points.len(), 1, "restarted");
         convergence.add(&report(2, 50, None));
-        assert!(convergence.points().is_empty(), "another scene");
+        assert!(convergence.points.is_empty(), "another scene");
     }
 }

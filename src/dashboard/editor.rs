@@ -1,9 +1,9 @@
-//! Text editor for one line.
+//! Text editor for one line, as in fields and prompts of the dashboard.
 
 use crate::terminal::event::{Code, Key};
 use tui_input::{Input, InputRequest};
 
-/// Maximum length of the text in characters. It suffices for a path and keeps editing fast.
+/// Largest length of the edited text in characters. It suffices for a path and keeps editing fast.
 const MOST: usize = 400;
 
 /// Editor of a line of text, with a cursor. It also holds the reason why the text was refused.
@@ -21,18 +21,18 @@ impl Editor {
         Self { input: Input::new(text.into()), problem: None }
     }
 
-    /// Returns the text.
+    /// Returns the text that is being edited.
     pub fn text(&self) -> &str {
         self.input.value()
     }
 
-    /// Returns the distance in columns between the start of the text and the cursor.
+    /// Returns the width in columns of the text before the cursor.
     pub fn cursor_columns(&self) -> usize {
         self.input.visual_cursor()
     }
 
-    /// Returns the number of columns to skip at the start of the text so that the cursor is visible
-    /// in `width` columns.
+    /// Returns the number of columns of the text that are scrolled out of view at the left, so that
+    /// the cursor is visible in `width` columns.
     pub fn scroll_columns(&self, width: usize) -> usize {
         self.input.visual_scroll(width)
     }

@@ -5,43 +5,36 @@ use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::commands::{COMMANDS, Chapter, Command, Hint, HintLine};
 
-/// A line of the help.
+/// Line of the dashboard's help: a heading, or a command with its keys.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HelpLine {
-    /// The heading of a chapter.
+    /// Heading of a chapter of the help.
     Heading(&'static str),
-    /// Keys of a command with their contexts, and the label of the command.
+    /// Two texts: the keys of a command with the contexts in which they work, and the label of the
+    /// command.
     Keys(String, &'static str),
 }
 
 /// Returns the state of the dashboard that determines the hints. Returns `None` while an exported
-/// image covers the screen.
+/// image covers the screen, which then has no hint line.
 fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
         Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => HintLine::Reading,
         Some(
-            Overlay::Palette(_)
+            Overlay::CommandPalette(_)
             | Overlay::Pick(_)
             | Overlay::NoiseTargets { .. }
             | Overlay::Question(_),
         ) => HintLine::List,
         Some(Overlay::ViewerImage(_)) => return None,
-        Some(Overlay::Form(form)) if form.editor.is_none() => HintLine::Form,
+        Some(Overlay::Form(form)) if form.fields.editor.is_none() => HintLine::Form,
         Some(Overlay::Form(_) | Overlay::Prompt(_)) => HintLine::Typing,
         None if model.inspector.editor.is_some() => HintLine::Typing,
         None if model.watch.is_some() && model.context() != KeyContext::Probing => {
             HintLine::Watching
         }
-        None => match model.context() {
-            KeyContext::Moving => HintLine::Moving,
-            KeyContext::Turning => HintLine::Turning,
-            KeyContext::Flying => HintLine::Flying,
-            KeyContext::Probing => HintLine::Probing,
-            KeyContext::Outline => HintLine::Outline,
-            KeyContext::Inspector => HintLine::Inspector,
-            _ if model.first_time => HintLine::First,
-            _ => HintLine::Picture,
-        },
+        None if model.first_time && model.context() == KeyContext::Picture => HintLine::First,
+        None => HintLine::In(model.context()),
     })
 }
 
@@ -61,8 +54,8 @@ pub fn hints(model: &Model) -> Vec<&'static Hint> {
     hint_line(model).map_or_else(Vec::new, hints_of)
 }
 
-/// Returns the lines of the help: all commands, or those that run while files are watched if
-/// `watching` is `true`.
+/// Returns the lines of the help about all commands. If `watching` is `true`, commands that cannot
+/// run in `zerkalo watch` are omitted.
 pub fn help(watching: bool) -> Vec<HelpLine> {
     let line = |command: &Command| {
         let keys = match watching {
@@ -83,43 +76,6 @@ pub fn help(watching: bool) -> Vec<HelpLine> {
     lines
 }
 
-/// Returns the text of docs/keys.md.
-pub fn reference() -> String {
-    let mut page = "# Keys\n\n\
-        Generated from the command table. Every action is also found by typing a part of its name \
-        after `:`; actions without a key only there.\n"
-        .to_string();
-    // A vertical bar would end a cell of the Markdown table.
-    let quoted = |key: &str| format!("`{}`", key.replace('|', "\\|"));
-    for (chapter, title) in Chapter::ALL {
-        page += &format!("\n## {title}\n\n| keys | action |\n|---|---|\n");
-        for command in chapter.commands() {
-            page += &format!("| {} | {} |\n", command.all_keys(quoted), command.label);
-        }
-    }
-    page += "\n## While watching\n\n`zerkalo watch` edits and renders nothing. It has these keys:\n\n\
-             | keys | action |\n|---|---|\n";
-    for command in COMMANDS.iter().filter(|command| command.while_watching) {
-        page += &format!("| {} | {} |\n", command.watch_keys(quoted), command.label);
-    }
-    page += "\n## Mouse\n\n| mouse | effect |\n|---|---|\n";
-    for (mouse, effect) in MOUSE {
-        page += &format!("| {mouse} | {effect} |\n");
-    }
-    page
-}
-
-/// Mouse gestures and their effects.
-const MOUSE: &[(&str, &str)] = &[
-    ("click in the picture", "selects the visible object; while probing: shows the pixel"),
-    ("drag in the picture", "orbits; while moving: moves the selection in the ground plane"),
-    ("drag with the right button, or with Ctrl or Alt", "pans; while moving: moves it up and down"),
-    ("click with the right button, or with Ctrl or Alt", "focuses the lens on the visible point"),
-    ("wheel over the picture", "dollies"),
-    ("click in a panel or list", "selects; a second time: opens"),
-    ("wheel over the field under the cursor", "steps its value; elsewhere: scrolls"),
-];
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -130,13 +86,9 @@ mod tests {
             for hint in command.hints {
                 for line in hint.lines {
                     let context = match line {
-                        HintLine::First | HintLine::Picture => KeyContext::Picture,
-                        HintLine::Moving => KeyContext::Moving,
-                        HintLine::Turning => KeyContext::Turning,
-                        HintLine::Flying => KeyContext::Flying,
-                        HintLine::Probing => KeyContext::Probing,
-                        HintLine::Outline | HintLine::Watching => KeyContext::Outline,
-                        HintLine::Inspector => KeyContext::Inspector,
+                        HintLine::First => KeyContext::Picture,
+                        HintLine::In(context) => *context,
+                        HintLine::Watching => KeyContext::Outline,
                         HintLine::List | HintLine::Form | HintLine::Typing | HintLine::Reading => {
                             KeyContext::Overlay
                         }

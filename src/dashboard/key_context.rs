@@ -1,4 +1,4 @@
-//! Contexts in which keys are looked up.
+//! Contexts (panels and modes) in which keys are looked up in the command table.
 
 /// Panel or mode of the dashboard in which a key runs a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -6,26 +6,27 @@ pub enum KeyContext {
     /// Every panel and mode in which no other command has the key. Overlays and text editors are
     /// excluded.
     Anywhere,
-    /// The picture has the focus.
+    /// The picture's panel has the focus, in its default mode.
     Picture,
-    /// The selection is being moved.
+    /// The arrow keys move the selected object or light.
     Moving,
-    /// The selection is being turned.
+    /// The arrow keys turn the selected object or light.
     Turning,
-    /// The camera flies.
+    /// The arrow keys turn the camera and letter keys fly it.
     Flying,
-    /// The probe moves over the picture.
+    /// The arrow keys move the pixel probe, which shows the samples, radiance and error of one
+    /// pixel.
     Probing,
-    /// The outline has the focus.
+    /// The outline, the list of all parts of the scene, has the focus.
     Outline,
-    /// The inspector has the focus.
+    /// The inspector, the list of the selection's properties, has the focus.
     Inspector,
     /// An overlay is open, such as a list, a form, the help or a question.
     Overlay,
 }
 
 impl KeyContext {
-    /// Returns the context as a phrase, such as `in the outline`. The phrase is empty for
+    /// Returns the key context as a phrase, such as `in the outline`. The phrase is empty for
     /// [`KeyContext::Anywhere`].
     pub fn place(self) -> &'static str {
         match self {

@@ -1,60 +1,65 @@
-//! Layout of the screen, a pure function that drawing and mouse handling share.
+//! Layout of the screen in panels: a pure function that drawing and mouse handling share.
 
-use crate::terminal::Area;
+use ratatui::layout::{Margin, Rect};
 
-/// Panel that can have the focus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// Panel of the dashboard that can have the focus.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Focus {
-    /// The picture.
+    /// Panel with the rendered picture.
+    #[default]
     Picture,
-    /// The outline, a list of everything in the scene that can be selected and edited.
+    /// Outline: the list of everything in the scene that can be selected and edited.
     Outline,
-    /// The inspector, with the fields of the selection.
+    /// Inspector: the list of the selection's properties.
     Inspector,
 }
 
-/// Input of the layout.
+/// Input from which [`layout`] computes the areas of the panels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request {
     /// Columns and rows of the terminal.
     pub screen: [u16; 2],
     /// Width and height of the film in pixels.
     pub film: [u32; 2],
-    /// Panel with the focus.
+    /// Panel with the keyboard focus.
     pub focus: Focus,
     /// `true` if only the picture is visible.
     pub fullscreen: bool,
-    /// `true` if the table of watched files takes the place of outline and inspector.
+    /// `true` if the table of watched files is shown in place of the lists for editing.
     pub watching: bool,
 }
 
-/// Areas of the screen. Panels include their borders; folded panels are `None`.
+/// Areas of the panels on the screen, borders included. A panel that is folded for lack of room has
+/// the area `None`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layout {
-    /// Panel of the picture.
-    pub picture: Area,
-    /// Cells that show the picture, centred inside the panel.
-    pub image: Area,
+    /// Area of the panel with the rendered picture.
+    pub picture: Rect,
+    /// Area of the terminal cells that show the picture, centred inside of the panel.
+    pub image: Rect,
     /// Columns and rows of the picture in half cells. A half cell is the upper or lower half of a
     /// cell, and is treated as square. If the number of rows is odd, the last row consists of upper
     /// halves.
     pub raster: [usize; 2],
-    /// Panel of the outline, or of the table of watched files.
-    pub outline: Option<Area>,
-    /// Panel of the inspector.
-    pub inspector: Option<Area>,
-    /// Panel of the convergence plot.
-    pub plot: Option<Area>,
-    /// Row of the status line.
-    pub status: Area,
-    /// Row of hints and notices.
-    pub hints: Area,
+    /// Area of the outline (the list of all parts of the scene), or of the table of watched files.
+    pub outline: Option<Rect>,
+    /// Area of the inspector, the panel that lists the selection's properties.
+    pub inspector: Option<Rect>,
+    /// Area of the panel with the convergence plot.
+    pub plot: Option<Rect>,
+    /// Row of the status line on the screen.
+    pub status: Rect,
+    /// Row of key hints and notices on the screen.
+    pub hints: Rect,
 }
+
+/// Border of a panel: one cell on each side.
+pub const BORDER: Margin = Margin { horizontal: 1, vertical: 1 };
 
 /// Columns and rows of the smallest supported terminal.
 pub const SMALLEST: [u16; 2] = [40, 12];
 
-/// Minimum height of the plot in rows.
+/// Smallest height of the convergence plot in rows.
 const PLOT_ROWS: u16 = 8;
 /// Smallest width of the terminal, in columns, at which the side panels stay visible while the
 /// picture has the focus.
@@ -66,8 +71,8 @@ pub fn layout(request: &Request) -> Option<Layout> {
     if width < SMALLEST[0] || height < SMALLEST[1] {
         return None;
     }
-    let status = Area { x: 0, y: height - 2, width, height: 1 };
-    let hints = Area { x: 0, y: height - 1, width, height: 1 };
+    let status = Rect { x: 0, y: height - 2, width, height: 1 };
+    let hints = Rect { x: 0, y: height - 1, width, height: 1 };
     let rows = height - 2;
     let mut side = match (width, request.watching) {
         (0..100, false) => 28,
@@ -79,24 +84,25 @@ pub fn layout(request: &Request) -> Option<Layout> {
     if request.fullscreen || width < SIDE_FROM && request.focus == Focus::Picture {
         side = 0;
     }
-    let picture = Area { x: 0, y: 0, width: width - side, height: rows };
-    let inside = if request.fullscreen { picture } else { picture.inner() };
+    let picture = Rect { x: 0, y: 0, width: width - side, height: rows };
+    let inside = if request.fullscreen { picture } else { picture.inner(BORDER) };
     let (image, raster) = fitted(inside, request.film);
     let [outline, inspector, plot] = match side {
         0 => [None; 3],
         _ => {
-            let column = Area { x: width - side, y: 0, width: side, height: rows };
+            let column = Rect { x: width - side, y: 0, width: side, height: rows };
             if request.watching { watch_column(column) } else { edit_column(column, request.focus) }
         }
     };
     Some(Layout { picture, image, raster, outline, inspector, plot, status, hints })
 }
 
-/// Divides the side column into outline, inspector and plot, from top to bottom. Panels without
-/// room are folded.
-fn edit_column(side: Area, focus: Focus) -> [Option<Area>; 3] {
+/// Divides the side column of the screen into three panels, from top to bottom: the outline (the
+/// list of all parts of the scene), the inspector (properties of the selection) and the convergence
+/// plot. Panels without room are `None`.
+fn edit_column(side: Rect, focus: Focus) -> [Option<Rect>; 3] {
     let rows = side.height;
-    let part = |y: u16, height: u16| Some(Area { y: side.y + y, height, ..side });
+    let part = |y: u16, height: u16| Some(Rect { y: side.y + y, height, ..side });
     if rows < 16 {
         // There is room for one panel only.
         return match focus {
@@ -116,30 +122,31 @@ fn edit_column(side: Area, focus: Focus) -> [Option<Area>; 3] {
     [part(0, outline), part(outline, left - outline), plot]
 }
 
-/// Divides the side column into the table of watched files, in the place of the outline, and the
-/// plot.
-fn watch_column(side: Area) -> [Option<Area>; 3] {
+/// Divides the side column of the screen into the table of watched files and the convergence plot.
+/// Returns three areas as [`edit_column`] does: the table in place of the outline, `None` for the
+/// inspector, and the plot (`None` if there is no room).
+fn watch_column(side: Rect) -> [Option<Rect>; 3] {
     let plot = plot_rows(side.height);
-    let table = Area { height: side.height - plot, ..side };
-    let plot = (plot > 0).then(|| Area { y: side.y + table.height, height: plot, ..side });
+    let table = Rect { height: side.height - plot, ..side };
+    let plot = (plot > 0).then(|| Rect { y: side.y + table.height, height: plot, ..side });
     [Some(table), None, plot]
 }
 
-/// Returns the height of the plot in a column of `rows` rows, or 0 if there is no room.
+/// Returns the height of the convergence plot in a column of `rows` rows, or 0 if there is no room.
 fn plot_rows(rows: u16) -> u16 {
     if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 }
 }
 
-/// Returns the largest centred area with the film's aspect ratio inside `inside`, and its columns
-/// and rows of half cells.
-fn fitted(inside: Area, [film_width, film_height]: [u32; 2]) -> (Area, [usize; 2]) {
+/// Returns two values: the largest centred area with the film's aspect ratio in the area `inside`,
+/// and its columns and rows of half cells. A half cell is the upper or lower half of a cell.
+fn fitted(inside: Rect, [film_width, film_height]: [u32; 2]) -> (Rect, [usize; 2]) {
     let (columns, halves) = (f64::from(inside.width), 2.0 * f64::from(inside.height));
     let (film_width, film_height) = (f64::from(film_width.max(1)), f64::from(film_height.max(1)));
     let per_pixel = (columns / film_width).min(halves / film_height);
     let whole = |pixels: f64, most: f64| (pixels * per_pixel).round().clamp(1.0, most.max(1.0));
     let raster = [whole(film_width, columns), whole(film_height, halves)];
     let [width, height] = [raster[0] as u16, (raster[1] / 2.0).ceil() as u16];
-    let image = Area {
+    let image = Rect {
         x: inside.x + (inside.width - width.min(inside.width)) / 2,
         y: inside.y + (inside.height - height.min(inside.height)) / 2,
         width,
@@ -149,10 +156,10 @@ fn fitted(inside: Area, [film_width, film_height]: [u32; 2]) -> (Area, [usize; 2
 }
 
 impl Layout {
-    /// Returns the film pixel (column, row) at the centre of a cell. Returns `None` if the cell is
-    /// outside the picture.
+    /// Returns the pixel of the film (column, row) that the terminal cell at `column` and `row` of
+    /// the screen shows at its centre. Returns `None` if the cell is outside of the picture.
     pub fn film_pixel(&self, film: [u32; 2], column: u16, row: u16) -> Option<[usize; 2]> {
-        if !self.image.contains(column, row) {
+        if !self.image.contains((column, row).into()) {
             return None;
         }
         let at =
@@ -177,8 +184,8 @@ mod tests {
 
     const FOCI: [Focus; 3] = [Focus::Picture, Focus::Outline, Focus::Inspector];
 
-    /// Checks at every size that panels stay on the screen and together fill it without overlap,
-    /// and that the panel with the focus is not folded.
+    /// Checks at every terminal size that the panels stay on the screen and fill it without
+    /// overlap, and that the panel with the keyboard focus is never folded.
     #[test]
     fn panels_tile_the_screen() {
         for width in 40..220 {
@@ -186,7 +193,7 @@ mod tests {
                 for focus in FOCI {
                     let l = at(width, height, focus).unwrap();
                     let panels = [Some(l.picture), l.outline, l.inspector, l.plot];
-                    let cells = |a: &Area| u32::from(a.width) * u32::from(a.height);
+                    let cells = |a: &Rect| u32::from(a.width) * u32::from(a.height);
                     let all: u32 = panels.iter().flatten().map(cells).sum();
                     assert_eq!(all, u32::from(width) * u32::from(height - 2), "{width}x{height}");
                     for panel in panels.into_iter().flatten() {
@@ -209,8 +216,9 @@ mod tests {
         assert!(at(80, 24, Focus::Picture).unwrap().inspector.is_some());
     }
 
-    /// Checks that the picture is as large as possible, that it has the film's aspect ratio to
-    /// within half of a half cell, and that each of its cells shows a film pixel.
+    /// Checks that the picture fills the width or the height of its panel, and that each of its
+    /// cells shows a film pixel. Its width and height have the film's aspect ratio, except for
+    /// rounding to whole half cells (a half cell is the upper or lower half of a cell).
     #[test]
     fn picture_keeps_aspect_ratio_of_film() {
         for film in [[640, 480], [480, 640], [1920, 800], [1, 1], [8192, 1], [1, 8192]] {
@@ -219,7 +227,7 @@ mod tests {
                     let focus = Focus::Picture;
                     let request = Request { screen, film, focus, fullscreen, watching: false };
                     let l = layout(&request).unwrap();
-                    let inside = if fullscreen { l.picture } else { l.picture.inner() };
+                    let inside = if fullscreen { l.picture } else { l.picture.inner(BORDER) };
                     let [columns, halves] = l.raster;
                     let room = [usize::from(inside.width), 2 * usize::from(inside.height)];
                     assert!(columns == room[0] || halves == room[1], "{request:?} {l:?}");
@@ -230,7 +238,7 @@ mod tests {
                     let image = l.image;
                     for row in image.y..image.y + image.height {
                         for column in image.x..image.x + image.width {
-                            assert!(inside.contains(column, row));
+                            assert!(inside.contains((column, row).into()));
                             assert!(l.film_pixel(film, column, row).is_some());
                         }
                     }

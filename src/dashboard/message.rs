@@ -2,7 +2,7 @@
 
 use crate::film::{Display, LinearImage};
 use crate::render::schedule::Stop;
-use crate::render::session::{Snapshot, WatchReport};
+use crate::render::session::{Snapshot, View, WatchReport};
 use crate::scene::{SaveError, Scene, SceneErrors};
 use crate::terminal::event::{Key, Mouse};
 use crate::terminal::flow::LinkStatus;
@@ -11,87 +11,92 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// An event that `update` receives.
+/// Message to `update`: an event that changes the model.
 #[derive(Debug)]
 pub enum Message {
-    /// A key was pressed.
+    /// Key that was pressed.
     Key(Key),
-    /// Mouse event. Pending drags are joined: only the newest position is reported.
+    /// Mouse event. Successive drags that wait to be handled are joined to one, which has the
+    /// newest position.
     Mouse(Mouse),
     /// Pasted text, which is never interpreted as keys.
     Paste(String),
     /// New size of the terminal in columns and rows.
     Resize([u16; 2]),
-    /// Latest snapshot of the renderer.
+    /// Latest snapshot of the renderer: the state of the render at one moment, with the picture so
+    /// far.
     Snapshot(Box<Snapshot>),
     /// State of the files that `zerkalo watch` shows.
     Watched(Box<WatchReport>),
-    /// Result of [`Effect::Pin`]: the picture and its mean samples per pixel.
+    /// Result of [`Effect::Pin`]: the picture to keep for later comparison, and its mean number of
+    /// samples per pixel.
     Pinned(Arc<LinearImage>, f64),
-    /// Result of [`Effect::Save`] for this scene.
+    /// Result of saving this scene by [`Effect::Save`]: the path of the written file, or the error.
     Saved(Arc<Scene>, Result<PathBuf, SaveError>),
-    /// Result of [`Effect::Load`].
+    /// Scene that was read from the scene file by [`Effect::Load`], or the errors in the file.
     Loaded(Box<Result<Arc<Scene>, SceneErrors>>),
     /// Another program has changed the scene file since this program last read or wrote it.
     ChangedOnDisk,
     /// Unsaved edits of this scene from a crashed session.
     OrphanedEdits(OrphanedEdits),
-    /// Warning, to be shown until the next key.
+    /// Warning that is shown until the next key.
     Warning(String),
-    /// Result of an export.
+    /// Image that was exported, or the reason of the failure.
     Exported(Result<Exported, String>),
-    /// Result of [`Effect::Checkpoint`].
+    /// Path of the checkpoint that [`Effect::Checkpoint`] has written, or the reason of the
+    /// failure.
     CheckpointWritten(Result<PathBuf, String>),
-    /// Progress of [`Effect::ExportSized`], 0..=1.
+    /// Progress of a render for an exported image ([`Effect::ExportSized`]), 0..=1.
     ExportProgress(f64),
-    /// Result of [`Effect::ViewImage`] for this path.
+    /// Image that [`Effect::ViewImage`] has prepared from the file at this path for the viewer, or
+    /// the reason of the failure.
     ViewerImage(PathBuf, Result<Arc<ViewerImage>, String>),
-    /// Transferred fraction of the image in the viewer, 0..=1.
+    /// Share of the viewed image that was sent to the terminal, 0..=1.
     ImageSent(f64),
     /// Status of the connection to a remote terminal; `None` for a local terminal.
     LinkStatus(Option<LinkStatus>),
-    /// A timeout has expired: the time of
+    /// Expiry of a timeout: the time of
     /// [`Model::next_timeout`](crate::dashboard::model::Model::next_timeout) has come.
     Tick,
 }
 
-/// Unsaved edits of a crashed session.
+/// Unsaved edits of a crashed session, which the user can recover.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrphanedEdits {
-    /// Scene with the edits.
+    /// Scene with the unsaved edits.
     pub scene: Arc<Scene>,
-    /// Time since the edits were last written to the recovery file.
+    /// Time since the unsaved edits were last written to the recovery file.
     pub age: Duration,
     /// `true` if the scene file has changed since the edits were written.
     pub changed: bool,
 }
 
-/// An exported image.
+/// Description of an exported image file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exported {
-    /// Path of the file.
+    /// Path of the image file.
     pub path: PathBuf,
-    /// Width and height in pixels.
+    /// Width and height of the image in pixels.
     pub size: [usize; 2],
-    /// Mean samples per pixel.
+    /// Mean number of samples per pixel of the image.
     pub spp: f64,
     /// Estimated RMSE of the displayed picture in 8-bit levels; `None` without an estimate.
     pub noise_codes: Option<f64>,
-    /// Argument of scp that copies the file, such as `user@host:path`.
+    /// Argument of scp that copies the image file, such as `user@host:path`.
     pub scp: String,
 }
 
-/// File format of an export.
+/// File format of an exported image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// PNG: as displayed, 8 bits per channel.
+    /// PNG: the picture as displayed, 8 bits per channel.
     Png,
-    /// OpenEXR: linear radiance.
+    /// OpenEXR: the picture in linear radiance.
     Exr,
 }
 
 impl Format {
-    /// File name extension.
+    /// Returns the file name extension of the format.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",
@@ -100,10 +105,12 @@ impl Format {
     }
 }
 
-/// Channel of the render that the picture shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// Channel of the render that the picture shows: the rendered picture itself, a statistic of each
+/// tile, or a property of the first hits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum DisplayChannel {
-    /// Rendered picture.
+    /// Rendered picture (beauty pass).
+    #[default]
     Beauty,
     /// Estimated error of each tile, in false colour.
     Noise,
@@ -118,14 +125,15 @@ pub enum DisplayChannel {
 }
 
 impl DisplayChannel {
-    /// Every channel, in the order in which the key cycles through them.
+    /// All channels of the picture that the dashboard can show, in the order in which a key cycles
+    /// through them.
     pub const ALL: [Self; 6] =
         [Self::Beauty, Self::Noise, Self::Samples, Self::Objects, Self::Normals, Self::Depth];
 
-    /// Channels of a film, which need no scene.
+    /// Channels that are computed from a film alone, without a scene.
     pub const OF_FILM: [Self; 3] = [Self::Beauty, Self::Noise, Self::Samples];
 
-    /// Returns the name of the channel.
+    /// Returns the channel's name on the screen.
     pub fn name(self) -> &'static str {
         match self {
             Self::Beauty => "beauty",
@@ -138,58 +146,59 @@ impl DisplayChannel {
     }
 }
 
-/// A request from `update` to the event loop. If several effects of one kind are pending, only the
-/// last one is executed, except for saves and exports.
+/// Effect: a request from `update` to the event loop. If several effects of one kind are pending,
+/// only the last one is executed. Saves and exports are exceptions: all are executed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     /// Render this scene. Existing samples are kept if only lighting has changed: intensity or
     /// colour of a light, a light switched on or off, ambient light, background.
     Show(Arc<Scene>),
-    /// Use this display transform to measure noise and to write images.
+    /// Use this display transform (exposure and tone curve) to measure noise and to write images.
     Display(Display),
-    /// Use these stop criteria.
+    /// Render until these stop criteria are reached.
     Stop(Stop),
-    /// Resample snapshots to these columns and rows of half cells.
-    Raster([usize; 2]),
-    /// Pause (`true`) or resume (`false`) tracing.
+    /// Return snapshots of the render with pictures of these columns and rows of half cells (a half
+    /// cell is the upper or lower half of a terminal cell), and with the values of this film pixel.
+    View(View),
+    /// Pause (`true`) or resume (`false`) the render.
     Pause(bool),
     /// Discard all samples and restart rendering.
     Restart,
-    /// Use this number of tracing threads, at least 1.
+    /// Render with this number of threads, at least 1.
     Threads(usize),
-    /// Give the tracing threads low (`true`) or normal (`false`) priority.
+    /// Give the render's threads low (`true`) or normal (`false`) priority.
     LowPriority(bool),
-    /// Include the values of this film pixel (column, row) in snapshots; with `None`, those of no
-    /// pixel.
-    Probe(Option<[usize; 2]>),
-    /// Return the current picture as [`Message::Pinned`], for comparison.
+    /// Return the current picture as [`Message::Pinned`]. The model stores it, so that the user can
+    /// compare later pictures with it.
     Pin,
     /// Write the scene to its file, or to `path`, which becomes the scene's file.
     Save {
-        /// Scene to write.
+        /// Scene to write to the file.
         scene: Arc<Scene>,
-        /// Path other than the scene's own, relative to the working directory.
+        /// Path of the file to write; `None` for the scene's own file. A relative path starts at
+        /// the working directory.
         path: Option<PathBuf>,
-        /// Permission to overwrite changes by other programs, or an existing file at `path`.
+        /// `true` if changes by other programs, or an existing file at `path`, may be overwritten.
         overwrite: bool,
     },
-    /// Read the scene file.
+    /// Read the scene file again.
     Load,
-    /// Write the current picture to the next free file name derived from the scene's name.
+    /// Write the current picture as an image. Its file gets the next free name derived from the
+    /// scene's name, such as `room-2.png`.
     Export(Format),
-    /// Write the samples of this scene as a checkpoint to the next free file name derived from the
-    /// scene's name.
+    /// Write the samples of this scene as a checkpoint. Its file gets the next free name derived
+    /// from the scene's name.
     Checkpoint(Arc<Scene>),
     /// Render the scene at another size until `stop`, while the main render continues, and write
     /// the picture to the next free file name.
     ExportSized {
-        /// Scene whose film has the requested size.
+        /// Scene to render; its film has the requested size.
         scene: Arc<Scene>,
-        /// File format.
+        /// File format of the image.
         format: Format,
-        /// Exposure and tone curve.
+        /// Exposure and tone curve of the image.
         display: Display,
-        /// Stop criteria.
+        /// Stop criteria of the exported image's render.
         stop: Stop,
     },
     /// Cancel the render of [`Effect::ExportSized`], so that it writes nothing.
@@ -197,23 +206,23 @@ pub enum Effect {
     /// Write the scene with unsaved edits to the recovery file, from which the next start offers to
     /// recover them. `None` removes the file.
     Autosave(Option<Arc<Scene>>),
-    /// Adopt the orphaned edits as the unsaved edits of this session.
+    /// Adopt the offered edits of a crashed session as the unsaved edits of this one.
     Recover,
-    /// Discard the orphaned edits.
+    /// Discard the offered edits of a crashed session.
     Discard,
     /// Read and encode an exported image for the viewer.
     ViewImage {
-        /// Path of a PNG or EXR file.
+        /// Path of the PNG or EXR file to view.
         path: PathBuf,
-        /// Display transform for linear images.
+        /// Display transform (exposure and tone curve) for images in linear radiance.
         display: Display,
         /// Columns and rows of the terminal.
         screen: [u16; 2],
     },
-    /// Copy the path of this file to the terminal's clipboard.
+    /// Copy this path to the terminal's clipboard.
     Copy(PathBuf),
     /// Suspend the program and give the terminal to the shell.
     Suspend,
-    /// Quit.
+    /// End the program.
     Quit,
 }

@@ -1,4 +1,4 @@
-//! Model: the complete state that the screen is drawn from.
+//! Model: the complete state of the dashboard, from which the screen is drawn.
 
 use crate::dashboard::convergence::Convergence;
 use crate::dashboard::editor::Editor;
@@ -7,7 +7,7 @@ use crate::dashboard::layout::{Focus, Layout, Request, layout};
 use crate::dashboard::message::{DisplayChannel, Format, OrphanedEdits};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::overlay_layout::wrapped;
-use crate::film::{Display, LinearImage, Probe};
+use crate::film::{Display, LinearImage, PixelProbe};
 use crate::render::schedule::Stop;
 use crate::render::session::{Snapshot, WatchReport};
 use crate::scene::edit::Target;
@@ -20,224 +20,214 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Mode of the picture's panel: determines the effect of arrow keys and drags.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// Mode of the picture's panel, which determines the effect of arrow keys and drags.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mode {
-    /// Default mode: orbit the camera.
+    /// Orbit the camera, the default mode.
+    #[default]
     Orbit,
-    /// Move the selection.
+    /// Move the selected object or light.
     Move,
-    /// Rotate the selection about the vertical axis.
+    /// Rotate the selected object or light about the vertical axis.
     Rotate,
-    /// Fly: arrow keys and drags turn the camera, letter keys move it.
+    /// Fly the camera: arrow keys and drags turn it, letter keys move it.
     Fly,
-    /// Move the probe, which shows the values of a pixel.
+    /// Move the pixel probe, which shows the samples, radiance and error of one pixel.
     Probe,
 }
 
-/// State of the scene file.
-#[derive(Clone, Debug)]
+/// State of the edited scene's file.
+#[derive(Clone, Debug, Default)]
 pub struct File {
-    /// Path; `None` for a scene that has no file yet.
+    /// Path of the scene file; `None` for a scene that has no file yet.
     pub path: Option<PathBuf>,
-    /// Last component of the path for titles, with control characters escaped.
+    /// Last component of the scene file's path, for titles, with control characters escaped.
     pub name: String,
-    /// Scene as last read from or written to the file; without a file, the scene at the start.
+    /// Scene as last read from or written to its file; without a file, the scene at the start.
     pub saved: Arc<Scene>,
-    /// Errors in the current contents of the file; `None` if they are valid.
+    /// Errors in the current contents of the scene file; `None` if they are valid.
     pub broken: Option<SceneErrors>,
-    /// `true` if the file has never been readable. There is no scene then, and only `broken` can be
-    /// shown.
+    /// `true` if the scene file has never been readable. There is no scene then, and only `broken`
+    /// can be shown.
     pub unreadable: bool,
 }
 
-/// State of the inspector, whose lines `panel_lines::inspector` returns.
+/// State of a list of properties: the inspector or a form.
 #[derive(Clone, Debug, Default)]
-pub struct Inspector {
-    /// Index of the line under the cursor, which is always a field.
+pub struct FieldList {
+    /// Index of the list's line under the cursor. This line is always a field, not a heading.
     pub cursor: usize,
-    /// Index of the first visible line.
+    /// Index of the first visible line of the list.
     pub scroll: usize,
-    /// Text editor of the field under the cursor, while a value is typed.
+    /// Text editor of the field under the cursor; `None` unless a value is being typed.
     pub editor: Option<Editor>,
 }
 
 /// Comparison of the live picture with a pinned one: an earlier picture that the user has stored.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
-    /// The pinned picture and its mean samples per pixel.
+    /// Pinned picture (the one that the user has stored for comparison) and its mean number of
+    /// samples per pixel; `None` if none is pinned.
     pub pinned: Option<(Arc<LinearImage>, f64)>,
-    /// Visible view of the comparison.
+    /// Picture that the dashboard shows during the comparison: the live one, the pinned (stored)
+    /// one, or the difference.
     pub shown: CompareView,
 }
 
-/// Visible view of a comparison.
+/// Picture that is visible in a comparison: the live one, the stored one or their difference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CompareView {
-    /// The live picture.
+    /// Live picture: the one that the renderer refines.
     #[default]
     Live,
-    /// The pinned picture.
+    /// Pinned picture, which the user has stored earlier, in place of the live one.
     Pinned,
-    /// The difference, live minus pinned.
+    /// Live picture minus the pinned (stored) one, in false colour.
     Difference,
 }
 
-/// Kind of a notice, which determines its mark and colour.
+/// Kind of a notice: success, information or failure. It determines the notice's mark and colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
-    /// Success.
+    /// Notice of success.
     Good,
-    /// Information.
+    /// Notice with information.
     Plain,
-    /// Refusal or failure.
+    /// Notice of a refusal or failure.
     Bad,
 }
 
-/// A message that replaces the hint line for a while.
+/// Notice: a message that replaces the hint line for a while.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Notice {
-    /// Text, with control characters escaped.
+    /// Text of the notice, with control characters escaped.
     pub text: String,
-    /// Kind of the notice.
+    /// Kind of the notice: success, information, or refusal.
     pub tone: Tone,
-    /// Time at which the notice disappears; `None` if it stays until the next key.
+    /// Time at which the notice disappears, measured like the argument `now` of
+    /// [`update`](crate::dashboard::update::update). `None` if the notice stays until the next key.
     pub until: Option<Duration>,
 }
 
-/// Table of the files that `zerkalo watch` shows.
+/// Table of the film files that `zerkalo watch` shows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchTable {
-    /// State of the files.
+    /// Report on the film files that are watched.
     pub report: WatchReport,
-    /// Index of the row under the cursor.
+    /// Index of the table's row under the cursor.
     pub cursor: usize,
-    /// Index of the first visible row.
+    /// Index of the first visible row of the table.
     pub scroll: usize,
 }
 
-/// A running export, which renders at another size.
+/// Export that renders at another size in the background.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunningExport {
-    /// Width and height in pixels.
+    /// Width and height of the exported image in pixels.
     pub size: [u32; 2],
-    /// File format.
+    /// File format of the exported image.
     pub format: Format,
-    /// Progress, 0..=1.
+    /// Progress of the export's render, 0..=1.
     pub progress: f64,
 }
 
-/// State of a mouse button that is held down.
+/// State of a drag, which lasts from the press of a mouse button to its release.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drag {
-    /// Button that is held down.
+    /// Mouse button that is held down.
     pub button: Button,
-    /// Control or Alt was held when the button was pressed.
+    /// `true` if Control or Alt was held when the button was pressed.
     pub modified: bool,
-    /// Last known column and row of the mouse.
+    /// Column and row of the mouse at its last event.
     pub last: [u16; 2],
-    /// The mouse has moved since the press. Otherwise the release is a click.
+    /// `true` if the mouse has moved since the press. Otherwise the release is a click.
     pub moved: bool,
-    /// The button was pressed inside the picture.
+    /// `true` if the button was pressed inside of the picture.
     pub in_picture: bool,
 }
 
 /// State of the dashboard, from which the screen is drawn.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Model {
     /// Columns and rows of the terminal.
     pub screen: [u16; 2],
-    /// Colour depth of the terminal.
+    /// Set of colours that the terminal shows.
     pub colors: Colors,
-    /// Scene file.
+    /// State of the scene file.
     pub file: File,
-    /// Scene with its undo history.
+    /// Edited scene with its undo history.
     pub history: History,
-    /// Selected part of the scene, such as the camera or an object. It always exists.
+    /// Selected part of the scene, such as the camera or an object. It always exists in the scene.
     pub selection: Target,
-    /// Panel with the focus.
+    /// Panel with the keyboard focus.
     pub focus: Focus,
-    /// Meaning of the arrow keys while the picture has the focus.
+    /// Mode of the picture's panel, which determines the effect of arrow keys.
     pub mode: Mode,
     /// `true` if only the picture is visible.
     pub fullscreen: bool,
-    /// First visible line of the outline.
+    /// Index of the first visible line of the outline, the list of all parts of the scene.
     pub outline_scroll: usize,
-    /// State of the inspector.
-    pub inspector: Inspector,
+    /// Cursor, scroll position and text editor of the inspector, the list of the selection's
+    /// properties. `panel_lines::inspector` returns its lines.
+    pub inspector: FieldList,
     /// Open overlay, which covers panels and receives the keys.
     pub overlay: Option<Overlay>,
-    /// Exposure and tone curve.
+    /// Exposure and tone curve of the displayed picture.
     pub display: Display,
-    /// Channel that the picture shows.
+    /// Channel of the render that the picture shows.
     pub channel: DisplayChannel,
-    /// Comparison with a pinned picture.
+    /// Comparison of the live picture with a pinned one: an earlier picture that the user has
+    /// stored.
     pub comparison: Comparison,
-    /// Film pixel (column, row) whose values the probe shows.
+    /// Film pixel (column, row) whose values the pixel probe shows; `None` without a probe.
     pub probe: Option<[usize; 2]>,
-    /// Latest snapshot of the renderer.
+    /// Latest snapshot of the renderer: state of the render at one moment, with the picture so far.
+    /// `None` before the first one.
     pub snapshot: Option<Box<Snapshot>>,
-    /// History of the estimated error.
+    /// History of the picture's estimated error, for the convergence plot.
     pub convergence: Convergence,
     /// Stop criteria of the render.
     pub stop: Stop,
     /// `true` if the user has paused the render.
     pub paused: bool,
-    /// Number of tracing threads.
+    /// Number of threads that trace rays.
     pub threads: usize,
-    /// Maximum number of tracing threads.
+    /// Largest number of rendering threads that the user can set.
     pub max_threads: usize,
-    /// `true` if the tracing threads have low priority.
+    /// `true` if the rendering threads have low priority.
     pub low_priority: bool,
     /// Status of the connection to a remote terminal; `None` for a local terminal.
     pub link: Option<LinkStatus>,
-    /// Notice that replaces the hints.
+    /// Notice that replaces the hint line for a while.
     pub notice: Option<Notice>,
-    /// The running export at another size.
+    /// Export that renders at another size in the background; `None` if there is none.
     pub export: Option<RunningExport>,
-    /// Path of the last exported image.
+    /// Path of the last exported image; `None` before the first export.
     pub last_export: Option<PathBuf>,
-    /// `true` until the first key is pressed. The hint line then shows the hints for beginners.
+    /// `true` until the first key is pressed. Until then, the hint line shows hints for beginners.
     pub first_time: bool,
-    /// A mouse button that is held down.
+    /// Drag in progress; `None` if no mouse button is held down.
     pub drag: Option<Drag>,
-    /// Time of the last edit, if the next one may be merged with it into one undo step.
+    /// Time of the last edit, if edits that repeat it soon join its undo step. `None` if they start
+    /// a new step.
     pub last_edit: Option<Duration>,
     /// `true` if the program quits after the pending save.
     pub quit_when_saved: bool,
     /// Unsaved edits of a crashed session that the user has neither recovered nor discarded.
     pub orphaned_edits: Option<OrphanedEdits>,
     /// Scene that was last passed to
-    /// [`Effect::Autosave`](crate::dashboard::message::Effect::Autosave).
+    /// [`Effect::Autosave`](crate::dashboard::message::Effect::Autosave), so that it is not passed
+    /// again. `None` if there were no unsaved edits.
     pub autosaved: Option<Arc<Scene>>,
-    /// Columns and rows of half cells that were last requested for snapshots.
+    /// Columns and rows of half cells to which the renderer was last asked to resample its
+    /// pictures. A half cell is the upper or lower half of a terminal cell. `None` before the first
+    /// request.
     pub raster: Option<[usize; 2]>,
-    /// Counter that increases whenever the picture's cells may have changed.
+    /// Counter that increases whenever the terminal cells of the picture may have changed.
     pub picture_version: u64,
-    /// Table of watched files, in `zerkalo watch`. Commands that edit or render are then refused.
-    /// `None` in the editing dashboard.
+    /// Table of watched film files; `None` except in `zerkalo watch`. Commands that edit or render
+    /// are refused while files are watched.
     pub watch: Option<WatchTable>,
-}
-
-/// Parameters of a new model.
-#[derive(Debug)]
-pub struct Start {
-    /// Path of the scene file; `None` without a file.
-    pub path: Option<PathBuf>,
-    /// Name of a scene without a file.
-    pub name: String,
-    /// The scene, or the errors in its file.
-    pub scene: Result<Arc<Scene>, SceneErrors>,
-    /// Columns and rows of the terminal.
-    pub screen: [u16; 2],
-    /// Colour depth of the terminal.
-    pub colors: Colors,
-    /// Stop criteria of the render.
-    pub stop: Stop,
-    /// Number of tracing threads.
-    pub threads: usize,
-    /// Maximum number of tracing threads.
-    pub max_threads: usize,
 }
 
 /// Returns the last component of a path, with control characters escaped.
@@ -247,52 +237,33 @@ pub fn short_name(path: &Path) -> String {
 }
 
 impl Model {
-    /// Creates the model at the start of the program. The event loop then renders [`Model::scene`],
+    /// Creates the model of a dashboard that renders `scene` until `stop` with `threads` threads.
+    /// `scene` is an error if the scene file cannot be read. `path` is the path of the scene file;
+    /// if it is `None`, `name` is shown instead. Screen size and colours are defaults, which the
+    /// event loop replaces by those of the terminal. The event loop renders [`Model::scene`],
     /// unless [`File::unreadable`] is `true`.
-    pub fn new(start: Start) -> Self {
-        let (scene, broken) = match start.scene {
+    pub fn new(
+        path: Option<PathBuf>,
+        name: &str,
+        scene: Result<Arc<Scene>, SceneErrors>,
+        stop: Stop,
+        threads: usize,
+    ) -> Self {
+        let (scene, broken) = match scene {
             Ok(scene) => (scene, None),
-            Err(errors) => (Arc::new(Scene::default()), Some(errors)),
+            Err(errors) => (Arc::default(), Some(errors)),
         };
-        let name = start.path.as_deref().map_or(sanitized(&start.name), short_name);
+        let name = path.as_deref().map_or(sanitized(name), short_name);
         let unreadable = broken.is_some();
-        let selection = Target::Camera;
+        let threads = threads.max(1);
         Self {
-            screen: start.screen,
-            colors: start.colors,
-            file: File { path: start.path, name, saved: Arc::clone(&scene), broken, unreadable },
+            file: File { path, name, saved: Arc::clone(&scene), broken, unreadable },
             history: History::new(scene),
-            selection,
-            focus: Focus::Picture,
-            mode: Mode::Orbit,
-            fullscreen: false,
-            outline_scroll: 0,
-            inspector: Inspector::default(),
-            overlay: None,
-            display: Display::default(),
-            channel: DisplayChannel::Beauty,
-            comparison: Comparison::default(),
-            probe: None,
-            snapshot: None,
-            convergence: Convergence::default(),
-            stop: start.stop,
-            paused: false,
-            threads: start.threads.max(1),
-            max_threads: start.max_threads.max(1),
-            low_priority: false,
-            link: None,
-            notice: None,
-            export: None,
-            last_export: None,
+            stop,
+            threads,
+            max_threads: threads,
             first_time: true,
-            drag: None,
-            last_edit: None,
-            quit_when_saved: false,
-            orphaned_edits: None,
-            autosaved: None,
-            raster: None,
-            picture_version: 0,
-            watch: None,
+            ..Self::default()
         }
     }
 
@@ -309,7 +280,7 @@ impl Model {
         !self.history.is_saved()
     }
 
-    /// Returns the layout of the screen. Returns `None` if the terminal is too small.
+    /// Returns the layout of the screen in panels. Returns `None` if the terminal is too small.
     pub fn layout(&self) -> Option<Layout> {
         layout(&Request {
             screen: self.screen,
@@ -320,7 +291,7 @@ impl Model {
         })
     }
 
-    /// Returns the context in which keys are looked up.
+    /// Returns the context (overlay, panel or mode) that decides which commands the keys run.
     pub fn context(&self) -> KeyContext {
         match (&self.overlay, self.focus, self.mode) {
             (Some(_), ..) => KeyContext::Overlay,
@@ -338,30 +309,29 @@ impl Model {
         }
     }
 
-    /// Returns the text editor that receives the keys. Returns `None` if none is open.
-    pub fn editor(&self) -> Option<&Editor> {
+    /// Returns the cursor, scroll position and text editor of the open form, or of the inspector if
+    /// no form is open.
+    pub fn field_list(&self) -> &FieldList {
         match &self.overlay {
-            Some(Overlay::Palette(palette)) => Some(&palette.editor),
-            Some(Overlay::Prompt(prompt)) => Some(&prompt.editor),
-            Some(Overlay::Form(form)) => form.editor.as_ref(),
-            Some(_) => None,
-            None => self.inspector.editor.as_ref(),
+            Some(Overlay::Form(form)) => &form.fields,
+            _ => &self.inspector,
         }
     }
 
-    /// Returns `true` while an overlay or a text editor is open, which notices must not interrupt.
+    /// Returns `true` while an overlay or the inspector's text editor is open, which a question to
+    /// the user must not interrupt.
     pub fn is_busy(&self) -> bool {
-        self.overlay.is_some() || self.editor().is_some()
+        self.overlay.is_some() || self.inspector.editor.is_some()
     }
 
-    /// Returns the values of the probed pixel. Returns `None` if the snapshot does not contain
-    /// them.
-    pub fn probed(&self) -> Option<&Probe> {
+    /// Returns the samples, the value and the error of the pixel at the pixel probe. Returns `None`
+    /// if there is no probe, or if the renderer has not reported this pixel yet.
+    pub fn probed(&self) -> Option<&PixelProbe> {
         let probe = self.snapshot.as_ref()?.probe.as_ref()?;
         (Some(probe.pixel) == self.probe).then_some(probe)
     }
 
-    /// Returns the lines of the compiled scene's inventory, wrapped to `width` columns.
+    /// Returns the lines of the list of the compiled scene's features, wrapped to `width` columns.
     pub fn inventory(&self, width: u16) -> Vec<String> {
         match &self.snapshot {
             Some(snapshot) if !snapshot.report.inventory.is_empty() => {

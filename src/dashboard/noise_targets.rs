@@ -1,10 +1,11 @@
-//! List of noise targets that the user can select, with the time to reach each of them.
+//! List of noise targets (noise values at which rendering can stop) with the time to reach each of
+//! them.
 
 use crate::dashboard::convergence::Convergence;
 use crate::dashboard::model::Model;
 use crate::render::session::{QUALITIES, Report};
 
-/// Description of the picture's look at each noise target.
+/// Appearance of the picture at each of the noise targets [`QUALITIES`].
 const LOOKS: [&str; QUALITIES.len()] = [
     "a draft: grain is visible",
     "grain in dark and even parts",
@@ -14,32 +15,32 @@ const LOOKS: [&str; QUALITIES.len()] = [
     "for 16-bit files and measurements",
 ];
 
-/// Note below the list of targets.
+/// Note below the list of noise targets.
 pub const ABOUT: &str = "Halving the noise takes two to four times as long. Enter: stop there.";
 
-/// Time to reach a noise target.
+/// Render time that is needed to reach a noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cost {
-    /// The target was reached after this number of seconds of tracing. `None` if the first report
-    /// was below it already.
+    /// The noise target was reached after this render time in seconds. `None` if the noise was
+    /// below the target in the first report already.
     Reached(Option<f64>),
-    /// The target has not been reached. The numbers are the lower and upper estimate of the
-    /// remaining seconds of tracing.
+    /// The noise target has not been reached. The numbers are a lower and an upper estimate of the
+    /// remaining render time in seconds.
     Left(f64, f64),
-    /// There is no error estimate yet.
+    /// The render time is unknown, because there is no noise estimate yet.
     Unknown,
 }
 
-/// A selectable noise target.
+/// Noise target that the user can select: a noise value at which rendering stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseTarget {
-    /// Noise in 8-bit levels.
+    /// Target noise: estimated root mean square error of the picture, in 8-bit levels.
     pub noise_codes: f64,
     /// Visual quality at this noise, in a few words.
     pub looks: &'static str,
-    /// Time to reach the target.
+    /// Render time to reach the noise target.
     pub cost: Cost,
-    /// `true` if this target is the current stop criterion.
+    /// `true` if this noise target is the current stop criterion.
     pub is_target: bool,
 }
 
@@ -56,7 +57,8 @@ impl Model {
     }
 }
 
-/// Returns the time to reach the noise target with index `at`.
+/// Returns the render time to reach the noise target `QUALITIES[at]`. `report` is the latest report
+/// of the render, and `convergence` the history of the picture's noise.
 fn cost(report: &Report, convergence: &Convergence, at: usize) -> Cost {
     let reached = report.noise.is_some_and(|noise| noise.rmse_codes <= QUALITIES[at]);
     match report.quality_seconds[at] {

@@ -1,7 +1,8 @@
-//! Overlays: help, lists, forms, prompts and questions. An overlay covers panels and receives the
-//! keys.
+//! Overlays of the dashboard: help, lists, forms, prompts and questions. An overlay covers panels
+//! and receives the keys.
 
 use crate::dashboard::editor::Editor;
+use crate::dashboard::model::FieldList;
 use crate::render::session::QUALITIES;
 use crate::scene::Scene;
 use crate::scene::edit::Target;
@@ -9,47 +10,48 @@ use crate::terminal::image::ViewerImage;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// An overlay, which covers panels and receives the keys.
+/// Overlay of the dashboard, which covers panels and receives the keys.
 #[derive(Clone, Debug)]
 pub enum Overlay {
-    /// List of all keys: [`help`](crate::dashboard::hints::help).
+    /// List of all keys and their commands: [`help`](crate::dashboard::hints::help).
     Help {
-        /// First visible line.
+        /// Index of the first visible line of the help.
         scroll: usize,
     },
-    /// Inventory of the compiled scene, a text about its contents:
+    /// List of the compiled scene's features:
     /// [`Model::inventory`](crate::dashboard::model::Model::inventory).
     Inventory {
-        /// First visible line.
+        /// Index of the first visible line of the inventory.
         scroll: usize,
     },
-    /// List of noise targets with the time to reach each of them:
-    /// [`Model::noise_targets`](crate::dashboard::model::Model::noise_targets).
+    /// List of noise targets (noise values at which rendering can stop) with the time to reach each
+    /// of them: [`Model::noise_targets`](crate::dashboard::model::Model::noise_targets).
     NoiseTargets {
-        /// Index of the target under the cursor.
+        /// Index of the noise target under the cursor.
         cursor: usize,
     },
     /// Command palette: finds commands by fuzzy search.
-    Palette(Palette),
-    /// A choice from a list.
+    CommandPalette(CommandPalette),
+    /// List from which the user picks an entry.
     Pick(Pick),
-    /// A new object or light, confirmed or cancelled as a whole.
+    /// Form for a new object or light, confirmed or cancelled as a whole.
     Form(Form),
-    /// A prompt for a line of text.
+    /// Prompt in which the user types a line of text.
     Prompt(Prompt),
-    /// A question with a few answers.
+    /// Question to the user, with a few answers to choose from.
     Question(Question),
     /// Viewer of an exported image, on the whole screen.
     ViewerImage(ViewedImage),
 }
 
 impl Overlay {
-    /// Returns the cursor, the first visible line (`None` if the overlay never scrolls) and the
+    /// Returns three values of the list in the open overlay: the index of the entry under the
+    /// cursor, the index of the first visible entry (`None` if the list never scrolls), and the
     /// number of entries. Returns `None` for overlays without a cursor.
     pub fn list(&mut self) -> Option<(&mut usize, Option<&mut usize>, usize)> {
         match self {
             Self::NoiseTargets { cursor } => Some((cursor, None, QUALITIES.len())),
-            Self::Palette(Palette { cursor, scroll, found, .. }) => {
+            Self::CommandPalette(CommandPalette { cursor, scroll, found, .. }) => {
                 Some((cursor, Some(scroll), found.len()))
             }
             Self::Pick(Pick { cursor, scroll, entries, .. }) => {
@@ -61,135 +63,133 @@ impl Overlay {
     }
 }
 
-/// An exported image in the viewer.
+/// Exported image that the viewer shows.
 #[derive(Clone, Debug)]
 pub struct ViewedImage {
-    /// Path of the file.
+    /// Path of the image file.
     pub path: PathBuf,
-    /// The image; `None` while the file is being read.
+    /// Image prepared for the screen; `None` while the file is being read.
     pub image: Option<Arc<ViewerImage>>,
-    /// Transferred fraction of the image, 0..=1.
+    /// Share of the image that was sent to the terminal, 0..=1.
     pub sent: f64,
 }
 
 /// Command palette, which finds commands by fuzzy search.
 #[derive(Clone, Debug)]
-pub struct Palette {
-    /// Text being typed.
+pub struct CommandPalette {
+    /// Editor of the search text.
     pub editor: Editor,
     /// Indices of the matching commands in the command table, best match first.
     pub found: Vec<usize>,
-    /// Index in `found`.
+    /// Index in `found` of the command under the cursor.
     pub cursor: usize,
-    /// First visible line.
+    /// Index of the first visible line of found commands.
     pub scroll: usize,
 }
 
-/// A choice from a list.
+/// List from which the user picks an entry.
 #[derive(Clone, Debug)]
 pub struct Pick {
-    /// Use of the chosen entry.
+    /// Use of the entry that the user picks.
     pub purpose: PickFor,
-    /// Title.
+    /// Title of the list of entries.
     pub title: String,
     /// Name and description of each entry. The description may be empty.
     pub entries: Vec<(String, String)>,
     /// Index of the entry under the cursor.
     pub cursor: usize,
-    /// First visible line.
+    /// Index of the first visible entry of the list.
     pub scroll: usize,
 }
 
-/// Purpose of a list from which the user chooses.
+/// Use of an entry that the user picks from a list.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PickFor {
-    /// Kind of a new object.
+    /// The picked entry is the kind of an object, which is added to the scene.
     Object,
-    /// Kind of a new light.
+    /// The picked entry is the kind of a light, which is added to the scene.
     Light,
-    /// Value of a key. The fields are the part of the scene with the key, and the key.
+    /// The picked entry is the new value of a property. The two values are the part of the scene
+    /// that has the property, and the property's key.
     Word(Target, String),
 }
 
-/// A form for a new object or light. The picture previews the result while the form is open.
+/// Form for a new object or light. The picture previews the result while the form is open.
 #[derive(Clone, Debug)]
 pub struct Form {
-    /// Title, such as `new sphere`.
+    /// Title of the form, such as `new sphere`.
     pub title: String,
     /// Valid scene that includes the new object or light.
     pub scene: Arc<Scene>,
-    /// The new object or light in `scene`.
+    /// New object or light in `scene`.
     pub subject: Target,
     /// Label of the undo step that adds the object or light.
     pub label: String,
-    /// Selection before the form was opened.
+    /// Part of the scene that was selected before the form was opened. It is selected again if the
+    /// form is cancelled.
     pub before: Target,
-    /// Index of the line under the cursor in the result of `panel_lines::form`.
-    pub cursor: usize,
-    /// First visible line.
-    pub scroll: usize,
-    /// Text editor of the field under the cursor, if one is open.
-    pub editor: Option<Editor>,
-    /// Reason why the last change of a field was refused.
+    /// Cursor, scroll position and text editor of the form. `panel_lines::form` returns its lines.
+    pub fields: FieldList,
+    /// Reason why the last change of a field was refused; `None` if it was accepted.
     pub problem: Option<String>,
 }
 
-/// A prompt for a line of text.
+/// Prompt in which the user types a line of text, such as a path.
 #[derive(Clone, Debug)]
 pub struct Prompt {
-    /// Use of the typed text.
+    /// Use of the text that the user types.
     pub purpose: PromptFor,
-    /// Title, such as `save as`.
+    /// Title of the prompt, such as `save as`.
     pub title: String,
-    /// Description of valid input.
+    /// Description of valid text, for the user.
     pub help: String,
-    /// Text being typed.
+    /// Editor of the text.
     pub editor: Editor,
 }
 
-/// Purpose of a prompt.
+/// Use of the text that the user types into a prompt.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PromptFor {
-    /// Path to save to.
+    /// The typed text is the path of a file, to which the scene is saved.
     SaveAs,
-    /// New name of this target.
+    /// The typed text is the new name of this part of the scene.
     Rename(Target),
-    /// Name of a new viewpoint.
+    /// The typed text is the name under which the current camera is stored.
     StoreView,
-    /// Stop criteria.
+    /// The typed text is the stop criteria of the render.
     StopAt,
-    /// Size and format of an export at another size.
+    /// The typed text is the size and the format of an image, which is rendered and exported.
     ExportSized,
 }
 
-/// A question with a few answers, each with a letter.
+/// Question with a few answers, each with a letter.
 #[derive(Clone, Debug)]
 pub struct Question {
     /// Text of the question, one or two sentences.
     pub text: String,
     /// Letter, text and effect of each answer. The cursor starts on the first answer.
-    pub answers: Vec<(char, String, Answer)>,
+    pub answers: Vec<(char, &'static str, Answer)>,
     /// Index of the answer under the cursor.
     pub cursor: usize,
 }
 
-/// Effect of an answer.
+/// Effect of the answer that the user chooses for a question.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// No effect except closing the question.
     Nothing,
-    /// Save, then quit.
+    /// Save the scene, then end the program.
     SaveAndQuit,
-    /// Quit.
+    /// End the program.
     Quit,
-    /// Read the file; unsaved edits are lost.
+    /// Read the scene file again; unsaved edits are lost.
     Load,
-    /// Overwrite the scene file (`None`) or the file at this path.
+    /// Overwrite the file at this path; the scene file if the path is `None`.
     Overwrite(Option<PathBuf>),
-    /// Prompt for another path.
+    /// Open the prompt for another path to save to.
     SaveAs,
-    /// Recover the orphaned edits.
+    /// Recover the unsaved edits of a crashed session.
     Recover,
-    /// Discard the orphaned edits.
+    /// Discard the unsaved edits of a crashed session.
     Discard,
 }

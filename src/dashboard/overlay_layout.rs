@@ -1,27 +1,29 @@
 //! Layout of overlays and of rows in panels, shared by drawing and mouse handling.
 
+use crate::dashboard::layout::BORDER;
 use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::ABOUT;
 use crate::dashboard::overlay::Overlay;
 use crate::render::session::QUALITIES;
-use crate::terminal::Area;
+use ratatui::layout::Rect;
 
 /// Areas of an overlay. Areas that an overlay does not use are empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OverlayLayout {
-    /// Whole overlay with its border.
-    pub frame: Area,
+    /// Area of the whole overlay with its border.
+    pub frame: Rect,
     /// Row of the text input.
-    pub input: Area,
-    /// Area of a list, of a form's fields or of a text.
-    pub list: Area,
-    /// Area of help, a problem or the text of a question.
-    pub help: Area,
+    pub input: Rect,
+    /// Area of the main content: a list, a form's fields or a text.
+    pub list: Rect,
+    /// Area of the text for the user: help on the overlay, the problem of a refused input, or the
+    /// text of a question.
+    pub help: Rect,
 }
 
 impl Model {
-    /// Returns the layout of the overlay. Returns `None` if no overlay is open or the terminal is
-    /// too small.
+    /// Returns the layout of the open overlay. Returns `None` if no overlay is open or the terminal
+    /// is too small.
     pub fn overlay_layout(&self) -> Option<OverlayLayout> {
         let layout = self.layout()?;
         let [width, height] = self.screen;
@@ -29,15 +31,15 @@ impl Model {
             // The last two rows, status line and hint line, stay visible.
             let (columns, rows) = (columns.min(width - 2), rows.min(height - 2));
             let [x, y] = [(width - columns) / 2, (height - 2 - rows) / 2];
-            Area { x, y, width: columns, height: rows }
+            Rect { x, y, width: columns, height: rows }
         };
         let low = |columns: u16, rows: u16| {
             let y = height.saturating_sub(3 + rows);
-            Area { y, ..centred(columns, rows) }
+            Rect { y, ..centred(columns, rows) }
         };
         Some(match self.overlay.as_ref()? {
             Overlay::ViewerImage(_) => OverlayLayout {
-                frame: Area { x: 0, y: 0, width, height },
+                frame: Rect { x: 0, y: 0, width, height },
                 ..OverlayLayout::default()
             },
             Overlay::Help { .. } => whole(centred(84, height - 2)),
@@ -49,22 +51,22 @@ impl Model {
             Overlay::NoiseTargets { .. } => {
                 let about = wrapped_rows(ABOUT, 76.min(width - 2) - 5);
                 let frame = low(76, QUALITIES.len() as u16 + 2 + about);
-                let inner = frame.inner();
-                let list = Area { height: inner.height.min(QUALITIES.len() as u16), ..inner };
-                let help = Area {
+                let inner = frame.inner(BORDER);
+                let list = Rect { height: inner.height.min(QUALITIES.len() as u16), ..inner };
+                let help = Rect {
                     x: inner.x + 3,
                     y: inner.y + list.height,
                     width: inner.width - 3,
                     height: inner.height - list.height,
                 };
-                OverlayLayout { frame, input: Area::default(), list, help }
+                OverlayLayout { frame, input: Rect::default(), list, help }
             }
-            Overlay::Palette(_) => {
+            Overlay::CommandPalette(_) => {
                 let frame = centred(72, height.min(26) - 2);
-                let inner = frame.inner();
-                let input = Area { height: 1, ..inner };
-                let list = Area { y: inner.y + 1, height: inner.height - 1, ..inner };
-                OverlayLayout { frame, input, list, help: Area::default() }
+                let inner = frame.inner(BORDER);
+                let input = Rect { height: 1, ..inner };
+                let list = Rect { y: inner.y + 1, height: inner.height - 1, ..inner };
+                OverlayLayout { frame, input, list, help: Rect::default() }
             }
             Overlay::Pick(pick) => {
                 whole(centred(76, (pick.entries.len() as u16).saturating_add(2)))
@@ -75,21 +77,21 @@ impl Model {
                 let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
                 let columns = side.min(width);
                 let x = width - columns;
-                let frame = Area { x, y: 0, width: columns, height: height - 2 };
+                let frame = Rect { x, y: 0, width: columns, height: height - 2 };
                 let problem = form.problem.is_some()
-                    || form.editor.as_ref().is_some_and(|editor| editor.problem.is_some());
-                let (list, help) = split(frame.inner(), problem);
-                OverlayLayout { frame, input: Area::default(), list, help }
+                    || form.fields.editor.as_ref().is_some_and(|editor| editor.problem.is_some());
+                let (list, help) = split(frame.inner(BORDER), problem);
+                OverlayLayout { frame, input: Rect::default(), list, help }
             }
             Overlay::Prompt(prompt) => {
                 let columns = 64.min(width - 2);
                 let text = prompt.editor.problem.as_ref().unwrap_or(&prompt.help);
                 let rows = wrapped_rows(text, columns - 2);
                 let frame = low(columns, rows + 3);
-                let inner = frame.inner();
-                let input = Area { height: 1, ..inner };
-                let help = Area { y: inner.y + 1, height: inner.height - 1, ..inner };
-                OverlayLayout { frame, input, list: Area::default(), help }
+                let inner = frame.inner(BORDER);
+                let input = Rect { height: 1, ..inner };
+                let help = Rect { y: inner.y + 1, height: inner.height - 1, ..inner };
+                OverlayLayout { frame, input, list: Rect::default(), help }
             }
             Overlay::Question(question) => {
                 let columns = 64.min(width - 2);
@@ -97,48 +99,50 @@ impl Model {
                 // The text has a margin of one column on both sides.
                 let rows = wrapped_rows(&question.text, columns - 4);
                 let frame = low(columns, rows + answers + 2);
-                let inner = frame.inner();
+                let inner = frame.inner(BORDER);
                 let answers = answers.min(inner.height);
                 let height = inner.height - answers;
-                let help = Area { x: inner.x + 1, width: inner.width - 2, height, ..inner };
-                let list = Area { y: inner.y + height, height: answers, ..inner };
-                OverlayLayout { frame, input: Area::default(), list, help }
+                let help = Rect { x: inner.x + 1, width: inner.width - 2, height, ..inner };
+                let list = Rect { y: inner.y + height, height: answers, ..inner };
+                OverlayLayout { frame, input: Rect::default(), list, help }
             }
         })
     }
 
-    /// Returns the area of the outline's lines. Returns `None` if the panel is folded.
-    pub fn outline_rows(&self) -> Option<Area> {
-        self.layout()?.outline.map(|area| area.inner())
+    /// Returns the area of the lines of the outline, the list of all parts of the scene. Returns
+    /// `None` if the panel is folded.
+    pub fn outline_rows(&self) -> Option<Rect> {
+        self.layout()?.outline.map(|area| area.inner(BORDER))
     }
 
-    /// Returns the area of the rows of the table of watched files, and the area for details on the
-    /// row under the cursor. Returns `None` if the panel is folded.
-    pub fn watch_rows(&self) -> Option<(Area, Area)> {
-        let inner = self.layout()?.outline?.inner();
+    /// Returns two areas of the panel of watched files: one for the rows of its table, one for
+    /// details on the row under the cursor. Returns `None` if the panel is folded.
+    pub fn watch_rows(&self) -> Option<(Rect, Rect)> {
+        let inner = self.layout()?.outline?.inner(BORDER);
         let details = if inner.height >= 10 { 5 } else { 0 };
         // The first row has the titles of the columns.
         let rows = inner.height.saturating_sub(1 + details);
-        let table = Area { y: inner.y + 1, height: rows, ..inner };
-        Some((table, Area { y: table.y + rows, height: details, ..inner }))
+        let table = Rect { y: inner.y + 1, height: rows, ..inner };
+        Some((table, Rect { y: table.y + rows, height: details, ..inner }))
     }
 
-    /// Returns the area of the inspector's lines, and the area for help on the field under the
+    /// Returns two areas of the inspector: one for its lines, one for help on the field under the
     /// cursor. Returns `None` if the panel is folded.
-    pub fn inspector_rows(&self) -> Option<(Area, Area)> {
+    pub fn inspector_rows(&self) -> Option<(Rect, Rect)> {
         let problem = self.inspector.editor.as_ref().is_some_and(|e| e.problem.is_some());
-        self.layout()?.inspector.map(|area| split(area.inner(), problem))
+        self.layout()?.inspector.map(|area| split(area.inner(BORDER), problem))
     }
 }
 
-/// Returns the layout of an overlay that consists of a list only.
-fn whole(frame: Area) -> OverlayLayout {
-    OverlayLayout { frame, list: frame.inner(), ..OverlayLayout::default() }
+/// Returns the layout of an overlay that consists of a list alone.
+fn whole(frame: Rect) -> OverlayLayout {
+    OverlayLayout { frame, list: frame.inner(BORDER), ..OverlayLayout::default() }
 }
 
-/// Splits the inside of a panel into an area for lines and an area for help below. If `problem` is
-/// `true`, the help area is larger.
-fn split(inner: Area, problem: bool) -> (Area, Area) {
+/// Splits the inside of a panel into two areas: the upper one for lines, the lower one for help.
+/// The lower one is larger if `problem` is `true`, because the help then includes the reason why an
+/// input was refused.
+fn split(inner: Rect, problem: bool) -> (Rect, Rect) {
     let rows = match (inner.height, problem) {
         (0..4, _) => 0,
         (_, true) => (inner.height / 2).min(5),
@@ -146,8 +150,8 @@ fn split(inner: Area, problem: bool) -> (Area, Area) {
         (8..14, _) => 2,
         _ => 3,
     };
-    let lines = Area { height: inner.height - rows, ..inner };
-    (lines, Area { y: inner.y + lines.height, height: rows, ..inner })
+    let lines = Rect { height: inner.height - rows, ..inner };
+    (lines, Rect { y: inner.y + lines.height, height: rows, ..inner })
 }
 
 /// Returns the number of lines that `text` wraps to in `width` columns.
@@ -201,7 +205,7 @@ mod tests {
     fn panel_splits_into_lines_and_help() {
         for height in 0..40 {
             for problem in [false, true] {
-                let inner = Area { x: 3, y: 2, width: 20, height };
+                let inner = Rect { x: 3, y: 2, width: 20, height };
                 let (lines, help) = split(inner, problem);
                 assert_eq!(lines.height + help.height, height);
                 assert_eq!(help.y, inner.y + lines.height);

@@ -1,5 +1,6 @@
-//! Lines of outline, inspector and form as data, which `view` draws and `update` moves the cursor
-//! over.
+//! Lines of three lists as data: the outline (all parts of the scene), the inspector (properties of
+//! the selection) and the form for a new object or light. `view` draws the lines, and `update`
+//! moves the cursor over them.
 
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::{Form, Overlay};
@@ -7,66 +8,64 @@ use crate::scene::Scene;
 use crate::scene::edit::{Property, Target, Widget, outline as subjects, rows};
 use crate::value::truncated;
 
-/// A line of the outline.
+/// Line of the outline, the list of all parts of the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub enum OutlineLine {
-    /// Heading of a section.
+    /// Heading of a section of the outline, the list of all parts of the scene.
     Heading(&'static str),
-    /// A selectable entry.
+    /// Part of the scene that can be selected.
     Entry {
         /// Part of the scene that the entry selects.
         subject: Target,
-        /// Name, with control characters escaped.
+        /// Name of the part, with control characters escaped.
         label: String,
-        /// Material of an object, `off` for a light that is off, key that recalls a viewpoint;
-        /// otherwise empty.
+        /// Note after the name: the material of an object, `off` for a light that is off, or the
+        /// key that recalls a stored camera. Empty for other parts.
         note: String,
     },
 }
 
-/// A line of the inspector or of a form.
+/// Line of the inspector or of a form.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PanelLine {
     /// Heading of the fields below.
     Heading(String),
-    /// A field with its value.
+    /// Line that shows the value of a property, or one number of it.
     Field(Box<FieldLine>),
 }
 
-/// A field with its value and description.
+/// Line of the inspector or of a form that shows the value of a property, or one number of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldLine {
-    /// Part of the scene that the field belongs to.
+    /// Part of the scene that the property belongs to.
     pub subject: Target,
-    /// Key of the scene file, with dots between its parts.
-    pub key: String,
-    /// Index of the field's number, if the value of the key is a list of numbers.
+    /// Property that the line shows. It may show only one number of the value, see `component`.
+    pub property: Property,
+    /// Index of the number that the line shows, if the property's value is a list of numbers.
+    /// `None` for any other value.
     pub component: Option<usize>,
-    /// Label before the value.
+    /// Name of the property or number on the line, left of the value.
     pub label: String,
-    /// Nesting depth: 0, 1, 2.
-    pub depth: usize,
-    /// Kind of input widget.
-    pub entry: Widget,
-    /// Value in the syntax of the text editor, with control characters escaped; empty if the scene
-    /// does not have the key.
+    /// Value in the syntax of the text editor, with control characters escaped. Empty if the
+    /// property is not set in the scene.
     pub value: String,
-    /// Linear colour of the swatch beside the value. `None` except in the first line of a colour.
+    /// Linear colour of the colour sample beside the value. `None` except in the first line of a
+    /// colour.
     pub swatch: Option<[f64; 3]>,
-    /// Unit of the value; may be empty.
-    pub unit: &'static str,
-    /// `true` if the value equals the default.
-    pub is_default: bool,
-    /// Default value; `None` for a required key.
-    pub default: Option<String>,
-    /// Valid input, as a phrase.
-    pub expected: String,
-    /// Description, in a sentence.
-    pub doc: &'static str,
+}
+
+impl OutlineLine {
+    /// Returns the part of the scene that the line selects. Returns `None` for a heading.
+    pub fn subject(&self) -> Option<&Target> {
+        match self {
+            Self::Entry { subject, .. } => Some(subject),
+            Self::Heading(_) => None,
+        }
+    }
 }
 
 impl PanelLine {
-    /// Returns the field of the line. Returns `None` for a heading.
+    /// Returns the property of the line. Returns `None` for a heading.
     pub fn field(&self) -> Option<&FieldLine> {
         match self {
             Self::Field(field) => Some(field),
@@ -75,7 +74,7 @@ impl PanelLine {
     }
 }
 
-/// Returns the outline of a scene.
+/// Returns the lines of the outline, the list of all parts of `scene`.
 pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
     let mut lines = Vec::new();
     let mut last = None;
@@ -99,15 +98,14 @@ pub fn outline(scene: &Scene) -> Vec<OutlineLine> {
     lines
 }
 
-/// Returns the index of the line of `subject` in the outline. Returns `None` if there is none.
+/// Returns the index of the line that selects `subject` in the outline, the list of all parts of
+/// the scene. Returns `None` if there is none.
 pub fn outline_position(lines: &[OutlineLine], subject: &Target) -> Option<usize> {
-    lines
-        .iter()
-        .position(|line| matches!(line, OutlineLine::Entry { subject: s, .. } if s == subject))
+    lines.iter().position(|line| line.subject() == Some(subject))
 }
 
-/// Returns the lines of the inspector: the fields of `subject`, and those of its material if it is
-/// an object.
+/// Returns the lines of the inspector: the properties of `subject`, and those of its material if it
+/// is an object.
 pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     let mut lines = fields(scene, subject);
     let material = subject.material(scene).filter(|material| material != subject);
@@ -120,8 +118,8 @@ pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     lines
 }
 
-/// Returns the lines of a form: the fields of the new object or light, and those of its material if
-/// the material is new as well. `base` is the scene before the form was opened.
+/// Returns the lines of a form: the properties of the new object or light, and those of its
+/// material if the material is new as well. `base` is the scene before the form was opened.
 pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
     let has_new_material = match form.subject.material(&form.scene) {
         Some(Target::Material(name)) => !base.materials.contains_key(&name),
@@ -136,42 +134,36 @@ pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
 fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     // A missing target has no fields.
     let rows = rows(scene, subject).unwrap_or_default();
-    rows.iter()
-        .flat_map(|row| lines_of(subject, row))
+    rows.into_iter()
+        .flat_map(|property| lines_of(subject, property))
         .map(|f| PanelLine::Field(Box::new(f)))
         .collect()
 }
 
-/// Returns the lines of a property: one for each number if it is a list of numbers, otherwise one.
-fn lines_of(subject: &Target, row: &Property) -> Vec<FieldLine> {
-    let line = |component: Option<usize>, label: String, value: String| FieldLine {
+/// Returns the lines of `property`, which belongs to `subject`: one line for each number if its
+/// value is a list of numbers, otherwise one line.
+fn lines_of(subject: &Target, property: Property) -> Vec<FieldLine> {
+    let line = |component: Option<usize>, label: String, value: &str| FieldLine {
         subject: subject.clone(),
-        key: row.key.clone(),
+        property: property.clone(),
         component,
         label,
-        depth: row.depth,
-        entry: row.entry,
-        value: crate::value::sanitized(&value),
-        swatch: row.color.filter(|_| component.unwrap_or(0) == 0),
-        unit: row.unit,
-        is_default: row.is_default,
-        default: row.default.clone(),
-        expected: row.expected.clone(),
-        doc: row.doc,
+        value: crate::value::sanitized(value),
+        swatch: property.color.filter(|_| component.unwrap_or(0) == 0),
     };
-    if row.components.len() < 2 {
-        return vec![line(None, row.label.clone(), row.value.clone())];
+    if property.components.len() < 2 {
+        return vec![line(None, property.label.clone(), &property.value)];
     }
-    let names: &[&str] = match (row.entry, row.components.len()) {
+    let names: &[&str] = match (property.entry, property.components.len()) {
         (Widget::Color, _) => &["red", "green", "blue"],
         (_, 2) => &["width", "height"],
         _ => &["x", "y", "z"],
     };
     let component_line = |(i, value): (usize, &String)| {
         let name = names.get(i).copied().unwrap_or_default();
-        line(Some(i), format!("{} {name}", row.label), value.clone())
+        line(Some(i), format!("{} {name}", property.label), value)
     };
-    row.components.iter().enumerate().map(component_line).collect()
+    property.components.iter().enumerate().map(component_line).collect()
 }
 
 impl Model {
@@ -184,8 +176,9 @@ impl Model {
     }
 }
 
-/// Returns the index of the first field in `lines` from index `wanted` on. If there is none,
-/// returns the index of the last field before; without any field, 0.
+/// Returns the index of the line with a property that is nearest to index `wanted`. This is the
+/// first such line from `wanted` on, or else the last one before it. Returns 0 if no line has a
+/// property.
 pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
     let field = |i: &usize| lines[*i].field().is_some();
     (wanted..lines.len())
@@ -194,8 +187,9 @@ pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
         .unwrap_or(0)
 }
 
-/// Returns the index of the field that is `steps` fields below the field at `cursor`, or the last
-/// field if there are fewer. Negative steps go upwards. Headings are not counted.
+/// Returns the index of the line `steps` lines below the line at `cursor`, or above it if `steps`
+/// is negative. Only lines with a property are counted. Steps beyond the first or last such line
+/// end there.
 pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].field().is_some()).collect();
     let position =
@@ -204,9 +198,9 @@ pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     fields.get(to).copied().unwrap_or(0)
 }
 
-/// Returns the first visible line of a list of `len` lines in `rows` rows, as close to `scroll` as
-/// possible. Line `cursor` must be visible, and also the line above it if there are more than two
-/// rows.
+/// Returns the index of the first visible line of a list of `len` lines, of which `rows` are
+/// visible. The result is as near as possible to `scroll`, the present index, such that line
+/// `cursor` is visible. If `rows` is greater than 2, the line above the cursor is visible, too.
 pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize {
     let lowest = (cursor + 1).saturating_sub(rows);
     let highest = if rows > 2 { cursor.saturating_sub(1) } else { cursor };

@@ -1,11 +1,12 @@
-//! Helpers shared by tests of the dashboard.
+//! Simulated reports of the renderer for tests.
 
 use crate::film::{Mse, Noise};
 use crate::render::schedule::Spp;
 use crate::render::session::{QUALITIES, Report, State};
 
-/// Creates the report on generation `generation` of a scene, after `spp` samples in each of ten
-/// thousand pixels.
+/// Creates a report of the renderer after `spp` samples in each of ten thousand pixels.
+/// `generation` is the number of the scene's version, and `noise_codes` the estimated noise in
+/// 8-bit levels.
 pub fn report(generation: u64, spp: u64, noise_codes: Option<f64>) -> Report {
     Report {
         generation,

@@ -1,4 +1,4 @@
-//! Files on disk: reading of regular files without waiting, replacement of files in one step, and
+//! Files on disk: opening of regular files without blocking, replacement of files in one step, and
 //! the rule for symbolic links of other users.
 
 mod open;
@@ -8,4 +8,6 @@ mod replace;
 pub(crate) use open::open_regular_with;
 pub use open::{open_regular, require_regular};
 pub use owner::{is_own, user_name};
-pub use replace::{Existing, Replacement, TEMPORARY, WriteError, check_writable, lock, write};
+pub use replace::{
+    Existing, Replacement, TEMPORARY, WriteError, check_writable, lock, replace_file, write,
+};

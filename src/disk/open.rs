@@ -1,4 +1,4 @@
-//! Opening of regular files.
+//! Opening of regular files without blocking on pipes and devices.
 
 use rustix::fs::OFlags;
 use std::fs::{self, File, FileType, OpenOptions};
@@ -10,7 +10,7 @@ use std::path::Path;
 /// other end is open.
 ///
 /// # Errors
-/// Fails if the file cannot be opened, and with the error of [`require_regular`].
+/// Fails if the file cannot be opened or is not a regular file.
 pub fn open_regular(path: &Path) -> io::Result<File> {
     open_regular_with(File::options().read(true), path)
 }
@@ -29,7 +29,7 @@ pub(crate) fn open_regular_with(options: &mut OpenOptions, path: &Path) -> io::R
 /// Checks that `file_type` is that of a regular file.
 ///
 /// # Errors
-/// Returns [`ErrorKind::InvalidInput`] with the name of the type, for other types.
+/// Returns [`ErrorKind::InvalidInput`] for any other type, which the message names.
 pub fn require_regular(file_type: FileType) -> io::Result<()> {
     let found = if file_type.is_file() {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Owners of files.
+//! Owners of files: comparison with the user of this process, names of users.
 
 use crate::disk::TEMPORARY;
 use rustix::process::geteuid;
@@ -7,8 +7,9 @@ use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
 /// Returns `true` if a file in `folder` with this metadata belongs to the user of this process.
-/// File systems that give all files one owner, such as some network mounts, are recognised by a
-/// temporary file.
+/// Some file systems, such as network mounts, give all files one owner, who may be another user. A
+/// file with the same owner as a new file of this process in `folder` therefore belongs to the
+/// user, too.
 pub fn is_own(metadata: &Metadata, folder: &Path) -> bool {
     let owner = metadata.uid();
     let owner_of_new_file = || {
@@ -20,13 +21,15 @@ pub fn is_own(metadata: &Metadata, folder: &Path) -> bool {
     owner == geteuid().as_raw() || owner_of_new_file() == Some(owner)
 }
 
-/// Returns the name of the user with number `id` in `/etc/passwd`, or the number.
+/// Returns the name of the user with number `id` in `/etc/passwd`, or the number as text if it is
+/// not found there.
 pub fn user_name(id: u32) -> String {
     let users = fs::read_to_string("/etc/passwd").unwrap_or_default();
     name_in(&users, id).map_or_else(|| id.to_string(), String::from)
 }
 
-/// Finds the name of user `id` in the lines `name:password:id:…`.
+/// Finds the name of the user with number `id` in `users`, which consists of lines of the form
+/// `name:password:id:…`. Returns `None` if no line has this number.
 fn name_in(users: &str, id: u32) -> Option<&str> {
     users.lines().find_map(|line| {
         let mut fields = line.split(':');

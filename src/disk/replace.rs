@@ -9,17 +9,17 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// Prefix and suffix of the names of temporary files.
+/// Prefix and suffix of the names of the program's temporary files.
 pub const TEMPORARY: [&str; 2] = [".zerkalo-", ".tmp"];
-/// Largest number of symbolic links that are followed, as in Linux.
+/// Largest number of symbolic links that are followed to a file, as in Linux.
 const MAX_LINKS: usize = 40;
 
 /// Reason for which a file cannot be written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WriteError {
-    /// The requested file.
+    /// Path of the file as requested.
     pub path: PathBuf,
-    /// Kind of the problem.
+    /// Kind of the problem, as the operating system classifies it.
     pub kind: ErrorKind,
     /// Description of the problem, as a clause of a sentence.
     pub what: String,
@@ -35,23 +35,30 @@ impl fmt::Display for WriteError {
 
 impl std::error::Error for WriteError {}
 
-/// Action if the file exists already.
+impl WriteError {
+    fn new(path: &Path, kind: ErrorKind, what: impl Into<String>, remedy: &str) -> Self {
+        Self { path: path.to_path_buf(), kind, what: what.into(), remedy: remedy.to_string() }
+    }
+}
+
+/// Action if the file to be written exists already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Existing {
     /// Replaces the file. If its path is a symbolic link, the link stays and its target is
     /// replaced. The permissions stay.
     Replace,
-    /// Fails, also if another program creates the file in the meantime.
+    /// Fails if the file exists, even if another program creates it in the meantime.
     Refuse,
 }
 
-/// New content of a file. It is written to a temporary file in the same folder, which gets the name
-/// of the file by [`Replacement::commit`]. The temporary file is removed when the value is dropped.
+/// New content of a file. It is written to a temporary file in the same folder, which
+/// [`Replacement::commit`] renames to the file. The temporary file is removed if the value is
+/// dropped before.
 #[derive(Debug)]
 pub struct Replacement {
-    /// Path as requested.
+    /// Path of the file as requested.
     path: PathBuf,
-    /// Path of the file, with symbolic links followed.
+    /// Path of the file that is replaced, with symbolic links followed.
     target: PathBuf,
     folder: PathBuf,
     existing: Existing,
@@ -61,19 +68,14 @@ pub struct Replacement {
 }
 
 impl Replacement {
-    /// Creates the temporary file.
+    /// Creates the temporary file for the new content of the file at `path`.
     ///
     /// # Errors
     /// Fails if the file could not be replaced now: it is not a regular file, it is read-only, it
     /// exists and `existing` refuses that, the folder is not writable, or the path is a symbolic
     /// link that `may_follow` does not permit.
     pub fn begin(path: &Path, existing: Existing) -> Result<Self, WriteError> {
-        let error = |kind, what: &str, remedy: &str| WriteError {
-            path: path.to_path_buf(),
-            kind,
-            what: what.to_string(),
-            remedy: remedy.to_string(),
-        };
+        let error = |kind, what: &str, remedy: &str| WriteError::new(path, kind, what, remedy);
         let target = match existing {
             Existing::Replace => follow(path).map_err(|e| of_link(path, &e))?,
             Existing::Refuse if path.symlink_metadata().is_ok() => return Err(exists(path)),
@@ -115,17 +117,19 @@ impl Replacement {
         }
     }
 
-    /// Returns the temporary file, to be written.
+    /// Returns the temporary file, to which the caller writes the new content.
     pub fn temporary(&mut self) -> &mut NamedTempFile {
         &mut self.temporary
     }
 
-    /// Converts an I/O error that occurred while the temporary file was written.
+    /// Converts `error`, which occurred while the temporary file was written, to an error with a
+    /// remedy for the user.
     pub fn explain(&self, error: &io::Error) -> WriteError {
         explain(&self.path, &self.folder, self.exists, error)
     }
 
-    /// Stores the content on the disk and gives the temporary file the name of the file.
+    /// Stores the content of the temporary file on the disk, then renames this file to the path of
+    /// the file that is replaced or created.
     ///
     /// # Errors
     /// Fails if the content cannot be stored or the file cannot be replaced; an existing file is
@@ -148,8 +152,8 @@ impl Replacement {
     }
 }
 
-/// Locks a temporary file for the life of this process, which shows that the file is in use. On
-/// file systems without locks, leftover temporary files are not removed.
+/// Locks a temporary file until it is closed. Other processes remove a temporary file only if they
+/// can lock it. On a file system without locks they therefore never remove one.
 pub fn lock(temporary: &NamedTempFile) {
     let _ = temporary.as_file().try_lock();
 }
@@ -162,15 +166,26 @@ pub fn lock(temporary: &NamedTempFile) {
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     if is_stream(path) {
         let opened = File::options().append(true).open(path);
-        return opened.and_then(|mut stream| stream.write_all(bytes)).map_err(|error| WriteError {
-            path: path.to_path_buf(),
-            kind: error.kind(),
-            what: error.to_string(),
-            remedy: "name another file".to_string(),
+        return opened.and_then(|mut stream| stream.write_all(bytes)).map_err(|error| {
+            WriteError::new(path, error.kind(), error.to_string(), "name another file")
         });
     }
-    let mut replacement = Replacement::begin(path, Existing::Replace)?;
-    let written = replacement.temporary().write_all(bytes);
+    replace_file(path, Existing::Replace, |file| file.write_all(bytes))
+}
+
+/// Writes the file at `path`. `write` fills a temporary file, which is renamed to `path` when it is
+/// complete and stored on the disk. An existing file is replaced or refused, as `existing` says.
+///
+/// # Errors
+/// Fails if the file cannot be written or is refused, or if `write` fails; an existing file is then
+/// unchanged.
+pub fn replace_file(
+    path: &Path,
+    existing: Existing,
+    write: impl FnOnce(&mut NamedTempFile) -> io::Result<()>,
+) -> Result<(), WriteError> {
+    let mut replacement = Replacement::begin(path, existing)?;
+    let written = write(replacement.temporary());
     written.map_err(|error| replacement.explain(&error))?;
     replacement.commit()
 }
@@ -183,17 +198,17 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     if is_stream(path) { Ok(()) } else { Replacement::begin(path, Existing::Replace).map(drop) }
 }
 
-/// Returns `true` if `path` leads to a pipe, a device, a socket, or an open file of a process. Such
-/// targets are written to directly: a replacement of `/dev/stdout`, for example, would not reach
-/// the open file.
+/// Returns `true` if `path` leads to a pipe, a device, a socket, or an open file of a process.
+/// Bytes are written to such a target directly: a replacement of `/dev/stdout`, for example, would
+/// not reach the open file behind it.
 fn is_stream(path: &Path) -> bool {
     let is_other = |m: Metadata| !m.is_file() && !m.is_dir();
     fs::metadata(path).is_ok_and(is_other)
         || follow(path).is_err_and(|e| e.kind() == ErrorKind::Unsupported)
 }
 
-/// Follows the symbolic links at `path`. Returns the path of a file that is no link; it may not
-/// exist.
+/// Follows the symbolic links at `path`. Returns the path that they lead to, which is not a link; a
+/// file may not exist there.
 ///
 /// # Errors
 /// [`ErrorKind::PermissionDenied`] with an explanation if [`may_follow`] does not permit a link;
@@ -222,7 +237,7 @@ fn follow(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("too many symbolic links lead to it"))
 }
 
-/// Owner and permission bits of a file.
+/// Owner and permission bits of a file or folder.
 struct Owner {
     user: u32,
     mode: u32,
@@ -234,10 +249,11 @@ impl Owner {
     }
 }
 
-/// Returns `true` if `user` may write through the symbolic link `link` in the folder `folder`. In a
-/// sticky folder that everybody may write to, only links of `user` and of the folder's owner are
-/// followed: the rule of Linux's `fs.protected_symlinks` (proc_sys_fs(5)), here on every system and
-/// whatever its setting.
+/// Returns `true` if the user with the id `user` may write through a symbolic link. `link` and
+/// `folder` describe the link and the folder that contains it. In a sticky folder that everybody
+/// may write to, only links of `user` and of the folder's owner are followed. This is the rule of
+/// Linux's `fs.protected_symlinks` (proc_sys_fs(5)); it applies here on every system and with every
+/// setting.
 fn may_follow(link: &Owner, folder: &Owner, user: u32) -> bool {
     const STICKY_AND_WRITABLE_BY_ALL: u32 = 0o1002;
     let is_shared = folder.mode & STICKY_AND_WRITABLE_BY_ALL == STICKY_AND_WRITABLE_BY_ALL;
@@ -245,27 +261,20 @@ fn may_follow(link: &Owner, folder: &Owner, user: u32) -> bool {
 }
 
 fn of_link(path: &Path, error: &io::Error) -> WriteError {
-    WriteError {
-        path: path.to_path_buf(),
-        kind: error.kind(),
-        what: match error.kind() {
-            ErrorKind::Unsupported => "it is an open file of a process".to_string(),
-            _ => error.to_string(),
-        },
-        remedy: "name another file".to_string(),
-    }
+    let what = match error.kind() {
+        ErrorKind::Unsupported => "it is an open file of a process".to_string(),
+        _ => error.to_string(),
+    };
+    WriteError::new(path, error.kind(), what, "name another file")
 }
 
 fn exists(path: &Path) -> WriteError {
-    WriteError {
-        path: path.to_path_buf(),
-        kind: ErrorKind::AlreadyExists,
-        what: "there is such a file already, and it was not changed".to_string(),
-        remedy: "name another one or remove it first".to_string(),
-    }
+    let what = "there is such a file already, and it was not changed";
+    WriteError::new(path, ErrorKind::AlreadyExists, what, "name another one or remove it first")
 }
 
-/// Explains an I/O error. `exists` is `true` if there is an old file.
+/// Converts an I/O error of writing the file `path` in `folder` to an error with a remedy for the
+/// user. `exists` is `true` if the file existed before.
 fn explain(path: &Path, folder: &Path, exists: bool, error: &io::Error) -> WriteError {
     let shown = folder.display();
     let kept = if exists { "the old file is unchanged" } else { "no file was written" };
@@ -288,7 +297,7 @@ fn explain(path: &Path, folder: &Path, exists: bool, error: &io::Error) -> Write
         ),
         _ => (format!("{error}, and {kept}"), "if that is unclear, try another directory"),
     };
-    WriteError { path: path.to_path_buf(), kind: error.kind(), what, remedy: remedy.to_string() }
+    WriteError::new(path, error.kind(), what, remedy)
 }
 
 #[cfg(test)]
@@ -413,7 +422,9 @@ mod tests {
         }
     }
 
-    /// Only the superuser can give a link to another user.
+    /// Checks that a symbolic link in a shared folder is not followed if it belongs to another
+    /// user. Only the superuser can give the link to another user. For other users the test ends
+    /// before this step.
     #[test]
     fn link_of_another_user_in_a_shared_folder_is_refused() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Source of the samples of a picture file: one film, or films of bands of rows.
+//! Source of the samples of a picture file: one film, or one film for each band of rows.
 
 use crate::film::store::Film;
 use std::io;
@@ -13,15 +13,16 @@ pub trait Bands {
     /// Fails if the rows cannot be rendered.
     fn film_with_row(&mut self, y: usize) -> io::Result<&Film>;
 
-    /// Returns metadata as keys and values.
+    /// Returns the metadata of the picture as pairs of a key and a value.
     ///
-    /// Values that are known only after the last row may change until then, to values of up to 128
-    /// bytes. A key has 1 to 79 printable ASCII characters, without leading, trailing or double
-    /// spaces. It starts with a capital letter, because OpenEXR's own keys start with a small one.
+    /// A value that is known only after the last row, such as the noise, may change until then. It
+    /// has at most 128 bytes. A key has 1 to 79 printable ASCII characters, without leading,
+    /// trailing or double spaces. It starts with a capital letter, because OpenEXR's own keys start
+    /// with a small one.
     fn metadata(&self) -> Vec<(String, String)>;
 }
 
-/// A whole film as a single band.
+/// Film that holds the whole picture, as a source of its rows.
 #[derive(Clone, Copy, Debug)]
 pub struct WholeFilm<'a> {
     /// Film of the whole picture.

@@ -1,16 +1,18 @@
-//! Box filter: means of pixels over cells of any size, weighted by covered area. Cells without
-//! samples get the value of a neighbour.
+//! Box filter: means of an image's pixels over the cells of a coarser grid, weighted by covered
+//! area. Cells without samples get the value of a neighbour.
 
-/// Pixels that a cell overlaps along one axis, fully or in part.
+/// Pixels of an image that one cell of a smaller image overlaps along one axis, fully or in part. A
+/// cell is a pixel of the smaller image.
 pub(super) struct Coverage {
-    /// Index of the first covered pixel.
+    /// Index of the first pixel that the cell overlaps.
     pub first: usize,
-    /// Covered fraction of each pixel from `first` on, 0..=1.
+    /// Fraction of each overlapped pixel that the cell covers, 0..=1; the first element is for the
+    /// pixel `first`.
     pub parts: Vec<f64>,
 }
 
-/// Divides a row of `pixels` pixels into `cells` cells of equal width, and returns the pixels that
-/// each cell covers.
+/// Divides a row of `pixels` pixels into `cells` cells (pixels of a smaller image) of equal width.
+/// Returns the pixels that each cell covers.
 pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     let edge = |cell: usize| cell as f64 * pixels as f64 / cells as f64;
     let cover = |cell: usize| {
@@ -23,10 +25,10 @@ pub(super) fn coverage(pixels: usize, cells: usize) -> Vec<Coverage> {
     (0..cells).map(cover).collect()
 }
 
-/// Returns the mean of an image over each cell, `[row][column]`, weighted by the covered area of
-/// each pixel. The image has `size` (columns, rows) pixels. The `cells` (columns, rows) have equal
-/// sizes and together cover the image. `pixel` returns the value of the pixel with an index in
-/// `[row][column]` order.
+/// Returns the mean of an image over each cell of a coarser grid, `[row][column]`, weighted by the
+/// covered area of each pixel. The image has `size` (columns, rows) pixels. The `cells` (columns,
+/// rows) have equal sizes and together cover the image. `pixel` returns the value of the pixel with
+/// an index in `[row][column]` order.
 pub fn box_means(
     size: [usize; 2],
     cells: [usize; 2],
@@ -57,9 +59,10 @@ pub fn box_means(
     means
 }
 
-/// Fills cells without samples. Each gets the means of the nearest cell with samples in its row. A
-/// row without samples gets the means of the nearest row with samples. `stride` is the number of
-/// means in a cell.
+/// Fills cells without samples in a smaller image of `cols` x `rows` cells. `means` has `stride`
+/// values for each cell, one for each light group and channel. `known` is `true` for cells with
+/// samples. A cell without samples gets the values of the nearest cell with samples in its row. A
+/// row without samples gets the values of the nearest row with samples.
 pub(super) fn fill_gaps(
     means: &mut [f32],
     known: &mut [bool],
@@ -82,8 +85,9 @@ pub(super) fn fill_gaps(
     }
 }
 
-/// Returns, for each element, the index of the nearest known element, and of two equally near ones
-/// the lower index. If no element is known, returns each element's own index.
+/// Returns one index for each element of a row: that of the nearest element for which `known` is
+/// true, or the lower one of two that are equally near. If `known` is true nowhere, returns each
+/// element's own index.
 fn nearest(known: &[bool]) -> Vec<usize> {
     let mut below: Vec<Option<usize>> = Vec::with_capacity(known.len());
     for (i, k) in known.iter().enumerate() {

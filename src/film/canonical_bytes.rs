@@ -1,13 +1,16 @@
-//! Canonical serialisation of the film. Films with equal samples have equal bytes, in whatever
-//! order the samples were added. Unit and integration tests use the bytes to compare films.
+//! Canonical serialisation of the film, by which tests compare films. Films with equal samples have
+//! equal bytes, in whatever order the samples were added.
 //!
-//! All numbers are little-endian. The header contains width, height and number of groups (u32
-//! each), a scale for each group (f64), the seed (u64), and the length (u32) and text of the
-//! precision's name. Then follow the number of invalid samples (u64), the number of remembered ones
-//! (u32), and for each of these index, x, y (u32 each) and replicate (u8). Then follow the tiles in
-//! order: counts of A and B (u32), lattice (u8), and, if the tile has samples, the sums of the
-//! pixels inside the picture, `[replicate][row][column][group][channel]` (i64). If there are
-//! saturated samples, their number (u64) is at the end.
+//! All numbers are little-endian. The parts are, in this order:
+//!
+//! - Header: width, height and number of groups (u32 each), a scale for each group (f64), the seed (u64),
+//!   the length (u32) and the text of the precision's name.
+//! - Invalid samples: their number (u64), the number of stored positions (u32), and for each position
+//!   index, x, y (u32 each) and replicate (u8).
+//! - Tiles, row by row: sample counts of A and B, the two halves of the samples (u32), and
+//!   [`Tile::lattice_px`] (u8). If the tile has samples, the sums of the pixels inside the picture follow,
+//!   `[replicate][row][column][group][channel]` (i64).
+//! - Number of saturated samples (u64), if there are any.
 
 use crate::film::TILE;
 use crate::film::store::Film;

@@ -1,4 +1,4 @@
-//! Display transform: exposure, tone curve, sRGB.
+//! Display transform of radiance to pixel values: exposure, tone curve, sRGB encoding.
 
 use crate::film::srgb_table::SrgbTable;
 use crate::value::srgb_from_linear;
@@ -8,17 +8,17 @@ use std::str::FromStr;
 /// Tone curve: maps radiance to linear light of a display, whose white is 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tone {
-    /// Clips each channel at 1.
+    /// Tone curve that clips each colour channel at 1.
     #[default]
     Clip,
     /// The Khronos PBR Neutral tone mapper (Khronos specification of 2024). It keeps hues,
-    /// compresses the brightest fifth of the range, and darkens the rest by at most a small
-    /// constant.
+    /// compresses the brightest fifth of the range, and subtracts at most 0.04 from all
+    /// channels.
     Neutral,
 }
 
 impl Tone {
-    /// All tone curves with their names.
+    /// All tone curves, each with the name that options and scenes use.
     pub const NAMED: [(&'static str, Self); 2] = [("clip", Self::Clip), ("neutral", Self::Neutral)];
 }
 
@@ -56,8 +56,8 @@ impl Display {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Converts radiance to 8-bit sRGB. The result equals [`Display::codes`] after rounding, and is
-    /// computed several times as fast.
+    /// Converts radiance to 8-bit sRGB: the rounded result of [`Display::codes`], computed several
+    /// times as fast.
     pub fn codes_8(&self, radiance: [f64; 3]) -> [u8; 3] {
         self.to_8()(radiance)
     }
@@ -74,13 +74,15 @@ impl Display {
         toned(self.tone, radiance.map(|c| c * self.exposure_factor()))
     }
 
-    /// Factor by which the exposure multiplies radiance.
+    /// Returns the factor by which the exposure multiplies radiance: 2 to the power of the exposure
+    /// in stops.
     pub fn exposure_factor(&self) -> f64 {
         self.exposure_ev.exp2()
     }
 }
 
-/// Applies the tone curve `tone`. The result is in 0..=1.
+/// Applies the tone curve `tone` to the linear colour `color`, which includes the exposure. The
+/// result is linear light of the display, 0..=1.
 #[inline(always)]
 pub(super) fn toned(tone: Tone, color: [f64; 3]) -> [f64; 3] {
     match tone {
@@ -108,7 +110,7 @@ fn neutral(color: [f64; 3]) -> [f64; 3] {
     color.map(|c| c * (new_peak / peak)).map(|c| c + (new_peak - c) * to_white)
 }
 
-/// Converts an sRGB value from 0..=255 to 16 bits and rounds it; 255 becomes 65535.
+/// Converts an unrounded sRGB value, 0..=255, to 16 bits and rounds it; 255 becomes 65535.
 pub fn quantised_16(code: f64) -> u16 {
     (code * (65535.0 / 255.0)).round() as u16
 }

@@ -1,5 +1,5 @@
-//! Incremental downsampling of the film to the cells of a display. Only tiles that have changed
-//! since the previous picture are read again.
+//! Incremental downsampling of the film to the cells of a display, that is, to the pixels of a
+//! smaller image. Only tiles that have changed since the previous downsampling are read again.
 
 use crate::film::TILE;
 use crate::film::box_filter::{Coverage, coverage, fill_gaps};
@@ -7,15 +7,16 @@ use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::store::Film;
 use crate::film::tile::Tile;
 
-/// Mean of each light group over the cells of a raster. Light weights are applied when the
-/// thumbnail is displayed, so that a change of weights does not need the film.
+/// Film downsampled to a smaller image, whose pixels are called cells. It holds the mean radiance
+/// of each cell in each light group (lights with sums of their own). Light weights are applied
+/// later, so that a change of weights does not need the film.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Thumbnail {
-    /// Number of cells in a row.
+    /// Number of cells (pixels of the smaller image) in a row.
     pub cols: usize,
-    /// Number of rows.
+    /// Number of rows of cells (pixels of the smaller image).
     pub rows: usize,
-    /// Mean radiance for light weights of 1, `[row][column][group][channel]`.
+    /// Mean radiance of each cell for light weights of 1, `[row][column][group][channel]`.
     means: Vec<f32>,
     groups: usize,
 }
@@ -34,12 +35,8 @@ impl Thumbnail {
         downsample.thumbnail()
     }
 
-    /// Number of light groups. [`LightWeights`] for this thumbnail must have as many.
-    pub fn groups(&self) -> usize {
-        self.groups
-    }
-
-    /// Returns the radiance of each cell under `weights`, `[row][column]`.
+    /// Returns the radiance of each cell (pixel of the smaller image) under the light weights
+    /// `weights`, `[row][column]`.
     pub fn mixed(&self, weights: &LightWeights) -> Vec<[f32; 3]> {
         assert_eq!(weights.weights.len(), self.groups, "weights for the groups of the film");
         let weights: Vec<_> = weights.weights.iter().map(|w| w.map(|w| w as f32)).collect();
@@ -54,50 +51,56 @@ impl Thumbnail {
     }
 }
 
-/// Contributions of a film's tiles to the cells of a raster, cached between pictures; see
-/// [`Thumbnail::of_film`].
+/// Cache of the contributions of a film's tiles to the cells of a smaller image. It saves reading
+/// unchanged tiles when the film is downsampled repeatedly; see [`Thumbnail::of_film`].
 pub struct IncrementalDownsample {
     layout: Layout,
-    /// Contribution of each tile, in the order of the film's tiles.
+    /// Contribution of each film tile, in the order of the film's tiles.
     parts: Vec<TilePart>,
 }
 
-/// Overlap of the film's tiles with the cells of a raster, along each axis.
+/// Overlap of the film's tiles with the cells (pixels) of a smaller image: the cells that each
+/// column and each row of tiles overlaps.
 struct Layout {
     cols: usize,
     rows: usize,
     size: [usize; 2],
     groups: usize,
-    /// Cells that each column of tiles overlaps.
+    /// Cells of the smaller image that each column of tiles overlaps.
     across: Vec<Span>,
-    /// Cells that each row of tiles overlaps.
+    /// Cells of the smaller image that each row of tiles overlaps.
     down: Vec<Span>,
 }
 
-/// Cells that one column (or row) of tiles overlaps.
+/// Cells (pixels) of a smaller image that one column or one row of film tiles overlaps.
 struct Span {
-    /// Index of the first cell.
+    /// Index of the first cell (pixel of the smaller image) that the tiles overlap.
     first: usize,
-    /// Number of cells.
+    /// Number of cells (pixels of the smaller image) that the tiles overlap.
     len: usize,
-    /// Cells that overlap each pixel of the tiles along the axis: index of the cell, counted from
-    /// `first`, and the fraction of the pixel that the cell covers, 0..=1.
+    /// Cells that overlap each pixel of the tiles, along x for a column of tiles and along y for a
+    /// row. Each pair is the index of a cell, counted from `first`, and the fraction of the pixel
+    /// that this cell covers, 0..=1.
     pixels: Vec<Vec<(usize, f64)>>,
 }
 
-/// Contribution of a tile to the cells that it overlaps.
+/// Contribution of a film tile to the cells (pixels) of a smaller image that it overlaps.
 #[derive(Default)]
 struct TilePart {
-    /// Epoch, sample counts and lattice of the tile at its latest refresh. If the tile still has
-    /// these values, its samples are unchanged.
-    version: Option<(u64, [u32; 2], usize)>,
-    /// Sums of area, and of area times mean: `[row][column][area, group 0 red, ...]`. Empty without
+    /// State of the tile at its latest refresh: epoch (number of the film's restarts),
+    /// [`Tile::counts`] and [`Tile::lattice_px`]. If the tile still has these values, its samples
+    /// are unchanged. `None` if [`Film::tile`] returned `None` then, because the tile had no
     /// samples.
+    version: Option<(u64, [u32; 2], usize)>,
+    /// Sums for each cell that the tile overlaps, `[row][column][area, group 0 red, ...]`. The
+    /// first is the total area, inside the cell, of the pixels with samples. Each of the others is
+    /// the sum, over these pixels, of this area times the pixel's mean in one group and channel.
+    /// Empty without samples.
     sums: Vec<f64>,
 }
 
-/// A tile that has changed since the previous picture. [`DirtyTile::refresh`] reads it, on any
-/// thread.
+/// Film tile that has changed since the previous downsampling. [`DirtyTile::refresh`] reads it, on
+/// any thread.
 pub struct DirtyTile<'a> {
     layout: &'a Layout,
     part: &'a mut TilePart,
@@ -106,8 +109,9 @@ pub struct DirtyTile<'a> {
 }
 
 impl IncrementalDownsample {
-    /// Creates the cache for `cols` x `rows` cells over a film with the size and the number of
-    /// groups of `film`. The contributions are initially those of an empty film.
+    /// Creates the cache for a smaller image of `cols` x `rows` cells (pixels) over a film with the
+    /// size and the number of groups of `film`. The contributions are initially those of an empty
+    /// film.
     pub fn new(film: &Film, cols: usize, rows: usize) -> Self {
         let size = [film.width(), film.height()];
         let spans = |pixels: usize, cells: usize| {
@@ -135,8 +139,8 @@ impl IncrementalDownsample {
             && groups == film.groups()
     }
 
-    /// Returns the tiles that have changed since their latest refresh. All calls must pass the same
-    /// film, which may be restarted between calls.
+    /// Returns the tiles that have changed since the previous call; the caller must refresh each of
+    /// them. All calls must pass the same film, which may be restarted between calls.
     pub fn stale<'a>(&'a mut self, film: &'a Film) -> Vec<DirtyTile<'a>> {
         let layout = &self.layout;
         let stale = |(index, part): (usize, &'a mut TilePart)| {
@@ -148,7 +152,8 @@ impl IncrementalDownsample {
         self.parts.iter_mut().enumerate().filter_map(stale).collect()
     }
 
-    /// Returns the means over the cells. Cells without samples are filled.
+    /// Returns the mean radiance of each cell (pixel of the smaller image) from the cached
+    /// contributions. Cells without samples get the values of a neighbour.
     pub fn thumbnail(&self) -> Thumbnail {
         let Layout { cols, rows, groups, .. } = self.layout;
         let stride = 3 * groups;
@@ -199,7 +204,8 @@ impl Span {
 }
 
 impl DirtyTile<'_> {
-    /// Reads the current samples of the tile into its cached contribution.
+    /// Reads the current samples of the tile into its cached contribution to the cells (pixels) of
+    /// the smaller image.
     pub fn refresh(self) {
         let Self { layout, part, film, index } = self;
         let columns = film.tile_columns();
@@ -224,8 +230,10 @@ impl DirtyTile<'_> {
     }
 }
 
-/// Adds the areas and the values of every `step`-th pixel of row `y` of a tile to `line`, one row
-/// of cells. Pixels and cells count with the height 1.
+/// Adds every `step`-th pixel in row `y` of a tile to `line`. `line` has the sums of one row of
+/// cells, in the order of [`TilePart::sums`]. Areas are computed as if the row of pixels had the
+/// height 1; the caller multiplies by the height that is inside the cells. `per_unit` are factors
+/// that convert integer sums to radiance, `[group][channel]`.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {
@@ -286,7 +294,8 @@ mod tests {
         assert_eq!(raster.thumbnail().mixed(&white(2)).len(), 63);
     }
 
-    /// Returns the means of the cells by brute force: the overlap of every pixel with every cell.
+    /// Returns the mean of each cell of the downsampled picture, computed for comparison from the
+    /// overlap of every pixel with every cell.
     fn brute_force(film: &Film, cols: usize, rows: usize, mix: &LightWeights) -> Vec<[f64; 3]> {
         let overlap = |cell: usize, cells: usize, pixel: usize, pixels: usize| {
             let edge = |c: usize| c as f64 * pixels as f64 / cells as f64;
@@ -333,8 +342,9 @@ mod tests {
         }
     }
 
-    /// Adds one sample of value x + 100 y to each pixel of the lattice with step `step_px` that is
-    /// not in the lattice with step `before_px`.
+    /// Adds the first sample, of value x + 100 y, to the pixels whose x and y are multiples of
+    /// `step_px`. Leaves out pixels whose x and y are multiples of `before_px`, the step of the
+    /// previous call; 0 leaves out none.
     fn first_samples(film: &mut Film, before_px: usize, step_px: usize) {
         each_tile(film, |tile, [x0, y0]| {
             let [width, height] = tile.extent();
@@ -377,7 +387,7 @@ mod tests {
         // The upper half of the film has samples. The lower half has none and gets the last row.
         let mut film = film(32, 32, &[1.0]);
         for slot in film.slots(&[1, 0]) {
-            let value = slot.index as i64 + 3;
+            let value = (slot.origin[0] / TILE) as i64 + 3;
             let tile = slot.prepare();
             (0..256).for_each(|p| tile.add(0, p, &[value; 3]));
             tile.advance(0, 1);

@@ -2,9 +2,9 @@
 //! replicates, light groups and sample count.
 //!
 //! All channels are in one part; prefixes of their names form layers. `R G B` is the picture.
-//! `A.R ..` and `B.R ..` are the two replicates; half of their difference is an estimate of the
-//! picture's error. `light_NAME.R ..` are the contributions of the light groups; their sum is the
-//! picture. `count` is the number of samples of a pixel.
+//! `A.R ..` and `B.R ..` are the pictures from the two halves of the samples (replicates); half of
+//! their difference is an estimate of the picture's error. `light_NAME.R ..` are the contributions
+//! of the light groups; their sum is the picture. `count` is the number of samples of a pixel.
 //!
 //! The file consists of tiles, so that programs can read a part of a large picture. A row of tiles
 //! is written as soon as it is complete. The header is written again at the end if metadata have
@@ -29,10 +29,11 @@ use exr::meta::{BlockDescription, Headers};
 use std::io::{self, Cursor};
 use std::ops::Range;
 
-/// Width and height of a tile in pixels. A row of tiles is held in memory while it is encoded.
+/// Width and height in pixels of a tile of the OpenEXR file. A row of tiles is held in memory while
+/// it is encoded.
 const TILE: [usize; 2] = [64, 16];
 
-/// Encodes a picture, one row of tiles after another.
+/// Encodes a picture as OpenEXR and writes it to `sink`, one row of tiles after another.
 pub(super) fn encode(
     picture: &ImageData,
     bands: &mut dyn Bands,
@@ -44,14 +45,16 @@ pub(super) fn encode(
     })
 }
 
-/// Value of a channel.
+/// Source of the values of one channel, such as `A.R`, of the OpenEXR file.
 #[derive(Clone, Copy)]
 enum Source {
-    /// Sum over all light groups: replicates `.0`, colour channel `.1`.
+    /// Radiance summed over all light groups. The fields are the replicates (halves of the samples)
+    /// whose samples are averaged, and the colour channel (0 red, 1 green, 2 blue).
     Mixed(Replicates, usize),
-    /// Single light group: group `.0`, colour channel `.1`.
+    /// Radiance of one light group alone. The fields are the group's index and the colour channel
+    /// (0 red, 1 green, 2 blue).
     Group(usize, usize),
-    /// Number of samples of a pixel in both replicates.
+    /// Number of samples of a pixel, summed over both replicates (halves of the samples).
     Count,
 }
 
@@ -90,7 +93,8 @@ fn encode_to(
     Ok(())
 }
 
-/// Returns all bytes of a file before the table of chunks.
+/// Returns all bytes of an OpenEXR file before its table of chunks, that is, magic number, version
+/// and header.
 fn header(
     picture: &ImageData,
     channels: &[(String, Source)],
@@ -104,7 +108,7 @@ fn header(
     }
 }
 
-/// Returns the header of the file's only part.
+/// Returns the headers of the OpenEXR file: a list of one, because the file has one part.
 fn headers(
     picture: &ImageData,
     channels: &[(String, Source)],
@@ -147,7 +151,8 @@ fn text(text: &str) -> Text {
     Text::new_or_none(text).unwrap_or_else(|| Text::from_bytes_unchecked(text.bytes().collect()))
 }
 
-/// Returns all channels with their names, sorted by name as the format requires.
+/// Returns all channels of the OpenEXR file, each as its name and the source of its values. They
+/// are sorted by name, as the format requires.
 fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
     let mut channels = vec![("count".to_string(), Source::Count)];
     for (c, color) in ["R", "G", "B"].into_iter().enumerate() {
@@ -162,8 +167,9 @@ fn channels(group_layers: &[String]) -> Vec<(String, Source)> {
     channels
 }
 
-/// Returns a unique layer name for each light group. Names consist of ASCII letters, digits, `_`
-/// and `-`.
+/// Returns a unique layer name for each light group. It contains the group's name in `names`, or
+/// its number if there is none. A layer is a group of OpenEXR channels with a common prefix. Layer
+/// names consist of ASCII letters, digits, `_` and `-`.
 fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
     let mut layers: Vec<String> = Vec::new();
@@ -180,11 +186,11 @@ fn layer_names(names: &[String], groups: usize) -> Vec<String> {
     layers
 }
 
-/// Encoded values of a row of tiles.
+/// Pixel values of a row of tiles of the OpenEXR file, encoded as bytes.
 struct TileRow<'a> {
     picture: &'a ImageData<'a>,
     sources: Vec<Source>,
-    /// Bytes of each channel, in `[row][column]` order.
+    /// Encoded values of each channel, in `[row][column]` order.
     bytes: Vec<Vec<u8>>,
 }
 
@@ -193,7 +199,7 @@ impl<'a> TileRow<'a> {
         Self { picture, bytes: sources.iter().map(|_| Vec::new()).collect(), sources }
     }
 
-    /// Replaces the values by those of the given rows of the picture.
+    /// Replaces the encoded values by those of the given rows of the picture.
     fn load(&mut self, rows: Range<usize>, bands: &mut dyn Bands) -> io::Result<()> {
         let Self { picture, sources, bytes } = self;
         bytes.iter_mut().for_each(Vec::clear);
@@ -225,7 +231,8 @@ impl<'a> TileRow<'a> {
     }
 }
 
-/// Returns the contribution of one light group to one colour channel. `i` is the index in
+/// Returns the contribution of one light group to one colour channel of a pixel: the mean over the
+/// pixel's samples; 0 without samples. `i` is the position of this group and channel in
 /// `[group][channel]` order.
 fn group_mean(sums: &Sums, per_unit: &[f64], i: usize) -> f32 {
     match sums.count(Replicates::Both) {

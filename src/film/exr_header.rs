@@ -7,28 +7,29 @@
 
 use std::io::{self, Cursor, Seek, SeekFrom, Write};
 
-/// Number of bytes before the first attribute: magic number and version.
+/// Number of bytes of an OpenEXR file before the first attribute: magic number and version.
 const PREAMBLE: usize = 8;
 
 /// Writer that sorts the attributes of an OpenEXR header by name. It buffers the header until it is
 /// complete, writes it to the sink, and passes on all further bytes.
 pub(super) struct Ordered<W: Write + Seek> {
     sink: W,
-    /// Buffered bytes. `None` after the header has been written.
+    /// Buffered bytes of the header. `None` after the header has been written.
     buffer: Option<Vec<u8>>,
     /// Number of bytes of the header, including its last byte; 0 until the header is complete.
     header_len: usize,
 }
 
 impl<W: Write + Seek> Ordered<W> {
-    /// Creates a writer for a file that starts at the current position of `sink`.
+    /// Creates a writer of an OpenEXR file that starts at the current position of `sink`.
     pub fn new(sink: W) -> Self {
         Self { sink, buffer: Some(Vec::new()), header_len: 0 }
     }
 }
 
 impl Ordered<Cursor<Vec<u8>>> {
-    /// Returns the bytes of the header; none if the header is not complete.
+    /// Returns the bytes of the OpenEXR header with sorted attributes; none if the header is not
+    /// complete.
     pub fn into_header(self) -> Vec<u8> {
         let mut bytes = self.sink.into_inner();
         bytes.truncate(self.header_len);
@@ -64,8 +65,9 @@ impl<W: Write + Seek> Seek for Ordered<W> {
     }
 }
 
-/// Splits a header into its attributes and the bytes after the header. Returns `None` if the header
-/// is incomplete.
+/// Splits `bytes`, an OpenEXR header without its first [`PREAMBLE`] bytes. Returns two values: the
+/// bytes of each attribute, and the bytes from the zero byte at the end of the header on. Returns
+/// `None` if the header is incomplete.
 fn attributes(mut bytes: &[u8]) -> Option<(Vec<&[u8]>, &[u8])> {
     let mut found = Vec::new();
     while *bytes.first()? != 0 {

@@ -3,22 +3,23 @@
 use exr::prelude::*;
 use std::path::Path;
 
-/// Picture read from a file, in linear radiance.
+/// Picture that was read from an OpenEXR file, in linear radiance.
 pub struct ReadPicture {
-    /// Width and height in pixels.
+    /// Width and height of the picture in pixels.
     pub size: [usize; 2],
     /// Pixels in linear radiance, `[row][column]`.
     pub pixels: Vec<[f64; 3]>,
-    /// Replicates A and B, `[row][column]`. `None` if the file was not written by this program.
+    /// Pictures of the two halves of the samples (replicates A and B), `[row][column]`, from which
+    /// the error is estimated. `None` if the file was not written by this program.
     pub replicates: Option<[Vec<[f64; 3]>; 2]>,
 }
 
-/// Largest number of pixels of a file that is read: 8192 x 8192. It limits the memory, because the
-/// whole picture is read into memory.
+/// Largest number of pixels of an OpenEXR file that is read: 8192 x 8192. Larger files are refused,
+/// because the whole picture is read into memory.
 const MAX_PIXELS: usize = 1 << 26;
 
-/// Reads the channels `R G B` of an OpenEXR file, and the replicates `A.R ..` and `B.R ..` if they
-/// exist.
+/// Reads the channels `R G B` of an OpenEXR file, and the channels `A.R ..` and `B.R ..` of the two
+/// replicates (halves of the samples) if they exist.
 ///
 /// # Errors
 /// Fails if the file cannot be read, is too large, or lacks `R G B`.

@@ -8,25 +8,26 @@ use std::io::{self, Seek, SeekFrom, Write};
 /// [`Bands`](crate::film::Bands).
 #[derive(Clone, Copy, Debug)]
 pub struct ImageData<'a> {
-    /// Width and height in pixels.
+    /// Width and height of the image in pixels.
     pub size: [u32; 2],
-    /// Weight of each light group: colour times intensity.
+    /// Weight of each light group (lights with sums of their own in the film): colour times
+    /// intensity.
     pub mix: &'a LightWeights,
-    /// Name of each light group, for formats with layers.
+    /// Name of each light group, for file formats with layers of channels (OpenEXR).
     pub group_names: &'a [String],
-    /// Exposure and tone curve, for formats that hold display values.
+    /// Exposure and tone curve, for file formats with displayed values (PNG).
     pub display: Display,
-    /// Bits per channel, for formats that hold display values.
+    /// Bits per channel, for file formats with displayed values (PNG).
     pub depth: Depth,
 }
 
-/// Bits per channel of a picture file with display values.
+/// Number of bits per channel of a picture file with display values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Depth {
-    /// 8 bits: 256 levels.
+    /// 8 bits per channel: 256 levels.
     #[default]
     Eight,
-    /// 16 bits: 65 536 levels.
+    /// 16 bits per channel: 65 536 levels.
     Sixteen,
 }
 
@@ -34,7 +35,8 @@ pub enum Depth {
 pub(super) trait WriteSeek: Write + Seek {}
 impl<T: Write + Seek> WriteSeek for T {}
 
-/// Replaces `before`, the first bytes of a file, by `after`, then seeks to the end of the file.
+/// Replaces the first bytes of a file by `after`, then seeks to the end of the file. `before` are
+/// the bytes that the file begins with.
 ///
 /// # Errors
 /// Fails if the lengths differ, or the output cannot be written.

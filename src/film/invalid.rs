@@ -1,28 +1,29 @@
-//! Invalid samples: samples that are NaN or negative.
+//! Invalid samples of a film: samples that are NaN or negative.
 
 /// Largest number of invalid samples whose positions are stored. Further ones are only counted.
 pub const INVALID_REMEMBERED: usize = 16;
 
-/// Position of a sample: the values that are needed to trace it again.
+/// Position of an invalid sample (NaN or negative): the values that are needed to trace it again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct InvalidSample {
-    /// Index in the sample sequence of the replicate.
+    /// Index of the sample in the sample sequence of its pixel and replicate (half of the samples).
     pub index: u32,
-    /// Replicate; 0: A, 1: B.
+    /// Replicate (half of the samples) to which the sample belongs; 0: A, 1: B.
     pub replicate: u8,
-    /// Row, from the top, in pixels.
+    /// Row of the pixel, counted from the top.
     pub y: u32,
-    /// Column, from the left, in pixels.
+    /// Column of the pixel, counted from the left.
     pub x: u32,
 }
 
-/// Number of invalid samples, and the positions of the first ones in sorted order. Both are
-/// independent of the order in which threads find the samples.
+/// Number of invalid samples (NaN or negative), and the positions of up to [`INVALID_REMEMBERED`]
+/// of them. Both are independent of the order in which threads find the samples.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InvalidSamples {
-    /// Number of invalid samples.
+    /// Number of samples that were NaN or negative.
     pub count: u64,
-    /// Positions of the first [`INVALID_REMEMBERED`] invalid samples, in ascending order.
+    /// Positions of invalid samples in ascending order. If there are more than
+    /// [`INVALID_REMEMBERED`], the ones that are lowest in this order.
     pub first: Vec<InvalidSample>,
 }
 

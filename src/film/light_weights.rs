@@ -1,52 +1,49 @@
-//! Light weights: conversion of the film's integer sums to radiance.
+//! Light weights: colour times intensity of each light group (lights with sums of their own in the
+//! film). They convert the film's integer sums to radiance.
 
 use crate::film::tile::Tile;
 
-/// Weight of each light group in a picture: colour times intensity. The film's sums are for weights
-/// of 1.
-#[derive(Clone, Debug, PartialEq)]
+/// Weight of each light group (lights with sums of their own in the film) in a picture: colour
+/// times intensity. The film's sums are for weights of 1.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightWeights {
-    /// Red, green and blue weight of each light group; at least 0.
+    /// Red, green and blue weight of each light group; each at least 0.
     pub weights: Vec<[f64; 3]>,
 }
 
 impl LightWeights {
-    /// Creates weights that show light group `group` alone, with weight 1. The film has `groups`
-    /// groups.
-    pub fn only(group: usize, groups: usize) -> Self {
-        Self { weights: (0..groups).map(|g| [f64::from(u8::from(g == group)); 3]).collect() }
-    }
-
-    /// Returns the factors, `[group][channel]`, that convert sums of a film with the given `scales`
-    /// to radiance times sample count.
+    /// Returns factors, `[group][channel]`, for the integer sums of a film with the given `scales`.
+    /// A sum times its factor is the radiance of the pixel in one light group and channel, times
+    /// the number of the pixel's samples.
     pub(super) fn radiance_per_step(&self, scales: &[f64]) -> Vec<f64> {
         assert_eq!(self.weights.len(), scales.len(), "weights for the groups of the film");
         self.weights.iter().zip(scales).flat_map(|(w, scale)| w.map(|w| w / scale)).collect()
     }
 }
 
-/// Choice of the replicates over which a mean is computed.
+/// Choice of the replicates over which a mean is computed. The replicates A and B are the two
+/// halves of the samples, from whose difference the error is estimated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Replicates {
-    /// Both replicates: the picture.
+    /// Both replicates (halves of the samples) together: their mean is the picture.
     Both,
-    /// Replicate A alone.
+    /// Replicate A (one half of the samples) alone.
     A,
-    /// Replicate B alone.
+    /// Replicate B (one half of the samples) alone.
     B,
 }
 
-/// Integer sums and sample counts of one pixel.
+/// Integer sums and sample counts of one pixel of a film.
 #[derive(Clone, Copy)]
 pub(super) struct Sums<'a> {
-    /// Sums of the replicates A and B, each `[group][channel]`.
+    /// Integer sums of the replicates A and B (halves of the samples), each `[group][channel]`.
     pub values: [&'a [i64]; 2],
-    /// Number of samples of the replicates A and B.
+    /// Number of samples in each of the replicates A and B (halves of the samples).
     pub counts: [u32; 2],
 }
 
 impl Sums<'_> {
-    /// Returns the number of samples in the chosen replicates.
+    /// Returns the number of the pixel's samples in the chosen replicates (halves of the samples).
     pub fn count(&self, replicates: Replicates) -> u32 {
         match replicates {
             Replicates::Both => self.counts[0].saturating_add(self.counts[1]),
@@ -55,7 +52,8 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns sum `i` (in `[group][channel]` order) over the chosen replicates.
+    /// Returns integer sum `i` (in `[group][channel]` order) of the pixel, summed over the chosen
+    /// replicates (halves of the samples).
     #[inline(always)]
     pub fn value(&self, replicates: Replicates, i: usize) -> f64 {
         match replicates {
@@ -65,8 +63,9 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns the radiance of the pixel: its mean over the chosen replicates, or black without
-    /// samples. `per_unit` is the result of [`LightWeights::radiance_per_step`].
+    /// Returns the radiance of the pixel: the mean over its samples in the chosen replicates
+    /// (halves of the samples), or black without samples. `per_unit` is the result of
+    /// [`LightWeights::radiance_per_step`].
     #[inline(always)]
     pub fn mean(&self, replicates: Replicates, per_unit: &[f64]) -> [f64; 3] {
         let count = self.count(replicates);
@@ -94,7 +93,7 @@ impl Tile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::testing::{each_tile, fill, film, white};
+    use crate::film::testing::{each_tile, fill, film, only, white};
 
     #[test]
     fn pixel_is_the_weighted_mean_of_both_replicates() {
@@ -113,7 +112,7 @@ mod tests {
         film.row(17, Replicates::Both, &mix, &mut row);
         assert_eq!(row.len(), 20);
         assert_eq!(row[19], expected(19.0, 17.0));
-        film.row(17, Replicates::B, &LightWeights::only(0, 2), &mut row);
+        film.row(17, Replicates::B, &only(0, 2), &mut row);
         assert_eq!(row[5], [5.0 / 4.0, 17.0 / 4.0, 0.5]);
     }
 

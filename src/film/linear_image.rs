@@ -4,7 +4,7 @@ use crate::film::box_filter::{box_means, fill_gaps};
 use crate::film::light_weights::{LightWeights, Replicates};
 use crate::film::store::Film;
 
-/// Linear radiance of every pixel of a film at one moment.
+/// Linear radiance of every pixel of a film at one moment; later samples do not change it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearImage {
     width: usize,
@@ -35,22 +35,13 @@ impl LinearImage {
         Self { width, height, pixels }
     }
 
-    /// Number of columns and rows.
+    /// Returns the number of columns and rows of pixels.
     pub fn size(&self) -> [usize; 2] {
         [self.width, self.height]
     }
 
-    /// Returns the radiance of the pixel in column `x` and row `y`.
-    ///
-    /// # Panics
-    /// Panics if there is no such pixel.
-    pub fn pixel(&self, x: usize, y: usize) -> [f32; 3] {
-        assert!(x < self.width, "column {x} of {}", self.width);
-        self.pixels[y * self.width + x]
-    }
-
-    /// Returns the means over `cols` x `rows` cells of equal size that together cover the picture,
-    /// `[row][column]`, weighted by area.
+    /// Returns the means of the picture over `cols` x `rows` cells, `[row][column]`, weighted by
+    /// area. The cells (pixels of a smaller image) have equal sizes and together cover the picture.
     pub fn resampled(&self, cols: usize, rows: usize) -> Vec<[f32; 3]> {
         let means = box_means(self.size(), [cols, rows], |pixel| self.pixels[pixel].map(f64::from));
         means.into_iter().map(|mean| mean.map(|c| c as f32)).collect()
@@ -63,6 +54,10 @@ mod tests {
     use crate::film::Thumbnail;
     use crate::film::testing::{each_tile, fill, film, white};
 
+    fn pixel(image: &LinearImage, x: usize, y: usize) -> [f32; 3] {
+        image.pixels[y * image.width + x]
+    }
+
     #[test]
     fn linear_image_resamples_like_the_film() {
         let mut film = film(37, 29, &[1024.0, 1.0]);
@@ -73,7 +68,7 @@ mod tests {
         let mix = LightWeights { weights: vec![[1.0, 0.5, 2.0], [0.0, 1.0, 0.25]] };
         let image = LinearImage::of_film(&film, &mix);
         assert_eq!(image.size(), [37, 29]);
-        assert_eq!(image.pixel(36, 28), film.pixel(36, 28, &mix).map(|c| c as f32));
+        assert_eq!(pixel(&image, 36, 28), film.pixel(36, 28, &mix).map(|c| c as f32));
         for (cols, rows) in [(1, 1), (5, 4), (37, 29), (80, 45)] {
             let expected = Thumbnail::of_film(&film, cols, rows).mixed(&mix);
             let got = image.resampled(cols, rows);
@@ -93,7 +88,7 @@ mod tests {
             tile.set_lattice(8);
         });
         let image = LinearImage::of_film(&film, &white(1));
-        let corners = [image.pixel(1, 2)[0], image.pixel(15, 1)[0], image.pixel(9, 9)[0]];
+        let corners = [pixel(&image, 1, 2)[0], pixel(&image, 15, 1)[0], pixel(&image, 9, 9)[0]];
         assert_eq!(corners, [0.0, 8.0, 136.0]);
     }
 }

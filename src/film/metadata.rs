@@ -1,4 +1,5 @@
-//! Metadata of picture files and film files: reader, and padding of values.
+//! Metadata of picture files and film files. Reads it, and pads values with spaces, so that a value
+//! known only at the end of a render fits into the place reserved for it.
 
 use crate::disk::open_regular;
 use crate::film::file::{FilmFileHeader, FilmReader, is_film_file};
@@ -8,29 +9,31 @@ use png::Decoder;
 use std::io::BufReader;
 use std::path::Path;
 
-/// Values in picture files are padded to a multiple of this number of bytes.
+/// Block size in bytes: metadata values in picture files are padded to a multiple of it.
 const PADDED: usize = 128;
 
-/// Pads a value with spaces. In a picture that is written while it is rendered, noise and sample
-/// counts are placeholders until the end. Their final values must have the same length.
+/// Pads a metadata value with spaces to a multiple of [`PADDED`] bytes. If a picture is written
+/// while it is rendered, its noise and sample counts are placeholders until the end; their final
+/// values must have the same length.
 pub(super) fn padded(value: &str) -> String {
     let len = value.len().next_multiple_of(PADDED).max(PADDED);
     format!("{value}{}", " ".repeat(len - value.len()))
 }
 
-/// Removes the padding of a value.
+/// Removes the trailing spaces of the value of a metadata entry. Takes and returns the entry's key
+/// and value.
 fn unpadded((key, value): (String, String)) -> (String, String) {
     (key, value.trim_end_matches(' ').to_string())
 }
 
-/// Metadata of a picture file or film file.
+/// Metadata of a picture file (PNG, OpenEXR) or film file (`.zk`).
 #[derive(Clone, Debug)]
 pub struct FileMetadata {
-    /// Format: `PNG`, `OpenEXR` or `film`.
+    /// Name of the file's format: `PNG`, `OpenEXR` or `film`.
     pub format: &'static str,
-    /// Width and height in pixels.
+    /// Width and height of the picture in pixels.
     pub size: [usize; 2],
-    /// Keys and values, in the order of the file; sorted by key in OpenEXR files.
+    /// Metadata keys and values, in the order of the file; sorted by key in OpenEXR files.
     pub entries: Vec<(String, String)>,
     /// Header of a film file; `None` for a picture file.
     pub film: Option<FilmFileHeader>,
@@ -88,7 +91,7 @@ impl FileMetadata {
         Ok(Self { format: "OpenEXR", size, entries, film: None })
     }
 
-    /// Returns the value of the entry `key`.
+    /// Returns the value of the metadata entry `key`. Returns `None` if there is no such entry.
     pub fn get(&self, key: &str) -> Option<&str> {
         self.entries.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str())
     }

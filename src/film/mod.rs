@@ -1,9 +1,10 @@
 //! Film: integer sums of samples, and the pictures and noise estimates computed from them.
 //!
-//! The film stores two independent replicates of the picture, A and B. Their mean is the picture;
-//! their difference is a measure of the remaining error. Sums are integers, so that the order of
-//! addition changes no bit. Each light group has its own sums, for white light of unit intensity.
-//! [`LightWeights`] multiply each group by colour and intensity afterwards.
+//! The film divides the samples into two independent halves, the replicates A and B. Each is a
+//! picture of its own. The mean of both is the picture; their difference is a measure of the
+//! remaining error. Sums are integers, so that the order of addition changes no bit. Each light
+//! group has its own sums, for white light of unit intensity. [`LightWeights`] multiply each group
+//! by colour and intensity afterwards.
 
 mod bands;
 mod box_filter;
@@ -23,9 +24,9 @@ mod noise;
 #[cfg(test)]
 mod noise_test;
 mod output;
+mod pixel_probe;
 mod png;
 mod png_read;
-mod probe;
 mod srgb_table;
 mod store;
 #[cfg(test)]
@@ -46,12 +47,13 @@ pub use linear_image::LinearImage;
 pub use metadata::FileMetadata;
 pub use noise::{Estimator, Mse, Noise, TileNoise};
 pub use output::ImageOutput;
+pub use pixel_probe::PixelProbe;
 pub use png::png_of_rgb;
 pub use png_read::read_png;
-pub use probe::Probe;
 pub use srgb_table::quantised_8;
 pub use store::{Film, Header, Mismatch, TileHandle};
 pub use tile::{MAX_FILM_GROUPS, TILE_PIXELS, Tile, lattice_pixels};
 
-/// Side of a tile in pixels.
+/// Side of a film tile in pixels. A tile is a square of pixels that are stored and sampled
+/// together.
 pub const TILE: usize = 16;

@@ -1,5 +1,5 @@
 //! Noise estimates: the error of tiles and pictures, estimated from the difference of the two
-//! replicates.
+//! replicates (halves of the samples).
 //!
 //! The replicates A and B are independent, and equally distributed if their sample counts are
 //! equal. The half difference d = (A - B) / 2 then has the variance of the picture M = (A + B) / 2.
@@ -8,11 +8,12 @@
 //!
 //! The displayed error is code(M) - code(truth), where code is the display transform to 8-bit
 //! levels. It is estimated by code(M) - code(M + d) and code(M) - code(M - d), squared and
-//! averaged; M + d is A and M - d is B. These differences displace the picture by its own error, so
-//! that a curved or clipped tone curve acts on estimate and error alike. The hardest case are dark
-//! pixels that few of 16 + 16 samples find lit. There the ratio of true to estimated RMSE is 1.13.
-//! It is 1.20 with half the displayed difference of A and B, and 1.52 with d times the slope of the
-//! curve at M (a test compares the three).
+//! averaged; M + d is A and M - d is B. These differences displace M by d, which is as large as the
+//! error of M. A curved or clipped tone curve therefore acts alike on estimate and error. The
+//! hardest case is dark pixels with 16 samples in each of A and B, few of which are lit. There the
+//! ratio of true to estimated RMSE is 1.13. A test compares two simpler estimates: half the
+//! displayed difference of A and B has the ratio 1.20, and d times the slope of the curve at M has
+//! the ratio 1.52.
 //!
 //! The estimate of a single pixel has one degree of freedom and is meaningless. The estimate of a
 //! tile has an uncertainty of about 7 % if its pixels are alike; that of a whole picture is far
@@ -23,11 +24,12 @@
 //! too low: by 2 % of the RMSE after 32 samples per pixel, by 5 % after 8. Each tile therefore has
 //! two estimates, from the black and the white squares of a chessboard of pixels, whose samples are
 //! independent. The black pixels give the *allocation estimate*, which adaptive sampling uses. The
-//! white pixels give the *validation estimate*, which is reported. Half of the pixels may give a
-//! worse estimate of a small picture than all pixels do; the larger of the two estimates is
-//! reported. If all tiles have the same number of samples, no estimate has selected tiles, and the
-//! estimate from all pixels is reported. The larger of two would be too high by up to 30 % in
-//! pictures whose error is in a few pixels.
+//! white pixels give the *validation estimate*, which is reported. In a small picture, half of the
+//! pixels may give a worse estimate than all pixels do. The larger of two estimates is therefore
+//! reported: that from the white pixels, and that from all pixels. If all tiles have the same
+//! number of samples, no tile was preferred, and the estimate from all pixels is reported. The
+//! larger of the two estimates would then be too high by up to 30 % in pictures whose error is in a
+//! few pixels.
 //!
 //! The error of a sparse picture (stars, hairlines) is concentrated in few pixels. With k effective
 //! pixels the relative uncertainty of the estimated RMSE is 1 / sqrt(2 k); the true error of a
@@ -39,7 +41,7 @@ use crate::film::light_weights::LightWeights;
 use crate::film::srgb_table::SrgbTable;
 use crate::film::tile::Tile;
 
-/// Mean square error over all pixels and channels.
+/// Mean square error over all pixels and channels of a tile or picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mse {
     /// Mean square error of linear radiance.
@@ -49,7 +51,8 @@ pub struct Mse {
 }
 
 impl Mse {
-    /// Value of [`TileNoise::squares`] for an error that is spread over very many effective pixels.
+    /// Value of [`TileNoise::squares`] for tests: the smallest positive numbers. The number of
+    /// effective pixels computed from it is practically infinite.
     #[cfg(test)]
     pub const SPREAD: Self = Self { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
 
@@ -62,23 +65,26 @@ impl Mse {
 /// Estimated error of one tile. Its pixels alternate between white and black, like a checkerboard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileNoise {
-    /// Validation estimate, from the white pixels. The noise of the picture is computed from it,
-    /// unless all tiles have the same number of samples.
+    /// Validation estimate, from the white pixels of the checkerboard. The noise of the picture is
+    /// computed from it, unless all tiles have the same number of samples.
     pub reported: Mse,
-    /// Allocation estimate, from the black pixels. It selects tiles for further samples.
+    /// Allocation estimate, from the black pixels of the checkerboard. It selects tiles for further
+    /// samples.
     pub allocation: Mse,
-    /// Sum over all pixels of the squared error of the pixel, squared again. The squared error of a
-    /// pixel is summed over channels. The number of effective pixels is computed from this sum.
+    /// Sum of e^2 over the pixels of the tile, where e is the squared error of a pixel, summed over
+    /// its channels. [`Noise::effective_pixels`] is computed from it.
     pub squares: Mse,
     /// Number of pixels of the tile that are inside the picture.
     pub pixels: u32,
-    /// Samples per pixel in each replicate; their mean if A and B have different numbers.
+    /// Number of samples per pixel in each replicate (half of the samples). If it differs between A
+    /// and B, the mean of both numbers.
     pub samples: u32,
 }
 
 /// Estimator of tile errors under the given light weights and display transform.
 pub struct Estimator {
-    /// Factors from sums to radiance times sample count, `[group][channel]`.
+    /// Factors, `[group][channel]`, that convert the film's integer sums to radiance times sample
+    /// count.
     per_unit: Vec<f64>,
     exposure: f64,
     tone: Tone,
@@ -87,7 +93,8 @@ pub struct Estimator {
 
 impl Estimator {
     /// Creates an estimator for the tiles of a film. `scales` are those of the film (see
-    /// [`Film::scales`](crate::film::Film::scales)).
+    /// [`Film::scales`](crate::film::Film::scales)), `mix` are the light weights, and `display` is
+    /// the display transform.
     pub fn new(scales: &[f64], mix: &LightWeights, display: &Display) -> Self {
         Self {
             per_unit: mix.radiance_per_step(scales),
@@ -97,21 +104,21 @@ impl Estimator {
         }
     }
 
-    /// Estimates the error of a tile. Returns `None` if the replicates A and B have different
-    /// numbers of samples, or none.
+    /// Estimates the error of a tile. Returns `None` if the replicates A and B (halves of the
+    /// samples) have different numbers of samples, or if they have none.
     pub fn tile(&self, tile: &Tile) -> Option<TileNoise> {
         let [count, count_b] = tile.counts();
         if count == count_b { self.tile_so_far(tile) } else { None }
     }
 
-    /// Estimates the error of a tile, even if replicate B has fewer samples than A. Returns `None`
-    /// if A or B has no samples.
+    /// Estimates the error of a tile, even if replicate B (the second half of the samples) has
+    /// fewer samples than A. Returns `None` if A or B has no samples.
     ///
-    /// With n and m samples of variance v each, (A - B)^2 has the mean v (n + m) / nm. The picture
-    /// (nA + mB) / (n + m) has the variance v / (n + m). Hence d = (A - B) sqrt(nm) / (n + m)
-    /// replaces the half difference. This is exact for independent samples. For samplers whose
-    /// errors fall faster the estimate is too high, by at most a quarter if B has at least half as
-    /// many samples as A.
+    /// A has n samples and B has m, each of variance v. (A - B)^2 then has the mean v (n + m) / nm.
+    /// The picture (nA + mB) / (n + m) has the variance v / (n + m). Hence d = (A - B) sqrt(nm) /
+    /// (n + m) replaces the half difference. This is exact for independent samples. If the variance
+    /// of a mean falls faster than v / n, the estimate is too high, by at most a quarter if B has
+    /// at least half as many samples as A.
     pub fn tile_so_far(&self, tile: &Tile) -> Option<TileNoise> {
         let counts = tile.counts();
         if counts.contains(&0) || tile.lattice_px() != 0 {
@@ -188,7 +195,7 @@ fn weighted(sums: &[i64], per_sum: &[f64]) -> [f64; 3] {
 }
 
 impl TileNoise {
-    /// Returns the estimate from all pixels, black and white.
+    /// Returns the error estimate of the tile from all its pixels, black and white.
     pub fn of_all(&self) -> Mse {
         let [black, white] = [self.pixels.div_ceil(2), self.pixels / 2].map(f64::from);
         let mean = |black_mse: f64, white_mse: f64| {
@@ -201,26 +208,29 @@ impl TileNoise {
     }
 }
 
-/// Estimated error of a whole picture as root mean square errors (RMSE).
+/// Estimated error of a whole picture: root mean square errors (RMSE) over pixels and channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// Root mean square error in linear radiance.
+    /// Root mean square error over pixels and channels, in linear radiance.
     pub rmse_linear: f64,
-    /// Root mean square error as displayed, in 8-bit levels.
+    /// Root mean square error over pixels and channels as displayed, in 8-bit levels.
     pub rmse_codes: f64,
-    /// 95th percentile of the RMSE of the tiles, in 8-bit levels.
+    /// 95th percentile of the tiles' RMSE as displayed, in 8-bit levels.
     pub p95_codes: f64,
-    /// Largest RMSE of a tile, in 8-bit levels.
+    /// Largest RMSE of a tile as displayed, in 8-bit levels.
     pub worst_codes: f64,
-    /// Number of effective pixels (Kish's effective sample size): with e the squared error of a
-    /// pixel, it is (sum of e)^2 / (sum of e^2). It is 0 if there is no error.
+    /// Number of effective pixels (Kish's effective sample size), for the linear and for the
+    /// displayed error. It is (sum of e)^2 / (sum of e^2), where e is the squared error of a pixel;
+    /// 0 if there is no error.
     pub effective_pixels: Mse,
 }
 
 impl Noise {
-    /// Combines the estimates of all tiles. If they are of equal numbers of samples, the error is
-    /// that of all pixels. Otherwise it is the larger of the errors of the white pixels and of all
-    /// pixels. Returns `None` if there are no tiles or an estimate is missing.
+    /// Combines the estimates of all tiles. If all tiles have equal numbers of samples, the error
+    /// is estimated from all pixels. Otherwise tiles were selected by the estimates from one half
+    /// of the pixels (the black ones of a checkerboard). The error is then the larger of two
+    /// estimates: one from the other half alone, and one from all pixels. Returns `None` if there
+    /// are no tiles or an estimate is missing.
     pub fn of_tiles(tiles: impl IntoIterator<Item = Option<TileNoise>>) -> Option<Self> {
         let (mut reported, mut all, mut pixels) = (Mse::default(), Mse::default(), 0.0);
         let mut squares = Mse::default();

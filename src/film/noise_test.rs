@@ -1,12 +1,13 @@
-//! Noise estimates compared with known errors.
+//! Tests of the noise estimate: pictures with a known error.
 
 use crate::film::noise::*;
-use crate::film::testing::{Rng, each_tile, fill, film, white};
+use crate::film::testing::{Rng, each_tile, fill, film, only, white};
 use crate::film::*;
 use crate::film::{Replicates, quantised_8};
 
-/// Pixel of known mean. A sample is `dark + LIGHT` with probability `chance`, otherwise `dark`. If
-/// `normal` is `true`, samples are normally distributed around the mean instead.
+/// Pixel of known mean in a simulated picture. A sample is `dark + LIGHT` with probability
+/// `chance`, otherwise `dark`. If `normal` is `true`, sums of samples are normally distributed with
+/// the same mean instead.
 #[derive(Clone, Copy)]
 struct Pixel {
     chance: f64,
@@ -22,8 +23,8 @@ impl Pixel {
         [0, 1, 2].map(|c| self.dark[c] + self.chance * LIGHT[c])
     }
 
-    /// Returns the sum of `n` samples. Stratified samples use one random number in each n-th part
-    /// of the unit interval.
+    /// Returns the sum of `n` samples of the pixel in each channel. Sample i uses a random number
+    /// in [i/n, (i + 1)/n) if `stratified` is `true`, otherwise in [0, 1).
     fn sum(self, n: u32, stratified: bool, rng: &mut Rng) -> [f64; 3] {
         let count = f64::from(n);
         let hits = if self.normal {
@@ -39,8 +40,8 @@ impl Pixel {
     }
 }
 
-/// Returns the pixels of a picture of 64 x 48 pixels. Their probabilities `chance` of a lit sample
-/// range from 0 to 1.
+/// Returns the pixels of a simulated picture of 64 x 48 pixels. Their probabilities `chance` of a
+/// lit sample are random in [0, 1); all have the given `normal` and `dark`.
 fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
     (0..64 * 48).map(|_| Pixel { chance: rng.unit(), normal, dark }).collect()
 }
@@ -48,12 +49,15 @@ fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
 struct Outcome {
     linear: Vec<f64>,
     codes: Vec<f64>,
-    /// Relative standard deviation over the seeds of a tile's estimated RMSE, averaged over all
-    /// tiles.
+    /// Relative standard deviation of a tile's estimated RMSE between films with different random
+    /// seeds, averaged over all tiles.
     tile_spread: f64,
 }
 
-/// Returns the ratio of true to estimated RMSE for each of 20 seeds.
+/// Simulates 20 films with different random seeds and `n` samples per pixel in each replicate (half
+/// of the samples). Returns the ratio of the true to the estimated RMSE of each film, for linear
+/// radiance and for 8-bit levels, and the spread of the tiles' estimates. The other parameters are
+/// those of [`Pixel`] and [`Pixel::sum`].
 fn ratios(n: u32, normal: bool, stratified: bool, dark: [f64; 3]) -> Outcome {
     let pixels = scene(normal, dark, &mut Rng(11));
     let (mix, display) = (white(1), Display::default());
@@ -120,8 +124,10 @@ fn estimates_equal_true_errors_in_the_mean() {
     }
 }
 
-/// Compares the estimate with two simpler ones for dark pixels whose samples are rarely lit. At
-/// their values the tone curve is steep and curved.
+/// Checks the noise estimate for dark pixels whose samples are rarely lit; the tone curve is steep
+/// and curved there. The estimate must be better than two simpler ones: half the displayed
+/// difference of the replicates A and B (halves of the samples), and the half difference in
+/// radiance times the slope of the curve.
 #[test]
 fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
     let (n, mut rng) = (16u32, Rng(5));
@@ -167,7 +173,7 @@ fn estimate_of_one_pixel_matches_the_formula() {
     assert_eq!((tile.pixels, tile.allocation), (1, tile.reported));
     // Far above white the displayed difference is 0.
     let bright = Display { exposure_ev: 9.0, tone: Tone::Clip };
-    let noise = film.noise(&LightWeights::only(0, 2), &bright).unwrap();
+    let noise = film.noise(&only(0, 2), &bright).unwrap();
     assert_eq!((noise.rmse_codes, quantised_8(bright.codes([0.125; 3])[0])), (0.0, 255));
     assert!(noise.rmse_linear > 0.0);
 }
@@ -222,8 +228,8 @@ fn unequal_counts_have_no_noise() {
     assert_eq!(noise(&film), None);
 }
 
-/// Checks the estimate between two waves of samples, when B has fewer samples than A. Its mean over
-/// many tiles equals the variance of the picture.
+/// Checks the noise estimate of tiles whose replicate B (second half of the samples) has fewer
+/// samples than A. The mean estimate of 200 random tiles must equal their mean square error.
 #[test]
 fn replicate_with_fewer_samples_still_has_an_estimate() {
     let display = Display { exposure_ev: -2.0, tone: Tone::Clip };

@@ -1,6 +1,7 @@
-//! Picture files: chooses the format by extension.
+//! Output of picture files: choice of the format by the file's extension, and replacement of
+//! existing files.
 
-use crate::disk::{Existing, Replacement, WriteError};
+use crate::disk::{Existing, Replacement, WriteError, replace_file};
 use crate::film::bands::Bands;
 use crate::film::image_data::{ImageData, WriteSeek};
 use crate::film::{exr, png};
@@ -14,7 +15,7 @@ struct Format {
     encode: fn(&ImageData, &mut dyn Bands, &mut dyn WriteSeek) -> io::Result<()>,
 }
 
-/// All formats that can be written.
+/// Formats of the picture files that can be written.
 static FORMATS: [Format; 2] = [
     Format { extension: "png", encode: png::encode },
     Format { extension: "exr", encode: exr::encode },
@@ -29,7 +30,8 @@ pub struct ImageOutput {
 }
 
 impl ImageOutput {
-    /// Chooses the format by the extension of `path`, in upper or lower case. Accesses no file.
+    /// Creates an output for the file `path`. Its extension, in upper or lower case, chooses the
+    /// format. Accesses no file.
     ///
     /// # Errors
     /// Fails if the extension is missing or unknown.
@@ -58,21 +60,22 @@ impl ImageOutput {
         }
     }
 
-    /// Returns an output that does not replace files: writing fails if the file exists at the start
-    /// or when the write is complete.
+    /// Changes this output so that it never replaces an existing file, and returns it. Writing then
+    /// fails if the file exists when the write begins, or when the last row is complete.
     pub fn create_new(self) -> Self {
         Self { existing: Existing::Refuse, ..self }
     }
 
-    /// Path of the file.
+    /// Returns the path of the picture file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Checks that the file can be written, without changing it. Long renders call it at their
-    /// start.
+    /// Checks that the picture file can be written, without changing it. Long renders call it at
+    /// their start.
     ///
     /// # Errors
+    ///
     /// Returns the error that writing would return now.
     pub fn check_writable(&self) -> Result<(), WriteError> {
         Replacement::begin(&self.path, self.existing).map(drop)
@@ -84,19 +87,11 @@ impl ImageOutput {
     /// # Errors
     /// Fails if the file cannot be written or `bands` fail; an existing file is then unchanged.
     pub fn write(&self, picture: &ImageData, bands: &mut dyn Bands) -> Result<(), WriteError> {
-        self.replace(|sink| (FORMATS[self.format].encode)(picture, bands, sink))
-    }
-
-    fn replace(
-        &self,
-        encode: impl FnOnce(&mut dyn WriteSeek) -> io::Result<()>,
-    ) -> Result<(), WriteError> {
-        let mut replacement = Replacement::begin(&self.path, self.existing)?;
-        let mut out = BufWriter::with_capacity(1 << 16, replacement.temporary());
-        let written = encode(&mut out).and_then(|()| out.flush());
-        drop(out);
-        written.map_err(|error| replacement.explain(&error))?;
-        replacement.commit()
+        replace_file(&self.path, self.existing, |file| {
+            let mut out = BufWriter::with_capacity(1 << 16, file);
+            (FORMATS[self.format].encode)(picture, bands, &mut out)?;
+            out.flush()
+        })
     }
 }
 
@@ -104,7 +99,7 @@ impl ImageOutput {
 mod tests {
     use super::*;
     use crate::film::testing::{fill, film, white};
-    use crate::film::{Depth, Display, FileMetadata, Film, WholeFilm};
+    use crate::film::{Depth, Display, FileMetadata, Film, LightWeights, WholeFilm};
     use std::fs;
 
     #[test]
@@ -122,17 +117,20 @@ mod tests {
         assert!(error.contains("has no extension") && error.contains(".png, .exr"), "{error}");
     }
 
+    /// Returns a picture of 40 x 20 pixels.
+    fn picture(mix: &LightWeights) -> ImageData<'_> {
+        let (display, depth) = (Display::default(), Depth::Eight);
+        ImageData { size: [40, 20], mix, group_names: &[], display, depth }
+    }
+
     #[test]
     fn failed_write_keeps_the_old_file_and_names_the_reason() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
         fs::write(&path, "old").unwrap();
         let target = ImageOutput::from_path(&path).unwrap();
-        let failing = |sink: &mut dyn WriteSeek| {
-            sink.write_all(&[7; 100_000])?;
-            Err(ErrorKind::StorageFull.into())
-        };
-        let error = target.replace(failing).unwrap_err().to_string();
+        let mut full = Failing(film(40, 20, &[1.0]), || ErrorKind::StorageFull.into());
+        let error = target.write(&picture(&white(1)), &mut full).unwrap_err().to_string();
         assert!(error.contains("no space is left"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
@@ -143,15 +141,20 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
         let target = ImageOutput::from_path(&path).unwrap().create_new();
-        target.replace(|sink| sink.write_all(b"new")).unwrap();
-        let error = target.replace(|sink| sink.write_all(b"newer")).unwrap_err().to_string();
+        let film = film(40, 20, &[1.0]);
+        let write = |noise: &str| {
+            let metadata = &entries(noise);
+            target.write(&picture(&white(1)), &mut WholeFilm { film: &film, metadata })
+        };
+        write("new").unwrap();
+        let error = write("newer").unwrap_err().to_string();
         assert!(error.contains("such a file already"), "{error}");
-        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(FileMetadata::read(&path).unwrap().get("Noise"), Some("new"));
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
-    /// Bands whose metadata change after the last row, as in a render that runs while the file is
-    /// written.
+    /// Source of picture rows for tests. Its metadata change after the last row, like those of a
+    /// render that runs while the file is written.
     struct Late<'a> {
         film: &'a Film,
         rows: usize,
@@ -178,13 +181,8 @@ mod tests {
         let mut film = film(40, 20, &[1.0]);
         fill(&mut film, 2, |x, y, _| vec![x as f64, y as f64, 1.0]);
         let folder = tempfile::tempdir().unwrap();
-        let picture = ImageData {
-            size: [40, 20],
-            mix: &white(1),
-            group_names: &[],
-            display: Display::default(),
-            depth: Depth::Eight,
-        };
+        let mix = white(1);
+        let picture = picture(&mix);
         for name in ["a.png", "a.exr"] {
             let write = |bands: &mut dyn Bands| {
                 let path = folder.path().join(name);
@@ -202,12 +200,13 @@ mod tests {
         }
     }
 
-    /// Bands whose rows cannot be rendered, as after a signal that stops the render.
-    struct Failing(Film);
+    /// Source of picture rows that fails after ten rows, as when a signal stops the render or the
+    /// disk is full. The fields are the film and the function that creates the error.
+    struct Failing(Film, fn() -> io::Error);
 
     impl Bands for Failing {
         fn film_with_row(&mut self, y: usize) -> io::Result<&Film> {
-            if y < 10 { Ok(&self.0) } else { Err(io::Error::other("stopped by a signal")) }
+            if y < 10 { Ok(&self.0) } else { Err(self.1()) }
         }
 
         fn metadata(&self) -> Vec<(String, String)> {
@@ -218,14 +217,15 @@ mod tests {
     #[test]
     fn failed_bands_leave_the_old_file() {
         let folder = tempfile::tempdir().unwrap();
-        let mix = &white(1);
-        let (display, depth) = (Display::default(), Depth::Sixteen);
-        let picture = ImageData { size: [40, 20], mix, group_names: &[], display, depth };
+        let mix = white(1);
+        let picture = ImageData { depth: Depth::Sixteen, ..picture(&mix) };
         for name in ["a.png", "a.exr"] {
             let path = folder.path().join(name);
             fs::write(&path, "old").unwrap();
             let output = ImageOutput::from_path(&path).unwrap();
-            let error = output.write(&picture, &mut Failing(film(40, 20, &[1.0]))).unwrap_err();
+            let mut stopped =
+                Failing(film(40, 20, &[1.0]), || io::Error::other("stopped by a signal"));
+            let error = output.write(&picture, &mut stopped).unwrap_err();
             assert!(error.to_string().contains("stopped by a signal, and the old file"), "{error}");
             assert_eq!(fs::read(&path).unwrap(), b"old");
         }

@@ -11,12 +11,12 @@ use png::{
 };
 use std::io::{self, Write};
 
-/// Size of the chunks of image data \[bytes\].
+/// Number of bytes of image data in a chunk of the PNG file.
 const CHUNK_BYTES: usize = 1 << 18;
-/// Size of the last chunk, which has no data \[bytes\].
+/// Number of bytes of the PNG file's last chunk, which has no data.
 const END_CHUNK_BYTES: usize = 12;
 
-/// Encodes a picture row by row.
+/// Encodes a picture as PNG and writes it to `sink` row by row.
 pub(super) fn encode(
     picture: &ImageData,
     bands: &mut dyn Bands,
@@ -50,7 +50,7 @@ fn encode_to(
     Ok(())
 }
 
-/// Returns all bytes of a file before its image data.
+/// Returns all bytes of a PNG file before its image data.
 fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
     // The writer adds the last chunk when it is dropped.
@@ -59,7 +59,7 @@ fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8
     Ok(bytes)
 }
 
-/// Writes the part of the file before the image data, and returns the writer of the rest.
+/// Writes the part of a PNG file before the image data, and returns the writer of the rest.
 fn start<W: Write>(
     picture: &ImageData,
     metadata: &[(String, String)],
@@ -111,8 +111,8 @@ pub fn png_of_rgb([width, height]: [u32; 2], rgb: &[u8]) -> io::Result<Vec<u8>> 
     Ok(bytes)
 }
 
-/// Replaces `bytes` by those of row `y`: red, green, blue of each pixel. 16-bit values are
-/// big-endian, as PNG requires.
+/// Replaces `bytes` by those of row `y` of the PNG image: red, green, blue of each pixel. 16-bit
+/// values are big-endian, as PNG requires.
 fn encode_row(
     picture: &ImageData,
     bands: &mut dyn Bands,

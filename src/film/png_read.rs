@@ -1,12 +1,12 @@
-//! PNG reader for the image viewer.
+//! PNG reader, for the display of finished pictures in the dashboard.
 
 use crate::disk::open_regular;
 use png::{ColorType, Decoder, Transformations};
 use std::io::BufReader;
 use std::path::Path;
 
-/// Largest number of pixels of a file that is read: 8192 x 8192. It limits the memory, because the
-/// whole picture is read into memory.
+/// Largest number of pixels of a PNG file that is read: 8192 x 8192. Larger files are refused,
+/// because the whole picture is read into memory.
 const MAX_PIXELS: u64 = 1 << 26;
 
 /// Reads a PNG file. Returns its size (width, height) and its pixels in 8-bit sRGB,

@@ -3,24 +3,26 @@
 use crate::value::srgb_from_linear;
 use std::sync::LazyLock;
 
-/// Base-2 logarithm of the number of table entries per octave (factor 2 of linear light).
+/// Base-2 logarithm of the number of entries of the sRGB table per octave (factor 2 of linear
+/// light).
 const SEGMENTS_LOG2: u32 = 7;
-/// Exponent of the power of two below which one table entry is exact: the sRGB encoding is linear
-/// up to 0.0031308.
+/// Exponent of the smallest octave of the sRGB table. Linear light below 2^-9 needs only one entry,
+/// because the sRGB encoding is linear up to 0.0031308.
 const FIRST_OCTAVE: i32 = -9;
 const SHIFT: u32 = 52 - SEGMENTS_LOG2;
-/// Upper bits of the double 2^FIRST_OCTAVE, minus one, so that table entry 0 is the linear part of
-/// the encoding.
+/// Number that is subtracted from the upper bits of a double to get its index in the sRGB table.
+/// Entry 0 is the linear part of the encoding; entry 1 begins at 2^FIRST_OCTAVE.
 const BASE: u64 = (((1023 + FIRST_OCTAVE) as u64) << SEGMENTS_LOG2) - 1;
 const ENTRIES: usize = ((-FIRST_OCTAVE as usize) << SEGMENTS_LOG2) + 2;
 
-/// Largest difference between the table and the exact encoding, in 8-bit levels.
+/// Largest difference between the sRGB table and the exact encoding, in 8-bit levels.
 const MAX_ERROR_CODES: f64 = 5.5e-4;
 
 /// Piecewise linear approximation of the sRGB encoding, exact at 128 points per octave of linear
 /// light.
 pub(super) struct SrgbTable {
-    /// Linear pieces in 8-bit levels: the value of each line at 0, and its slope.
+    /// Linear pieces of the sRGB encoding in 8-bit levels: the value of each line at 0, and its
+    /// slope.
     chords: [[f64; 2]; ENTRIES],
 }
 
@@ -65,7 +67,7 @@ impl SrgbTable {
     }
 }
 
-/// Rounds an sRGB value from 0..=255 to 8 bits.
+/// Rounds an unrounded sRGB value, 0..=255, to 8 bits.
 pub fn quantised_8(code: f64) -> u8 {
     code.round() as u8
 }

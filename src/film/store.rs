@@ -1,5 +1,5 @@
-//! Film store: tiles of integer sums. A restart clears each tile when it is next written. Films are
-//! added without rounding.
+//! Film: storage of samples as tiles of integer sums. After a restart, each tile is cleared when it
+//! is next written. The sum of two films is exact, because their sums are integers.
 
 use crate::film::TILE;
 use crate::film::display::Display;
@@ -10,35 +10,38 @@ use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::collections::TryReserveError;
 use std::fmt;
 
-/// Smallest memory of a film \[bytes\] that is allocated as a whole before the first sample.
+/// Smallest size in bytes of a film whose memory is allocated as a whole, before the first sample.
 const RESERVED_FROM: u64 = 64 << 20;
 
-/// Properties of a film. Two films can be added only if their headers are equal.
+/// Properties of a film: size, scales, random seed, precision. Two films can be added only if these
+/// are equal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
-    /// Width in pixels, at least 1.
+    /// Width of the film in pixels, at least 1.
     pub width: usize,
-    /// Height in pixels, at least 1.
+    /// Height of the film in pixels, at least 1.
     pub height: usize,
     /// Scale of each light group: samples are multiplied by it before they are rounded to integers.
     /// It is a power of two, so that the product is exact.
     pub scales: Vec<f64>,
     /// Random seed of all samples.
     pub seed: u64,
-    /// Precision of the samples, `single` or `double`. The number of lanes does not change the
-    /// samples.
+    /// Floating-point precision in which the samples were computed, `single` or `double`. The
+    /// number of SIMD lanes does not change the samples.
     pub precision: String,
 }
 
 impl Header {
-    /// Returns `true` if `scale` is a power of two and a normal number.
+    /// Returns `true` if `scale`, by which samples are multiplied before rounding, is a power of
+    /// two and a normal number.
     pub(super) fn is_valid_scale(scale: f64) -> bool {
         scale.is_normal() && scale > 0.0 && scale.to_bits() << 12 == 0
     }
 }
 
-/// Integer sums of samples for every pixel, light group, channel and replicate. Integer addition
-/// gives the same sums in any order. The radiance of a pixel is its sum divided by `scale * count`.
+/// Integer sums of samples for every pixel, light group, channel and replicate (half of the
+/// samples). Integer addition gives the same sums in any order. The radiance of a pixel in a light
+/// group is its sum divided by the group's scale and by the number of samples.
 #[derive(Debug)]
 pub struct Film {
     header: Header,
@@ -48,11 +51,10 @@ pub struct Film {
     tiles: Vec<Tile>,
 }
 
-/// Exclusive access of one thread to a tile. [`TileHandle::prepare`] allocates or clears the tile.
+/// Exclusive access of one thread to a film tile. [`TileHandle::prepare`] allocates or clears the
+/// tile.
 #[derive(Debug)]
 pub struct TileHandle<'a> {
-    /// Number of the tile; tiles are numbered row by row.
-    pub index: usize,
     /// Column and row of the tile's upper left pixel in the picture.
     pub origin: [usize; 2],
     tile: &'a mut Tile,
@@ -60,7 +62,8 @@ pub struct TileHandle<'a> {
 }
 
 impl<'a> TileHandle<'a> {
-    /// Allocates or clears the tile if necessary, and returns it.
+    /// Returns the tile for writing. Allocates it first if it has no memory, or clears it if it was
+    /// written before the film's latest restart.
     pub fn prepare(self) -> &'a mut Tile {
         self.tile.clear_if_stale(self.epoch);
         self.tile
@@ -73,7 +76,8 @@ pub enum Mismatch {
     /// The headers of the two films differ. The fields are the name of the property, its value in
     /// the first film, and its value in the second film.
     Header(&'static str, String, String),
-    /// Both films hold a part of the first sample of the tile with this number.
+    /// In the tile with this number, each of the films has the first sample of only some pixels. A
+    /// film cannot hold their sum, whose pixels would have different numbers of samples.
     Overlap(usize),
 }
 
@@ -122,7 +126,7 @@ impl Film {
 
     /// Returns the memory of the sums of a film in bytes. For each pixel the film holds a 64-bit
     /// sum for each of two replicates (halves of the samples), each of `groups` light groups, and
-    /// each of three channels. Tiles at the edge of the picture are complete.
+    /// each of three channels. Tiles at the edge of the picture count in full.
     pub fn memory_bytes(size: [u32; 2], groups: usize) -> u64 {
         let [columns, rows] = size.map(|n| u64::from(n).div_ceil(TILE as u64));
         columns * rows * (Tile::sums_len(groups) * size_of::<i64>()) as u64
@@ -161,7 +165,7 @@ impl Film {
         Ok(Self { epoch: 1, tiles, header, first_row: 0 })
     }
 
-    /// Creates a film without samples with the header `header` in the memory of this film.
+    /// Creates a film without samples with the properties `header` in the memory of this film.
     ///
     /// # Errors
     /// Fails if the memory cannot be allocated.
@@ -177,13 +181,9 @@ impl Film {
         let mut film = Self::without_memory(header)?;
         // Larger than every epoch of the old tiles.
         film.epoch = self.epoch + 1;
-        let memory = self.tiles.into_iter().map(Tile::into_memory);
-        film.tiles = film
-            .tiles
-            .into_iter()
-            .zip(memory.chain(std::iter::repeat(Vec::new())))
-            .map(|(tile, memory)| tile.with_memory(memory))
-            .collect();
+        for (tile, old) in film.tiles.iter_mut().zip(self.tiles) {
+            tile.take_memory(old);
+        }
         film.reserve()?;
         Ok(film)
     }
@@ -198,79 +198,92 @@ impl Film {
         Self { first_row, ..self }
     }
 
-    /// Row of the picture in which the film begins; 0 for the film of a whole picture.
+    /// Returns the row of the picture in which the film begins; 0 for the film of a whole picture.
     pub fn first_row(&self) -> usize {
         self.first_row
     }
 
-    /// Width in pixels.
+    /// Returns the width of the film in pixels.
     pub fn width(&self) -> usize {
         self.header.width
     }
 
-    /// Height in pixels.
+    /// Returns the height of the film in pixels.
     pub fn height(&self) -> usize {
         self.header.height
     }
 
-    /// Number of light groups.
+    /// Returns the number of light groups, each of which has its own sums.
     pub fn groups(&self) -> usize {
         self.header.scales.len()
     }
 
-    /// Scale of each light group: samples are multiplied by it before rounding. It is a power of
-    /// two.
+    /// Returns the scale of each light group: samples are multiplied by it before rounding. It is a
+    /// power of two.
     pub fn scales(&self) -> &[f64] {
         &self.header.scales
     }
 
-    /// Size, scales, seed and precision of the film.
+    /// Returns size, scales, random seed and precision of the film.
     pub fn header(&self) -> &Header {
         &self.header
     }
 
-    /// Number of restarts. As long as it is unchanged, a tile with unchanged sample counts has
-    /// unchanged contents.
+    /// Returns the film's epoch, the number of its restarts. A tile has the same contents as before
+    /// if neither the epoch nor the sample counts of the tile have changed.
     pub(super) fn epoch(&self) -> u64 {
         self.epoch
     }
 
-    /// Discards all samples. The sums of a pixel are cleared when it is next written.
+    /// Discards all samples of the film. The sums of a pixel are cleared when it is next written.
     pub fn restart(&mut self) {
         self.epoch += 1;
     }
 
-    /// Number of tiles. Tiles are numbered row by row.
+    /// Returns the number of tiles of the film. Tiles are numbered row by row.
     pub fn tile_count(&self) -> usize {
         self.tiles.len()
     }
 
-    /// Number of tiles in a row.
+    /// Returns the number of tiles in a row of tiles.
     pub fn tile_columns(&self) -> usize {
         self.header.width.div_ceil(TILE)
     }
 
-    /// Column and row of a tile's upper left pixel.
+    /// Returns column and row, in pixels, of the upper left pixel of tile `index`.
     pub fn tile_origin(&self, index: usize) -> [usize; 2] {
         let columns = self.tile_columns();
         [index % columns * TILE, index / columns * TILE]
     }
 
-    /// Returns the tile with the number `index`. Returns `None` if it has not been prepared since
-    /// the last restart.
+    /// Returns the tile with the number `index`. Returns `None` if neither
+    /// [`TileHandle::prepare`] nor [`Film::add`] has written to it since the last restart.
     pub fn tile(&self, index: usize) -> Option<&Tile> {
         Some(&self.tiles[index]).filter(|tile| tile.is_of(self.epoch))
     }
 
-    /// Iterates over the tiles that have been prepared since the last restart, with their numbers.
+    /// Returns the number of pixels of tile `index`.
+    pub fn tile_pixels(&self, index: usize) -> u64 {
+        let [width, height] = self.tiles[index].extent();
+        (width * height) as u64
+    }
+
+    /// Returns the sample counts of tile `index` in both replicates (halves of the samples).
+    pub fn counts(&self, index: usize) -> [u32; 2] {
+        self.tile(index).map_or([0; 2], Tile::counts)
+    }
+
+    /// Iterates over the tiles for which [`Film::tile`] is not `None`. Returns the number of each
+    /// tile and the tile.
     pub fn touched(&self) -> impl Iterator<Item = (usize, &Tile)> {
         self.tiles.iter().enumerate().filter(|(_, tile)| tile.is_of(self.epoch))
     }
 
-    /// Returns handles of tiles, in the order of `indices`. The thread that works on a tile calls
-    /// [`TileHandle::prepare`].
+    /// Returns handles of tiles of the film, in the order of `indices`. The thread that works on a
+    /// tile calls [`TileHandle::prepare`].
     ///
     /// # Panics
+    ///
     /// Panics if an index occurs twice or is not below [`Film::tile_count`].
     pub fn slots(&mut self, indices: &[usize]) -> Vec<TileHandle<'_>> {
         let mut order: Vec<usize> = (0..indices.len()).collect();
@@ -285,13 +298,14 @@ impl Film {
             let (tile, after) =
                 remaining[index - first..].split_first_mut().expect("tile in range");
             let origin = [index % columns * TILE, first_row + index / columns * TILE];
-            handles[i] = Some(TileHandle { index, origin, tile, epoch });
+            handles[i] = Some(TileHandle { origin, tile, epoch });
             (remaining, first) = (after, index + 1);
         }
         handles.into_iter().flatten().collect()
     }
 
-    /// Number of samples, over all pixels and both replicates.
+    /// Returns the number of samples in the film, over all pixels and both replicates (halves of
+    /// the samples).
     pub fn samples(&self) -> u64 {
         let samples_of_tile = |tile: &Tile| {
             let [width, height] = tile.extent();
@@ -306,7 +320,7 @@ impl Film {
     }
 
     /// Returns the radiance of the pixel in column `x` and row `y`: the mean over its samples in
-    /// both replicates, or black without samples.
+    /// both replicates (halves of the samples), or black without samples.
     ///
     /// # Panics
     /// Panics if there is no such pixel.
@@ -319,6 +333,8 @@ impl Film {
     }
 
     /// Writes the radiance of the pixels in row `y` to `row`, which is resized to the film's width.
+    /// The radiance is the mean over the samples in `replicates` (halves of the samples), with the
+    /// light weights `weights`; black without samples.
     pub fn row(
         &self,
         y: usize,
@@ -332,8 +348,8 @@ impl Film {
         self.visit_row(y, |x, sums| row[x] = sums.mean(replicates, &per_unit));
     }
 
-    /// Calls `f` with the column and the sums of each pixel of row `y`. Tiles without samples are
-    /// skipped.
+    /// Calls `f` with the column and the integer sums of each pixel of row `y`. Tiles without
+    /// samples are skipped.
     pub(super) fn visit_row(&self, y: usize, mut f: impl FnMut(usize, Sums)) {
         let columns = self.tile_columns();
         for column in 0..columns {
@@ -345,34 +361,29 @@ impl Film {
     }
 
     /// Returns the estimated error of the picture. Returns `None` if a tile has no samples, or
-    /// unequal numbers of them in A and B.
+    /// unequal numbers of them in the two replicates (halves of the samples).
     pub fn noise(&self, weights: &LightWeights, display: &Display) -> Option<Noise> {
         let estimator = Estimator::new(self.scales(), weights, display);
         let noise_of_tile = |index| self.tile(index).and_then(|tile| estimator.tile(tile));
         Noise::of_tiles((0..self.tile_count()).map(noise_of_tile))
     }
 
-    /// Number and positions of the samples that were NaN or negative, since the film was last
-    /// cleared.
+    /// Returns number and positions of the samples that were NaN or negative, since the last
+    /// restart of the film.
     pub fn bad_samples(&self) -> InvalidSamples {
         let mut all = InvalidSamples::default();
         self.touched().for_each(|(_, tile)| all.merge(tile.bad()));
         all
     }
 
-    /// Number of samples above the film's limit, since the film was last cleared.
+    /// Returns the number of samples above the largest value that the film can store, since the
+    /// last restart of the film.
     pub fn saturated_samples(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_samples()).sum()
     }
 
-    /// Number of sums that have reached their limit. There is one sum for each pixel, group,
-    /// channel and replicate.
-    pub fn saturated(&self) -> u64 {
-        self.touched().map(|(_, tile)| tile.saturated()).sum()
-    }
-
-    /// Number of pixels with a sum that has reached its limit. Further samples make these pixels
-    /// too dark.
+    /// Returns the number of pixels with an integer sum that has reached `i64::MAX`. Further
+    /// samples make these pixels too dark.
     pub fn saturated_pixels(&self) -> u64 {
         self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
     }
@@ -381,8 +392,8 @@ impl Film {
     /// the same sums as one film of all ranges.
     ///
     /// # Errors
-    /// Fails if the headers differ, or if both films hold parts of the first sample of a tile. The
-    /// film is then unchanged.
+    /// Fails if the headers differ, or if there is a tile in which each film has the first sample
+    /// of only some pixels. The film is then unchanged.
     pub fn add(&mut self, other: &Self) -> Result<(), Mismatch> {
         self.check_addable(other)?;
         for (index, theirs) in other.touched() {
@@ -401,7 +412,8 @@ impl Film {
         tile
     }
 
-    /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to the tile `index`.
+    /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to the tile of this
+    /// film with the number `index`. Fails if both tiles have the first sample of only some pixels.
     pub(super) fn add_at(&mut self, index: usize, tile: Tile) -> Result<(), Mismatch> {
         let ours = &mut self.tiles[index];
         if !ours.is_of(self.epoch) {
@@ -411,7 +423,7 @@ impl Film {
         ours.add_tile(&tile).map_err(|()| Mismatch::Overlap(index))
     }
 
-    /// Checks that the samples of a film with the header `theirs` can be added to this film.
+    /// Checks that the samples of a film with the properties `theirs` can be added to this film.
     ///
     /// # Errors
     /// Fails if size, scales, seed or precision differ.
@@ -458,8 +470,8 @@ mod tests {
     fn slots_have_the_order_of_the_indices() {
         let mut film = film(48, 32, &[1.0]);
         let slots = film.slots(&[4, 0, 5, 2]);
-        let order: Vec<_> = slots.iter().map(|slot| (slot.index, slot.origin)).collect();
-        assert_eq!(order, [(4, [16, 16]), (0, [0, 0]), (5, [32, 16]), (2, [32, 0])]);
+        let order: Vec<_> = slots.iter().map(|slot| slot.origin).collect();
+        assert_eq!(order, [[16, 16], [0, 0], [32, 16], [32, 0]]);
         // Only the prepared tile counts as touched.
         slots.into_iter().nth(2).unwrap().prepare().advance(0, 3);
         let touched: Vec<_> = film.touched().map(|(i, tile)| (i, tile.counts())).collect();

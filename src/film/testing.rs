@@ -17,6 +17,11 @@ pub fn white(groups: usize) -> LightWeights {
     LightWeights { weights: vec![[1.0; 3]; groups] }
 }
 
+/// Returns light weights of 1 for the group `group` and 0 for the others of `groups`.
+pub fn only(group: usize, groups: usize) -> LightWeights {
+    LightWeights { weights: (0..groups).map(|g| [f64::from(u8::from(g == group)); 3]).collect() }
+}
+
 /// Calls `f` with every tile, and with the column and row of its upper left pixel.
 pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
     let all: Vec<_> = (0..film.tile_count()).collect();
@@ -26,9 +31,9 @@ pub fn each_tile(film: &mut Film, mut f: impl FnMut(&mut Tile, [usize; 2])) {
     }
 }
 
-/// Adds `count` samples per pixel to both replicates. `sums(x, y, replicate)` returns the sum of a
-/// pixel's samples in radiance, `[group][channel]`. It is multiplied by the scale of the group and
-/// rounded.
+/// Adds `count` samples per pixel to both replicates (halves of the samples). `sums(x, y,
+/// replicate)` returns the sum of a pixel's samples in radiance, `[group][channel]`. It is
+/// multiplied by the scale of the group and rounded.
 pub fn fill(film: &mut Film, count: u32, mut sums: impl FnMut(usize, usize, usize) -> Vec<f64>) {
     let scales = film.scales().to_vec();
     each_tile(film, |tile, [x0, y0]| {

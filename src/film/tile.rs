@@ -1,46 +1,50 @@
-//! Tile of 16x16 pixels: integer sums of the samples of both replicates.
+//! Film tile of 16x16 pixels: integer sums of the samples of both replicates (halves of the
+//! samples).
 
 use crate::film::invalid::InvalidSamples;
 use crate::film::{InvalidSample, TILE};
 use crate::lanes::prefetch;
 use std::collections::TryReserveError;
 
-/// Number of pixels in a tile.
+/// Number of pixels in a film tile.
 pub const TILE_PIXELS: usize = TILE * TILE;
 
-/// Largest number of light groups of a film.
+/// Largest number of light groups of a film. Each light group has its own sums.
 pub const MAX_FILM_GROUPS: usize = 16;
 
-/// Number of sums in a cache line of 64 bytes.
+/// Number of integer sums (8 bytes each) in a cache line of 64 bytes.
 const CACHE_LINE: usize = 8;
 
-/// Sums of a pixel without samples.
+/// Integer sums of a pixel without samples.
 static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 
-/// Sums of 16 x 16 pixels. A pixel has the number `y * 16 + x` in its tile. In tiles at the right
-/// and lower edge of the picture, pixels outside of the picture stay zero (see [`Tile::extent`]).
+/// Integer sums of 16 x 16 pixels of a film. A pixel has the number `y * 16 + x` in its tile. In
+/// tiles at the right and lower edge of the picture, pixels outside of the picture stay zero (see
+/// [`Tile::extent`]).
 ///
-/// All pixels have the same number of samples, except during the first pass, which adds the first
-/// sample of replicate A in stages: [`Tile::lattice_px`] determines the pixels that have this
-/// sample already. The number may differ between the replicates.
+/// All pixels have the same number of samples, except during the first pass. This pass adds the
+/// first sample of replicate A (half of the samples) to more and more pixels; [`Tile::lattice_px`]
+/// determines those that have it already. The number of samples may differ between the replicates A
+/// and B.
 #[derive(Debug)]
 pub struct Tile {
-    /// Epoch of the film in which the contents were written; 0 for a new tile.
+    /// Epoch of the tile: number of the film's restarts when its contents were written; 0 for a new
+    /// tile.
     epoch: u64,
-    /// Number of sums of a pixel: `groups * 3`.
+    /// Number of integer sums of a pixel: `groups * 3` for red, green and blue.
     stride: usize,
     extent: [usize; 2],
     counts: [u32; 2],
     lattice_px: u8,
-    /// `true` if a sum has reached its limit.
+    /// `true` if an integer sum has reached `i64::MAX`.
     full: bool,
     saturated_samples: u64,
     bad: InvalidSamples,
-    /// Sums, `[replicate][pixel][group][channel]`. Empty until the tile is first written.
+    /// Integer sums, `[replicate][pixel][group][channel]`. Empty until the tile is first written.
     sums: Vec<i64>,
-    /// Bits of the pixels that have been written in this epoch: bit `p % 64` of `[replicate][p /
-    /// 64]` is for pixel p. The sums of other pixels count as zero, whatever the memory contains. A
-    /// restart therefore does not access the sums.
+    /// Bits of the pixels that have been written since the film's last restart: bit `p % 64` of
+    /// `[replicate][p / 64]` is for pixel p. The sums of other pixels count as zero, whatever the
+    /// memory contains. A restart therefore does not access the sums.
     written: [[u64; TILE_PIXELS / 64]; 2],
 }
 
@@ -60,22 +64,18 @@ impl Tile {
         }
     }
 
-    /// Returns the memory of the sums, for use by another film.
-    pub(super) fn into_memory(self) -> Vec<i64> {
-        self.sums
+    /// Takes the memory of the integer sums of `old`, a tile of another film. This tile must not
+    /// have been written.
+    pub(super) fn take_memory(&mut self, old: Self) {
+        self.sums = old.sums;
     }
 
-    /// Returns a tile that uses `sums` as its memory. The tile must not have been written.
-    pub(super) fn with_memory(self, sums: Vec<i64>) -> Self {
-        Self { sums, ..self }
-    }
-
-    /// Returns the number of sums of a tile with `groups` light groups.
+    /// Returns the number of integer sums of a tile with `groups` light groups.
     pub(super) fn sums_len(groups: usize) -> usize {
         2 * TILE_PIXELS * groups * 3
     }
 
-    /// Allocates the memory of the sums if the tile has none. The memory is not written.
+    /// Allocates the memory of the integer sums if the tile has none. The memory is not written.
     pub(super) fn reserve(&mut self) -> Result<(), TryReserveError> {
         let len = Self::sums_len(self.stride / 3);
         if self.sums.capacity() < len {
@@ -85,58 +85,53 @@ impl Tile {
         Ok(())
     }
 
-    /// Allocates or clears the tile if its contents belong to another epoch than `epoch`.
+    /// Allocates the tile if it has no memory, or clears it if it was written before the film's
+    /// latest restart. `epoch` is the number of the film's restarts.
     pub(super) fn clear_if_stale(&mut self, epoch: u64) {
         if self.epoch == epoch {
             return;
         }
         let len = Self::sums_len(self.stride / 3);
-        if self.sums.capacity() >= len {
-            self.sums.resize(len, 0);
+        let mut sums = std::mem::take(&mut self.sums);
+        if sums.capacity() >= len {
+            sums.resize(len, 0);
         } else {
             // The memory is allocated anew, because growth would copy old contents.
-            self.sums = vec![0; len];
+            sums = vec![0; len];
         }
-        self.written = Default::default();
-        self.epoch = epoch;
-        self.counts = [0; 2];
-        self.lattice_px = 0;
-        self.full = false;
-        self.saturated_samples = 0;
-        self.bad = InvalidSamples::default();
+        *self = Self { epoch, sums, ..Self::cleared(self.stride / 3, self.extent) };
     }
 
     pub(super) fn is_of(&self, epoch: u64) -> bool {
         self.epoch == epoch
     }
 
-    /// Width and height in pixels of the part that is inside the picture, 1..=16 each.
+    /// Returns width and height in pixels of the tile's part that is inside the picture, 1..=16
+    /// each.
     pub fn extent(&self) -> [usize; 2] {
         self.extent
     }
 
-    /// Number of samples that every pixel has in the replicates A and B.
+    /// Returns the number of samples that every pixel of the tile has in replicate A, and the
+    /// number in replicate B (halves of the samples).
     pub fn counts(&self) -> [u32; 2] {
         self.counts
     }
 
-    /// Step of the pixel lattice during the first pass, in pixels. Pixels whose x and y are
-    /// multiples of it have the first sample of replicate A, in addition to [`Tile::counts`]. 0
-    /// before and after the first pass.
+    /// Returns the progress of the first pass, which gives every pixel of the tile its first sample
+    /// of replicate A (half of the samples). Pixels whose x and y are multiples of the result have
+    /// this sample already; [`Tile::counts`] does not include it. The result is 0 before and after
+    /// the first pass.
     pub fn lattice_px(&self) -> usize {
         usize::from(self.lattice_px)
     }
 
-    /// Number of samples of one pixel in the replicates A and B.
+    /// Returns the number of samples of one pixel in replicate A, and the number in replicate B
+    /// (halves of the samples).
     #[inline]
     pub fn counts_of(&self, pixel: usize) -> [u32; 2] {
         let extra = self.lattice_px != 0 && on_lattice(pixel, usize::from(self.lattice_px));
         [self.counts[0] + u32::from(extra), self.counts[1]]
-    }
-
-    /// Returns `true` if the pixel has at least one sample.
-    pub fn sampled(&self, pixel: usize) -> bool {
-        self.counts_of(pixel) != [0; 2]
     }
 
     /// Returns `true` if at least one pixel has a sample.
@@ -144,17 +139,19 @@ impl Tile {
         self.counts != [0; 2] || self.lattice_px != 0
     }
 
-    /// Increases the sample count of all pixels in `replicate` (0: A, 1: B) by `samples`.
+    /// Increases the sample count of all pixels of the tile in `replicate` (half of the samples; 0:
+    /// A, 1: B) by `samples`. The sums do not change.
     pub fn advance(&mut self, replicate: usize, samples: u32) {
         self.counts[replicate] = self.counts[replicate].saturating_add(samples);
     }
 
     /// Records that the pixels whose x and y are multiples of `step_px` (1, 2, 4, 8 or 16) have the
-    /// first sample of replicate A. A step of 1 includes all pixels: the sample count grows by one,
-    /// and the first pass of the tile is complete.
+    /// first sample of replicate A (half of the samples). A step of 1 includes all pixels: the
+    /// sample count grows by one, and the first pass of the tile is complete.
     ///
     /// # Panics
-    /// Panics if `step_px` is another number, or larger than the step of the current lattice.
+    /// Panics if `step_px` is another number, or larger than the step of the previous call in the
+    /// same first pass.
     pub fn set_lattice(&mut self, step_px: usize) {
         assert!(
             matches!(step_px, 1 | 2 | 4 | 8 | 16)
@@ -170,8 +167,9 @@ impl Tile {
         }
     }
 
-    /// Returns the sums of one pixel in one replicate (0: A, 1: B) for writing, `[group][channel]`.
-    /// Callers must ensure that no sum overflows; [`Tile::add`] works for all values.
+    /// Returns the integer sums of one pixel in one replicate (half of the samples; 0: A, 1: B) for
+    /// writing, `[group][channel]`. Callers must ensure that no sum overflows; [`Tile::add`] works
+    /// for all values.
     #[inline(always)]
     pub fn pixel_mut(&mut self, replicate: usize, pixel: usize) -> &mut [i64] {
         let start = (replicate * TILE_PIXELS + pixel) * self.stride;
@@ -188,7 +186,8 @@ impl Tile {
         sums
     }
 
-    /// Returns the sums of one pixel in one replicate: `[group][channel]`.
+    /// Returns the integer sums of one pixel in one replicate (half of the samples; 0: A, 1: B):
+    /// `[group][channel]`.
     #[inline(always)]
     pub fn pixel(&self, replicate: usize, pixel: usize) -> &[i64] {
         if self.written[replicate][pixel / 64] >> (pixel % 64) & 1 == 0 {
@@ -198,14 +197,16 @@ impl Tile {
         &self.sums[start..start + self.stride]
     }
 
-    /// Prefetches the sums of a replicate into the processor's cache.
+    /// Prefetches the integer sums of a replicate (half of the samples; 0: A, 1: B) of the tile
+    /// into the processor's cache.
     pub fn prefetch(&self, replicate: usize) {
         let start = replicate * TILE_PIXELS * self.stride;
         let sums = &self.sums[start..start + TILE_PIXELS * self.stride];
         sums.chunks(CACHE_LINE).for_each(|line| prefetch(&line[0]));
     }
 
-    /// Iterates over the pairs of replicate and pixel that have been written in this epoch.
+    /// Iterates over the pairs (replicate, pixel) whose sums have been written since the film's
+    /// last restart. The replicates 0 and 1 are the two halves of the samples.
     fn written(&self) -> impl Iterator<Item = (usize, usize)> {
         let all = (0..2).flat_map(|r| (0..TILE_PIXELS).map(move |p| (r, p)));
         all.filter(|(r, p)| self.written[*r][p / 64] >> (p % 64) & 1 != 0)
@@ -221,7 +222,8 @@ impl Tile {
         }
     }
 
-    /// Adds non-negative `values` to the sums of one pixel and group; see [`Tile::add`].
+    /// Adds non-negative `values` (red, green, blue) to the integer sums of one pixel and light
+    /// group; see [`Tile::add`].
     #[inline(always)]
     pub fn add_group(&mut self, replicate: usize, pixel: usize, group: usize, values: [i64; 3]) {
         let sums = &mut self.pixel_mut(replicate, pixel)[3 * group..][..3];
@@ -232,16 +234,7 @@ impl Tile {
         self.full |= !fit;
     }
 
-    /// Number of sums (of one pixel, group, channel and replicate) that have reached their limit.
-    pub fn saturated(&self) -> u64 {
-        if !self.full {
-            return 0;
-        }
-        let full = |(r, p)| self.pixel(r, p).iter().filter(|sum| **sum == i64::MAX).count() as u64;
-        self.written().map(full).sum()
-    }
-
-    /// Number of pixels with a sum that has reached its limit.
+    /// Returns the number of pixels with an integer sum that has reached `i64::MAX`.
     pub fn saturated_pixels(&self) -> u64 {
         if !self.full {
             return 0;
@@ -250,25 +243,28 @@ impl Tile {
         (0..TILE_PIXELS).filter(full).count() as u64
     }
 
-    /// Counts samples that were above the film's limit and were stored with the limit.
+    /// Increases the number of saturated samples by `samples`. A saturated sample is above the
+    /// film's largest sample value and is stored with this value.
     #[cold]
     pub fn record_saturated(&mut self, samples: u64) {
         self.saturated_samples += samples;
     }
 
-    /// Number of samples that were above the film's limit.
+    /// Returns the number of samples that were above the film's largest sample value.
     pub fn saturated_samples(&self) -> u64 {
         self.saturated_samples
     }
 
-    /// Records an invalid sample. It contributes black to the sums.
+    /// Records an invalid sample (NaN or negative). It contributes black to the sums.
     #[cold]
     pub fn record_bad(&mut self, sample: InvalidSample) {
         self.bad.record(sample);
     }
 
-    /// Sets everything except for the sums to the values of a tile in a file. `full` is `true` if a
-    /// sum has reached its limit.
+    /// Sets the tile's counters to the values in a film file; the integer sums stay. `counts` are
+    /// the sample counts of the replicates A and B (halves of the samples). `saturated_samples`
+    /// counts samples above the film's limit. `bad` are the invalid samples. `full` is `true` if a
+    /// sum has reached `i64::MAX`.
     pub(super) fn restore(
         &mut self,
         counts: [u32; 2],
@@ -286,10 +282,11 @@ impl Tile {
         &self.bad
     }
 
-    /// Adds the samples of a tile of another film, at the same position.
+    /// Adds the samples of `other`, a tile of another film at the same position.
     ///
     /// # Errors
-    /// Fails if both tiles hold parts of the first sample.
+    ///
+    /// Fails if both tiles hold the first sample of only a part of their pixels.
     pub(super) fn add_tile(&mut self, other: &Self) -> Result<(), ()> {
         if self.lattice_px != 0 && other.lattice_px != 0 {
             return Err(());
@@ -320,8 +317,9 @@ fn on_lattice(pixel: usize, step_px: usize) -> bool {
     ((pixel % TILE) | (pixel / TILE)) & (step_px - 1) == 0
 }
 
-/// Iterates over the pixels of the lattice with step `step_px` that are not in the lattice with
-/// step `before_px` (0: no earlier lattice), row by row. `step_px` divides 16.
+/// Iterates row by row over the pixels of a tile whose x and y are multiples of `step_px`, which
+/// divides 16. Leaves out pixels whose x and y are multiples of the larger step `before_px`; 0
+/// leaves out none.
 pub fn lattice_pixels(before_px: usize, step_px: usize) -> impl Iterator<Item = usize> {
     let lines = move || (0..TILE).step_by(step_px);
     lines()
@@ -355,7 +353,7 @@ mod tests {
         let mut tile = tile();
         assert!(!tile.any_sampled());
         tile.set_lattice(8);
-        assert!(tile.any_sampled() && tile.sampled(136) && !tile.sampled(137));
+        assert!(tile.any_sampled() && tile.counts_of(137) == [0; 2]);
         assert_eq!((tile.counts(), tile.counts_of(8)), ([0, 0], [1, 0]));
         tile.set_lattice(1);
         assert_eq!((tile.counts(), tile.lattice_px()), ([1, 0], 0));
@@ -374,16 +372,16 @@ mod tests {
     fn saturated_sums_stay_and_are_counted() {
         let mut tile = tile();
         tile.add(1, 3, &[i64::MAX - 1, 1, 2, 3, 4, 5]);
-        assert_eq!(tile.saturated(), 0);
+        assert_eq!(tile.saturated_pixels(), 0);
         tile.add(1, 3, &[2, 1, 2, 3, 4, 5]);
         tile.add(1, 3, &[2, 0, 0, 0, 0, 0]);
-        assert_eq!(tile.saturated(), 1);
+        assert_eq!(tile.saturated_pixels(), 1);
         assert_eq!(tile.pixel(1, 3), [i64::MAX, 2, 4, 6, 8, 10]);
         assert_eq!(tile.pixel(0, 3), [0; 6]);
-        assert_eq!(tile.saturated_pixels(), 1);
         tile.add(0, 3, &[i64::MAX, i64::MAX, 0, 0, 0, 0]);
         tile.add(0, 3, &[1, 1, 0, 0, 0, 0]);
-        assert_eq!((tile.saturated(), tile.saturated_pixels()), (3, 1));
+        assert_eq!(tile.pixel(0, 3), [i64::MAX, i64::MAX, 0, 0, 0, 0]);
+        assert_eq!(tile.saturated_pixels(), 1);
     }
 
     #[test]
@@ -403,7 +401,7 @@ mod tests {
         assert_eq!((tile.pixel(0, 0), tile.pixel(1, 0)), (&[2; 6][..], &[0; 6][..]));
         for groups in [1, 3] {
             let memory = std::mem::replace(&mut tile, Tile::cleared(groups, [16, 16]));
-            tile = tile.with_memory(memory.into_memory());
+            tile.take_memory(memory);
             tile.clear_if_stale(7);
             tile.add(1, 255, &vec![5; 3 * groups]);
             assert_eq!(tile.pixel(1, 255), vec![5; 3 * groups]);

@@ -3,17 +3,15 @@
 //! A kernel (intersection, shading, sampling) is written once, generic over the trait
 //! [`SimdFloat`]: a vector of `WIDTH` floats. The trait has these instances:
 //!
-//! | type | precision | width | use |
-//! |---|---|---|---|
-//! | `wide::f32x8` | single | 8 | production, speed |
-//! | `wide::f64x4` | double | 4 | production, accuracy |
-//! | `wide::f32x16`, `wide::f64x8` | both | 16, 8 | production when built for AVX-512 |
-//! | `f32`, `f64` | both | 1 | tests, benches, and primitives without packet kernels |
+//! | type | precision | width | use | |---|---|---|---| | `wide::f32x8` | single | 8 | production,
+//! speed | | `wide::f64x4` | double | 4 | production, accuracy | | `wide::f32x16`, `wide::f64x8` |
+//! both | 16, 8 | production when built for AVX-512 | | `f32`, `f64` | both | 1 | tests, benches,
+//! and primitives without packet kernels |
 //!
-//! All operations up to `sqrt` are IEEE operations, so that all instances of one precision return
-//! identical bits. [`SimdFloat::mul_add`] is fused on all instances or on none. Only `sin_cos`,
-//! `atan2`, `ln` and `exp` may differ by a few ulps between the vector instances and those of width
-//! 1.
+//! All operations that [`SimdFloat`] declares up to `sqrt` are IEEE operations. Therefore all
+//! instances of one precision return identical bits. [`SimdFloat::mul_add`] is fused on all
+//! instances or on none. Only `sin_cos`, `atan2`, `ln` and `exp` may differ by a few ulps between
+//! the vector instances and those of width 1.
 
 mod scalar;
 mod vec3;
@@ -26,20 +24,21 @@ use std::ops::{
     Add, AddAssign, BitAnd, BitOr, BitXor, Div, Mul, MulAssign, Neg, Not, Shl, Shr, Sub, SubAssign,
 };
 
-/// Single-precision vector that the renderer uses.
+/// Single-precision SIMD vector that the renderer uses: eight lanes.
 #[cfg(not(target_feature = "avx512f"))]
 pub type Single = wide::f32x8;
-/// Double-precision vector that the renderer uses.
+/// Double-precision SIMD vector that the renderer uses: four lanes.
 #[cfg(not(target_feature = "avx512f"))]
 pub type Double = wide::f64x4;
-/// Single-precision vector that the renderer uses.
+/// Single-precision SIMD vector that the renderer uses with AVX-512: 16 lanes.
 #[cfg(target_feature = "avx512f")]
 pub type Single = wide::f32x16;
-/// Double-precision vector that the renderer uses.
+/// Double-precision SIMD vector that the renderer uses with AVX-512: eight lanes.
 #[cfg(target_feature = "avx512f")]
 pub type Double = wide::f64x8;
 
-/// Width of the widest instance. Arrays that are indexed by lane have this length.
+/// Number of lanes of the widest SIMD type of this build. Arrays that are indexed by lane have this
+/// length.
 pub const MAX_WIDTH: usize = if cfg!(target_feature = "avx512f") { 16 } else { 8 };
 
 /// Returns the array whose element `i` is `f(i)`.
@@ -58,37 +57,53 @@ pub fn array_from_fn<T: Copy, const N: usize>(mut f: impl FnMut(usize) -> T) -> 
 
 /// Type of one lane: `f32` or `f64`.
 pub trait Float: Copy + Debug + PartialOrd + Default + Send + Sync + 'static {
-    /// Distance from 1 to the next larger number of this precision.
+    /// Distance from 1 to the next larger number of this floating-point type.
     const EPSILON: f64;
-    /// Rounds to the nearest value of this precision.
+    /// Rounds `x` to the nearest value of this floating-point type.
     fn from_f64(x: f64) -> Self;
-    /// Converts without rounding.
+    /// Converts to double precision without rounding.
     fn to_f64(self) -> f64;
+    /// Converts to an integer, rounded towards zero. Numbers outside the range of `u32` become its
+    /// nearest end.
+    fn to_u32(self) -> u32;
 }
 
-impl Float for f32 {
-    const EPSILON: f64 = f32::EPSILON as f64;
-    #[inline(always)]
-    fn from_f64(x: f64) -> Self {
-        x as f32
-    }
-    #[inline(always)]
-    fn to_f64(self) -> f64 {
-        f64::from(self)
-    }
-}
+macro_rules! float {
+    ($float:ident) => {
+        impl Float for $float {
+            const EPSILON: f64 = $float::EPSILON as f64;
 
-impl Float for f64 {
-    const EPSILON: f64 = f64::EPSILON;
-    #[inline(always)]
-    fn from_f64(x: f64) -> Self {
-        x
-    }
-    #[inline(always)]
-    fn to_f64(self) -> f64 {
-        self
-    }
+            #[inline(always)]
+            fn from_f64(x: f64) -> Self {
+                x as $float
+            }
+
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+
+            #[inline(always)]
+            fn to_u32(self) -> u32 {
+                self as u32
+            }
+        }
+    };
 }
+float!(f32);
+float!(f64);
+
+/// Implements methods of [`SimdFloat`] for the type `$type` by calling its own methods of the same
+/// names.
+macro_rules! by_own_methods {
+    ($type:ident: $($name:ident($($argument:ident),*) -> $result:ty),+ $(,)?) => {$(
+        #[inline(always)]
+        fn $name(self, $($argument: Self),*) -> $result {
+            <$type>::$name(self, $($argument),*)
+        }
+    )+};
+}
+use by_own_methods;
 
 /// Result of a lane-wise comparison: one truth value for each lane.
 pub trait Mask:
@@ -105,9 +120,9 @@ pub trait Mask:
     fn any(self) -> bool;
     /// Returns `true` if every lane is true.
     fn all(self) -> bool;
-    /// Returns the lanes as bits; bit `i` is lane `i`.
+    /// Returns the truth values as bits; bit `i` is lane `i`.
     fn bits(self) -> u32;
-    /// Value of lane `i`.
+    /// Returns the truth value of lane `i`.
     #[inline(always)]
     fn lane(self, i: usize) -> bool {
         self.bits() >> i & 1 != 0
@@ -117,7 +132,7 @@ pub trait Mask:
     fn none(self) -> bool {
         !self.any()
     }
-    /// Returns the lanes that are true in `self` and false in `other`.
+    /// Returns the mask of lanes that are true in `self` and false in `other`.
     #[inline(always)]
     fn and_not(self, other: Self) -> Self {
         self & !other
@@ -143,13 +158,14 @@ pub trait SimdU32:
     fn splat(x: u32) -> Self;
     /// Returns the vector whose lane `i` is `f(i)`.
     fn from_fn(f: impl FnMut(usize) -> u32) -> Self;
-    /// Value of lane `i`.
+    /// Returns the integer in lane `i`.
     fn lane(self, i: usize) -> u32;
     /// Reverses the order of the bits in each lane.
     fn reverse(self) -> Self;
 }
 
-/// Vector of `WIDTH` floats; see the [module](self).
+/// SIMD vector of `WIDTH` floats, the number type in which kernels are written; see the
+/// [module](self).
 pub trait SimdFloat:
     Copy
     + Debug
@@ -167,36 +183,38 @@ pub trait SimdFloat:
 {
     /// Number of lanes.
     const WIDTH: usize;
-    /// Name for statistics and reports, such as `f32x8`.
+    /// Name of the vector type for statistics and reports, such as `f32x8`.
     const NAME: &'static str;
-    /// Distance from 1 to the next larger number of this precision.
+    /// Distance from 1 to the next larger number of the lanes' floating-point type.
     const EPSILON: f64 = Self::Scalar::EPSILON;
-    /// Largest finite number of this precision.
+    /// Largest finite number of the lanes' floating-point type.
     const MAX: f64;
-    /// Type of one lane.
+    /// Type of one lane: `f32` or `f64`.
     type Scalar: Float;
-    /// Result of comparisons.
+    /// Type of lane-wise comparison results.
     type Mask: Mask;
-    /// Integers of the same width.
+    /// Vector of 32-bit integers with the same number of lanes.
     type SimdU32: SimdU32;
 
     /// Returns `x` in every lane.
     fn splat(x: Self::Scalar) -> Self;
     /// Returns the vector whose lane `i` is `f(i)`.
     fn from_fn(f: impl FnMut(usize) -> Self::Scalar) -> Self;
-    /// Value of lane `i`.
+    /// Returns `table[indices[i]]` in each lane `i`. Each index is less than the length of `table`.
+    fn gather(table: &[Self::Scalar], indices: &[u32; MAX_WIDTH]) -> Self;
+    /// Returns the number in lane `i`.
     fn lane(self, i: usize) -> Self::Scalar;
-    /// Returns `x`, rounded to this precision, in every lane.
+    /// Returns `x`, rounded to the lanes' floating-point type, in every lane.
     #[inline(always)]
     fn from_f64(x: f64) -> Self {
         Self::splat(Self::Scalar::from_f64(x))
     }
-    /// Zero in every lane.
+    /// Returns zero in every lane.
     #[inline(always)]
     fn zero() -> Self {
         Self::from_f64(0.0)
     }
-    /// One in every lane.
+    /// Returns one in every lane.
     #[inline(always)]
     fn one() -> Self {
         Self::from_f64(1.0)
@@ -213,31 +231,32 @@ pub trait SimdFloat:
     /// Returns the minimum and the maximum over all lanes. NaN lanes are ignored. If all lanes are
     /// NaN, the results are [`SimdFloat::MAX`] and its negative.
     fn min_max(self) -> (Self::Scalar, Self::Scalar);
-    /// Absolute value.
+    /// Returns the absolute value of each lane.
     fn abs(self) -> Self;
-    /// Square root; NaN for negative numbers.
+    /// Returns the square root of each lane; NaN for negative numbers.
     fn sqrt(self) -> Self;
-    /// Sine and cosine of an angle in radians.
+    /// Returns the sine and the cosine of each lane, an angle in radians.
     fn sin_cos(self) -> (Self, Self);
-    /// Angle of the point (`x`, `self`) from the x axis, in radians from -pi to pi.
+    /// Returns the angle of the point (`x`, `self`) from the x axis in each lane, in radians from
+    /// -pi to pi.
     fn atan2(self, x: Self) -> Self;
-    /// Natural logarithm.
+    /// Returns the natural logarithm of each lane.
     fn ln(self) -> Self;
-    /// Natural exponential.
+    /// Returns e to the power of each lane.
     fn exp(self) -> Self;
-    /// Magnitude of `self` with the sign of `sign`.
+    /// Returns the magnitude of `self` with the sign of `sign`, lane by lane.
     fn copysign(self, sign: Self) -> Self;
 
-    /// Mask of `self < other`; false for NaN.
+    /// Returns the mask of lanes where `self < other`; false for NaN.
     fn lt(self, other: Self) -> Self::Mask;
-    /// Mask of `self <= other`; false for NaN.
+    /// Returns the mask of lanes where `self <= other`; false for NaN.
     fn le(self, other: Self) -> Self::Mask;
-    /// Mask of `self > other`; false for NaN.
+    /// Returns the mask of lanes where `self > other`; false for NaN.
     #[inline(always)]
     fn gt(self, other: Self) -> Self::Mask {
         other.lt(self)
     }
-    /// Mask of `self >= other`; false for NaN.
+    /// Returns the mask of lanes where `self >= other`; false for NaN.
     #[inline(always)]
     fn ge(self, other: Self) -> Self::Mask {
         other.le(self)
@@ -259,23 +278,24 @@ pub trait SimdFloat:
     fn from_id(id: u32) -> Self;
     /// Returns the id that [`SimdFloat::from_id`] has stored in lane `i`.
     fn id_lane(self, i: usize) -> u32;
-    /// Mask of lanes whose id is `id`.
+    /// Returns the mask of lanes in which [`SimdFloat::from_id`] has stored `id`.
     fn id_eq(self, id: u32) -> Self::Mask;
 
-    /// Maps 32 random bits to [0, 1). Single precision uses 24 of the bits. Double precision uses
-    /// all bits, and returns the middle of a step.
+    /// Maps 32 random bits per lane to a number in [0, 1). Single precision uses 24 of the bits.
+    /// Double precision uses all bits, and returns the middle of one of 2^32 equal intervals.
     fn to_unit(bits: Self::SimdU32) -> Self;
 
     /// Returns the sum of `round(lane * scale)` over all lanes. Each lane is rounded separately, so
-    /// that the sum does not depend on the grouping of lanes. `|lane * scale|` is at most 2^49.
+    /// that the sum is the same for every number of lanes in a vector. `scale` is a power of two,
+    /// and `|lane * scale|` is at most 2^49.
     fn fixed_sum(self, scale: f64) -> i64;
-    /// Returns `round(lane * scale)` for each lane, and zeros beyond the last lane.
-    /// `|lane * scale|` is at most 2^49.
+    /// Returns `round(lane * scale)` of each lane as an integer; array elements beyond the last
+    /// lane are zero. `|lane * scale|` is at most 2^49.
     fn fixed(self, scale: f64) -> [i64; MAX_WIDTH];
 }
 
-/// Returns the id in the first lane of `mask`, and all lanes of `mask` that have this id. Returns
-/// `None` if `mask` is empty.
+/// Returns two values: the id in the first lane of `mask`, and the mask of all lanes of `mask` that
+/// have this id. Returns `None` if `mask` is empty.
 #[inline(always)]
 pub fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mask)> {
     let bits = mask.bits();
@@ -286,9 +306,9 @@ pub fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mas
     Some((id, mask & ids.id_eq(id)))
 }
 
-/// Rounding constant, 1.5 x 2^52. The sum of the constant and a double `x` below 2^51 in magnitude
-/// has no fraction bits, so that the addition rounds `x` to the nearest integer. This integer is
-/// the difference between the bits of the sum and the bits of the constant.
+/// Constant 1.5 x 2^52, by whose addition a double `x` is rounded to the nearest integer. For |x|
+/// below 2^51 the sum has no fraction bits. The integer is the difference between the bits of the
+/// sum and the bits of the constant.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// Rounds `x` to the nearest integer, ties to even. `|x|` is below 2^51.

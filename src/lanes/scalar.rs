@@ -1,7 +1,7 @@
-//! Instances of width 1: `f32` and `f64`. Their operations have the same order as those of the
-//! vector instances.
+//! Implementations of the SIMD traits with one lane: `f32` and `f64`. A method of several
+//! floating-point operations executes them in the same order as the types with several lanes.
 
-use crate::lanes::{MAX_WIDTH, Mask, SimdFloat, SimdU32, round_i64};
+use crate::lanes::{MAX_WIDTH, Mask, SimdFloat, SimdU32, by_own_methods, round_i64};
 
 impl Mask for bool {
     #[inline(always)]
@@ -18,7 +18,7 @@ impl Mask for bool {
     }
 }
 
-/// Vector of one `u32` with wrapping arithmetic.
+/// Integer vector of one lane: a `u32` with wrapping arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct One(u32);
 
@@ -97,6 +97,10 @@ macro_rules! scalar_lanes {
                 f(0)
             }
             #[inline(always)]
+            fn gather(table: &[$float], indices: &[u32; MAX_WIDTH]) -> Self {
+                table[indices[0] as usize]
+            }
+            #[inline(always)]
             fn lane(self, _: usize) -> $float {
                 self
             }
@@ -122,33 +126,15 @@ macro_rules! scalar_lanes {
             fn min_max(self) -> (Self, Self) {
                 (SimdFloat::min(self, <$float>::MAX), SimdFloat::max(self, -<$float>::MAX))
             }
-            #[inline(always)]
-            fn abs(self) -> Self {
-                <$float>::abs(self)
-            }
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                <$float>::sqrt(self)
-            }
-            #[inline(always)]
-            fn sin_cos(self) -> (Self, Self) {
-                <$float>::sin_cos(self)
-            }
-            #[inline(always)]
-            fn atan2(self, x: Self) -> Self {
-                <$float>::atan2(self, x)
-            }
-            #[inline(always)]
-            fn ln(self) -> Self {
-                <$float>::ln(self)
-            }
-            #[inline(always)]
-            fn exp(self) -> Self {
-                <$float>::exp(self)
-            }
-            #[inline(always)]
-            fn copysign(self, sign: Self) -> Self {
-                <$float>::copysign(self, sign)
+            by_own_methods! {
+                $float:
+                abs() -> Self,
+                sqrt() -> Self,
+                sin_cos() -> (Self, Self),
+                atan2(x) -> Self,
+                ln() -> Self,
+                exp() -> Self,
+                copysign(sign) -> Self,
             }
             #[inline(always)]
             fn lt(self, other: Self) -> bool {

@@ -3,14 +3,14 @@
 use crate::lanes::{Float, MAX_WIDTH, SimdFloat};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-/// Three coordinates, or three colour channels, in each lane.
+/// Three-dimensional vector, or linear RGB colour, in each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Vec3<L> {
-    /// First coordinate or red.
+    /// First coordinate, or red.
     pub x: L,
-    /// Second coordinate or green.
+    /// Second coordinate, or green.
     pub y: L,
-    /// Third coordinate or blue.
+    /// Third coordinate, or blue.
     pub z: L,
 }
 
@@ -25,7 +25,7 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn splat(v: [L::Scalar; 3]) -> Self {
         Self::new(L::splat(v[0]), L::splat(v[1]), L::splat(v[2]))
     }
-    /// Returns `v`, rounded to this precision, in every lane.
+    /// Returns `v`, rounded to the lanes' floating-point type, in every lane.
     #[inline(always)]
     pub fn of(v: [f64; 3]) -> Self {
         Self::splat(v.map(L::Scalar::from_f64))
@@ -41,7 +41,7 @@ impl<L: SimdFloat> Vec3<L> {
         }
         Self::new(L::from_fn(|i| x[i]), L::from_fn(|i| y[i]), L::from_fn(|i| z[i]))
     }
-    /// Zero in every lane.
+    /// Returns the zero vector in every lane.
     #[inline(always)]
     pub fn zero() -> Self {
         Self::new(L::zero(), L::zero(), L::zero())
@@ -51,12 +51,12 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn lane(self, i: usize) -> [L::Scalar; 3] {
         [self.x.lane(i), self.y.lane(i), self.z.lane(i)]
     }
-    /// Dot product.
+    /// Returns the dot product, lane by lane.
     #[inline(always)]
     pub fn dot(self, other: Self) -> L {
         self.x.mul_add(other.x, self.y.mul_add(other.y, self.z * other.z))
     }
-    /// Cross product.
+    /// Returns the cross product `self x o`, lane by lane.
     #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
         Self::new(
@@ -65,7 +65,7 @@ impl<L: SimdFloat> Vec3<L> {
             self.x.mul_add(o.y, -(self.y * o.x)),
         )
     }
-    /// Squared length.
+    /// Returns the squared length of the vector in each lane.
     #[inline(always)]
     pub fn length_squared(self) -> L {
         self.dot(self)
@@ -81,27 +81,27 @@ impl<L: SimdFloat> Vec3<L> {
     pub fn renormalize(self) -> Self {
         self * self.length_squared().mul_add(L::from_f64(-0.5), L::from_f64(1.5))
     }
-    /// Computes `self * t + b`.
+    /// Computes `self * t + b`, with the scalar `t`, lane by lane.
     #[inline(always)]
     pub fn mul_add(self, t: L, b: Self) -> Self {
         Self::new(self.x.mul_add(t, b.x), self.y.mul_add(t, b.y), self.z.mul_add(t, b.z))
     }
-    /// Component-wise product.
+    /// Multiplies coordinate by coordinate, as for colours.
     #[inline(always)]
     pub fn component_mul(self, o: Self) -> Self {
         Self::new(self.x * o.x, self.y * o.y, self.z * o.z)
     }
-    /// Largest coordinate.
+    /// Returns the largest of the three coordinates in each lane.
     #[inline(always)]
     pub fn max_element(self) -> L {
         self.x.max(self.y).max(self.z)
     }
-    /// Largest absolute value of a coordinate.
+    /// Returns the largest absolute value of the three coordinates in each lane.
     #[inline(always)]
     pub fn max_abs(self) -> L {
         self.x.abs().max(self.y.abs()).max(self.z.abs())
     }
-    /// Returns `yes` in lanes where `mask` is true, `no` elsewhere.
+    /// Returns the vector `yes` in lanes where `mask` is true, `no` elsewhere.
     #[inline(always)]
     pub fn select(mask: L::Mask, yes: Self, no: Self) -> Self {
         Self::new(
@@ -110,12 +110,12 @@ impl<L: SimdFloat> Vec3<L> {
             L::select(mask, yes.z, no.z),
         )
     }
-    /// Returns `self` in lanes where `mask` is true, zero elsewhere.
+    /// Returns `self` in lanes where `mask` is true, the zero vector elsewhere.
     #[inline(always)]
     pub fn masked(self, mask: L::Mask) -> Self {
         Self::new(self.x.masked(mask), self.y.masked(mask), self.z.masked(mask))
     }
-    /// Reflects this direction at a plane with unit normal `n`: v - 2 (v.n) n.
+    /// Mirrors this direction v at a plane with the unit normal n: returns v - 2 (v.n) n.
     #[inline(always)]
     pub fn reflect(self, n: Self) -> Self {
         let twice = self.dot(n) * L::from_f64(-2.0);
@@ -165,9 +165,9 @@ impl<L: SimdFloat> Neg for Vec3<L> {
 /// Orthonormal frame around a unit vector.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<L> {
-    /// First tangent.
+    /// First tangent, a unit vector perpendicular to `n`.
     pub t: Vec3<L>,
-    /// Second tangent.
+    /// Second tangent, a unit vector perpendicular to `n` and `t`.
     pub b: Vec3<L>,
     /// Unit vector around which the frame was built.
     pub n: Vec3<L>,
@@ -176,7 +176,8 @@ pub struct Frame<L> {
 impl<L: SimdFloat> Frame<L> {
     /// Builds a frame around the unit vector `n` without branches. It is continuous except where
     /// `n.z` is 0. Around a horizontal vector (`n.y` is 0) the first tangent is horizontal and the
-    /// second vertical, as are the axes of the lobes of a vertical mirror.
+    /// second vertical. The sides of a square reflection lobe around such a vector have these
+    /// directions.
     ///
     /// Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1).
     #[inline(always)]
@@ -188,12 +189,12 @@ impl<L: SimdFloat> Frame<L> {
         let b = Vec3::new(b, (n.y * n.y).mul_add(a, sign), -n.y);
         Self { t, b, n }
     }
-    /// Transforms local coordinates (t, b, n) to world coordinates.
+    /// Transforms `v` from the coordinates (t, b, n) of this frame to world coordinates.
     #[inline(always)]
     pub fn to_world(&self, v: Vec3<L>) -> Vec3<L> {
         self.t.mul_add(v.x, self.b.mul_add(v.y, self.n * v.z))
     }
-    /// Transforms world coordinates to local coordinates (t, b, n).
+    /// Transforms `v` from world coordinates to the coordinates (t, b, n) of this frame.
     #[inline(always)]
     pub fn to_local(&self, v: Vec3<L>) -> Vec3<L> {
         Vec3::new(self.t.dot(v), self.b.dot(v), self.n.dot(v))

@@ -1,10 +1,10 @@
-//! Vector instances, based on the types of the `wide` crate.
+//! Implementations of the SIMD traits with several lanes, based on the types of the `wide` crate.
 
-use crate::lanes::{MAX_WIDTH, Mask, ROUNDER, SimdFloat, SimdU32, array_from_fn};
+use crate::lanes::{MAX_WIDTH, Mask, ROUNDER, SimdFloat, SimdU32, array_from_fn, by_own_methods};
 use wide::bytemuck::cast;
 use wide::{f32x4, f32x8, f64x2, f64x4, i32x4, i32x8, i64x4, u32x4, u32x8};
 #[cfg(target_feature = "avx512f")]
-use wide::{f32x16, f64x8, i32x16, u32x16};
+use wide::{f32x16, f64x8, i32x16, i64x8, u32x16};
 
 macro_rules! vector_bits {
     ($bits:ident, $n:literal, $reverse:expr) => {
@@ -42,7 +42,8 @@ fn reverse_by_shifts<B: SimdU32>(x: B) -> B {
     (x >> 16) | (x << 16)
 }
 
-/// Returns a table of the reversed bits of each nibble, shifted left by `SHIFT`.
+/// Returns a table for byte shuffles: entry i holds the four bits of i in reverse order, shifted
+/// left by `SHIFT`.
 const fn nibbles<const SHIFT: u32>() -> [i8; 16] {
     let mut table = [0i8; 16];
     let mut n = 0;
@@ -77,7 +78,7 @@ fn reverse8(x: u32x8) -> u32x8 {
     cast(i8x32::swizzle_half_relaxed(cast(bytes), i8x32::new(ORDER)))
 }
 
-/// Does the same as [`reverse8`] for four lanes.
+/// Reverses the bits of each of four 32-bit lanes, as [`reverse8`] does for eight.
 #[inline(always)]
 fn reverse4(x: u32x4) -> u32x4 {
     use wide::i8x16;
@@ -94,8 +95,37 @@ vector_bits!(u32x4, 4, reverse4);
 #[cfg(target_feature = "avx512f")]
 vector_bits!(u32x16, 16, reverse_by_shifts);
 
+/// Implements [`SimdFloat::gather`] by one table access for each lane.
+#[inline(always)]
+fn gather_by_lane<L: SimdFloat>(table: &[L::Scalar], indices: &[u32; MAX_WIDTH]) -> L {
+    L::from_fn(|i| table[indices[i] as usize])
+}
+
+/// Returns the same result as [`gather_by_lane`]. A table of 16 elements fits into one register, so
+/// that a single permutation instruction looks up all lanes.
+#[cfg(target_feature = "avx512f")]
+#[inline(always)]
+fn gather16(table: &[f32], indices: &[u32; MAX_WIDTH]) -> f32x16 {
+    use safe_arch::{m512i, permute_i32_m512i};
+    let Ok(table) = <[f32; 16]>::try_from(table) else { return gather_by_lane(table, indices) };
+    let indices = m512i::from(cast::<[u32; 16], [i32; 16]>(*indices));
+    let table = m512i::from(cast::<[f32; 16], [i32; 16]>(table));
+    let lanes: [i32; 16] = permute_i32_m512i(indices, table).into();
+    f32x16::new(cast(lanes))
+}
+
+/// Returns the four element-wise sums of the two halves of `sums` if it has eight elements. Returns
+/// `sums` itself if it has four.
+#[inline(always)]
+fn fold_to_four(sums: &[i64]) -> i64x4 {
+    sums.chunks_exact(4)
+        .map(|four| i64x4::new([four[0], four[1], four[2], four[3]]))
+        .fold(i64x4::splat(0), |sum, four| sum + four)
+}
+
 macro_rules! vector_lanes {
-    ($vector:ident, $half:ident, $scalar:ident, $bits:ident, $raw:ident, $n:literal, $unit:expr) => {
+    ($vector:ident, $half:ident, $scalar:ident, $bits:ident, $raw:ident, $n:literal, [$double:ident, $long:ident],
+     $gather:expr, $unit:expr) => {
         impl Mask for $vector {
             #[inline(always)]
             fn any(self) -> bool {
@@ -128,6 +158,11 @@ macro_rules! vector_lanes {
                 $vector::new(array_from_fn(f))
             }
             #[inline(always)]
+            fn gather(table: &[$scalar], indices: &[u32; MAX_WIDTH]) -> Self {
+                let gather: fn(&[$scalar], &[u32; MAX_WIDTH]) -> Self = $gather;
+                gather(table, indices)
+            }
+            #[inline(always)]
             fn lane(self, i: usize) -> $scalar {
                 self.as_array()[i]
             }
@@ -157,33 +192,15 @@ macro_rules! vector_lanes {
                     high.into_iter().fold(-$scalar::MAX, larger),
                 )
             }
-            #[inline(always)]
-            fn abs(self) -> Self {
-                $vector::abs(self)
-            }
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                $vector::sqrt(self)
-            }
-            #[inline(always)]
-            fn sin_cos(self) -> (Self, Self) {
-                $vector::sin_cos(self)
-            }
-            #[inline(always)]
-            fn atan2(self, x: Self) -> Self {
-                $vector::atan2(self, x)
-            }
-            #[inline(always)]
-            fn ln(self) -> Self {
-                $vector::ln(self)
-            }
-            #[inline(always)]
-            fn exp(self) -> Self {
-                $vector::exp(self)
-            }
-            #[inline(always)]
-            fn copysign(self, sign: Self) -> Self {
-                $vector::copysign(self, sign)
+            by_own_methods! {
+                $vector:
+                abs() -> Self,
+                sqrt() -> Self,
+                sin_cos() -> (Self, Self),
+                atan2(x) -> Self,
+                ln() -> Self,
+                exp() -> Self,
+                copysign(sign) -> Self,
             }
             #[inline(always)]
             fn lt(self, other: Self) -> Self {
@@ -227,27 +244,28 @@ macro_rules! vector_lanes {
             fn fixed_sum(self, scale: f64) -> i64 {
                 // The rounded integer is the difference between the bits of `x + ROUNDER` and those
                 // of `ROUNDER`.
-                let (scale, rounder) = (f64x4::splat(scale), f64x4::splat(ROUNDER));
-                let mut sum = i64x4::splat(0);
-                for four in self.as_array().chunks_exact(4) {
-                    let x = f64x4::new(std::array::from_fn(|i| f64::from(four[i])));
-                    sum += cast::<f64x4, i64x4>(x * scale + rounder);
+                let (scale, rounder) = ($double::splat(scale), $double::splat(ROUNDER));
+                let mut sum = $long::splat(0);
+                for part in self.as_array().chunks_exact(<$double as SimdFloat>::WIDTH) {
+                    let x = $double::new(std::array::from_fn(|i| f64::from(part[i])));
+                    sum += cast::<$double, $long>(x.mul_add(scale, rounder));
                 }
-                let [a, b, c, d] = sum.to_array();
+                let [a, b, c, d] = fold_to_four(sum.as_array()).to_array();
                 let all = (a.wrapping_add(b)).wrapping_add(c.wrapping_add(d));
                 all.wrapping_sub((ROUNDER.to_bits() as i64).wrapping_mul($n))
             }
             #[inline(always)]
             fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {
-                // Lanes are converted in groups of four. For single numbers the compiler emits
-                // scattered stores.
-                let (scale, rounder) = (f64x4::splat(scale), f64x4::splat(ROUNDER));
+                // Lanes are converted in groups. For single numbers the compiler emits scattered
+                // stores.
+                let (scale, rounder) = ($double::splat(scale), $double::splat(ROUNDER));
                 let mut each = [0; MAX_WIDTH];
-                let fours = self.as_array().chunks_exact(4);
-                for (each, four) in each.chunks_exact_mut(4).zip(fours) {
-                    let x = f64x4::new(std::array::from_fn(|i| f64::from(four[i])));
-                    let bits = cast::<f64x4, i64x4>(x * scale + rounder);
-                    let rounded = bits - i64x4::splat(ROUNDER.to_bits() as i64);
+                let parts = self.as_array().chunks_exact(<$double as SimdFloat>::WIDTH);
+                for (each, part) in each.chunks_exact_mut(<$double as SimdFloat>::WIDTH).zip(parts)
+                {
+                    let x = $double::new(std::array::from_fn(|i| f64::from(part[i])));
+                    let bits = cast::<$double, $long>(x.mul_add(scale, rounder));
+                    let rounded = bits - $long::splat(ROUNDER.to_bits() as i64);
                     each.copy_from_slice(&rounded.to_array());
                 }
                 each
@@ -256,20 +274,20 @@ macro_rules! vector_lanes {
     };
 }
 
-vector_lanes!(f32x8, f32x4, f32, u32x8, u32, 8, |bits| {
+vector_lanes!(f32x8, f32x4, f32, u32x8, u32, 8, [f64x4, i64x4], gather_by_lane, |bits| {
     f32x8::from_i32x8(cast::<u32x8, i32x8>(bits >> 8u32)) * f32x8::splat(1.0 / 16_777_216.0)
 });
-vector_lanes!(f64x4, f64x2, f64, u32x4, u64, 4, |bits| {
+vector_lanes!(f64x4, f64x2, f64, u32x4, u64, 4, [f64x4, i64x4], gather_by_lane, |bits| {
     let signed: i32x4 = cast(bits ^ u32x4::splat(0x8000_0000));
     (f64x4::from_i32x4(signed) + f64x4::splat(2_147_483_648.5))
         * f64x4::splat(1.0 / 4_294_967_296.0)
 });
 #[cfg(target_feature = "avx512f")]
-vector_lanes!(f32x16, f32x8, f32, u32x16, u32, 16, |bits| {
+vector_lanes!(f32x16, f32x8, f32, u32x16, u32, 16, [f64x8, i64x8], gather16, |bits| {
     f32x16::from_i32x16(cast::<u32x16, i32x16>(bits >> 8u32)) * f32x16::splat(1.0 / 16_777_216.0)
 });
 #[cfg(target_feature = "avx512f")]
-vector_lanes!(f64x8, f64x4, f64, u32x8, u64, 8, |bits| {
+vector_lanes!(f64x8, f64x4, f64, u32x8, u64, 8, [f64x8, i64x8], gather_by_lane, |bits| {
     let signed: i32x8 = cast(bits ^ u32x8::splat(0x8000_0000));
     (f64x8::from_i32x8(signed) + f64x8::splat(2_147_483_648.5))
         * f64x8::splat(1.0 / 4_294_967_296.0)

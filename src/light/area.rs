@@ -9,9 +9,9 @@ use std::f64::consts::PI;
 description! {
     /// Light from a sphere. Points inside of it are lit from all sides.
     pub struct SphereLight: Copy {
-        /// Centre.
+        /// Centre of the sphere.
         center: [f64; 3], in COORDINATE "scene units";
-        /// Radius.
+        /// Radius of the sphere.
         radius: f64, in SIZE "scene units";
     }
 }
@@ -19,11 +19,11 @@ description! {
 description! {
     /// Light from one side of a rectangle.
     pub struct RectangleLight: Copy {
-        /// Centre.
+        /// Centre of the rectangle.
         center: [f64; 3], in COORDINATE "scene units";
-        /// Width (across) and height (along `up`).
+        /// Width and height of the rectangle; the height is along `up`.
         size: [f64; 2], in SIZE "scene units";
-        /// Direction of the side that shines.
+        /// Direction in which the side that shines faces.
         normal: [f64; 3], as Direction;
         /// Direction of the height, made perpendicular to `normal`. If the two are parallel, the
         /// height is along z.
@@ -34,23 +34,23 @@ description! {
 description! {
     /// Light from one side of a disk.
     pub struct DiskLight: Copy {
-        /// Centre.
+        /// Centre of the disk.
         center: [f64; 3], in COORDINATE "scene units";
-        /// Radius.
+        /// Radius of the disk.
         radius: f64, in SIZE "scene units";
-        /// Direction of the side that shines.
+        /// Direction in which the side that shines faces.
         normal: [f64; 3], as Direction;
     }
 }
 
-/// Default of [`RectangleLight::up`].
+/// Returns the default of [`RectangleLight::up`], the +y direction.
 pub(super) fn up() -> [f64; 3] {
     [0.0, 1.0, 0.0]
 }
 
-/// Returns unit vectors across, up and along `normal`. `up` is made perpendicular to the normal; if
-/// they are parallel within 1e-6, the z axis replaces it, or the x axis for a normal along z.
-/// Returns `None` if `normal` is zero.
+/// Returns the unit vectors of a rectangle's frame: across, up and along `normal`. `up` is made
+/// perpendicular to the normal; if they are parallel within 1e-6, the z axis replaces it, or the x
+/// axis for a normal along z. Returns `None` if `normal` is zero.
 fn frame(normal: [f64; 3], up: [f64; 3]) -> Option<[DVec3; 3]> {
     let front = unit(normal)?;
     let across = |up: DVec3| Some(up.cross(front)).filter(|across| across.length() > 1e-6);
@@ -58,19 +58,19 @@ fn frame(normal: [f64; 3], up: [f64; 3]) -> Option<[DVec3; 3]> {
     Some([right, front.cross(right), front])
 }
 
-/// Surface of a light with a size.
+/// Surface of a light that has a size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EmitterSurface {
-    /// Sphere.
+    /// Surface of a sphere that emits light outwards.
     Sphere(SphereLight),
-    /// Rectangle that shines from one side.
+    /// Surface of a rectangle that emits light from one side.
     Rectangle(RectangleLight),
-    /// Disk that shines from one side.
+    /// Surface of a disk that emits light from one side.
     Disk(DiskLight),
 }
 
 impl EmitterSurface {
-    /// Centre \[scene units\].
+    /// Returns the centre of the surface \[scene units\].
     pub fn center(&self) -> DVec3 {
         DVec3::from(match self {
             Self::Sphere(sphere) => sphere.center,
@@ -79,7 +79,8 @@ impl EmitterSurface {
         })
     }
 
-    /// Radius \[scene units\] of the smallest ball around the centre that contains the surface.
+    /// Returns the radius \[scene units\] of the smallest sphere around the centre that contains
+    /// the surface.
     pub fn radius(&self) -> f64 {
         match self {
             Self::Sphere(sphere) => sphere.radius,
@@ -88,7 +89,7 @@ impl EmitterSurface {
         }
     }
 
-    /// Area that emits light \[scene units²\].
+    /// Returns the area that emits light \[scene units²\].
     pub fn area(&self) -> f64 {
         match self {
             Self::Sphere(sphere) => 4.0 * PI * sphere.radius * sphere.radius,
@@ -97,8 +98,8 @@ impl EmitterSurface {
         }
     }
 
-    /// Smallest extent \[scene units\]: the shorter side of a rectangle; the radius of a sphere or
-    /// disk.
+    /// Returns the smallest extent of the surface \[scene units\]: the shorter side of a rectangle;
+    /// the radius of a sphere or disk.
     pub fn thickness(&self) -> f64 {
         match self {
             Self::Rectangle(rectangle) => rectangle.size[0].min(rectangle.size[1]),
@@ -106,8 +107,8 @@ impl EmitterSurface {
         }
     }
 
-    /// Returns unit vectors across, up, and towards the side that emits light. The frame of a
-    /// sphere is arbitrary. Returns `None` if the normal is zero.
+    /// Returns the unit vectors of the surface's frame: across, up, and towards the side that emits
+    /// light. The frame of a sphere is arbitrary. Returns `None` if the normal is zero.
     pub fn frame(&self) -> Option<[DVec3; 3]> {
         match self {
             Self::Sphere(_) => Some([DVec3::X, DVec3::Y, DVec3::Z]),

@@ -1,5 +1,6 @@
-//! Compiled lights, white and of unit strength. Colour and intensity of a light are applied to the
-//! accumulated sums, so that new colours and intensities need no new samples.
+//! Compiled lights without a size (delta lights), white and of unit strength. Colour and intensity
+//! of a light are applied to the film's sums, so that new colours and intensities need no new
+//! samples.
 
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::light::{Falloff, Light, Spot};
@@ -7,52 +8,45 @@ use crate::value::unit;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// A compiled delta light: a light without a size.
+/// Delta light: a light without a size, compiled for the kernels.
 #[derive(Clone, Copy, Debug)]
 pub enum DeltaLight<S> {
-    /// Point light. Its irradiance at normal incidence is 1 / d^2 at the distance d.
-    InverseSquare {
-        /// Position of the light.
+    /// Point or spot light: light from one point.
+    Point {
+        /// Position of the light, relative to the scene's centre.
         position: [S; 3],
-    },
-    /// Point light. Its irradiance at normal incidence is pi at every distance.
-    Constant {
-        /// Position of the light.
-        position: [S; 3],
+        /// Falloff: `true` if the irradiance at normal incidence is 1 / d^2 at the distance d;
+        /// `false` if it is pi at every distance.
+        inverse_square: bool,
+        /// Cone that limits the light of a spot; `None` for a point light.
+        cone: Option<SpotCone<S>>,
     },
     /// Directional light with the irradiance pi at normal incidence.
     Directional {
-        /// Unit vector towards the light.
+        /// Unit vector towards the distant light.
         wi: [S; 3],
-    },
-    /// Light from one point into a cone.
-    Spot {
-        /// Position of the light.
-        position: [S; 3],
-        /// Cone that limits the light.
-        cone: SpotCone<S>,
-        /// Falloff: `true` if the irradiance inside the inner cone is 1 / d^2 at the distance d;
-        /// `false` if it is pi.
-        inverse_square: bool,
     },
 }
 
-/// Largest value of `SpotCone::scale`. It is finite in single precision.
+/// Largest value of [`SpotCone::scale`], the reciprocal width of the cone's soft edge. A cone
+/// without a soft edge gets this value, which is finite in single precision.
 const SHARP: f64 = 1e30;
 
-/// Cone of a spot light: the factor of its intensity in each direction.
+/// Cone of a spot light. It gives the factor, 0..=1, by which the light's intensity is multiplied
+/// in each direction.
 ///
-/// With s = 1 - cos of the angle to the axis, the factor is smoothstep(t) = t^2 (3 - 2t) for
-/// t = (s_outer - s) / (s_outer - s_inner), clamped to [0, 1]: a smoothstep of the cosine, as in
-/// pbrt. s is half the squared distance between the unit vectors, which keeps its precision in
-/// narrow cones.
+/// Let s = 1 - cos(angle to the axis), and let s_inner and s_outer be its values at the inner and
+/// the outer cone. The factor is t^2 (3 - 2t) for t = (s_outer - s) / (s_outer - s_inner), clamped
+/// to [0, 1]. It is a smoothstep of the cosine, as in pbrt. s is computed as half the squared
+/// distance between the unit vectors of the direction and the axis, which is precise in narrow
+/// cones.
 #[derive(Clone, Copy, Debug)]
 pub struct SpotCone<S> {
     /// Unit vector from lit points on the cone's axis towards the light.
     axis: [S; 3],
-    /// Value of s at the outer cone.
+    /// Value of s = 1 - cos(angle to the axis) at the outer cone.
     outer: S,
-    /// 1 / (s_outer - s_inner), at most [`SHARP`].
+    /// 1 / (s_outer - s_inner), at most [`SHARP`], where s = 1 - cos(angle to the axis).
     scale: S,
 }
 
@@ -73,8 +67,8 @@ impl<S: Float> SpotCone<S> {
         })
     }
 
-    /// Returns the factor of the intensity, from 0 to 1, at points from which the light is in the
-    /// direction of the unit vector `wi`.
+    /// Returns the factor of the spot's intensity, 0..=1, at surface points. `wi` is the unit
+    /// vector from each point to the light.
     #[inline(always)]
     fn factor<L: SimdFloat<Scalar = S>>(&self, wi: Vec3<L>) -> L {
         let s = (wi - Vec3::splat(self.axis)).length_squared() * L::from_f64(0.5);
@@ -88,45 +82,42 @@ impl<S: Float> SpotCone<S> {
 pub struct LightSample<L> {
     /// Unit vector towards the light.
     pub wi: Vec3<L>,
-    /// Distance to the light; the largest finite number for a directional light.
+    /// Distance from the surface point to the light; the largest finite number for a directional
+    /// light.
     pub distance: L,
-    /// Irradiance on a surface that faces the light.
+    /// Irradiance that the light, with unit strength, causes on a surface that faces it.
     pub irradiance: L,
 }
 
 impl<S: Float> DeltaLight<S> {
-    /// Compiles `light` for a scene translated by -`origin`. Returns `None` if `light` has a size
-    /// or is an environment, or if its direction is zero.
+    /// Compiles `light`. Positions become relative to `origin`, the scene's centre. Returns `None`
+    /// if `light` has a size or is an environment, or if its direction is zero.
     pub fn new(light: &Light, origin: DVec3) -> Option<Self> {
         if let Some(position) = light.apex() {
             let position = (DVec3::from(position) - origin).to_array().map(S::from_f64);
             let inverse_square = light.falloff == Falloff::InverseSquare;
-            return match &light.spot {
-                Some(spot) => {
-                    let cone = SpotCone::new(spot)?;
-                    Some(Self::Spot { position, cone, inverse_square })
-                }
-                None if inverse_square => Some(Self::InverseSquare { position }),
-                None => Some(Self::Constant { position }),
+            let cone = match &light.spot {
+                Some(spot) => Some(SpotCone::new(spot)?),
+                None => None,
             };
+            return Some(Self::Point { position, inverse_square, cone });
         }
         let wi = -unit(light.directional?.direction)?;
         Some(Self::Directional { wi: wi.to_array().map(S::from_f64) })
     }
 
-    /// Position of the light in the translated scene; `None` for a directional light.
+    /// Returns the position of the light relative to the scene's centre; `None` for a directional
+    /// light.
     pub fn position(&self) -> Option<DVec3> {
         match self {
-            Self::InverseSquare { position }
-            | Self::Constant { position }
-            | Self::Spot { position, .. } => Some(DVec3::from(position.map(S::to_f64))),
+            Self::Point { position, .. } => Some(DVec3::from(position.map(S::to_f64))),
             Self::Directional { .. } => None,
         }
     }
 
     /// Returns `true` if the irradiance decreases with the square of the distance.
     pub fn is_inverse_square(&self) -> bool {
-        matches!(self, Self::InverseSquare { .. } | Self::Spot { inverse_square: true, .. })
+        matches!(self, Self::Point { inverse_square: true, .. })
     }
 
     /// Returns the light that arrives at `point` if nothing occludes it.
@@ -138,21 +129,18 @@ impl<S: Float> DeltaLight<S> {
                 distance: L::from_f64(L::MAX),
                 irradiance: L::from_f64(PI),
             },
-            Self::InverseSquare { position }
-            | Self::Constant { position }
-            | Self::Spot { position, .. } => {
+            Self::Point { position, inverse_square, cone } => {
                 let to_light = Vec3::splat(*position) - point;
                 let distance = to_light.length_squared().sqrt();
                 let inverse = L::one() / distance;
                 let wi = to_light * inverse;
-                let mut irradiance = match self {
-                    Self::InverseSquare { .. } | Self::Spot { inverse_square: true, .. } => {
-                        // The irradiance is kept finite, because infinity times black would be NaN.
-                        (inverse * inverse).min(L::from_f64(L::MAX))
-                    }
-                    _ => L::from_f64(PI),
+                let mut irradiance = if *inverse_square {
+                    // The irradiance is kept finite, because infinity times black would be NaN.
+                    (inverse * inverse).min(L::from_f64(L::MAX))
+                } else {
+                    L::from_f64(PI)
                 };
-                if let Self::Spot { cone, .. } = self {
+                if let Some(cone) = cone {
                     irradiance *= cone.factor(wi);
                 }
                 LightSample { wi, distance, irradiance }
@@ -160,8 +148,9 @@ impl<S: Float> DeltaLight<S> {
         }
     }
 
-    /// Returns the irradiance at normal incidence at the origin of the translated scene. If the
-    /// light is nearer than `radius`, returns the irradiance at the distance `radius`.
+    /// Returns the irradiance that the light, with unit strength, causes at normal incidence at the
+    /// scene's centre. If the light is nearer to the centre than `radius`, returns the irradiance
+    /// at the distance `radius` from the light.
     pub fn typical_irradiance(&self, radius: f64) -> f64 {
         match self.position().filter(|_| self.is_inverse_square()) {
             Some(position) => {
@@ -184,11 +173,12 @@ mod tests {
         Light { spot: Some(spot), falloff, ..Light::default() }
     }
 
-    /// Compares the irradiance around a spot light with the smoothstep of the angle's cosine.
+    /// Checks that the irradiance around a spot light follows the smoothstep of the cosine of the
+    /// angle to its axis. `L` is the number type and `epsilon` its rounding error.
     ///
-    /// Tolerance: the direction has an error of about ten rounding errors, from coordinates below
-    /// 8, divided by distances of at least 0.5, and from two unit vectors. The slope of the
-    /// smoothstep, at most 1.5 times that of the cosine, multiplies it.
+    /// The tolerance follows from the error of the direction to the light, which is about ten times
+    /// `epsilon`: coordinates are below 8, distances at least 0.5. The smoothstep multiplies this
+    /// error by its slope, which is at most 1.5 times that of t (see [`SpotCone`]).
     fn check<L: SimdFloat>(epsilon: f64) {
         let origin = DVec3::new(0.25, 0.0, 0.5);
         for (inner, outer) in [(10.0, 30.0), (0.0, 90.0), (0.0, 0.5), (70.0, 160.0), (180.0, 180.0)]

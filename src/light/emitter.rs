@@ -1,4 +1,5 @@
-//! Compiled lights with a size: intersection, sampling by solid angle or area, densities.
+//! Compiled lights with a size (emitters): ray intersection, sampling by solid angle or area,
+//! densities.
 
 use crate::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
 use crate::light::area::EmitterSurface;
@@ -7,12 +8,12 @@ use crate::sampling::warp;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
-/// Smallest solid angle at which a rectangle is sampled by solid angle instead of area, in units of
-/// the rounding error. At this solid angle rounding moves the sampled points by 1e-5 of the
-/// rectangle's size.
+/// Smallest solid angle at which a rectangle or triangle is sampled by solid angle; smaller ones
+/// are sampled by area. The unit is 1 sr times the rounding error of the number type. At this solid
+/// angle, rounding moves the sampled points by 1e-5 of the surface's size.
 pub(super) const MIN_SOLID_ANGLE: f64 = 2e5;
 
-/// Surface of a compiled emitter.
+/// Surface of a compiled light with a size.
 #[derive(Clone, Copy, Debug)]
 enum Surface<S> {
     Sphere {
@@ -29,34 +30,38 @@ enum Surface<S> {
     },
 }
 
-/// A light of finite size, compiled for the kernels. It emits white light of intensity 1; the
-/// weights of its light group add colour and intensity.
+/// Emitter: a light of finite size, compiled for the kernels. It emits white light of intensity 1.
+/// Colour and intensity are applied later, by the weights of its light group (lights with sums of
+/// their own in the film).
 #[derive(Clone, Copy, Debug)]
 pub struct Emitter<S> {
     surface: Surface<S>,
     center: [S; 3],
-    /// Area that emits light.
+    /// Area of the surface that emits light \[scene units²\].
     area: S,
-    /// Radiance, the same at every point and in every direction.
-    radiance: S,
+    /// Radiance of the emitter for white colour and intensity 1, the same at every point and in
+    /// every direction.
+    pub radiance: S,
 }
 
 /// Light that arrives at surface points from sampled points of an emitter, one point per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct EmitterSample<L> {
-    /// Unit vector towards the sampled point.
+    /// Unit vector from the surface point towards the sampled point.
     pub wi: Vec3<L>,
-    /// Distance to the sampled point.
+    /// Distance from the surface point to the sampled point.
     pub distance: L,
-    /// Density of the direction \[1/sr\]; zero if no light arrives.
+    /// Probability density \[1/sr\] with which the direction `wi` is sampled; zero if no light
+    /// arrives.
     pub density: L,
-    /// Radiance divided by the density; zero if no light arrives.
+    /// Estimate of the irradiance from one sample: the radiance of the emitter divided by
+    /// `density`. Zero if no light arrives.
     pub irradiance: L,
 }
 
 impl<S: Float> Emitter<S> {
-    /// Compiles `light` for a scene translated by -`origin`. Returns `None` if the light has no
-    /// size or no direction.
+    /// Compiles `light`. Positions become relative to `origin`, the scene's centre. Returns `None`
+    /// if the light has no size or no direction.
     ///
     /// The surface is lifted by `lift`, at most 1e-4 of its size, so that rounding does not hide an
     /// emitter that touches an object: a flat emitter moves to the side that emits light, a sphere
@@ -97,12 +102,12 @@ impl<S: Float> Emitter<S> {
         })
     }
 
-    /// Centre, in coordinates relative to the scene's centre.
+    /// Returns the centre of the surface, relative to the scene's centre.
     pub fn center(&self) -> DVec3 {
         DVec3::from(self.center.map(S::to_f64))
     }
 
-    /// Radius of a ball around the centre that contains the surface.
+    /// Returns the radius of a sphere around the centre that contains the surface.
     pub fn radius(&self) -> f64 {
         match &self.surface {
             Surface::Sphere { radius } | Surface::Disk { radius, .. } => radius.to_f64(),
@@ -112,14 +117,9 @@ impl<S: Float> Emitter<S> {
         }
     }
 
-    /// Area that emits light \[scene units²\].
+    /// Returns the area that emits light \[scene units²\].
     pub fn area(&self) -> f64 {
         self.area.to_f64()
-    }
-
-    /// Radiance, the same at every point and in every direction.
-    pub fn radiance(&self) -> S {
-        self.radiance
     }
 
     /// Returns the distance at which each ray hits the side that emits light; the largest finite
@@ -225,8 +225,9 @@ impl<S: Float> Emitter<S> {
         }
     }
 
-    /// Creates a sample with the given density. Its irradiance is radiance divided by `density`,
-    /// limited to the largest finite number, because infinity times black would be NaN.
+    /// Creates the sample of direction `wi` with the given density. The irradiance of the sample is
+    /// the emitter's radiance divided by `density`. It is limited to the largest finite number,
+    /// because an infinite irradiance times a black reflectance would be NaN.
     #[inline(always)]
     fn with_density<L: SimdFloat<Scalar = S>>(
         &self,
@@ -240,14 +241,14 @@ impl<S: Float> Emitter<S> {
     }
 }
 
-/// Returns the components of `v` along the axes.
+/// Returns the components of `v` along the three unit vectors `axes`.
 #[inline(always)]
 pub(super) fn local_of<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], v: Vec3<L>) -> [L; 3] {
     axes.map(|axis| Vec3::splat(axis).dot(v))
 }
 
-/// Returns the unit vector in the direction of the given local components, and the length of the
-/// components.
+/// Returns two values: the unit vector in the direction of the vector with the components [x, y, z]
+/// along `axes`, and the length of this vector.
 #[inline(always)]
 pub(super) fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3]) -> (Vec3<L>, L) {
     let distance = (x * x + y * y + z * z).sqrt();
@@ -256,9 +257,9 @@ pub(super) fn towards<L: SimdFloat>(axes: &[[L::Scalar; 3]; 3], [x, y, z]: [L; 3
     ((across * x + up * y + normal * z) * inverse, distance)
 }
 
-/// Returns the distance at which rays hit the emitter's plane, and the local coordinates of the hit
-/// points. `to_center` is the vector from the rays' origin to the emitter's centre. The distance is
-/// negative for rays that do not hit the front.
+/// Returns two values: the distance at which each ray hits the plane of a flat emitter, and the
+/// local coordinates (across, up) of the hit point. `to_center` is the vector from the rays' origin
+/// to the emitter's centre. The distance is negative for rays that do not hit the front.
 #[inline(always)]
 fn plane_hit<L: SimdFloat>(
     axes: &[[L::Scalar; 3]; 3],
@@ -273,22 +274,23 @@ fn plane_hit<L: SimdFloat>(
 }
 
 /// Returns the density \[1/sr\] of directions to uniform points of a flat surface at `distance`:
-/// distance^2 / (area cos). `height` is the coordinate of the surface along its normal, relative to
-/// the receiver; it is negative if the receiver is in front of the surface.
+/// distance^2 / (area cos(angle to the normal)). `height` is the coordinate of the surface along
+/// its normal, relative to the receiver. It is negative for receivers in front of the surface; for
+/// all others the density is zero.
 #[inline(always)]
 pub(super) fn density_of_area<L: SimdFloat>(area: L, distance: L, height: L) -> L {
     let density = distance * distance * distance / (area * -height);
     density.min(L::from_f64(L::MAX)).masked(height.lt(L::zero()))
 }
 
-/// Cone of the directions from a point to a sphere. From a point inside of the sphere it contains
-/// all directions.
+/// Cone of the directions from a receiver point to a spherical emitter. From a point inside of the
+/// sphere it contains all directions.
 pub(super) struct Cone<L: SimdFloat> {
     pub axis: Vec3<L>,
     pub one_minus_cos: L,
-    /// Squared distance to the centre.
+    /// Squared distance from the receiver point to the centre of the sphere.
     pub distance2: L,
-    /// Lanes whose origin is inside of the sphere.
+    /// Lanes whose receiver point is inside of the sphere.
     pub inside: L::Mask,
 }
 
@@ -309,22 +311,22 @@ impl<L: SimdFloat> Cone<L> {
         }
     }
 
-    /// Density of uniform directions in the cone \[1/sr\].
+    /// Returns the density \[1/sr\] of uniform directions in the cone.
     #[inline(always)]
     pub fn density(&self) -> L {
         (L::one() / (self.one_minus_cos * L::from_f64(TAU))).min(L::from_f64(L::MAX))
     }
 }
 
-/// Rectangle seen from a point, sampled by solid angle.
+/// Rectangle as seen from a receiver point, sampled by solid angle.
 ///
 /// Ureña, Fajardo, King 2013, *An Area-Preserving Parametrization for Spherical Rectangles*.
 pub(super) struct SphericalRectangle<L: SimdFloat> {
-    /// Interval of the rectangle's coordinates across, relative to the point.
+    /// Interval of the rectangle's coordinates along its width, relative to the receiver point.
     x: [L; 2],
     y: [L; 2],
-    /// Coordinate of the rectangle's plane along the normal, relative to the point; negative if the
-    /// point is in front of it.
+    /// Coordinate of the rectangle's plane along its normal, relative to the receiver point;
+    /// negative if the point is in front of the rectangle.
     height: L,
     area: L,
     solid_angle: L,
@@ -334,8 +336,8 @@ pub(super) struct SphericalRectangle<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> SphericalRectangle<L> {
-    /// Creates the rectangle with the given width and height, whose centre has the given local
-    /// coordinates relative to the point: across, up and along the normal.
+    /// Creates the rectangle with the given width and height. [center_x, center_y, z] is its centre
+    /// relative to the receiver point, in the rectangle's frame: across, up and along the normal.
     #[inline(always)]
     pub fn new([width, height]: [L; 2], [center_x, center_y, z]: [L; 3]) -> Self {
         let half = L::from_f64(0.5);
@@ -347,7 +349,8 @@ impl<L: SimdFloat> SphericalRectangle<L> {
         Self { x, y, height: z, area, solid_angle, by_angle }
     }
 
-    /// Samples a point of the rectangle and returns its local coordinates relative to the receiver.
+    /// Samples a point of the rectangle. Returns its coordinates across and up, relative to the
+    /// receiver point. `u` and `v` are uniform in [0, 1).
     #[inline(always)]
     pub fn sample(&self, u: L, v: L) -> [L; 2] {
         let ([x0, x1], [y0, y1]) = (self.x, self.y);
@@ -377,7 +380,8 @@ impl<L: SimdFloat> SphericalRectangle<L> {
         [L::select(self.by_angle, x, by_area[0]), L::select(self.by_angle, y, by_area[1])]
     }
 
-    /// Density \[1/sr\] of a direction in which the rectangle is hit at `distance`.
+    /// Returns the density \[1/sr\] with which [`Self::sample`] draws a direction that hits the
+    /// rectangle at `distance`.
     #[inline(always)]
     pub fn density(&self, distance: L) -> L {
         let by_area = density_of_area(self.area, distance, self.height);
@@ -388,8 +392,8 @@ impl<L: SimdFloat> SphericalRectangle<L> {
 
 /// Returns the solid angle of a rectangle: the sum of the solid angles of two triangles, each by an
 /// arc tangent without cancellation at small angles (Van Oosterom and Strackee 1983). `[x0, x1]`
-/// and `[y0, y1]` are the intervals of the rectangle's local coordinates relative to the point, and
-/// `z` is the coordinate of its plane.
+/// and `[y0, y1]` are the intervals of the rectangle's coordinates relative to the receiver point,
+/// and `z` is the coordinate of its plane.
 #[inline(always)]
 fn solid_angle<L: SimdFloat>([x0, x1]: [L; 2], [y0, y1]: [L; 2], z: L, area: L) -> L {
     let corner = |x: L, y: L| {

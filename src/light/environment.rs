@@ -12,7 +12,7 @@ use crate::value::{Color, ValidationError, description};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Number of rows of the image that represents a gradient.
+/// Number of rows of the image that represents a gradient environment.
 const GRADIENT_ROWS: u32 = 512;
 
 description! {
@@ -36,12 +36,13 @@ description! {
 }
 
 impl Environment {
-    /// Name of the image; `None` for a gradient.
+    /// Returns the name of the image file; `None` for a gradient.
     pub fn file(&self) -> Option<&str> {
         (!self.file.is_empty()).then_some(self.file.as_str())
     }
 
-    /// The image; `None` for a gradient, or if no readable file has been loaded.
+    /// Returns the image of the environment; `None` for a gradient, or if no readable file has been
+    /// loaded.
     pub fn map(&self) -> Option<&Arc<RadianceMap>> {
         self.file().and(self.map.content())
     }
@@ -61,13 +62,13 @@ impl Environment {
         }
     }
 
-    /// Returns the error of reading the image; `None` if there was none.
+    /// Returns the error of reading the environment image; `None` if there was none.
     pub(super) fn fault(&self) -> Option<ValidationError> {
         self.file().and_then(|_| self.map.fault())
     }
 
-    /// Image of the gradient. It has one column, because the radiance depends on the elevation
-    /// alone.
+    /// Returns an image of the gradient. It has one column, because the radiance depends on the
+    /// elevation alone.
     fn gradient(&self) -> RadianceMap {
         let row = |row: u32| {
             let height = (PI * (f64::from(row) + 0.5) / f64::from(GRADIENT_ROWS)).cos();
@@ -79,27 +80,28 @@ impl Environment {
     }
 }
 
-/// A compiled environment light, white and with intensity 1.
+/// Environment light compiled for the kernels, white and with intensity 1.
 pub struct EnvironmentLight {
     map: Arc<RadianceMap>,
-    /// Sine and cosine of the rotation.
+    /// Sine and cosine of the environment's rotation about the vertical.
     rotation: (f64, f64),
 }
 
 /// Light that arrives from sampled directions of an environment, one direction per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct EnvironmentSample<L> {
-    /// Unit vector towards the light.
+    /// Unit vector towards the environment, from which the light arrives.
     pub wi: Vec3<L>,
-    /// Density of the direction \[1/sr\].
+    /// Probability density \[1/sr\] with which the direction `wi` is sampled.
     pub density: L,
-    /// Radiance divided by the density.
+    /// Estimate of the irradiance from one sample: the radiance of the environment divided by
+    /// `density`.
     pub irradiance: Vec3<L>,
 }
 
 impl EnvironmentLight {
-    /// Compiles `light`. Returns `None` if it is no environment light, or if its image is not
-    /// loaded.
+    /// Compiles the environment light `light`. Returns `None` if it is another kind of light, or if
+    /// its image is not loaded.
     pub fn new(light: &Light) -> Option<Self> {
         let environment = light.environment.as_ref()?;
         let map = match environment.file() {
@@ -109,20 +111,23 @@ impl EnvironmentLight {
         Some(Self { map, rotation: environment.rotation.to_radians().sin_cos() })
     }
 
-    /// The image.
+    /// Returns the image of the environment. For a gradient, this is the image of one column that
+    /// represents it.
     pub fn map(&self) -> &RadianceMap {
         &self.map
     }
 
-    /// Rotates `direction` of one lane from scene coordinates into the coordinates of the image.
+    /// Rotates `direction` of lane `lane` from scene coordinates into the coordinates of the
+    /// environment image.
     fn in_image<L: SimdFloat>(&self, direction: Vec3<L>, lane: usize) -> [f64; 3] {
         let (sin, cos) = self.rotation;
         let [x, y, z] = direction.lane(lane).map(L::Scalar::to_f64);
         [x * cos - z * sin, y, x * sin + z * cos]
     }
 
-    /// Returns the radiance from the unit vectors `direction`, and the density \[1/sr\] with which
-    /// [`EnvironmentLight::sample`] draws them. Both are zero outside of `lanes`.
+    /// Returns two values for the unit vectors `direction`: the radiance that arrives from them,
+    /// and the density \[1/sr\] with which [`EnvironmentLight::sample`] draws them. Both are zero
+    /// outside of `lanes`.
     #[inline(never)]
     pub fn radiance<L: SimdFloat>(&self, direction: Vec3<L>, lanes: L::Mask) -> (Vec3<L>, L) {
         let (mut radiance, mut density) = ([[0.0; 3]; MAX_WIDTH], [0.0; MAX_WIDTH]);
@@ -137,8 +142,8 @@ impl EnvironmentLight {
         )
     }
 
-    /// Samples a direction in proportion to luminance for each of `lanes`; in other lanes no light
-    /// arrives. `u` and `v` are uniform in [0, 1).
+    /// Samples a direction for each of `lanes`, with a density in proportion to the environment's
+    /// luminance. In other lanes the irradiance is zero. `u` and `v` are uniform in [0, 1).
     #[inline(never)]
     pub fn sample<L: SimdFloat>(&self, (u, v): (L, L), lanes: L::Mask) -> EnvironmentSample<L> {
         let (sin, cos) = self.rotation;
@@ -159,7 +164,7 @@ impl EnvironmentLight {
     }
 }
 
-/// Calls `action` with each of `lanes`.
+/// Calls `action` with the number of each lane that is true in the mask `lanes`.
 #[inline(always)]
 fn for_each(lanes: impl Mask, mut action: impl FnMut(usize)) {
     let mut remaining = lanes.bits();
@@ -208,7 +213,8 @@ mod tests {
         }
     }
 
-    /// Checks that the rotation 90 moves the middle of the image from -z to -x.
+    /// Checks that a rotation of the environment by 90 degrees moves the middle of its image from
+    /// -z to -x.
     #[test]
     fn rotation_is_counter_clockwise_from_above() {
         let pixels = (0..8).map(|i| [f32::from(u8::from(i % 4 == 1 || i % 4 == 2)); 3]).collect();

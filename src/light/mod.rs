@@ -22,7 +22,7 @@ description! {
     /// A light: exactly one of `point`, `directional`, `spot`, `sphere`, `rectangle`, `disk` and
     /// `environment`, with a colour and an intensity.
     pub struct Light: Default {
-        /// Name. Every light has a different one.
+        /// Name of the light; every light has a different one.
         name: String, or "a number";
         /// Light from one point. A light has exactly one of `point`, `directional`, `spot`,
         /// `sphere`, `rectangle`, `disk` and `environment`.
@@ -93,9 +93,9 @@ description! {
 choices! {
     /// Falloff of a point or spot light with the distance.
     pub enum Falloff {
-        /// not at all
+        /// no falloff: the same light at every distance
         None = "none",
-        /// with the square of the distance
+        /// falloff with the square of the distance
         InverseSquare = "inverse-square",
     }
 }
@@ -110,7 +110,7 @@ choices! {
     }
 }
 
-/// Keys of the kinds, of which each light has exactly one.
+/// Keys of the kinds of lights; each light has exactly one of them.
 pub const KINDS: &[&str] =
     &["point", "directional", "spot", "sphere", "rectangle", "disk", "environment"];
 
@@ -118,13 +118,13 @@ pub const KINDS: &[&str] =
 pub const FIELDS: &[Field] = Light::FIELDS;
 
 impl Light {
-    /// Position of a point or spot light; `None` for any other light.
+    /// Returns the position of a point or spot light; `None` for any other light.
     pub fn apex(&self) -> Option<[f64; 3]> {
         self.point.map(|point| point.position).or(self.spot.map(|spot| spot.position))
     }
 
-    /// Direction in which a directional light travels, the axis of a spot light, or the normal of a
-    /// flat light; `None` for any other light.
+    /// Returns the direction in which a directional light travels, the axis of a spot light, or the
+    /// normal of a flat light; `None` for any other light.
     pub fn direction(&self) -> Option<[f64; 3]> {
         let directional = self.directional.map(|sun| sun.direction);
         let rectangle = self.rectangle.map(|rectangle| rectangle.normal);
@@ -132,7 +132,7 @@ impl Light {
         directional.or(self.spot.map(|spot| spot.direction)).or(flat)
     }
 
-    /// [`Light::direction`] as a mutable reference.
+    /// Returns [`Light::direction`] as a mutable reference.
     pub fn direction_mut(&mut self) -> Option<&mut [f64; 3]> {
         let directional = self.directional.as_mut().map(|sun| &mut sun.direction);
         let rectangle = self.rectangle.as_mut().map(|rectangle| &mut rectangle.normal);
@@ -140,7 +140,7 @@ impl Light {
         directional.or(self.spot.as_mut().map(|spot| &mut spot.direction)).or(flat)
     }
 
-    /// Returns the errors of the light's keys and values.
+    /// Returns the validation errors of the light's keys and values.
     pub fn faults(&self) -> Vec<ValidationError> {
         let kinds = self.kinds();
         let kind_fault = match &kinds[..] {
@@ -195,7 +195,8 @@ impl Light {
         self.validator().and(kind_fault).and(other_fault).and(file_fault).errors()
     }
 
-    /// Names of the kinds (such as `point`) that the light has. A valid light has exactly one.
+    /// Returns the names of the kinds (such as `point`) that the light has. A valid light has
+    /// exactly one.
     pub fn kinds(&self) -> Vec<&'static str> {
         let given = [
             ("point", self.point.is_some()),
@@ -209,7 +210,7 @@ impl Light {
         given.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
     }
 
-    /// Surface of a light with a size; `None` for any other light.
+    /// Returns the surface of a light with a size; `None` for any other light.
     pub fn surface(&self) -> Option<EmitterSurface> {
         let sphere = self.sphere.map(EmitterSurface::Sphere);
         let rectangle = self.rectangle.map(EmitterSurface::Rectangle);
@@ -224,8 +225,8 @@ impl Light {
     }
 
     /// Gives the light a surface of the kind `name` (`sphere`, `rectangle` or `disk`) with the
-    /// given radius. The sides of a rectangle are twice as long. The numbers are rounded. Other
-    /// names change nothing.
+    /// given radius; the sides of a rectangle are 2 x `radius` long. `radius` is rounded to two
+    /// significant digits, `center` by `round_nice`. Other names change nothing.
     pub fn set_surface(&mut self, name: &str, center: DVec3, normal: [f64; 3], radius: f64) {
         let center = center.map(|x| round_nice(x, radius)).to_array();
         let radius = round_significant(radius, 2);
@@ -240,13 +241,14 @@ impl Light {
         }
     }
 
-    /// Position of the light: the point, or the centre of the surface. `None` for a directional or
-    /// environment light.
+    /// Returns the position of the light: the point, or the centre of the surface. `None` for a
+    /// directional or environment light.
     pub fn position(&self) -> Option<[f64; 3]> {
         self.apex().or(self.surface().map(|surface| surface.center().to_array()))
     }
 
-    /// Position of the light as a mutable reference. `None` for a directional or environment light.
+    /// Returns the position of the light as a mutable reference. `None` for a directional or
+    /// environment light.
     pub fn position_mut(&mut self) -> Option<&mut [f64; 3]> {
         let Self { point, spot, sphere, rectangle, disk, .. } = self;
         let point = point.as_mut().map(|point| &mut point.position);

@@ -1,9 +1,9 @@
-//! Emission of objects: sampling of points on their surfaces by solid angle or area, and the
-//! densities. Rays find the emission where they hit the object itself.
+//! Emissive objects as lights: sampling of points on their surfaces by solid angle or area, and the
+//! densities. Rays that hit such an object find its emission without this module.
 //!
-//! A sampled point is lifted off the surface, along the normal and to the side of the receiver, so
-//! that the object does not occlude its own points. At any angle the lifted point is above the
-//! rounding errors of the surface.
+//! A sampled point is lifted off the surface to the side of the receiver, so that the object does
+//! not occlude its own points. The lift is along the normal and larger than the rounding errors of
+//! the surface. It therefore suffices for rays at any angle.
 
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3};
 use crate::light::EmitterSample;
@@ -14,27 +14,27 @@ use crate::sampling::warp;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Largest number of triangles for the choice of a triangle by solid angle. This choice computes
-/// the solid angles of all triangles for each receiver.
+/// Largest number of triangles of an emissive object for which one is chosen in proportion to its
+/// solid angle. For this choice, the solid angles of all triangles are computed for each receiver.
 const MAX_FACES: usize = 32;
 
-/// Surface of an object from which light can be sampled.
+/// Surface of an emissive object from which light can be sampled.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ObjectSurface {
-    /// Sphere.
+    /// Light-emitting sphere.
     Sphere {
-        /// Centre.
+        /// Centre of the sphere, relative to the scene's centre.
         center: DVec3,
-        /// Radius.
+        /// Radius of the sphere.
         radius: f64,
     },
-    /// Rectangle.
+    /// Light-emitting rectangle.
     Rectangle {
-        /// Centre.
+        /// Centre of the rectangle, relative to the scene's centre.
         center: DVec3,
-        /// Unit vectors across, up, and along the normal of the front.
+        /// Unit vectors across and up the rectangle, and along the normal of its front.
         axes: [DVec3; 3],
-        /// Width and height.
+        /// Width and height of the rectangle.
         size: [f64; 2],
     },
     /// Triangles with areas greater than 0, counter-clockwise as seen from the front.
@@ -43,14 +43,15 @@ pub enum ObjectSurface {
     ConvexTriangles(Vec<[DVec3; 3]>),
 }
 
-/// Emission of an object, white and with radiance 1.
+/// Emissive object, compiled as a light. It is white with radiance 1.
 #[derive(Clone, Debug)]
 pub struct ObjectEmitter<S> {
     surface: CompiledSurface<S>,
-    /// Centre of a ball that contains the surface and the lifted points.
-    center: DVec3,
-    /// Radius of the ball.
-    radius: f64,
+    /// Centre of a sphere that contains all sampled points; these are lifted off the surface.
+    pub center: DVec3,
+    /// Radius of a sphere around `center` that contains all sampled points; these are lifted off
+    /// the surface.
+    pub radius: f64,
     /// Height of sampled points above the surface.
     lift: S,
     /// `true` if the back emits light, too: the other side of a flat surface, the inside of a
@@ -69,35 +70,35 @@ enum CompiledSurface<S> {
         axes: [[S; 3]; 3],
         size: [S; 2],
     },
-    /// Up to [`MAX_FACES`] triangles, of which one is chosen by its solid angle.
+    /// Up to [`MAX_FACES`] triangles. One is chosen in proportion to its solid angle.
     Faces {
         triangles: Vec<Triangle<S>>,
-        /// `true` if the triangles enclose a convex solid.
+        /// `true` if the triangles enclose a convex solid, so that no triangle occludes another.
         convex: bool,
     },
-    /// More than [`MAX_FACES`] triangles, of which one is chosen by its area. They are sorted by
-    /// their `end`.
+    /// More than [`MAX_FACES`] triangles, sorted by their `end`. One is chosen in proportion to its
+    /// area.
     Mesh(Vec<Triangle<S>>),
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Triangle<S> {
     corner: [S; 3],
-    /// Edges from the corner to the two others.
+    /// Edges from the first corner of the triangle to the two others.
     edges: [[S; 3]; 2],
-    /// Unit normal of the front.
+    /// Unit normal of the triangle's front.
     normal: [S; 3],
     area: S,
-    /// Range of the random numbers that choose this triangle: from `start` to `end`. The length of
-    /// the range is the triangle's share of the total area.
+    /// Start of the range of random numbers for which this triangle is chosen; `end` is its end.
+    /// The length of the range is the triangle's share of the total area.
     start: S,
     end: S,
 }
 
 impl<S: Float> ObjectEmitter<S> {
-    /// Compiles a surface with coordinates relative to the scene's centre. `lift` is the height of
-    /// sampled points above the surface; at most 1e-4 of the surface's size is used. Returns `None`
-    /// if the surface has no area.
+    /// Compiles the surface of an emissive object. Its back emits light, too, if `two_sided` is
+    /// `true`. `lift` is the height of sampled points above the surface; at most 1e-4 of the
+    /// surface's size is used. Returns `None` if the surface has no area.
     pub fn new(surface: &ObjectSurface, two_sided: bool, lift: f64) -> Option<Self> {
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
         let (compiled, center, radius, area, size);
@@ -160,21 +161,12 @@ impl<S: Float> ObjectEmitter<S> {
         })
     }
 
-    /// Centre, in coordinates relative to the scene's centre.
-    pub fn center(&self) -> DVec3 {
-        self.center
-    }
-
-    /// Radius of a ball around the centre that contains all sampled points.
-    pub fn radius(&self) -> f64 {
-        self.radius
-    }
-
-    /// Samples a point for each of the receivers at `origin`. `u` and `v` are uniform in [0, 1).
+    /// Samples a point of the emissive surface for each of the receivers at `origin`. `u` and `v`
+    /// are uniform in [0, 1).
     ///
-    /// A sphere is sampled by the cone that it subtends, a rectangle by solid angle. Of up to
-    /// 32 triangles one is chosen by its solid angle, of more by its area. The chosen
-    /// triangle is sampled by solid angle, or by area if it is tiny.
+    /// A sphere is sampled by the cone that it subtends, a rectangle by solid angle. One of up to
+    /// 32 triangles is chosen in proportion to its solid angle, one of more triangles in proportion
+    /// to its area. The chosen triangle is sampled by solid angle, or by area if it is tiny.
     #[inline(never)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
@@ -250,7 +242,7 @@ impl<S: Float> ObjectEmitter<S> {
 
     /// Returns the density \[1/sr\] with which [`ObjectEmitter::sample`] draws the direction of a
     /// ray from `origin` that hits the object at `distance`. `triangle` is the index of the
-    /// triangle of a mesh, stored as an id.
+    /// triangle of a mesh, stored by [`SimdFloat::from_id`].
     #[inline(never)]
     pub fn density<L: SimdFloat<Scalar = S>>(
         &self,
@@ -282,8 +274,10 @@ impl<S: Float> ObjectEmitter<S> {
         }
     }
 
-    /// Returns the solid angle of each triangle as seen from the receivers at `origin`, their sum,
-    /// and the lanes that see backs. From outside of a convex solid only fronts count.
+    /// Returns three values for the receivers at `origin`: the solid angle of each triangle that
+    /// emits light to the receiver (0 for others), their sum, and the lanes in which backs of
+    /// triangles may emit light to the receiver. Backs emit only if the object is two-sided, and
+    /// never from a convex object to a receiver outside of it.
     #[inline(always)]
     fn solid_angles<L: SimdFloat<Scalar = S>>(
         &self,
@@ -309,8 +303,9 @@ impl<S: Float> ObjectEmitter<S> {
         (angles, total, backs)
     }
 
-    /// Samples a point of each lane's triangle. Returns its direction, distance and density
-    /// \[1/sr\]. `backs` selects the lanes in which the back emits light.
+    /// Samples a point of each lane's triangle by `u` and `v`, which are uniform in [0, 1). Returns
+    /// three values, seen from the receiver: the direction of the point, its distance, and the
+    /// density \[1/sr\] of the direction. `backs` selects the lanes in which the back emits light.
     #[inline(always)]
     fn sample_triangle<L: SimdFloat<Scalar = S>>(
         &self,
@@ -333,9 +328,10 @@ impl<S: Float> ObjectEmitter<S> {
         (wi, distance, triangle.density(&seen, height, distance))
     }
 
-    /// Lifts each lane's triangle to the side of its receiver. Returns the triangle as a solid
-    /// angle, its corners relative to the receiver, and the coordinate of its plane along the
-    /// normal. This coordinate is negative where light arrives.
+    /// Lifts each lane's triangle to the front, or to the back if the receiver is behind it in a
+    /// lane of `backs`. Returns three values: the lifted triangle as seen from the receiver, its
+    /// corners relative to the receiver, and the coordinate of its plane along the normal. The
+    /// coordinate is negative in lanes whose receiver gets light.
     #[inline(always)]
     fn seen_triangle<L: SimdFloat<Scalar = S>>(
         &self,
@@ -358,9 +354,11 @@ impl<S: Float> ObjectEmitter<S> {
         if self.two_sided { density } else { density.masked(!cone.inside) }
     }
 
-    /// Lifts a point of a flat surface to the side of the receiver. Returns the point's local
-    /// coordinates relative to the receiver, and the lanes that see the back. The third coordinate
-    /// is negative where light arrives. Only lanes in `backs` may see the back.
+    /// Lifts a point of a flat surface to the side of the receiver. [x, y, height] are the point's
+    /// coordinates across, up and along the normal, relative to the receiver. Returns two values:
+    /// the coordinates of the lifted point, and the lanes of `backs` whose receiver is behind the
+    /// surface. In these lanes the sign of the third coordinate is reversed. It is then negative in
+    /// all lanes whose receiver gets light.
     #[inline(always)]
     fn lifted<L: SimdFloat<Scalar = S>>(
         &self,
@@ -373,7 +371,7 @@ impl<S: Float> ObjectEmitter<S> {
     }
 }
 
-/// Returns an array with the value of `f` for each lane.
+/// Returns an array with the value of `f` for each lane number.
 #[inline(always)]
 fn lanes_of<L: SimdFloat>(f: impl Fn(usize) -> usize) -> [usize; MAX_WIDTH] {
     let mut out = [0; MAX_WIDTH];
@@ -383,21 +381,21 @@ fn lanes_of<L: SimdFloat>(f: impl Fn(usize) -> usize) -> [usize; MAX_WIDTH] {
     out
 }
 
-/// One triangle per lane, with the receiver at the origin.
+/// Triangle of an emissive mesh in each lane, with the receiver of light at the origin.
 struct PacketTriangle<L> {
-    /// Corners relative to the receiver.
+    /// Corners of the triangle relative to the receiver.
     corners: [Vec3<L>; 3],
-    /// Unit normal of the front.
+    /// Unit normal of the triangle's front.
     normal: Vec3<L>,
-    /// Start of the range of the random numbers that choose the triangle.
+    /// Start of the range of random numbers in [0, 1) for which the triangle is chosen.
     start: L,
-    /// Probability with which the triangle is chosen.
+    /// Probability with which the triangle is chosen among those of the mesh.
     share: L,
     area: L,
 }
 
 impl<L: SimdFloat> PacketTriangle<L> {
-    /// Returns the same triangle in all lanes.
+    /// Returns the same triangle in all lanes, relative to the receivers at `origin`.
     #[inline(always)]
     fn splat(triangle: &Triangle<L::Scalar>, origin: Vec3<L>) -> Self {
         let corner = Vec3::splat(triangle.corner) - origin;
@@ -412,8 +410,8 @@ impl<L: SimdFloat> PacketTriangle<L> {
         }
     }
 
-    /// Gathers the triangles with the given index in each lane. An index past the end counts as the
-    /// last triangle.
+    /// Gathers the triangles with the given index in each lane, relative to the receivers at
+    /// `origin`. An index past the end counts as the last triangle.
     #[inline(always)]
     fn gather(
         triangles: &[Triangle<L::Scalar>],
@@ -435,7 +433,7 @@ impl<L: SimdFloat> PacketTriangle<L> {
 
     /// Returns the density \[1/sr\] of a direction in which the triangle is hit at `distance`: the
     /// probability of the triangle times the density of its points. `height` is the coordinate of
-    /// the triangle's plane along its normal.
+    /// the triangle's plane along its normal, relative to the receiver.
     #[inline(always)]
     fn density(&self, seen: &SphericalTriangle<L>, height: L, distance: L) -> L {
         let by_area = density_of_area(self.area / self.share, distance, height);
@@ -444,11 +442,11 @@ impl<L: SimdFloat> PacketTriangle<L> {
     }
 }
 
-/// Triangle seen from a point, sampled by solid angle.
+/// Triangle as seen from a receiver point, sampled by solid angle.
 ///
 /// Arvo 1995, *Stratified Sampling of Spherical Triangles*.
 struct SphericalTriangle<L: SimdFloat> {
-    /// Unit vectors to the corners.
+    /// Unit vectors from the receiver point to the triangle's corners.
     corners: [Vec3<L>; 3],
     /// Volume of the parallelepiped that the three unit vectors span.
     volume: L,
@@ -459,8 +457,9 @@ struct SphericalTriangle<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> SphericalTriangle<L> {
-    /// Creates the triangle. `corners` are relative to the receiver, and `height` is the coordinate
-    /// of the triangle's plane along its normal.
+    /// Creates the spherical triangle. `corners` are those of the triangle relative to the
+    /// receiver. `height` is the coordinate of the triangle's plane along its normal, also relative
+    /// to the receiver. `area` is the triangle's area.
     #[inline(always)]
     fn new(corners: [Vec3<L>; 3], height: L, area: L) -> Self {
         let inverse = corners.map(|corner| L::one() / corner.length_squared().sqrt());
@@ -475,7 +474,8 @@ impl<L: SimdFloat> SphericalTriangle<L> {
         Self { corners: [a, b, c], volume, solid_angle, by_angle }
     }
 
-    /// Samples a unit vector, uniformly over the solid angle.
+    /// Samples a unit vector, uniformly over the solid angle of the triangle. `u` and `v` are in
+    /// [0, 1).
     #[inline(always)]
     fn sample(&self, u: L, v: L) -> Vec3<L> {
         let [a, b, c] = self.corners;
@@ -511,8 +511,8 @@ mod tests {
 
     const LIFT: f64 = 1e-10;
 
-    /// Surfaces of every kind. The points of [`points`] are in front, behind, beside and inside of
-    /// them.
+    /// Returns one light-emitting surface of every kind. The points of [`points`] are in front of,
+    /// behind, beside and inside of these surfaces.
     fn surfaces() -> Vec<ObjectSurface> {
         let tetrahedron = [
             DVec3::new(0.0, 0.0, 0.0),
@@ -531,7 +531,7 @@ mod tests {
         ]
     }
 
-    /// A bent sheet of more than [`MAX_FACES`] triangles.
+    /// Returns a bent sheet of more than [`MAX_FACES`] triangles.
     fn grid() -> Vec<[DVec3; 3]> {
         let corner = |i: usize, j: usize| {
             let (x, y) = (0.2 * i as f64 - 0.5, 0.3 * j as f64 - 0.6);
@@ -546,7 +546,7 @@ mod tests {
         halves.collect()
     }
 
-    /// Points from which the tests sample the surfaces.
+    /// Returns the points from which the tests sample the surfaces of [`surfaces`].
     fn points() -> Vec<DVec3> {
         let points = [[0.1, 0.2, 1.5], [0.3, -0.1, -0.8], [2.0, 0.1, 0.2], [0.25, 0.2, 0.05]];
         [points.map(DVec3::from).into(), vec![DVec3::new(40.0, 30.0, 20.0)]].concat()
@@ -589,8 +589,9 @@ mod tests {
         }
     }
 
-    /// Checks the mean of 1 / density: it is the sum of the solid angles of all triangles, front
-    /// and back. For a convex solid seen from outside it is half of this sum, that of the fronts.
+    /// Checks the mean of 1 / density over the sampled directions. It must be the sum of the solid
+    /// angles of all triangles, front and back. For a convex solid seen from outside it must be
+    /// half of this sum, because only the fronts emit to the receiver.
     #[test]
     fn samples_of_triangles_cover_their_solid_angle() {
         for surface in surfaces() {

@@ -12,52 +12,55 @@ use std::f64::consts::FRAC_1_PI;
 /// error of the power is about the exponent times 1.5e-7.
 pub const SHARP_EXPONENT: f64 = 1024.0;
 
-/// Model of highlights, which are reflections of lights.
+/// Model of highlights (the reflections of lights in a surface), compiled for the kernels.
 #[derive(Clone, Copy, Debug)]
 pub enum SpecularModel<S> {
-    /// No highlight.
+    /// No highlights.
     None,
-    /// k_s (R.V)^alpha.
+    /// Phong's model: k_s (R.V)^alpha.
     Phong {
-        /// Specular coefficient k_s.
+        /// Specular coefficient k_s of Phong's model.
         strength: S,
         /// Phong exponent alpha.
         exponent: S,
-        /// `true` if alpha exceeds `SHARP_EXPONENT`.
+        /// `true` if the exponent alpha exceeds `SHARP_EXPONENT`. The power is then computed from a
+        /// tangent instead of a cosine.
         sharp: bool,
     },
-    /// k_s D G F / (4 N.L N.V).
+    /// Microfacet model: k_s D G F / (4 N.L N.V).
     MicrofacetDistribution {
-        /// Specular coefficient k_s.
+        /// Specular coefficient k_s of the microfacet model.
         strength: S,
-        /// Microfacet distribution, which defines D and G.
+        /// Microfacet distribution, which gives D and G of the formula.
         facets: MicrofacetDistribution<S>,
     },
 }
 
-/// Reflection lobe: distribution of the directions of reflected rays.
+/// Distribution of the directions of reflected rays about the mirror direction, compiled for the
+/// kernels.
 #[derive(Clone, Copy, Debug)]
 pub enum ReflectionLobe<S> {
-    /// All rays in the mirror direction.
+    /// Mirror: all reflected rays have the mirror direction.
     Mirror,
-    /// Uniform in a cone.
+    /// Uniform directions in a cone about the mirror direction.
     Cone {
-        /// 1 - cos of the half-angle.
+        /// 1 - cos of the cone's half-angle.
         one_minus_cos: S,
     },
-    /// Uniform on a square at unit distance.
+    /// Directions through uniform points of a square. The square is at unit distance along the
+    /// mirror direction and perpendicular to it.
     Square {
-        /// Side of the square.
+        /// Side length of the square at unit distance.
         side: S,
     },
-    /// Distribution of microfacet normals; rays are reflected at visible microfacets.
+    /// Mirror reflection at visible microfacets with this distribution of normals.
     MicrofacetDistribution(MicrofacetDistribution<S>),
 }
 
-/// Transmission through a surface.
+/// Transmission of light through a surface, compiled for the kernels.
 #[derive(Clone, Copy, Debug)]
 pub struct Transmission<S> {
-    /// Transmission coefficient k_t.
+    /// Transmission coefficient k_t of the material.
     pub strength: S,
     /// Index of refraction inside of the solid that the surface bounds.
     pub index: S,
@@ -70,25 +73,29 @@ pub struct Transmission<S> {
     pub dielectric: bool,
 }
 
-/// A compiled material.
+/// BSDF: a material compiled for the kernels.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf<S> {
-    /// Ambient coefficient times colour.
+    /// Ambient coefficient times the material's colour.
     pub ambient: [S; 3],
-    /// Diffuse coefficient times colour.
+    /// Diffuse coefficient times the material's colour.
     pub diffuse: [S; 3],
-    /// Highlights of lights.
+    /// Model of the highlights of lights.
     pub specular: SpecularModel<S>,
-    /// Reflection coefficient k_r and the reflection lobe; `None` if nothing is reflected.
+    /// Reflection coefficient k_r and the distribution of reflected rays; `None` if nothing is
+    /// reflected.
     pub reflection: Option<(S, ReflectionLobe<S>)>,
     /// Transmission through the surface; `None` if the material is opaque.
     pub transmission: Option<Transmission<S>>,
-    /// Fresnel reflectance of the highlight.
+    /// Fresnel reflectance of the microfacets in a highlight. The Phong model of highlights ignores
+    /// it.
     pub highlight_fresnel: Reflectance<S>,
     /// Fresnel reflectance of reflected rays. It is 1 for a transparent dielectric, whose
-    /// reflectance depends on the medium on the other side and is computed at each intersection.
+    /// reflectance is computed at each intersection because it depends on the medium on the other
+    /// side.
     pub reflection_fresnel: Reflectance<S>,
-    /// `true` if the surface reflects light that arrives directly from lights.
+    /// `true` if the surface has a diffuse part or highlights, so that it reflects light that
+    /// arrives directly from lights.
     pub has_direct: bool,
     /// `true` if the back of a surface has the same material as its front.
     pub two_sided: bool,
@@ -101,8 +108,8 @@ pub fn one_minus_cos_of_tan(r: f64) -> f64 {
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Compiles `material`. `reflects` is `true` if the scene traces reflected and transmitted
-    /// rays.
+    /// Compiles `material` to a BSDF. `reflects` is `true` if the scene traces reflected and
+    /// transmitted rays; otherwise the BSDF has no reflection and no transmission.
     pub fn new(material: &Material, reflects: bool) -> Self {
         let alpha = material.microfacet_alpha().max(SMOOTH_ALPHA);
         let facets = |ggx| MicrofacetDistribution::new(ggx, alpha, material.masking);
@@ -161,17 +168,17 @@ impl<S: Float> Bsdf<S> {
     }
 }
 
-/// Direction of a reflected ray, and the factor of its radiance.
+/// Sampled direction of a reflected ray, and the factor of its radiance.
 #[derive(Clone, Copy, Debug)]
 pub struct BsdfSample<L> {
-    /// Unit direction.
+    /// Unit direction of the reflected ray.
     pub direction: Vec3<L>,
-    /// Factor of the radiance from `direction`; zero if the ray is lost.
+    /// Factor of the radiance from `direction`; zero if nothing is reflected from there.
     pub weight: Vec3<L>,
 }
 
-/// Returns the component of `h` along the unit vector `n`, and the squared tangent of the angle
-/// between `h` and `n`. `h` may have any length.
+/// Returns two values: the component of `h` along the unit vector `n`, and the squared tangent of
+/// the angle between `h` and `n`. `h` may have any length.
 ///
 /// The tangent is computed from the part of `h` perpendicular to `n`, which keeps full precision at
 /// small angles. It is limited to 1e15, so that terms computed from it are finite.
@@ -241,8 +248,8 @@ impl<S: Float> Bsdf<S> {
     }
 
     /// Returns the highlight of a light [1/sr]: the radiance towards `view` divided by the
-    /// irradiance at normal incidence. It includes the cosine of the incident light if the model
-    /// has one.
+    /// irradiance at normal incidence. In the microfacet model it includes the factor `nl`; Phong's
+    /// model has no such factor.
     ///
     /// `n`, `view` and `light` are unit vectors away from the surface. `nl` is the cosine between
     /// `n` and `light`, `nv` that between `n` and `view`.
@@ -285,9 +292,11 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Samples a reflected ray. `incident` is the unit direction towards the surface, and `n` is
-    /// the normal on the viewer's side. `uv` are uniform in [0, 1). Directions below the surface
-    /// are mirrored up if `fold` is `true`; otherwise their weight is 0.
+    /// Samples a reflected ray of `lobe`. Its weight is `strength`, a constant of the material,
+    /// times the Fresnel reflectance and, for microfacets, their shadowing. `incident` is the unit
+    /// direction towards the surface, and `n` is the normal on the viewer's side. `uv` are uniform
+    /// in [0, 1). Directions below the surface have the weight 0. If `fold` is `true`, those of a
+    /// cone or square are mirrored up instead.
     #[inline(always)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
@@ -324,9 +333,11 @@ impl<S: Float> Bsdf<S> {
         BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }
     }
 
-    /// Samples the reflection at a visible microfacet. Directions below the surface have the weight
-    /// 0, because G is zero there. For other directions the weight f N.L / density = F G / G_1 is
-    /// at most 1.
+    /// Samples the reflection at a visible microfacet of `facets`. The weight of directions below
+    /// the surface is 0, because G is zero there. For other directions it is f N.L / density = k F
+    /// G / G_1, at most `k`. Here `k` is the `strength` of [`Bsdf::sample`], F the Fresnel
+    /// reflectance, and G and G_1 are those of `MicrofacetEval`. The other parameters are those of
+    /// [`Bsdf::sample`].
     #[inline(always)]
     fn sample_microfacet<L: SimdFloat<Scalar = S>>(
         &self,
@@ -351,7 +362,7 @@ impl<S: Float> Bsdf<S> {
 
     /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction` without mirroring
     /// directions up (`fold` is `false`). Returns `None` for a mirror. All directions are unit
-    /// vectors.
+    /// vectors. The other parameters are those of [`Bsdf::sample`].
     #[inline(always)]
     pub fn density<L: SimdFloat<Scalar = S>>(
         &self,
@@ -383,10 +394,10 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Returns the value [1/sr] of the reflection lobe in `direction`, times the cosine of the
-    /// light, and the density [1/sr] with which [`Bsdf::sample`] draws `direction`. The weight of a
-    /// sample is the first divided by the second. Both are zero for a mirror and for directions
-    /// below the surface. The other parameters are those of [`Bsdf::sample`].
+    /// Returns two values for light from `direction`: the value [1/sr] of the reflection lobe times
+    /// the cosine of the direction, and the density [1/sr] with which [`Bsdf::sample`] draws it.
+    /// The weight of a sample is the first divided by the second. Both are zero for a mirror and
+    /// for directions below the surface. The other parameters are those of [`Bsdf::sample`].
     #[inline(always)]
     pub fn evaluate_lobe<L: SimdFloat<Scalar = S>>(
         &self,

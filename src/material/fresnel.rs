@@ -1,4 +1,4 @@
-//! Fresnel reflectance as a function of the angle, per channel.
+//! Fresnel reflectance of materials as a function of the angle, per colour channel.
 
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::material::{Fresnel, Material};
@@ -18,12 +18,12 @@ pub fn f0_from_index(n: f64) -> f64 {
     ((n - 1.0) / (n + 1.0)).powi(2)
 }
 
-/// Compiled Fresnel reflectance.
+/// Fresnel reflectance of a material, compiled for the kernels.
 #[derive(Clone, Copy, Debug)]
 pub struct Reflectance<S> {
     mode: Fresnel,
     f0: [S; 3],
-    /// Squared index of refraction minus 1, for the modes `Exact` and `Dielectric`.
+    /// Squared index of refraction minus 1, per channel, for the modes `Exact` and `Dielectric`.
     index2_less_1: [S; 3],
     /// Channels with an infinite index of refraction (F0 = 1), whose reflectance is 1 at every
     /// angle.
@@ -55,8 +55,8 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// Returns `value` times the reflectance at the cosine that `c` returns. `c` is called only if
-    /// the reflectance depends on the angle.
+    /// Returns `value` times the reflectance at the angle whose cosine `c` returns. `c` is not
+    /// called if the reflectance is the same at every angle.
     #[inline(always)]
     pub fn times<L: SimdFloat<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> Vec3<L> {
         match self.mode {
@@ -118,7 +118,8 @@ mod tests {
         })
     }
 
-    /// Checks for every F0 and cosine that F is in [0, 1] and never NaN, and that F(1) = F0.
+    /// Checks the Fresnel reflectance F for every reflectance F0 at normal incidence and every
+    /// cosine: F is in [0, 1] and never NaN, and F is F0 for the cosine 1.
     #[test]
     fn extreme_24_fresnel() {
         let mut worst = 0f64;
@@ -146,7 +147,8 @@ mod tests {
         println!("extreme 24 | single | all in [0, 1 + 1e-6]");
     }
 
-    /// Checks textbook values for n = 1.5: F is 1 at grazing incidence and 4 % at normal incidence.
+    /// Checks the Fresnel reflectance of glass (n = 1.5): 1 at grazing incidence and 4 % at normal
+    /// incidence.
     #[test]
     fn fresnel_has_textbook_values() {
         assert!((index_from_f0(0.04) - 1.5).abs() < 1e-12);

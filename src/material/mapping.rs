@@ -9,78 +9,81 @@ use crate::material::texture::{Axis, Mapping, Placement};
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
-/// Formula of texture coordinates. Texture space has x to the right, y up, z to the front.
+/// Formula that gives texture coordinates (u, v) at points of texture space, which has x to the
+/// right, y up, z to the front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Projection {
-    /// u = x, v = y.
+    /// Planar projection: u = x, v = y.
     Planar,
-    /// u is the angle around y in turns, 1/2 at the front; v the angle from the lower pole in half
-    /// turns.
+    /// Spherical projection: u is the angle around y in turns, 1/2 at the front; v the angle from
+    /// the lower pole in half turns.
     Spherical,
-    /// u is the angle around y in turns, 1/2 at the front; v the height divided by the shape's
-    /// height.
+    /// Cylindrical projection: u is the angle around y in turns, 1/2 at the front; v the height
+    /// above the shape's lower end divided by the shape's height.
     Cylindrical,
     /// Planar projection of each side of a box, seen from outside.
     Box,
-    /// The shape's own texture coordinates.
+    /// No projection: the shape's own texture coordinates.
     Uv,
 }
 
-/// Smallest distance of v from the ends of a cylindrical projection, as a fraction of the height.
-/// With it, flat ends show the colours of their rims: rounding errors cannot wrap v to the opposite
-/// rim.
+/// Distance that v keeps from 0 and 1 in a cylindrical projection. At a flat end of the shape v
+/// would be exactly 0 or 1, and rounding errors would give it the colour of the opposite end.
 const RIM: f64 = 1.0 / 16_384.0;
 
-/// Factor in favour of the later of two axes when the side of a box is chosen. With it, rounding
-/// errors do not decide between axes at equal angles to the normal.
+/// Factor that favours the later of two axes (in the order x, y, z) when a box projection chooses
+/// the side of the box. Without it, rounding errors would decide between axes at equal angles to
+/// the normal.
 const TIE: f64 = 1.001;
 
-/// Largest error of a projection of a surface point, in rounding errors of the point's largest
-/// coordinate.
+/// Upper bound of the error of a surface point, and of a texture coordinate computed from it. The
+/// unit is the rounding error of the largest number in the computation.
 const POINT_ROUNDINGS: f64 = 16.0;
 
-/// Angle \[rounding errors\] between the normal of a surface and the gradient of a texture
-/// coordinate up to which the coordinate is constant along the surface.
+/// Largest angle between the normal of a surface and the gradient of a texture coordinate at which
+/// the coordinate counts as constant along the surface. The unit is the rounding error of the
+/// number 1.
 const ANGLE_ROUNDINGS: f64 = 64.0;
 
-/// Texture coordinates and their gradients in texture space. The unit of the coordinates is one
-/// repetition of the image.
+/// Texture coordinates (u, v) of a point, and their gradients by position in texture space. One
+/// unit of u or v is one repetition of the image.
 #[derive(Clone, Copy, Debug)]
 pub struct TexCoord<L> {
-    /// Coordinate to the right.
+    /// Texture coordinate u, which grows to the right in the image.
     pub u: L,
-    /// Coordinate upwards.
+    /// Texture coordinate v, which grows upwards in the image.
     pub v: L,
-    /// Gradient of u in texture space.
+    /// Gradient of the texture coordinate u by position in texture space.
     pub grad_u: Vec3<L>,
-    /// Gradient of v in texture space.
+    /// Gradient of the texture coordinate v by position in texture space.
     pub grad_v: Vec3<L>,
 }
 
-/// Compiled placement of a texture on one part of an object.
+/// Placement of a texture on one part of an object, compiled for the kernels.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureMapping<S> {
     projection: Projection,
     /// Columns of the linear map from scene space to texture space.
     texture_from_scene: [[S; 3]; 3],
-    /// Columns of the inverse map.
+    /// Columns of the linear map from texture space to scene space.
     scene_from_texture: [[S; 3]; 3],
-    /// Centre of the part in the scene. Points are mapped relative to this centre, so that rounding
-    /// errors are in proportion to the size of the part.
+    /// Centre of the object's part in the scene. Points are mapped relative to this centre, so that
+    /// rounding errors are in proportion to the size of the part.
     center: [S; 3],
-    /// Centre of the part in texture space, relative to the origin of the projection's formula.
+    /// Coordinates of the centre of the object's part in texture space. The origin is that of the
+    /// projection's formula.
     texture_center: [S; 3],
-    /// Lengths of the part's bounding box in texture space.
+    /// Edge lengths, in texture space, of the bounding box of the object's part.
     extent: [S; 3],
     scale: [S; 2],
     offset: [S; 2],
-    /// Rounding error of the coordinates of the scene file.
+    /// Rounding error of the coordinates in the scene file, in scene units.
     input_error: S,
 }
 
-/// Returns the rotation from texture space to the axes of the projection's formula, which projects
-/// along z (planar) or around y (spherical and cylindrical). `axis` is the axis of texture space
-/// for this; `None` is the default.
+/// Returns the rotation from texture space to the coordinates of the projection's formula. The
+/// formula projects along z (planar) or around y (spherical and cylindrical). `axis` is the axis of
+/// texture space along or around which the texture is projected; `None` is the axis of the formula.
 fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     let rows = match (projection, axis) {
@@ -94,10 +97,10 @@ fn axes_for(projection: Projection, axis: Option<Axis>) -> DMat3 {
 }
 
 impl<S: Float> TextureMapping<S> {
-    /// Compiles `placement` for one part of an object. `projection` is the projection that
-    /// `placement` selects for the part. `low` and `high` are opposite corners of the part's
-    /// bounding box, in texture space. `input_error` is the rounding error of the coordinates of
-    /// the scene file.
+    /// Compiles the placement of a texture for one part of an object. `projection` is the
+    /// projection that `placement` selects for the part. `low` and `high` are opposite corners of
+    /// the part's bounding box, in texture space. `input_error` is the rounding error of the
+    /// coordinates in the scene file, in scene units.
     pub fn new(
         placement: &Placement,
         projection: Projection,
@@ -138,13 +141,14 @@ impl<S: Float> TextureMapping<S> {
         }
     }
 
-    /// Returns `true` if the mapping uses the texture coordinates of the shape.
+    /// Returns `true` if the texture uses the shape's own texture coordinates instead of a
+    /// projection.
     pub fn wants_uv(&self) -> bool {
         self.projection == Projection::Uv
     }
 
-    /// Maps a normal of any length from one space to the other. `columns` are those of the linear
-    /// map in the opposite direction, because normals are transformed by its transpose.
+    /// Maps a normal of any length from scene space to texture space or back. `columns` are those
+    /// of the linear map in the opposite direction: its transpose maps the normals.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(columns: &[[S; 3]; 3], n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = columns.map(Vec3::splat);
@@ -152,8 +156,8 @@ impl<S: Float> TextureMapping<S> {
     }
 
     /// Returns the texture coordinates at `point` with the outer normal `normal`, both in scene
-    /// space. If [`TextureMapping::wants_uv`] is `true`, the caller must use the shape's own
-    /// coordinates instead; the result is then that of u = v = 0.
+    /// space. If [`TextureMapping::wants_uv`] is `true`, the caller must pass the shape's own
+    /// coordinates to [`TextureMapping::placed`] instead.
     pub fn coordinates<L: SimdFloat<Scalar = S>>(
         &self,
         point: Vec3<L>,
@@ -178,7 +182,7 @@ impl<S: Float> TextureMapping<S> {
         self.placed(coordinates)
     }
 
-    /// Applies scale and offset of the placement to texture coordinates.
+    /// Applies the scale and the offset of the texture's placement to texture coordinates.
     pub fn placed<L: SimdFloat<Scalar = S>>(&self, unplaced: TexCoord<L>) -> TexCoord<L> {
         let ([su, sv], [ou, ov]) = (self.scale.map(L::splat), self.offset.map(L::splat));
         TexCoord {
@@ -189,14 +193,14 @@ impl<S: Float> TextureMapping<S> {
         }
     }
 
-    /// Returns u and v for textures whose colour jumps at edges, such as checkers. `coordinates`
-    /// are those of `point` with the outer normal `normal`. `rounding` is the rounding error of the
-    /// point's largest coordinate.
+    /// Returns u and v, moved off edges of the texture if necessary, for textures whose colour
+    /// jumps at edges, such as checkers. `coordinates` are those of a point with the outer normal
+    /// `normal`. `rounding` is the rounding error of the point's largest coordinate.
     ///
-    /// A flat face may lie in an edge: the lid of a box whose height is a whole number of squares.
-    /// There the coordinate is constant, and rounding would decide between two colours at each
-    /// point. A coordinate that is constant along the surface is therefore moved up by its largest
-    /// error. Other coordinates are returned as they are.
+    /// A flat face may lie exactly on an edge, such as the lid of a box whose height is a whole
+    /// number of squares. One coordinate is constant there, and rounding would decide between two
+    /// colours at each point. A constant coordinate is therefore increased by its largest rounding
+    /// error.
     pub fn beside_edges<L: SimdFloat<Scalar = S>>(
         &self,
         coordinates: &TexCoord<L>,
@@ -246,7 +250,7 @@ impl<S: Float> TextureMapping<S> {
     }
 }
 
-/// Returns a vector of length `length` along the coordinate axis number `axis`.
+/// Returns a vector of the given length along coordinate axis 0 (x), 1 (y) or 2 (z).
 #[inline(always)]
 fn along_axis<L: SimdFloat>(axis: usize, length: L) -> Vec3<L> {
     let zero = L::zero();
@@ -341,7 +345,8 @@ mod tests {
         p.coordinates(Vec3::of(point.to_array()), Vec3::of(normal.to_array()))
     }
 
-    /// Checks that gradients, mapped to the scene, equal central differences of the coordinates.
+    /// Checks that the gradients of texture coordinates, mapped to scene space, equal central
+    /// differences of the coordinates.
     #[test]
     fn gradients_match_finite_differences() {
         let normal = DVec3::new(0.3, 0.8, -0.2).normalize();

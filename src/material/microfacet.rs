@@ -12,29 +12,30 @@ pub const SMOOTH_ALPHA: f64 = 1e-3;
 /// Distribution of microfacet normals, with its masking model.
 #[derive(Clone, Copy, Debug)]
 pub struct MicrofacetDistribution<S> {
-    /// `true` for GGX, `false` for Beckmann.
+    /// Kind of distribution: `true` for GGX, `false` for Beckmann.
     pub ggx: bool,
     /// Roughness parameter alpha, at least [`SMOOTH_ALPHA`].
     pub alpha: S,
-    /// Square of `alpha`.
+    /// Square of the roughness parameter `alpha`.
     pub alpha2: S,
-    /// Inverse square of `alpha`.
+    /// Reciprocal of the square of the roughness parameter `alpha`.
     pub inverse_alpha2: S,
     /// Model of masking and shadowing between microfacets.
     pub masking: Masking,
 }
 
 impl<S: Float> MicrofacetDistribution<S> {
-    /// Creates a distribution with the parameter `alpha`.
+    /// Creates a microfacet distribution with the roughness parameter `alpha` and the masking model
+    /// `masking`. It is GGX if `ggx` is `true`, otherwise Beckmann.
     pub fn new(ggx: bool, alpha: f64, masking: Masking) -> Self {
         let alpha2 = alpha * alpha;
         let [alpha, alpha2, inverse_alpha2] = [alpha, alpha2, 1.0 / alpha2].map(S::from_f64);
         Self { ggx, alpha, alpha2, inverse_alpha2, masking }
     }
 
-    /// Samples a microfacet normal that is visible from `view`. Both are in the frame of the
-    /// surface normal. `u` and `v` are uniform in [0, 1). The density is G_1 D V.H / N.V, with G_1
-    /// of `MicrofacetEval::visibility`.
+    /// Samples a microfacet normal H that is visible from the direction `view` (V). Both are in the
+    /// frame of the surface normal N. `u` and `v` are uniform in [0, 1). The density of H is G_1 D
+    /// V.H / N.V, with G_1 of `MicrofacetEval::visibility` and D of `MicrofacetEval::density`.
     #[inline(always)]
     pub fn sample_visible<L: SimdFloat<Scalar = S>>(
         &self,
@@ -56,9 +57,10 @@ pub trait MicrofacetEval<L: SimdFloat> {
     /// Returns the density D of microfacet normals [1/sr]. `tan2` is the squared tangent of the
     /// angle between microfacet normal and surface normal.
     fn density(&self, tan2: L) -> L;
-    /// Returns G, the fraction of the microfacets with normal h that are visible from both
-    /// directions, as numerator and denominator. `nh`, `nv`, `nl` and `vh` are positive cosines.
-    /// `nh` and `vh` may have a common factor, as for an h that is not normalised.
+    /// Returns the numerator and the denominator of G, the fraction of the microfacets with normal
+    /// h that are visible both from the viewer v and from the light l. `nh`, `nv`, `nl` and `vh`
+    /// are the positive cosines N.H, N.V, N.L and V.H. `nh` and `vh` may have a common factor, as
+    /// for an h that is not normalised.
     fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L);
     /// Returns G_1, the fraction of the microfacets with normal h that are visible from the viewer.
     /// The parameters are those of [`MicrofacetEval::masking`].
@@ -67,24 +69,26 @@ pub trait MicrofacetEval<L: SimdFloat> {
     /// sampled and the reflectance is 1. The parameters are those of [`MicrofacetEval::masking`].
     fn shadowing(&self, nh: L, nv: L, nl: L, vh: L) -> L;
     /// Returns G / G_1 in [0, 1] of rays that are transmitted to the other side. It is the weight
-    /// of a transmitted ray if visible normals are sampled and the transmittance is 1. `nh`, `nv`
-    /// and `vh` are those of [`MicrofacetEval::masking`]; `nt` and `lh` are the positive cosines of
-    /// the transmitted ray with the reversed surface normal and microfacet normal.
+    /// of a transmitted ray if visible normals are sampled and the transmittance is 1. `view` has
+    /// the cosines (`nh`, `nv`, `vh`) of [`MicrofacetEval::masking`]. `transmitted` has two
+    /// positive cosines: those between the transmitted ray and the reversed surface normal, and
+    /// between the ray and the reversed microfacet normal.
     fn shadowing_behind(&self, view: (L, L, L), transmitted: (L, L)) -> L;
-    /// Returns Smith's Lambda for a direction with the cosine `c` > 0 to the normal.
+    /// Returns the function Lambda of Smith's masking model, for a direction. `c` > 0 is the cosine
+    /// of its angle to the surface normal.
     fn lambda(&self, c: L) -> L;
 }
 
-/// Smallest a = 1 / (alpha tan) at which masking is neglected, because Beckmann's Lambda is below
-/// 3e-10.
+/// Value of a = 1 / (alpha tan theta) from which on masking by microfacets is neglected; theta is
+/// the angle between the direction and the surface normal. Beckmann's Lambda is below 3e-10 there.
 const STEEP: f64 = 4.0;
 
 /// Returns Beckmann's Lambda (erf(a) - 1) / 2 + exp(-a^2) / (2 a sqrt(pi)) for 0 < a < [`STEEP`]
 /// (Heitz 2014, eq. 57); undefined for larger `a`.
 ///
-/// Computed as exp(-a^2) k(a) / (2 a sqrt(pi) (1 + 2 a^2)) with a smooth k between 0.6 and 1,
-/// approximated by a Chebyshev fit of degree 10 in 2 - 6 / (a + 2). The error is below 1e-8 (1 +
-/// Lambda).
+/// Computed as exp(-a^2) k(a) / (2 a sqrt(pi) (1 + 2 a^2)). The function k is smooth, has values
+/// between 0.6 and 1, and is approximated by a Chebyshev fit of degree 10 in 2 - 6 / (a + 2). The
+/// error is below 1e-8 (1 + Lambda).
 #[inline(always)]
 fn beckmann_lambda<L: SimdFloat>(a: L) -> L {
     const K: [f64; 11] = [
@@ -118,9 +122,9 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         }
     }
 
-    /// Returns G of V-cavities, min(1, 2 N.H min(N.V, N.L) / V.H) (Torrance and Sparrow 1967), or
-    /// of height-correlated Smith masking, 1 / (1 + Lambda(V) + Lambda(L)) (Heitz 2014,
-    /// *Understanding the Masking-Shadowing Function*).
+    /// Returns the numerator and the denominator of G. For V-cavities G is min(1, 2 N.H min(N.V,
+    /// N.L) / V.H) (Torrance and Sparrow 1967). For height-correlated Smith masking it is 1 / (1 +
+    /// Lambda(V) + Lambda(L)) (Heitz 2014, *Understanding the Masking-Shadowing Function*).
     #[inline(always)]
     fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L) {
         match self.masking {
@@ -152,9 +156,10 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         }
     }
 
-    /// Returns the separable G_1 of Smith (Walter et al. 2007, eq. 23), or that of V-cavities: the
-    /// sides of a groove that are visible from above and from below overlap in G_1 + G_1' - 1
-    /// (Heitz and d'Eon 2014).
+    /// Returns G / G_1 of transmitted rays. Let G_1' be the G_1 of the transmitted ray. The result
+    /// is G_1' for Smith's masking (Walter et al. 2007, eq. 23). For V-cavities G is G_1 + G_1' -
+    /// 1, because the sides of a groove that are visible from above and from below overlap (Heitz
+    /// and d'Eon 2014).
     #[inline(always)]
     fn shadowing_behind(&self, (nh, nv, vh): (L, L, L), (nt, lh): (L, L)) -> L {
         match self.masking {
@@ -167,8 +172,8 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         }
     }
 
-    /// Returns Lambda. It depends on a = 1 / (alpha tan theta), for the angle theta with cosine
-    /// `c`.
+    /// Returns the function Lambda of Smith's masking model, for directions whose angle theta from
+    /// the surface normal has the cosine `c`. It depends on a = 1 / (alpha tan theta).
     #[inline(always)]
     fn lambda(&self, c: L) -> L {
         let alpha2 = L::splat(self.alpha2);

@@ -1,4 +1,4 @@
-//! Materials: description of a surface and its compiled BSDF.
+//! Materials: descriptions of surfaces in scene files, and the compiled BSDFs.
 
 mod bsdf;
 mod fresnel;
@@ -38,14 +38,14 @@ description! {
         specular: f64 = 0.0, in COEFFICIENT;
         /// Phong exponent alpha of (R.V)^alpha: the larger, the smaller the highlight.
         exponent: f64 = 32.0, in closed(0.0, 1e9);
-        /// Formula of a light's highlight.
+        /// Formula of the highlights that lights make on the surface.
         highlight: Highlight = "phong";
         /// Weight k_r of the traced reflection; not energy-conserving with the other coefficients.
         reflection: f64 = 0.0, in COEFFICIENT;
         /// Weight k_t of the transmitted light, not energy-conserving with the other coefficients;
         /// 0 is opaque.
         transmission: f64 = 0.0, in COEFFICIENT;
-        /// Index of refraction n of the inside; outside of everything it is 1.
+        /// Index of refraction n inside of the solid; outside of all solids it is 1.
         ior: f64 = 1.5, in closed(0.1, 1e4);
         /// Share of the light in each channel that is left after `attenuation_distance` inside of a
         /// solid with `transmission`, by Beer's law; white absorbs nothing.
@@ -55,18 +55,18 @@ description! {
         /// Tangent of the half-angle of the cone of reflected and of transmitted rays, not a
         /// microfacet alpha; 0 is a perfect mirror and clear glass.
         roughness: f64 = 0.0, in closed(0.0, 1e6);
-        /// Distribution of reflected and transmitted rays; the same roughness means a comparable
-        /// blur in each.
+        /// Distribution of reflected and transmitted rays. The same roughness gives a comparable
+        /// blur with each.
         lobe: Lobe = "cone";
         /// Roughness parameter alpha of the microfacet distribution.
         alpha: Option<f64>, or "roughness / (2 √2)", in closed(0.0, 1e6);
-        /// Masking and shadowing between microfacets.
+        /// Model of masking and shadowing between microfacets.
         masking: Masking = "v-cavity";
         /// Dependence of the reflectance on the angle.
         fresnel: Option<Fresnel>, or "`exact` for a metal, otherwise `constant`";
         /// Reflectance F0 at normal incidence. Not together with `metal`.
         f0: Option<Color>, or "white", in SHARE;
-        /// A metal, for its reflectance. Not together with `f0`.
+        /// Metal whose reflectance the surface has. Not together with `f0`.
         metal: Option<Metal>, or "no metal";
         /// Radiance that the surface emits, the same at every point and in every direction; 0 emits
         /// nothing. It is added to the light that the surface reflects, and illuminates other
@@ -91,9 +91,9 @@ pub const FIELDS: &[Field] = Material::FIELDS;
 choices! {
     /// Formula of a light's highlight.
     pub enum Highlight {
-        /// k_s (R.V)^alpha
+        /// Phong's formula k_s (R.V)^alpha
         Phong = "phong",
-        /// microfacets with the distribution of the lobe
+        /// highlight of microfacets with the distribution of `lobe`
         CookTorrance = "cook-torrance",
     }
 }
@@ -101,15 +101,15 @@ choices! {
 choices! {
     /// Distribution of reflected rays.
     pub enum Lobe {
-        /// no spread, whatever the roughness
+        /// mirror direction only, whatever the roughness
         Mirror = "mirror",
-        /// uniform in a cone
+        /// uniform directions in a cone
         Cone = "cone",
-        /// uniform on a square across the mirror direction: cheaper
+        /// uniform points of a square across the mirror direction: cheaper than a cone
         Square = "square",
-        /// microfacets, Beckmann distribution
+        /// microfacets with the Beckmann distribution
         Beckmann = "beckmann",
-        /// microfacets, GGX (Trowbridge-Reitz) distribution
+        /// microfacets with the GGX (Trowbridge-Reitz) distribution
         Ggx = "ggx",
     }
 }
@@ -117,17 +117,17 @@ choices! {
 choices! {
     /// Masking and shadowing between microfacets.
     pub enum Masking {
-        /// V-shaped grooves (Torrance-Sparrow)
+        /// masking by V-shaped grooves (Torrance-Sparrow)
         VCavity = "v-cavity",
-        /// Smith, height-correlated
+        /// Smith's masking, height-correlated
         Smith = "smith",
     }
 }
 
 choices! {
-    /// Reflectance against angle.
+    /// Dependence of the reflectance on the angle of incidence.
     pub enum Fresnel {
-        /// the same at every angle
+        /// the same reflectance at every angle
         Constant = "constant",
         /// Schlick's approximation
         Schlick = "schlick",
@@ -142,13 +142,13 @@ choices! {
 choices! {
     /// Metals by reflectance at normal incidence.
     pub enum Metal {
-        /// 0.989 0.876 0.349
+        /// reflectance F0 = 0.989 0.876 0.349
         Gold = "gold",
-        /// 0.950 0.930 0.880
+        /// reflectance F0 = 0.950 0.930 0.880
         Silver = "silver",
-        /// 0.755 0.490 0.095
+        /// reflectance F0 = 0.755 0.490 0.095
         Copper = "copper",
-        /// 0.530 0.505 0.480
+        /// reflectance F0 = 0.530 0.505 0.480
         Iron = "iron",
     }
 }
@@ -166,9 +166,9 @@ impl Metal {
 }
 
 impl Material {
-    /// Returns the reflectance at normal incidence: that of `metal`, else `f0`. If neither is
-    /// given, it is that of the index of refraction for a dielectric, and white for any other
-    /// material.
+    /// Returns the reflectance at normal incidence: that of `metal` if it is given, otherwise `f0`.
+    /// If neither is given, it follows from the index of refraction for a dielectric, and is white
+    /// for any other material.
     pub fn f0(&self) -> Color {
         let default = match self.fresnel_mode() {
             Fresnel::Dielectric => Color([f0_from_index(self.ior); 3]),
@@ -177,7 +177,7 @@ impl Material {
         self.metal.map(Metal::f0).or(self.f0).unwrap_or(default)
     }
 
-    /// Returns the dependence of the reflectance on the angle: `fresnel`, or its default.
+    /// Returns the dependence of the reflectance on the angle: the key `fresnel`, or its default.
     pub fn fresnel_mode(&self) -> Fresnel {
         let default = if self.metal.is_some() { Fresnel::Exact } else { Fresnel::Constant };
         self.fresnel.unwrap_or(default)
@@ -189,9 +189,10 @@ impl Material {
         self.alpha.unwrap_or(self.roughness / 8f64.sqrt())
     }
 
-    /// Returns the absorption coefficients of the inside [1 / scene unit], by Beer's law: light of
-    /// intensity 1 has the intensity exp(-coefficient x distance) after a distance. They are at
-    /// most 1e30. A channel of `attenuation_color` that is 0 is replaced by 1e-38.
+    /// Returns the absorption coefficient of the inside [1 / scene unit] in each channel. By Beer's
+    /// law, the fraction exp(-coefficient x distance) of the light is left after a distance.
+    /// Coefficients are at most 1e30. A channel of `attenuation_color` that is 0 is replaced by
+    /// 1e-38.
     pub fn absorption(&self) -> [f64; 3] {
         let coefficient = |c: f64| -c.max(1e-38).ln() / self.attenuation_distance;
         self.attenuation_color.0.map(|c| coefficient(c).clamp(0.0, 1e30))
@@ -213,7 +214,7 @@ impl Material {
             || self.highlight == Highlight::CookTorrance && self.specular > 0.0
     }
 
-    /// Returns the errors of the material's keys and values.
+    /// Returns the validation errors of the material's keys and values.
     pub fn faults(&self) -> Vec<ValidationError> {
         let both = self.f0.is_some() && self.metal.is_some();
         let dielectric = self.fresnel == Some(Fresnel::Dielectric);
@@ -250,7 +251,8 @@ mod tests {
         for metal in Metal::CHOICES {
             let text = format!("metal = \"{}\"", metal.name);
             let metal_read: Metal = toml::from_str::<Material>(&text).unwrap().metal.unwrap();
-            let documented: Vec<f64> = metal.doc.split(' ').map(|n| n.parse().unwrap()).collect();
+            let numbers = metal.doc.split(' ').filter_map(|word| word.parse().ok());
+            let documented: Vec<f64> = numbers.collect();
             assert_eq!(metal_read.f0().0.to_vec(), documented, "{}", metal.name);
         }
     }

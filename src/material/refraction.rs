@@ -1,36 +1,38 @@
-//! Light at the boundary of two transparent media, in lanes: Snell's law and Fresnel's equations.
+//! Light at the boundary of two transparent media: Snell's law and Fresnel's equations, for SIMD
+//! packets.
 //!
 //! Born and Wolf, *Principles of Optics*, sections 1.5.2 and 1.5.4.
 
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use crate::material::bsdf::Transmission;
 
-/// Refraction of rays at the boundary of two media.
+/// Boundary of two media with incident rays, one per lane: directions and cosines of refraction.
 #[derive(Clone, Copy, Debug)]
 pub struct Interface<L: SimdFloat> {
     /// Unit direction of the refracted rays; undefined in lanes of `tir`.
     pub refracted: Vec3<L>,
     /// Lanes with total internal reflection (TIR).
     pub tir: L::Mask,
-    /// Cosine of the angle of incidence.
+    /// Cosine of the angle of incidence at the boundary.
     cos_i: L,
     /// Cosine of the angle of refraction; 0 beyond the critical angle.
     cos_t: L,
     /// Index of refraction on the side of the incident rays.
     n_i: L,
-    /// Index of refraction on the other side.
+    /// Index of refraction on the side of the refracted rays.
     n_t: L,
 }
 
-/// Weights of reflected and transmitted rays at a boundary.
+/// Weights of reflected and transmitted rays at the boundary of two media.
 #[derive(Clone, Copy, Debug)]
 pub struct FresnelSplit<L> {
-    /// Factor of the BSDF's reflection lobe.
+    /// Factor of the radiance along the reflected ray, whose direction comes from the BSDF's
+    /// reflection lobe.
     pub reflected: L,
-    /// Factor of the transmitted ray.
+    /// Factor of the radiance along the transmitted ray.
     pub transmitted: L,
-    /// Factor of the mirror reflection that replaces the transmitted ray in total internal
-    /// reflection.
+    /// Factor of the radiance along the mirror reflection that replaces the transmitted ray in
+    /// total internal reflection.
     pub tir: L,
 }
 
@@ -61,7 +63,7 @@ impl<L: SimdFloat> Interface<L> {
         }
     }
 
-    /// Returns the reflectances for s and p polarisation.
+    /// Returns two reflectances of the boundary: for s polarisation and for p polarisation.
     #[inline(always)]
     fn polarised(&self) -> (L, L) {
         let Self { cos_i, cos_t, n_i, n_t, .. } = *self;
@@ -82,9 +84,9 @@ impl<L: SimdFloat> Interface<L> {
         (s + p) * L::from_f64(0.5)
     }
 
-    /// Returns the reflectance of a thin pane for unpolarised light: 2 F / (1 + F) for each
-    /// polarisation. The pane is a slab with this boundary on both sides, and all inner reflections
-    /// are included.
+    /// Returns the reflectance of a thin pane for unpolarised light: the mean over both
+    /// polarisations of 2 F / (1 + F), with F the reflectance of the boundary for one polarisation.
+    /// The pane is a slab with this boundary on both sides, and all inner reflections are included.
     #[inline(always)]
     pub fn pane_reflectance(&self) -> L {
         let (s, p) = self.polarised();
@@ -94,9 +96,9 @@ impl<L: SimdFloat> Interface<L> {
     /// Returns the weights of reflected and transmitted rays. `outer` selects the lanes whose rays
     /// come from outside of a solid.
     ///
-    /// Without Fresnel's equations a solid reflects only on its outer side, which prevents endless
-    /// reflections between its inner walls. Total internal reflection reflects all light in any
-    /// case.
+    /// If `transmission.dielectric` is `false`, Fresnel's equations are not used. A solid then
+    /// reflects only on its outer side, which prevents endless reflections between its inner walls.
+    /// Total internal reflection reflects all light in both cases.
     #[inline(always)]
     pub fn split(&self, transmission: &Transmission<L::Scalar>, outer: L::Mask) -> FresnelSplit<L> {
         let k_t = L::splat(transmission.strength);
@@ -156,15 +158,17 @@ mod tests {
     use crate::lanes::{Double, Single};
     use crate::material::f0_from_index;
 
-    /// Refracts rays that travel downwards, at `degrees` from the normal +z.
+    /// Returns the interface at which a ray passes from a medium of index `n_i` to one of index
+    /// `n_t`. The ray travels downwards, at `degrees` from the normal +z.
     fn interface<L: SimdFloat>(degrees: f64, n_i: f64, n_t: f64) -> Interface<L> {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let up = Vec3::of([0.0, 0.0, 1.0]);
         Interface::new(Vec3::of([sin, 0.0, -cos]), up, L::from_f64(n_i), L::from_f64(n_t))
     }
 
-    /// Returns the fraction of the energy that is transmitted: n_t cos t / (n_i cos i) times the
-    /// squared amplitudes.
+    /// Returns the fraction of the energy of unpolarised light that is transmitted: n_t cos t /
+    /// (n_i cos i) times the mean of the squared amplitudes of both polarisations. i is the angle
+    /// of incidence, t that of refraction.
     fn transmittance(i: &Interface<f64>) -> f64 {
         let Interface { cos_i, cos_t, n_i, n_t, .. } = *i;
         let s = 2.0 * n_i * cos_i / (n_i * cos_i + n_t * cos_t);
@@ -191,8 +195,8 @@ mod tests {
         }
     }
 
-    /// Checks that R + T = 1 at all angles, also near the critical angle, and that R is continuous
-    /// there.
+    /// Checks that reflectance and transmittance add up to 1 at all angles, also near the critical
+    /// angle, and that the reflectance is continuous there.
     #[test]
     fn extreme_25_total_reflection() {
         let mut worst = 0f64;

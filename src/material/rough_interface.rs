@@ -1,8 +1,9 @@
-//! Reflection and transmission at rough interfaces.
+//! Reflection and transmission at rough interfaces between transparent media.
 //!
-//! Microfacets reflect and refract like clear glass, each by its own normal (Walter et al. 2007,
-//! *Microfacet Models for Refraction through Rough Surfaces*). The lobes `cone` and `square` are spread
-//! about the refracted direction as they are about the mirror direction.
+//! Each microfacet reflects and refracts like clear glass, about its own normal (Walter et al.
+//! 2007, *Microfacet Models for Refraction through Rough Surfaces*). The lobes `cone` and `square`
+//! have no microfacets. They surround the refracted direction in the same way as the mirror
+//! direction.
 
 use crate::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
 use crate::material::bsdf::{Bsdf, ReflectionLobe, Transmission, along_tan2, spread};
@@ -10,8 +11,9 @@ use crate::material::microfacet::{MicrofacetDistribution, MicrofacetEval};
 use crate::material::refraction::Interface;
 use crate::sampling::warp;
 
-/// Relative difference of the indices of refraction below which transmitted rays of microfacets are
-/// regarded as parallel. The half vector has few valid digits there, in single precision three.
+/// Relative difference of the indices of refraction below which transmitted rays count as parallel
+/// to the incident ones. Below it, the half vector of a microfacet has at most three valid digits
+/// in single precision.
 const MIN_REFRACTION: f64 = 1e-3;
 
 /// Media on both sides of an interface, and the side from which rays arrive.
@@ -19,7 +21,7 @@ const MIN_REFRACTION: f64 = 1e-3;
 pub struct InterfaceMedia<L: SimdFloat> {
     /// Index of refraction on the side of the incident rays.
     pub n_i: L,
-    /// Index of refraction behind the interface. For a thin surface, that of its material.
+    /// Index of refraction behind the interface; at a thin surface, the index of its material.
     pub n_t: L,
     /// Lanes whose rays arrive from outside of the solid.
     pub outer: L::Mask,
@@ -28,8 +30,8 @@ pub struct InterfaceMedia<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> InterfaceMedia<L> {
-    /// Lanes with equal indices of refraction on both sides. Rays are not refracted there, even by
-    /// a rough surface.
+    /// Returns the lanes with equal indices of refraction on both sides of the interface, except
+    /// those of thin surfaces. Rays are not refracted there, even by a rough surface.
     #[inline(always)]
     fn same(&self) -> L::Mask {
         (self.n_i.le(self.n_t) & self.n_t.le(self.n_i)).and_not(self.thin)
@@ -41,24 +43,26 @@ impl<L: SimdFloat> InterfaceMedia<L> {
 pub struct InterfaceSample<L> {
     /// Unit direction of the reflected ray.
     pub reflected: Vec3<L>,
-    /// Factor of the radiance from `reflected`.
+    /// Factor of the radiance that arrives along the reflected ray, from the direction `reflected`.
     pub reflected_weight: Vec3<L>,
     /// Unit direction of the transmitted ray.
     pub transmitted: Vec3<L>,
-    /// Factor of the radiance from `transmitted`.
+    /// Factor of the radiance that arrives along the transmitted ray, from the direction
+    /// `transmitted`.
     pub transmitted_weight: L,
 }
 
 impl<S: Float> Bsdf<S> {
     /// Samples a reflected and a transmitted ray at an interface whose [`lobe`](Transmission::lobe)
-    /// is not a mirror. Both use the same numbers `uv`, uniform in [0, 1). `incident` is the unit
-    /// direction towards the surface, and `n` is the normal on the viewer's side. `reflecting`
-    /// selects the lanes in which the BSDF's reflection is included; total internal reflection is
-    /// included in all lanes.
+    /// is not a mirror. Both rays are computed from the same two random numbers `uv` in [0, 1).
+    /// `incident` is the unit direction towards the surface, and `n` is the normal on the viewer's
+    /// side. `reflecting` selects the lanes in which the reflection lobe of the BSDF counts; total
+    /// internal reflection counts in all lanes.
     ///
-    /// Directions of the lobes `cone` and `square` on the wrong side of the surface are mirrored to
-    /// the right one if `fold` is `true`; otherwise their weight is 0. Like clear glass, a rough
-    /// interface does not scale radiance by the squared index.
+    /// The lobes `cone` and `square` can give a reflected ray behind the surface, or a transmitted
+    /// ray in front of it. Such a ray is mirrored to the right side if `fold` is `true`; otherwise
+    /// its weight is 0. Like clear glass, a rough interface does not scale radiance by the squared
+    /// ratio of the indices.
     #[inline(always)]
     pub fn sample_interface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -122,8 +126,9 @@ impl<S: Float> Bsdf<S> {
     }
 
     /// Returns the density [1/sr] with which [`Bsdf::sample_interface`] draws the transmitted ray
-    /// `direction`, before directions on the wrong side are mirrored. The density is the largest
-    /// finite number where all rays have the same direction. All directions are unit vectors.
+    /// `direction` if its parameter `fold` is `false`, so that no rays are mirrored. The density is
+    /// the largest finite number in lanes in which all transmitted rays have the same direction.
+    /// All directions are unit vectors.
     #[inline(always)]
     pub fn transmission_density<L: SimdFloat<Scalar = S>>(
         &self,
@@ -152,12 +157,15 @@ impl<S: Float> Bsdf<S> {
         L::select(media.same(), L::from_f64(L::MAX), density)
     }
 
-    /// Returns the value [1/sr] of an interface in `direction`, times the cosine of the light, and
-    /// the density [1/sr] with which [`Bsdf::sample_interface`] draws `direction`: as the
-    /// transmitted ray in the lanes of `behind`, as the reflected ray elsewhere. The weight of a
-    /// sample is the first divided by the second. Both are zero for directions on the wrong side.
-    /// Where all transmitted rays have about the same direction, the value is zero, and the density
-    /// is the largest finite number. The other parameters are those of [`Bsdf::sample_interface`].
+    /// Returns two values for light that arrives from `direction`: the BSDF [1/sr] of the interface
+    /// times the cosine between `direction` and the normal, and the density [1/sr] with which
+    /// [`Bsdf::sample_interface`] draws `direction`. In the lanes of `behind` both values are for
+    /// the transmitted ray, elsewhere for the reflected ray.
+    ///
+    /// The weight of a sample is the first value divided by the second. Both are zero for reflected
+    /// rays behind the surface and for transmitted rays in front of it. Where all transmitted rays
+    /// have about the same direction, the first value is zero, and the density is the largest
+    /// finite number. The other parameters are those of [`Bsdf::sample_interface`].
     #[inline(always)]
     pub fn evaluate_interface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -209,28 +217,33 @@ impl<S: Float> Bsdf<S> {
 
 /// Microfacet that reflects or transmits an incident ray into a direction.
 struct Facet<L> {
-    /// Unit normal on the viewer's side.
+    /// Unit normal of the microfacet, on the viewer's side.
     normal: Vec3<L>,
-    /// Cosine of `normal` and the surface normal.
+    /// Cosine of the angle between microfacet normal and surface normal.
     nh: L,
-    /// Cosine of the viewer and the surface normal.
+    /// Cosine of the angle between the direction to the viewer and the surface normal.
     nv: L,
-    /// Cosine of the viewer and `normal`.
+    /// Cosine of the angle between the direction to the viewer and the microfacet normal.
     vh: L,
-    /// Cosine of the direction and the surface normal, which is reversed for transmitted rays.
+    /// Cosine of the angle between the outgoing direction and the surface normal, which is reversed
+    /// for transmitted rays.
     no: L,
-    /// Cosine of the direction and `normal`, which is reversed for transmitted rays.
+    /// Cosine of the angle between the outgoing direction and the microfacet normal, which is
+    /// reversed for transmitted rays.
     oh: L,
-    /// Density [1/sr] of the direction, if visible microfacets are sampled.
+    /// Density [1/sr] with which the outgoing direction is drawn if visible microfacets are
+    /// sampled.
     density: L,
 }
 
-/// Returns the microfacet that transmits (in the lanes of `behind`) or reflects rays into
-/// `direction`. The density is 0 for directions on the wrong side.
+/// Returns the microfacet that scatters rays of the direction `incident` into `direction`: by
+/// transmission in the lanes of `behind`, by reflection elsewhere. `n` is the surface normal. The
+/// density is 0 for directions on the wrong side of the surface.
 ///
-/// The half vector of refraction is n_i V + n_t L, and its solid angle per solid angle of L is n_t^2 L.h /
-/// |n_i V + n_t L|^2 (Walter et al. 2007, eq. 16 and 17). Thin surfaces mirror the reflected ray to the
-/// other side.
+/// The half vector of refraction is n_i V + n_t L, with V the direction to the viewer and L =
+/// `direction`. Its solid angle per solid angle of L is n_t^2 L.h / |n_i V + n_t L|^2 (Walter et
+/// al. 2007, eq. 16 and 17). At thin surfaces the transmitted ray is the reflected ray, mirrored to
+/// the other side.
 #[inline(always)]
 fn facet<L: SimdFloat>(
     facets: &MicrofacetDistribution<L::Scalar>,

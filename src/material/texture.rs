@@ -13,37 +13,37 @@ use crate::value::{choices, description};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// A texture that multiplies a material's colour: one kind with its parameters.
+/// Texture that multiplies a material's colour: one kind of texture with its parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Texture {
-    /// `texture.image`
+    /// Image from a file: `texture.image` in scene files.
     Image(ImageTexture),
-    /// `texture.checker`
+    /// Squares of two colours: `texture.checker` in scene files.
     Checker(Checker),
 }
 
-/// A bump map that perturbs shading normals: one kind with its parameters.
+/// Bump map that perturbs shading normals: one kind of bump map with its parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Bump {
-    /// `bump.image`
+    /// Heights from an image: `bump.image` in scene files.
     Image(HeightImage),
 }
 
 description! {
     /// A PNG or JPEG image.
     pub struct ImageTexture: Default {
-        /// Name of the file, relative to the folder of the scene file. Empty: white.
+        /// Name of the file, relative to the folder of the scene file. An empty name means white.
         file: String = "";
         /// Source of the coordinates u (to the right) and v (up).
         mapping: Mapping = "auto";
-        /// Axis around or along which those mappings project.
+        /// Axis around or along which the mapping projects.
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
-        /// Repeats per unit of u and of v: the larger, the smaller the picture.
+        /// Repetitions per unit of u and of v: larger numbers make the picture smaller.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
-        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it
-        /// left and down.
+        /// Offset that is added to the scaled u and v; 1 is one repetition of the image. Positive
+        /// values move the image left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
         /// Continuation of the image beyond its edges.
         wrap: Wrap = "repeat";
@@ -54,20 +54,20 @@ description! {
 }
 
 description! {
-    /// Squares of two colours, two by two a repeat.
+    /// Checkerboard of two colours; a repetition has two by two squares.
     pub struct Checker: Default {
         /// Colour of the square that begins at u = v = 0.
         even: Color = [1.0, 1.0, 1.0], in COEFFICIENT;
-        /// Colour of the other squares.
+        /// Colour of the squares between those of the colour `even`.
         odd: Color = [0.1, 0.1, 0.1], in COEFFICIENT;
         /// Source of the coordinates u (to the right) and v (up).
         mapping: Mapping = "auto";
-        /// Axis around or along which those mappings project.
+        /// Axis around or along which the mapping projects.
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
-        /// Repeats per unit of u and of v: the larger, the smaller the picture.
+        /// Repetitions per unit of u and of v: larger numbers make the picture smaller.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
-        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it
-        /// left and down.
+        /// Offset that is added to the scaled u and v; 1 is one repetition of the image. Positive
+        /// values move the image left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
     }
 }
@@ -75,18 +75,19 @@ description! {
 description! {
     /// Heights from a PNG or JPEG image: black is low, white is high.
     pub struct HeightImage: Default {
-        /// Name of the file, relative to the folder of the scene file. Empty: flat.
+        /// Name of the file, relative to the folder of the scene file. An empty name means a flat
+        /// surface.
         file: String = "";
         /// Height of white above black, before the object's transform; negative: depth below black.
         height: f64 = 0.02, in closed(-1e3, 1e3) "scene units";
         /// Source of the coordinates u (to the right) and v (up).
         mapping: Mapping = "auto";
-        /// Axis around or along which those mappings project.
+        /// Axis around or along which the mapping projects.
         axis: Option<Axis>, or "y for `spherical` and `cylindrical`, z for `planar`";
-        /// Repeats per unit of u and of v: the larger, the smaller the picture.
+        /// Repetitions per unit of u and of v: larger numbers make the picture smaller.
         scale: [f64; 2] = [1.0, 1.0], in above(0.0, 1e6);
-        /// Added to the scaled u and v; 1 is one repetition of the image. Positive values move it
-        /// left and down.
+        /// Offset that is added to the scaled u and v; 1 is one repetition of the image. Positive
+        /// values move the image left and down.
         offset: [f64; 2] = [0.0, 0.0], in closed(-1e6, 1e6);
         /// Continuation of the image beyond its edges.
         wrap: Wrap = "repeat";
@@ -101,16 +102,16 @@ choices! {
         /// about an axis, `box` on solids with flat faces, `planar` on flat shapes, `uv` on meshes
         /// whose file has texture coordinates, `box` on other meshes
         Auto = "auto",
-        /// projection along the axis; one repeat per scene unit, from the lower left corner of the
-        /// box around the shape (of a plane, from its `point`)
+        /// projection along the axis; one repetition per scene unit, from the lower left corner of
+        /// the box around the shape (of a plane, from its `point`)
         Planar = "planar",
         /// u once around the axis, v once from pole to pole, about the middle of the box around the
         /// shape; the middle of the image faces the front
         Spherical = "spherical",
         /// u once around the axis, v once along the shape; the ends show the colours of their rims
         Cylindrical = "cylindrical",
-        /// planar projection of each side, seen from outside; one repeat per scene unit, from the
-        /// side's lower left corner
+        /// planar projection of each side, seen from outside; one repetition per scene unit, from
+        /// the side's lower left corner
         Box = "box",
         /// texture coordinates of the mesh file; on rectangles and platforms, from 0 to 1 between
         /// opposite edges
@@ -121,11 +122,11 @@ choices! {
 choices! {
     /// Axis of texture space.
     pub enum Axis {
-        /// to the right
+        /// axis that points to the right
         X = "x",
-        /// up, or along the axis of a cylinder or cone
+        /// axis that points up, or along the axis of a cylinder or cone
         Y = "y",
-        /// to the front, or along the normal of a flat shape
+        /// axis that points to the front, or along the normal of a flat shape
         Z = "z",
     }
 }
@@ -133,9 +134,9 @@ choices! {
 choices! {
     /// Continuation of an image beyond its edges.
     pub enum Wrap {
-        /// repeats the image
+        /// repetition of the image
         Repeat = "repeat",
-        /// repeats its outermost pixels
+        /// repetition of the outermost pixels
         Clamp = "clamp",
     }
 }
@@ -143,9 +144,9 @@ choices! {
 choices! {
     /// Interpolation between the centres of an image's pixels.
     pub enum TextureFilter {
-        /// smooth transitions
+        /// bilinear interpolation, with smooth transitions
         Bilinear = "bilinear",
-        /// none: every pixel is a square
+        /// no interpolation: every pixel is a square
         Nearest = "nearest",
     }
 }
@@ -153,17 +154,18 @@ choices! {
 /// Placement keys of a texture: they determine its coordinates on the shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Source of the coordinates.
+    /// Source of the texture coordinates, such as a projection.
     pub mapping: Mapping,
     /// Axis around or along which the mapping projects; `None` is the default axis of the mapping.
     pub axis: Option<Axis>,
     /// Repetitions of the image per unit of u and of v.
     pub scale: [f64; 2],
-    /// Offset that is added to the scaled coordinates. Its unit is one repetition of the image.
+    /// Offset that is added to the scaled texture coordinates. Its unit is one repetition of the
+    /// image.
     pub offset: [f64; 2],
 }
 
-/// Implements `placement` for texture kinds with the placement keys.
+/// Implements `placement` for kinds of textures that have the keys of [`Placement`].
 macro_rules! placed {
     ($($kind:ident),+) => {$(
         impl $kind {
@@ -179,14 +181,16 @@ macro_rules! placed {
 placed!(ImageTexture, Checker, HeightImage);
 
 impl ImageTexture {
-    /// Returns the pixels; `None` if no file has been loaded, or if it is unreadable.
+    /// Returns the pixels of the texture image; `None` if no file has been loaded, or if it is
+    /// unreadable.
     pub fn image(&self) -> Option<&Arc<Image>> {
         self.content.content()
     }
 }
 
 impl HeightImage {
-    /// Returns the pixels; `None` if no file has been loaded, or if it is unreadable.
+    /// Returns the pixels of the height image; `None` if no file has been loaded, or if it is
+    /// unreadable.
     pub fn image(&self) -> Option<&Arc<Image>> {
         self.content.content()
     }
@@ -203,7 +207,7 @@ impl Texture {
         }
     }
 
-    /// Returns the key of the texture's kind.
+    /// Returns the key of the texture's kind in scene files.
     pub fn key(&self) -> &'static str {
         match self {
             Self::Image(_) => "image",
@@ -233,7 +237,8 @@ impl Texture {
         })
     }
 
-    /// Returns `false` for an image without a readable file, otherwise `true`.
+    /// Returns `true` if the texture changes colours: a checkerboard, or an image whose file was
+    /// read.
     pub fn has_effect(&self) -> bool {
         match self {
             Self::Image(image) => image.image().is_some(),
@@ -263,13 +268,13 @@ impl Bump {
     }
 }
 
-/// Keys of the kinds of `texture` in scene files.
+/// Keys of `texture` in scene files, one for each kind of texture.
 const TEXTURE_KINDS: &[Field] = &[
     Field::required("image", ImageTexture::TYPE, "", ImageTexture::DOC),
     Field::required("checker", Checker::TYPE, "", Checker::DOC),
 ];
 
-/// Keys of the kinds of `bump` in scene files.
+/// Keys of `bump` in scene files, one for each kind of bump map.
 const BUMP_KINDS: &[Field] = &[Field::required("image", HeightImage::TYPE, "", HeightImage::DOC)];
 
 impl FieldValue for Texture {
@@ -306,7 +311,8 @@ impl FieldValue for Bump {
 }
 
 impl crate::material::Material {
-    /// Iterates over the files of the texture and the bump map: name and content of each.
+    /// Iterates over the files of the texture and the bump map. Each element is the name of a file
+    /// and its content.
     fn files_mut(&mut self) -> impl Iterator<Item = (&String, &mut Loaded<Image>)> {
         let texture = match &mut self.texture {
             Some(Texture::Image(image)) => Some((&image.file, &mut image.content)),
@@ -336,15 +342,16 @@ impl crate::material::Material {
         [texture, bump].into_iter().flatten()
     }
 
-    /// Calls `load` for the files of the texture and of the bump map and stores the results. Files
-    /// whose content or error is stored already are skipped.
+    /// Calls `load` for the files of the texture and of the bump map that were not loaded before,
+    /// and stores the results: content or error.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Image>, AssetError>) {
         for (file, content) in self.files_mut() {
             content.resolve(|| load(file));
         }
     }
 
-    /// Copies the contents of files from `other`, if both materials name the same files.
+    /// Copies the contents of texture and bump files from the material `other`, for the files that
+    /// both `self` and `other` name.
     pub fn resolve_as(&mut self, other: &Self) {
         let mut known = other.clone();
         let known: Vec<_> = known.files_mut().collect();

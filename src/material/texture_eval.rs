@@ -1,28 +1,28 @@
-//! Compiled textures: colours and height gradients at given coordinates.
+//! Compiled textures: evaluation of colours and of height gradients at texture coordinates.
 
 use crate::asset::Image;
 use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
 use crate::material::texture::{Bump, Texture, TextureFilter, Wrap};
 use std::sync::Arc;
 
-/// Compiled texture. Its coordinates count repetitions of the image.
+/// Texture compiled for the kernels. One unit of its coordinates is one repetition of the image.
 #[derive(Clone, Debug)]
 pub enum CompiledTexture<S> {
-    /// Squares of two colours, two by two per repetition: the colour of the first square, and the
-    /// colour of its neighbours.
+    /// Checkerboard with two by two squares per repetition: the colour of the square that begins at
+    /// u = v = 0, and the colour of its neighbours.
     Checker([[S; 3]; 2]),
-    /// An image.
+    /// Image from a file, with its interpolation and its continuation beyond the edges.
     Image {
-        /// Pixels.
+        /// Pixels of the texture image.
         image: Arc<Image>,
-        /// Continuation beyond the edges.
+        /// Continuation of the image beyond its edges.
         wrap: Wrap,
-        /// Interpolation between pixels.
+        /// Interpolation between the centres of pixels.
         filter: TextureFilter,
     },
 }
 
-/// Compiled bump map. Its coordinates count repetitions of the image.
+/// Bump map compiled for the kernels. One unit of its coordinates is one repetition of the image.
 #[derive(Clone, Debug)]
 pub struct BumpMap {
     image: Arc<Image>,
@@ -31,9 +31,10 @@ pub struct BumpMap {
     height: f64,
 }
 
-/// Returns the index of a pixel and a fraction for the coordinate `x` (in repetitions) along an
-/// axis of `size` pixels. The pixel is the one whose centre is at or before `x`. The fraction, from
-/// 0 to 1, is the part of the way to the next centre. The index may be out of range.
+/// Returns the position of the texture coordinate `x` (in repetitions) along an axis of `size`
+/// pixels, as two values. The first is the index of the last pixel whose centre is at or before
+/// `x`; it may be out of range. The second is the distance of `x` from this centre in pixels, from
+/// 0 to 1. `wrap` is the rule for positions beyond the edges.
 #[inline(always)]
 fn pixel_position(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
     let size = f64::from(size);
@@ -56,8 +57,8 @@ fn wrapped(i: i32, size: u32, wrap: Wrap) -> u32 {
     }
 }
 
-/// Returns the colour, in linear light, at (u, v). v points up; rows of pixels are stored
-/// downwards.
+/// Returns the colour of the image, in linear light, at the texture coordinates (u, v). v points
+/// up; rows of pixels are stored downwards.
 #[inline(always)]
 fn color_at(image: &Image, wrap: Wrap, filter: TextureFilter, u: f64, v: f64) -> [f64; 3] {
     let [width, height] = image.size();
@@ -76,8 +77,8 @@ fn color_at(image: &Image, wrap: Wrap, filter: TextureFilter, u: f64, v: f64) ->
     })
 }
 
-/// Calls `f(lane)` for the lanes whose bits are set in `bits`, and returns the vectors; other lanes
-/// are zero.
+/// Calls `f(lane)` for the lanes whose bits are set in `bits`, and returns the results as SIMD
+/// vectors; other lanes are zero.
 #[inline(always)]
 fn gathered<L: SimdFloat>(bits: u32, mut f: impl FnMut(usize) -> [f64; 3]) -> Vec3<L> {
     let mut all = [[0.0; 3]; MAX_WIDTH];
@@ -105,7 +106,8 @@ impl<S: Float> CompiledTexture<S> {
         }
     }
 
-    /// Returns `true` if the colour jumps between neighbouring points.
+    /// Returns `true` if the colour jumps at edges: in a checkerboard, or in an image whose pixels
+    /// are not interpolated.
     pub fn has_edges(&self) -> bool {
         match self {
             Self::Checker(_) => true,
@@ -113,7 +115,7 @@ impl<S: Float> CompiledTexture<S> {
         }
     }
 
-    /// Returns the colours at (u, v) in the lanes whose bits are set in `bits`.
+    /// Returns the texture's colours at (u, v) in the lanes whose bits are set in `bits`.
     pub fn eval<L: SimdFloat<Scalar = S>>(&self, (u, v): (L, L), bits: u32) -> Vec3<L> {
         let coordinates = |lane| (u.lane(lane).to_f64(), v.lane(lane).to_f64());
         match self {
@@ -138,11 +140,12 @@ impl BumpMap {
         Some(Self { image: source.image()?.clone(), wrap: source.wrap, height: source.height })
     }
 
-    /// Returns the gradient of the height along u and v, in scene units per repetition, in the
-    /// lanes whose bits are set in `bits`.
+    /// Returns two values: the derivatives of the bump map's height by u and by v, in scene units
+    /// per repetition, in the lanes whose bits are set in `bits`.
     ///
-    /// Central differences at the pixels are interpolated bilinearly. The gradient is continuous;
-    /// that of bilinear heights would jump at pixel boundaries.
+    /// Central differences of the heights at the pixels are interpolated bilinearly, so that the
+    /// result is continuous. The exact derivatives of bilinearly interpolated heights would jump at
+    /// pixel boundaries.
     pub fn gradient<L: SimdFloat>(&self, (u, v): (L, L), bits: u32) -> (L, L) {
         let slopes: Vec3<L> = gathered(bits, |lane| {
             let [du, dv] = self.slope_at(u.lane(lane).to_f64(), v.lane(lane).to_f64());

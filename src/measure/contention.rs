@@ -6,7 +6,8 @@ use std::collections::HashMap;
 use std::fs;
 use std::time::Duration;
 
-/// Run-queue delay of each thread of this program, since the start of the thread.
+/// Run-queue delay of each thread of this program since its start, by the system's id of the
+/// thread.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunQueueDelay(HashMap<String, Duration>);
 
@@ -32,8 +33,9 @@ impl RunQueueDelay {
     }
 }
 
-/// Parses the delay, the second of three numbers: nanoseconds run, nanoseconds waited, number of
-/// times scheduled.
+/// Parses the delay of a thread from the text of its file `schedstat`. The delay is the second of
+/// three numbers: nanoseconds run, nanoseconds waited, number of times scheduled. Returns `None` if
+/// this number is missing.
 fn parse_delay(schedstat: &str) -> Option<Duration> {
     schedstat.split_whitespace().nth(1)?.parse().ok().map(Duration::from_nanos)
 }

@@ -1,18 +1,19 @@
-//! Order of convergence: the slope of log error against log samples.
+//! Order of convergence of a render: the slope of log error against log samples.
 
-/// Slope of a least-squares line through points in log-log coordinates, with its standard error.
+/// Slope of a least-squares line through points (samples, error) in log-log coordinates, with its
+/// standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
-    /// d log(error) / d log(samples): -0.5 for independent random samples.
+    /// Value of the slope, d log(error) / d log(samples): -0.5 for independent random samples.
     pub value: f64,
-    /// Standard error of the slope, from the residuals.
+    /// Standard error of the slope, from the residuals of the fitted line.
     pub standard_error: f64,
 }
 
 impl Slope {
-    /// Fits a line to points (samples, error). Points with a number that is not positive are
-    /// ignored. Returns `None` if fewer than three points remain or all have the same number of
-    /// samples.
+    /// Fits a line to the logarithms of `points`, pairs (samples, error). Points with a number that
+    /// is not positive are ignored. Returns `None` if fewer than three points remain or all have
+    /// the same number of samples.
     pub fn fit(points: &[(f64, f64)]) -> Option<Self> {
         let logs: Vec<(f64, f64)> = points
             .iter()
@@ -50,8 +51,9 @@ mod tests {
         assert_eq!(Slope::fit(&points[..2]), None);
     }
 
-    /// Checks the standard error of a horizontal line. The residuals are (1, -2, 1) / 10, so that
-    /// it is sqrt(0.06 / 1 / 2).
+    /// Checks the standard error of the slope of a horizontal line through three points. The
+    /// residuals are (1, -2, 1) / 10, with the sum of squares 0.06. With one degree of freedom, and
+    /// 2 as the sum of squares of the abscissas, the standard error is sqrt(0.06 / 1 / 2).
     #[test]
     fn scatter_determines_the_standard_error() {
         let e = std::f64::consts::E;

@@ -1,30 +1,32 @@
-//! Error curve of one variant of the settings, from the first samples to the target noise.
+//! Error curve: the error of a render at increasing numbers of samples, until it reaches the target
+//! noise. Each variant of the render settings has its own curve.
 
 use crate::measure::contention::RunQueueDelay;
 use crate::measure::experiment::Variant;
-use crate::measure::reference::{Errors, Reference};
+use crate::measure::reference_image::{Errors, Reference};
 use crate::render::SyncRender;
 use std::io;
 
-/// Point of an error curve.
+/// Point of an error curve: the error of a render after some samples, against a reference picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Number of steps of the render before this point.
+    /// Number of steps of the render before this point of the curve. A step is one call of the
+    /// render's `step`.
     pub step: usize,
-    /// Number of samples over all pixels.
+    /// Number of samples of the picture at this point, summed over all pixels.
     pub samples: u64,
-    /// Mean number of samples per pixel.
+    /// Mean number of samples per pixel at this point of the curve.
     pub spp: f64,
-    /// Seconds of tracing, one entry for each repetition.
+    /// Seconds of tracing until this point, one number for each repetition of the render.
     pub seconds: Vec<f64>,
-    /// Error that the render estimates from its own replicates, without a reference, in 8-bit
-    /// levels.
+    /// Error that the render estimates without a reference, from the difference between the two
+    /// halves of its samples, in 8-bit levels. `None` before the first estimate.
     pub estimated_codes: Option<f64>,
-    /// Errors against the reference.
+    /// Errors of the picture at this point against the reference picture.
     pub errors: Errors,
 }
 
-/// Conditions that end an error curve.
+/// Conditions that end an error curve: a target error or a time limit, whichever is reached first.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
     /// Error at which the curve ends, in 8-bit levels.
@@ -32,16 +34,18 @@ pub struct End {
     /// Seconds of tracing after which the curve ends in any case.
     pub seconds: f64,
     /// `true` if `codes` is compared with the estimated error instead of the true one. This is for
-    /// biased variants, whose true error does not converge to 0.
+    /// renders with biased settings, whose true error does not converge to 0.
     pub use_estimate: bool,
 }
 
-/// Factor by which the estimated error falls from one point of the curve to the next.
+/// Ratio of the errors at consecutive points of the curve. The next point is recorded when the
+/// error, as the render estimates it, has fallen to this share of that at the latest point.
 const POINT_RATIO: f64 = 0.84;
 
 /// Returns the share of the processors' time that other programs used while `threads` threads ran
-/// for `seconds` since `before`. Returns `None` if the share is unknown, and if there are more
-/// threads than processors, because these threads then wait for each other.
+/// for `seconds`. `before` has the run-queue delays at the start of this time. Returns `None` if
+/// the share is unknown. It is unknown if there are more threads than processors, because these
+/// threads then wait for each other.
 fn stolen_share(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) -> Option<f64> {
     if seconds <= 0.0 || threads > std::thread::available_parallelism().map_or(1, usize::from) {
         return None;
@@ -50,10 +54,12 @@ fn stolen_share(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) ->
     Some((waited / (threads as f64 * seconds)).min(1.0))
 }
 
-/// Renders `variant` until `end`. Returns the points of the error curve, the share of the
-/// processors' time that other programs used meanwhile (`None` if unknown), and the render.
+/// Renders with the settings of `variant` until the conditions `end` are met. Returns three values:
+/// the points of the error curve, the share of the processors' time that other programs used
+/// meanwhile (`None` if unknown), and the render.
 ///
 /// # Errors
+///
 /// Returns the error of the system if a thread cannot be started.
 pub fn follow(
     variant: &Variant,
@@ -75,11 +81,11 @@ pub fn follow(
             last_estimate = estimate.unwrap_or(last_estimate);
             let rendering = render.rendering();
             let errors = reference.errors(&rendering.film, &rendering.mix);
-            if points.last().is_none_or(|last| last.samples < render.samples()) {
+            if points.last().is_none_or(|last| last.samples < render.schedule().samples()) {
                 points.push(Point {
                     step,
-                    samples: render.samples(),
-                    spp: render.spp().mean,
+                    samples: render.schedule().samples(),
+                    spp: render.schedule().spp().mean,
                     seconds: vec![render.seconds()],
                     estimated_codes: estimate,
                     errors,
@@ -95,10 +101,12 @@ pub fn follow(
     Ok((points, stolen, render))
 }
 
-/// Renders `variant` again, and adds the seconds of this repetition to each point. Returns the
-/// share of the processors' time that other programs used meanwhile, or `None` if unknown.
+/// Renders with the settings of `variant` again, and adds the seconds of this repetition to each
+/// point of its error curve. Returns the share of the processors' time that other programs used
+/// meanwhile, or `None` if unknown.
 ///
 /// # Errors
+///
 /// Returns the error of the system if a thread cannot be started.
 pub fn repeat(variant: &Variant, points: &mut [Point]) -> io::Result<Option<f64>> {
     let mut render = variant.start()?;

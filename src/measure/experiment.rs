@@ -11,30 +11,32 @@ use std::io;
 use std::str::FromStr;
 use std::sync::Arc;
 
-/// Setting that an experiment varies.
+/// Setting of the renderer that an experiment varies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Experiment {
-    /// No variation: the default settings.
+    /// Experiment without a change: a render with the default settings.
     Default,
-    /// Adaptive sampling against uniform sampling.
+    /// Experiment with adaptive sampling against uniform sampling.
     Adaptivity,
-    /// Single precision against double precision.
+    /// Experiment with single precision against double precision.
     Precision,
-    /// Number of tracing threads.
+    /// Experiment with different numbers of threads.
     Threads,
-    /// Sobol points against independent random numbers.
+    /// Experiment with Sobol points against independent random numbers.
     Sampler,
-    /// Cone lobe of glossy reflection against its cheap approximation, the square lobe.
+    /// Experiment with the cone lobe of glossy reflection against its cheap approximation, the
+    /// square lobe.
     Lobe,
-    /// Fewer types of rays: only camera rays, or camera and shadow rays.
+    /// Experiment with fewer types of rays: only camera rays, or camera and shadow rays.
     Level,
-    /// Largest number of reflections of a path.
+    /// Experiment with different limits of the number of reflections of a path.
     Depth,
-    /// Throughput below which a path ends.
+    /// Experiment with different throughputs below which a path ends.
     MinWeight,
-    /// Cap on the number of samples of a glossy pixel.
+    /// Experiment with different limits of the number of samples per pixel in tiles with glossy
+    /// lobes.
     RaysPerPixel,
-    /// Acceleration structure.
+    /// Experiment with different acceleration structures.
     Acceleration,
 }
 
@@ -54,25 +56,25 @@ impl Experiment {
         (Self::Acceleration, "acceleration", "Acceleration structures"),
     ];
 
-    /// Returns the name on the command line.
+    /// Returns the experiment's name on the command line.
     pub fn name(self) -> &'static str {
-        Self::ALL
-            .iter()
-            .find(|(experiment, ..)| *experiment == self)
-            .map_or("", |(_, name, _)| name)
+        self.words()[0]
     }
 
-    /// Returns the title in tables and plots.
+    /// Returns the experiment's title in tables and plots.
     pub fn title(self) -> &'static str {
-        Self::ALL
-            .iter()
-            .find(|(experiment, ..)| *experiment == self)
-            .map_or("", |(.., title)| title)
+        self.words()[1]
     }
 
-    /// Returns the name of the default value in the list of variants, such as `adaptive, default`.
-    /// `single` is `true` if the default is single precision; `threads` is the default number of
-    /// threads.
+    /// Returns the name and the title, from [`Self::ALL`].
+    fn words(self) -> [&'static str; 2] {
+        let found = Self::ALL.iter().find(|(experiment, ..)| *experiment == self);
+        found.map_or([""; 2], |(_, name, title)| [name, title])
+    }
+
+    /// Returns the name that tables give to the default value of the varied setting, such as
+    /// `adaptive, default`. `single` is `true` if the default is single precision; `threads` is the
+    /// default number of threads.
     pub fn default_name(self, single: bool, threads: usize) -> String {
         let name = match self {
             Self::Adaptivity => "adaptive".to_string(),
@@ -85,8 +87,8 @@ impl Experiment {
         format!("{name}, default")
     }
 
-    /// Returns `true` if the pictures of all variants have the same expectation, so that they
-    /// differ in noise only.
+    /// Returns `true` if the pictures of all variants of the experiment have the same expectation,
+    /// so that they differ in noise only. A variant is a render with one setting changed.
     pub fn unbiased(self) -> bool {
         matches!(
             self,
@@ -119,20 +121,20 @@ impl FromStr for Experiment {
     }
 }
 
-/// Scene and settings of one render.
+/// Scene and settings of one render of an experiment.
 #[derive(Clone)]
 pub struct Variant {
-    /// The setting that differs from the default.
+    /// Experiment, that is, the setting that differs from the default.
     pub experiment: Experiment,
-    /// Name of the value of this setting, such as `uniform` or `depth 4`.
+    /// Name of the value of the varied setting, such as `uniform` or `depth 4`.
     pub name: String,
-    /// The scene with this variant's settings.
+    /// Scene with the settings of this variant.
     pub scene: Arc<Scene>,
     /// Options of scene compilation and of sampling.
     pub options: Options,
-    /// `true` if sampling is adaptive.
+    /// `true` if the samples of the render are allocated adaptively.
     pub adaptive: bool,
-    /// Number of tracing threads.
+    /// Number of threads that trace rays.
     pub threads: usize,
 }
 
@@ -153,28 +155,29 @@ impl Variant {
     }
 }
 
-/// Plan of a measurement.
+/// Plan of a measurement (not of a render): experiments, noise targets, duration.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Noise targets in 8-bit levels, descending.
     pub targets: Vec<f64>,
-    /// The settings to vary.
+    /// Experiments to run; each changes one setting of the render.
     pub experiments: Vec<Experiment>,
-    /// Least number of timed runs of each variant.
+    /// Smallest number of timed renders of each variant (the default settings, or one changed
+    /// setting).
     pub repetitions: usize,
     /// Approximate duration of all measurements, in seconds.
     pub seconds: f64,
-    /// Number of threads, except in [`Experiment::Threads`].
+    /// Number of tracing threads, except in [`Experiment::Threads`].
     pub threads: usize,
-    /// Random seed of all variants. The reference has another seed.
+    /// Random seed of the measured renders. The reference picture has another seed.
     pub seed: u64,
     /// Exposure and tone curve of the picture whose displayed error is measured.
     pub display: Display,
 }
 
 impl Plan {
-    /// Returns the default variant, followed by the variants of each experiment that differ from
-    /// the default in this scene.
+    /// Returns the variants to measure: the default settings, followed by the changed settings of
+    /// each experiment. Settings that are equal to the default in this scene are left out.
     pub fn variants(&self, scene: &Arc<Scene>) -> Vec<Variant> {
         let mut all = vec![self.default_of(scene)];
         for experiment in &self.experiments {
@@ -183,7 +186,7 @@ impl Plan {
         all
     }
 
-    /// Returns the variant with default settings.
+    /// Returns the variant of `scene` in which no setting is changed.
     pub fn default_of(&self, scene: &Arc<Scene>) -> Variant {
         Variant {
             experiment: Experiment::Default,

@@ -11,7 +11,7 @@ mod convergence_order;
 mod error_curve;
 mod experiment;
 pub mod plot;
-mod reference;
+mod reference_image;
 mod result;
 mod run;
 #[cfg(test)]
@@ -21,6 +21,6 @@ mod test_random;
 pub use convergence_order::Slope;
 pub use error_curve::Point;
 pub use experiment::{Experiment, Plan, Variant};
-pub use reference::{Bias, Errors, Reference};
+pub use reference_image::{Bias, Errors, Reference};
 pub use result::{Expected, Measured, Measurement, Steadiness, TimeToTarget, median, spread};
 pub use run::{Progress, measure};

@@ -1,5 +1,5 @@
-//! Plot of error against time. Each experiment has a panel with logarithmic axes, which shows the
-//! curves of the default and of the variants.
+//! Plot of error against time in a measurement. Each experiment has a panel with logarithmic axes,
+//! which shows the error curves of the default settings and of the experiment's variants.
 
 use crate::measure::experiment::Experiment;
 use crate::measure::result::{Measured, Measurement, median};
@@ -11,7 +11,7 @@ use plotters::style::{FontStyle, register_font};
 use std::error::Error;
 use std::ops::Range;
 
-/// Width and height of a panel, in pixels.
+/// Width and height of a panel of the plot, in pixels.
 const PANEL: (i32, i32) = (440, 374);
 /// Height of the heading above all panels, in pixels.
 const HEAD: i32 = 64;
@@ -20,10 +20,11 @@ const HEAD: i32 = 64;
 /// bottom.
 const FRAME: [i32; 4] = [58, 22, 96, 50];
 
-/// Factor by which each axis extends beyond the smallest and the largest number.
+/// Factor by which each axis of the plot extends beyond the smallest and the largest number shown
+/// on it.
 const MARGIN: f64 = 1.15;
 
-/// Colours that are distinguishable with any colour vision (Okabe and Ito 2008).
+/// Colours of curves, distinguishable with any colour vision (Okabe and Ito 2008).
 const COLORS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -37,11 +38,11 @@ const INK: RGBColor = RGBColor(40, 40, 40);
 const GRID: RGBColor = RGBColor(226, 226, 226);
 const TARGET: RGBColor = RGBColor(150, 150, 150);
 
-/// Curve of one variant.
+/// Error curve of a render with one variant of the settings, in a panel of the plot.
 struct Line<'a> {
     name: &'a str,
     color: RGBColor,
-    /// Points (seconds, RMSE in 8-bit levels).
+    /// Points of the curve (seconds, RMSE in 8-bit levels).
     points: Vec<(f64, f64)>,
 }
 
@@ -54,7 +55,7 @@ pub fn size(measurement: &Measurement) -> (u32, u32) {
     ((cols * PANEL.0) as u32, (HEAD + rows * PANEL.1) as u32)
 }
 
-/// Draws the plot as SVG.
+/// Draws the plot of error against time as SVG.
 ///
 /// # Errors
 /// Returns the error of the drawing library.
@@ -64,8 +65,8 @@ pub fn svg(measurement: &Measurement, title: &str) -> Result<String, Box<dyn Err
     Ok(text)
 }
 
-/// Draws the plot as an RGB image of 8 bits per channel, row by row. Its width and height are those
-/// of [`size`].
+/// Draws the plot of error against time as an RGB image of 8 bits per channel, row by row. Its
+/// width and height are those of [`size`].
 ///
 /// # Errors
 /// Returns the error of the drawing library.
@@ -76,8 +77,8 @@ pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn
     Ok(bytes)
 }
 
-/// Returns the panels: each experiment with its variants. The default has a panel of its own only
-/// if there are no experiments.
+/// Returns the panels of the plot, each as an experiment and its variants. The default settings
+/// have a panel of their own only if there are no experiments.
 fn panels(measurement: &Measurement) -> Vec<(Experiment, Vec<&Measured>)> {
     let mut panels: Vec<(Experiment, Vec<&Measured>)> = Vec::new();
     for measured in measurement.measured.iter().skip(1) {
@@ -94,7 +95,7 @@ fn panels(measurement: &Measurement) -> Vec<(Experiment, Vec<&Measured>)> {
     panels
 }
 
-/// Returns the number of columns and rows of the grid for this number of panels.
+/// Returns the number of columns and rows of a grid for `panels` panels of the plot.
 fn grid(panels: usize) -> (i32, i32) {
     let cols = match panels {
         1 => 1,
@@ -104,15 +105,15 @@ fn grid(panels: usize) -> (i32, i32) {
     (cols as i32, panels.div_ceil(cols) as i32)
 }
 
-/// Returns the points (seconds, RMSE in 8-bit levels) of an error curve at which both numbers are
-/// positive.
+/// Returns the points (seconds, RMSE in 8-bit levels) of a variant's error curve at which both
+/// numbers are positive.
 fn points(measured: &Measured) -> Vec<(f64, f64)> {
     let coordinates =
         |p: &crate::measure::Point| (median(&measured.seconds(p)), p.errors.rmse_codes);
     measured.points.iter().map(coordinates).filter(|(s, e)| *s > 0.0 && *e > 0.0).collect()
 }
 
-/// Logarithmic axis, which maps numbers to pixel coordinates.
+/// Logarithmic axis of a plot, which maps numbers to pixel coordinates.
 struct Axis {
     numbers: Range<f64>,
     pixels: (i32, i32),
@@ -131,8 +132,9 @@ impl Axis {
         self.pixels.0 + (share * f64::from(self.pixels.1 - self.pixels.0)).round() as i32
     }
 
-    /// Returns the tick marks: round numbers in the range, with their labels. They are 1, 2 and 5
-    /// times each power of ten, or only the powers of ten if there would be more than nine.
+    /// Returns the tick marks of the axis: round numbers in its range, each with its label. They
+    /// are 1, 2 and 5 times each power of ten, or only the powers of ten if there would be more
+    /// than nine.
     fn ticks(&self) -> Vec<(f64, String)> {
         let Range { start, end } = self.numbers;
         let powers = start.log10().floor() as i32..=end.log10().ceil() as i32;
@@ -178,7 +180,8 @@ where
     Ok(())
 }
 
-/// Draws the panel of one experiment. `corner` is the upper left corner of the panel.
+/// Draws the plot panel of one experiment: the curves of the default settings and of `variants`.
+/// `corner` is the upper left corner of the panel.
 fn panel<'a, B: DrawingBackend>(
     root: &Canvas<B>,
     corner: (i32, i32),
@@ -247,8 +250,8 @@ where
     Ok(())
 }
 
-/// Draws the legend: a line in the colour of each curve, followed by the name of the curve. The
-/// first row starts at `corner`. Rows are wrapped at the x coordinate `end`.
+/// Draws the legend of a plot panel: a line in the colour of each curve, followed by the name of
+/// the curve. The first row starts at `corner`. Rows are wrapped at the x coordinate `end`.
 fn legend<B: DrawingBackend>(
     root: &Canvas<B>,
     corner: (i32, i32),

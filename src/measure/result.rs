@@ -1,20 +1,20 @@
-//! Results of a measurement.
+//! Results of a measurement of render times and errors.
 
 use crate::measure::convergence_order::Slope;
 use crate::measure::error_curve::Point;
 use crate::measure::experiment::{Experiment, Variant};
-use crate::measure::reference::Bias;
+use crate::measure::reference_image::Bias;
 
 /// Time at which a render reached a noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeToTarget {
-    /// The noise target, in 8-bit levels.
+    /// Noise target: RMSE of the displayed picture in 8-bit levels.
     pub codes: f64,
-    /// Seconds of tracing, median of the repetitions.
+    /// Seconds of tracing until the noise target: the median over the repetitions of the render.
     pub seconds: f64,
-    /// Relative spread of the repetitions, see [`spread`].
+    /// Relative spread of the seconds over the repetitions of the render, see [`spread`].
     pub spread: f64,
-    /// Mean number of samples per pixel.
+    /// Mean number of samples per pixel when the noise target is reached.
     pub spp: f64,
     /// `true` if the first point of the curve had reached the target already. `seconds` is then an
     /// upper bound.
@@ -24,98 +24,100 @@ pub struct TimeToTarget {
 /// Extrapolated time to a noise target that the default settings did not reach in the measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
-    /// The noise target, in 8-bit levels.
+    /// Noise target that was not reached, in 8-bit levels.
     pub codes: f64,
     /// Lower and upper estimate of the time to the target in seconds, extrapolated from the
     /// convergence so far.
     pub seconds: (f64, f64),
 }
 
-/// Results of one variant.
+/// Results of one variant of the settings in a measurement.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// The setting that differs from the default.
+    /// Experiment, that is, the setting that differs from the default.
     pub experiment: Experiment,
-    /// Value of the setting.
+    /// Value of the varied setting, such as `uniform` or `depth 4`.
     pub name: String,
-    /// Number of tracing threads.
+    /// Number of threads that trace rays.
     pub threads: usize,
-    /// Points of the error curve, in the order of samples.
+    /// Points of the error curve (error after some samples), in ascending order of sample count.
     pub points: Vec<Point>,
-    /// Share of the processors' time that other programs used, for each repetition. `None` if
-    /// unknown.
+    /// Share of the processors' time that other programs used, for each repetition of the render.
+    /// `None` if unknown.
     pub stolen: Vec<Option<f64>>,
-    /// Bias against the reference at the end of the curve. `None` for variants with the same
-    /// expectation as the default.
+    /// Bias of the picture against the reference picture at the end of the error curve. `None` for
+    /// settings whose pictures have the same expectation as with default settings.
     pub bias: Option<Bias>,
 }
 
-/// Results of all variants of a scene.
+/// Results of a measurement: all variants of the settings on one scene.
 pub struct Measurement {
-    /// Film size in pixels.
+    /// Width and height of the film in pixels.
     pub size: [u32; 2],
-    /// Samples per pixel of the reference. 0 if the reference was read from a file.
+    /// Samples per pixel of the reference picture. 0 if it was read from a file.
     pub reference_spp: f64,
-    /// Error of the reference itself, in 8-bit levels.
+    /// Error of the reference picture itself, in 8-bit levels.
     pub reference_codes: f64,
-    /// Error of the reference itself, in linear radiance.
+    /// Error of the reference picture itself, in linear radiance.
     pub reference_linear: f64,
-    /// Seconds of tracing that the reference took.
+    /// Seconds of tracing that the reference picture took.
     pub reference_seconds: f64,
     /// Noise at which settings are compared, in 8-bit levels: a noise that the default settings
     /// reached.
     pub compared_at: f64,
-    /// Noise targets, descending.
+    /// Noise targets in 8-bit levels, in descending order.
     pub targets: Vec<f64>,
-    /// Targets that the default settings did not reach in time, with extrapolated times.
+    /// Noise targets that the default settings did not reach in time, with extrapolated times.
     pub expected: Vec<Expected>,
     /// Requested experiments without a variant that differs from the default settings in this
     /// scene.
     pub idle: Vec<Experiment>,
-    /// Results of all variants, the default first.
+    /// Results of the renders with each variant of the settings, the default first.
     pub measured: Vec<Measured>,
 }
 
-/// Reliability of a measurement's times.
+/// Reliability of the times in a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steadiness {
-    /// Smallest number of repetitions over which a median was taken.
+    /// Smallest number of repetitions over which the median of a reported time was taken.
     pub repetitions: usize,
-    /// Largest relative spread of the reported times.
+    /// Largest relative spread of a reported time over the repetitions of its render.
     pub spread: f64,
-    /// Largest share of the processors' time that other programs used meanwhile. `None` if unknown.
+    /// Largest share of the processors' time that other programs used in a repetition from which
+    /// times are reported. `None` if unknown.
     pub stolen: Option<f64>,
 }
 
 /// Largest share of the processors' time that other programs may use in a repetition that counts as
 /// undisturbed.
 const MAX_STOLEN: f64 = 0.05;
-/// Smallest number of repetitions that count. If fewer are undisturbed, the least disturbed ones
-/// count as well.
+/// Smallest number of repetitions from which a result is computed. Repetitions that other programs
+/// disturbed are left out. If fewer than this number remain, the least disturbed of those left out
+/// are included.
 const MIN_COUNTED: usize = 5;
-/// Largest relative uncertainty of an error due to the error of the reference. More uncertain
-/// errors are ignored.
+/// Largest relative uncertainty of a measured error that the reference picture may cause. Points of
+/// the error curve with a larger uncertainty are ignored.
 const MAX_SPREAD: f64 = 0.05;
 
-/// Parameter of the sign test: half the width of the confidence interval, in units of half the
-/// square root of the number of values. This unit is the standard deviation of the count of signs.
-/// The value 1.4 contains the count in about four of five cases. The factor sqrt 2 is for the
-/// difference of two such counts.
+/// Half the width of the confidence interval of a median, as a multiple of sqrt(n) / 2 ranks for n
+/// values (sign test). sqrt(n) / 2 is the standard deviation of the number of values above the true
+/// median. This number is within 1.4 standard deviations of its mean in about four of five cases.
+/// The factor sqrt 2 is for the difference of two medians.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
-/// Returns the median. For an even number of values it is the mean of the two in the middle.
+/// Returns the median of `values`; for an even number of values, the mean of the two in the middle.
 /// Returns NaN if there are no values.
 pub fn median(values: &[f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// Returns the relative spread of the median of `values`. In about four of five cases the median of
-/// another measurement on the same machine differs from this median by at most this share.
+/// Returns the relative spread of the median of `values`. In about four of five cases, the median
+/// of another measurement on the same machine differs from this one by at most this share.
 ///
 /// For five and more values it is half the width of the confidence interval of the median by the
 /// sign test (Conover, *Practical Nonparametric Statistics*, confidence interval for a quantile),
-/// divided by the median. The confidence level is chosen so that two such medians agree. For fewer
-/// than five values it is their range divided by the median; for fewer than two it is 0.
+/// divided by the median. The interval is widened by sqrt 2 for the comparison of two medians. For
+/// fewer than five values it is their range divided by the median; for fewer than two it is 0.
 pub fn spread(values: &[f64]) -> f64 {
     let middle = median(values);
     if values.len() < 2 || middle == 0.0 {
@@ -139,7 +141,7 @@ fn quantile(values: &[f64], q: f64) -> f64 {
 }
 
 impl Measured {
-    /// Creates the results of the first repetition of `variant`.
+    /// Creates the results of one variant of the settings from its first render.
     pub fn new(
         variant: &Variant,
         points: Vec<Point>,
@@ -156,8 +158,8 @@ impl Measured {
         }
     }
 
-    /// Returns the indices of the repetitions that count: all undisturbed ones. If fewer than
-    /// [`MIN_COUNTED`] are undisturbed, the [`MIN_COUNTED`] least disturbed ones count.
+    /// Returns the indices of the repetitions that count: all that other programs did not disturb.
+    /// If these are fewer than [`MIN_COUNTED`], the [`MIN_COUNTED`] least disturbed ones count.
     fn counted(&self) -> Vec<usize> {
         let stolen = |i: &usize| self.stolen[*i].unwrap_or(0.0);
         let mut all: Vec<usize> = (0..self.stolen.len()).collect();
@@ -167,20 +169,22 @@ impl Measured {
         all
     }
 
-    /// Returns the seconds at `point` of each repetition that counts.
+    /// Returns the seconds of tracing until `point` of the error curve: one number for each
+    /// repetition that counts. Repetitions that other programs disturbed count only if too few
+    /// others exist.
     pub fn seconds(&self, point: &Point) -> Vec<f64> {
         self.counted().into_iter().filter_map(|i| point.seconds.get(i).copied()).collect()
     }
 
-    /// Returns the largest share of the processors' time that other programs used in a repetition
-    /// that counts. Returns `None` if unknown.
+    /// Returns the largest share of the processors' time that other programs used, over the
+    /// repetitions that count. Returns `None` if unknown.
     fn max_stolen(&self) -> Option<f64> {
         self.counted().into_iter().filter_map(|i| self.stolen[i]).reduce(f64::max)
     }
 
-    /// Returns the time at which the true error fell to `codes`, interpolated between points in
-    /// log-log coordinates. Returns `None` if the error stayed larger. Points with an uncertain
-    /// error are ignored, see `MAX_SPREAD`.
+    /// Returns the time at which the true error fell to `codes` 8-bit levels. It is interpolated
+    /// between points of the error curve in log-log coordinates. Returns `None` if the error stayed
+    /// larger. Points with an uncertain error are ignored, see `MAX_SPREAD`.
     pub fn time_to(&self, codes: f64) -> Option<TimeToTarget> {
         self.interpolated_time(codes, |p| {
             let certain = p.errors.spread <= MAX_SPREAD;
@@ -188,14 +192,16 @@ impl Measured {
         })
     }
 
-    /// Returns the time at which the render's own error estimate fell to `codes`, for biased
-    /// variants. Returns `None` if the estimate stayed larger.
+    /// Returns the time at which the render's own estimate of its error fell to `codes` 8-bit
+    /// levels. It is used for biased variants, whose true error does not converge to 0. Returns
+    /// `None` if the estimate stayed larger.
     pub fn estimated_time_to(&self, codes: f64) -> Option<TimeToTarget> {
         self.interpolated_time(codes, |p| p.estimated_codes.unwrap_or(f64::INFINITY))
     }
 
-    /// Returns [`Measured::estimated_time_to`] for biased variants and [`Measured::time_to`] for
-    /// unbiased ones.
+    /// Returns the time at which the error that decides fell to `codes` 8-bit levels: the estimated
+    /// error for biased variants, the true error for unbiased ones. Returns `None` if it stayed
+    /// larger.
     pub fn true_time_to(&self, codes: f64) -> Option<TimeToTarget> {
         if self.bias.is_some() { self.estimated_time_to(codes) } else { self.time_to(codes) }
     }
@@ -225,17 +231,19 @@ impl Measured {
         })
     }
 
-    /// Returns the median and the spread of the samples per second over the whole render. Returns
-    /// `None` if there are no points.
+    /// Returns two values: the number of samples traced per second until the last point of the
+    /// error curve (the median over the repetitions of the render), and the relative [`spread`] of
+    /// this median. Returns `None` if the curve has no points.
     pub fn samples_per_second(&self) -> Option<(f64, f64)> {
         let last = self.points.last()?;
         let speeds: Vec<f64> = self.seconds(last).iter().map(|s| last.samples as f64 / s).collect();
         Some((median(&speeds), spread(&speeds)))
     }
 
-    /// Returns the order of convergence of the linear error. The first quarter of the points is
-    /// left out, because these have too few samples for a power law. Returns `None` if too few
-    /// points remain.
+    /// Returns the order of convergence: the slope of the logarithm of the linear RMSE against the
+    /// logarithm of the sample count, over the points of the error curve. The first quarter of the
+    /// points is left out, because these have too few samples for a power law. Returns `None` if
+    /// too few points remain.
     pub fn slope(&self) -> Option<Slope> {
         let from = self.points.len() / 4;
         let points: Vec<_> =
@@ -243,8 +251,9 @@ impl Measured {
         Slope::fit(&points)
     }
 
-    /// Returns the efficiency at the end of the curve: 1 / (linear MSE x seconds). Returns `None`
-    /// if this is infinite or there are no points.
+    /// Returns the efficiency of the render at the end of its error curve: 1 / (linear MSE x
+    /// seconds). The seconds are the median over the repetitions. Returns `None` if the error or
+    /// the time is 0, or if the curve has no points.
     pub fn efficiency(&self) -> Option<f64> {
         let last = self.points.last()?;
         let cost = last.errors.rmse_linear.powi(2) * median(&self.seconds(last));
@@ -253,8 +262,8 @@ impl Measured {
 }
 
 impl Measurement {
-    /// Returns the reliability of the reported times: the times of the default to all targets, and
-    /// the times of all variants to the noise at which they are compared.
+    /// Returns the reliability of the reported times. These are the times of the default settings
+    /// to each noise target, and the times of all variants to the noise at which they are compared.
     pub fn steadiness(&self) -> Steadiness {
         let mut all = Steadiness { repetitions: usize::MAX, spread: 0.0, stolen: None };
         for (i, measured) in self.measured.iter().enumerate() {
@@ -272,7 +281,8 @@ impl Measurement {
         all
     }
 
-    /// Returns the largest relative change of the reported errors if another reference were used.
+    /// Returns the largest relative uncertainty of a reported error that the error of the reference
+    /// picture causes.
     pub fn reference_uncertainty(&self) -> f64 {
         let points = self.measured.iter().flat_map(|m| &m.points);
         let reported = points.map(|p| p.errors.spread).filter(|spread| *spread <= MAX_SPREAD);
@@ -283,7 +293,7 @@ impl Measurement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::reference::Errors;
+    use crate::measure::reference_image::Errors;
     use crate::measure::test_random::Rng;
 
     fn measured(points: &[(f64, f64)]) -> Measured {
@@ -338,8 +348,9 @@ mod tests {
         assert!(median(&[]).is_nan());
     }
 
-    /// Checks with normally distributed times that the median of a second measurement is within the
-    /// spread of the first in about four of five cases.
+    /// Checks the predicted spread of measured times with simulated, normally distributed times.
+    /// The median of a second measurement is within the spread of the first in about four of five
+    /// cases.
     #[test]
     fn spread_predicts_the_median_of_another_measurement() {
         let mut rng = Rng(5);
@@ -354,8 +365,9 @@ mod tests {
         }
     }
 
-    /// Checks that two disturbed repetitions of nine do not count. If all nine are disturbed, the
-    /// five least disturbed ones count, and their disturbance is reported.
+    /// Checks that disturbed repetitions of a render do not count. First, two of nine are
+    /// disturbed. Then all nine are disturbed: the five least disturbed ones count, and their
+    /// disturbance is reported.
     #[test]
     fn disturbed_repetitions_do_not_count() {
         let mut curve = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
@@ -390,7 +402,8 @@ mod tests {
         assert!((steady.spread - 1.0).abs() < 1e-9, "1, 3, 1, 1.1, 1: {steady:?}");
     }
 
-    /// Checks that an error with a large uncertainty due to the reference reaches no target.
+    /// Checks that a measured error never counts as having reached a target if the reference
+    /// picture makes it too uncertain.
     #[test]
     fn uncertain_error_reaches_no_target() {
         let mut curve = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);

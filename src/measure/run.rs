@@ -1,8 +1,9 @@
-//! Course of a measurement: reference, error curves, repetitions.
+//! Course of a measurement: renders the reference picture, follows the error curve of every variant
+//! of the settings, and repeats the renders for the medians of the times.
 
 use crate::measure::error_curve::{End, follow, repeat};
 use crate::measure::experiment::{Experiment, Plan, Variant};
-use crate::measure::reference::Reference;
+use crate::measure::reference_image::Reference;
 use crate::measure::result::{Expected, Measured, Measurement, spread};
 use crate::render::SyncRender;
 use crate::scene::Scene;
@@ -12,36 +13,42 @@ use std::time::Instant;
 
 /// Progress of a measurement, which consists of timed renders.
 pub struct Progress<'a> {
-    /// Name of the current render.
+    /// Name of the timed render that is in progress: `reference`, or the name of a variant of the
+    /// settings.
     pub step: &'a str,
-    /// Number of renders that have ended.
+    /// Number of the measurement's renders that have ended.
     pub done: usize,
     /// Expected number of renders of the whole measurement.
     pub total: usize,
 }
 
-/// Seconds of tracing before the measurement starts, after which clock rates and caches are steady.
+/// Seconds of tracing before the measurement starts, so that clock rates and caches are steady.
 const WARM_UP_SECONDS: f64 = 0.3;
-/// Noise of the reference divided by the smallest noise target.
+/// Noise at which the render of the reference picture ends, as a share of the smallest noise
+/// target.
 const REFERENCE_SHARE: f64 = 0.3;
-/// Largest part of the measurement's time that the reference may take.
+/// Largest duration of rendering the reference, as a share of the whole measurement's time.
 const REFERENCE_TIME: f64 = 0.3;
-/// Largest part of the measurement's time that the first run of the default settings may take.
+/// Largest duration of the first run of the default settings, as a share of the whole measurement's
+/// time.
 const DEFAULT_TIME: f64 = 0.12;
-/// Preferred noise at which settings are compared, in 8-bit levels.
+/// Smallest noise at which settings are compared, in 8-bit levels.
 const COMPARED_AT: f64 = 0.5;
-/// Longest duration of a variant, in multiples of the duration of the default.
+/// Longest duration of a render with a changed setting, in multiples of the duration with default
+/// settings.
 const MAX_SLOWDOWN: f64 = 5.0;
-/// Largest relative spread of times that are considered steady.
+/// Largest relative spread of the repeated times of a render that counts as steady.
 const STEADY: f64 = 0.05;
-/// Largest number of repetitions if all times are steady.
+/// Largest number of rounds of a measurement in which all times are steady. A round repeats the
+/// render of each variant once.
 const MAX_STEADY_ROUNDS: usize = 7;
-/// Largest number of repetitions if some times are unsteady.
+/// Largest number of rounds of a measurement, even if some times are unsteady. A round repeats the
+/// render of each variant once.
 const MAX_ROUNDS: usize = 31;
 
 /// Measures `scene`, which must be valid. `reference` is the reference picture; if it is `None`, a
-/// reference with another seed is rendered. `report` receives the progress; if it returns `false`,
-/// the measurement ends early with the results so far.
+/// reference is rendered with another random seed than the measured pictures. `report` receives the
+/// progress; if it returns `false`, the measurement ends early with the results so far.
 ///
 /// # Errors
 /// Returns the error of the system if a thread cannot be started.
@@ -133,16 +140,16 @@ pub fn measure(
     })
 }
 
-/// Returns the extrapolated time at which the noise falls to `codes`. Returns `None` if it cannot
-/// be extrapolated.
+/// Returns the extrapolated times at which the noise of `render` falls to `codes` 8-bit levels: a
+/// lower and an upper estimate. Returns `None` if they cannot be extrapolated.
 fn extrapolate(render: &SyncRender, codes: f64) -> Option<Expected> {
     render.seconds_to_noise(codes).map(|seconds| Expected { codes, seconds })
 }
 
 /// Returns the noise at which settings are compared, in 8-bit levels. Candidates are the targets
 /// and the powers of two from 0.5 to 8 that are at least [`COMPARED_AT`]. The result is the
-/// smallest candidate that the default reached within `seconds`; otherwise the largest candidate
-/// that it reached; otherwise the last noise of the default.
+/// smallest candidate that the default settings reached within `seconds`; otherwise the largest
+/// candidate that they reached; otherwise the error at the end of their error curve.
 fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     let mut levels: Vec<f64> = targets.iter().copied().chain([0.5, 1.0, 2.0, 4.0, 8.0]).collect();
     levels.retain(|codes| *codes >= COMPARED_AT);
@@ -154,8 +161,9 @@ fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
     in_time.or_else(any).map_or_else(end, |c| c.codes)
 }
 
-/// Returns `true` if the repetitions of the time to `codes` agree. If `codes` was not reached, the
-/// time of the whole curve is compared.
+/// Returns `true` if the times at which the repetitions reached the noise `codes` have a relative
+/// spread of at most [`STEADY`]. If they did not reach it, the times of the whole error curves are
+/// compared.
 fn is_steady(measured: &Measured, codes: f64) -> bool {
     let end = || measured.points.last().map_or(0.0, |p| spread(&measured.seconds(p)));
     measured.true_time_to(codes).map_or_else(end, |c| c.spread) <= STEADY
@@ -174,8 +182,8 @@ struct RenderedReference {
     seconds: f64,
 }
 
-/// Renders a reference with another seed until its noise is at most `codes` or `seconds` have
-/// passed.
+/// Renders a reference picture, with another random seed than the measured pictures, until its
+/// noise is at most `codes` 8-bit levels or `seconds` have passed.
 fn render_reference(default: &Variant, codes: f64, seconds: f64) -> io::Result<RenderedReference> {
     let mut other = default.clone();
     other.options.sampling.seed = other.options.sampling.seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -189,7 +197,7 @@ fn render_reference(default: &Variant, codes: f64, seconds: f64) -> io::Result<R
     let display = &other.options.display;
     Ok(RenderedReference {
         reference: Reference::of_film(&rendering.film, &rendering.mix, display),
-        spp: render.spp().mean,
+        spp: render.schedule().spp().mean,
         seconds: render.seconds(),
     })
 }
@@ -198,9 +206,10 @@ fn render_reference(default: &Variant, codes: f64, seconds: f64) -> io::Result<R
 mod tests {
     use super::*;
     use crate::measure::error_curve::Point;
-    use crate::measure::reference::Errors;
+    use crate::measure::reference_image::Errors;
 
-    /// Returns results whose error curve has these points (seconds, error).
+    /// Returns the results of a render. `points` are the points of its error curve, each as
+    /// (seconds, error in 8-bit levels).
     fn results(points: &[(f64, f64)]) -> Measured {
         let point = |(seconds, codes): &(f64, f64)| Point {
             step: 1,

@@ -1,4 +1,4 @@
-//! Aggregate: all primitives of a scene, compiled for rays. It holds a batch for each kind of
+//! Aggregate: all primitives of a scene, compiled for rays. It holds an array for each kind of
 //! primitive, and a BVH over all of them where a BVH is faster.
 
 use crate::bvh::{Hit, Ray};
@@ -13,65 +13,73 @@ use crate::primitive::scene_bvh::SceneBvh;
 use std::fmt;
 use std::ops::Range;
 
-/// Smallest number of primitives with finite bounds for which a BVH is built.
+/// Smallest number of primitives with finite bounds for which a BVH is built. Fewer primitives are
+/// tested one by one. This is faster, because each tile of the picture has a short list of the
+/// primitives that its rays may hit.
 ///
-/// For rays in a ball of spheres the BVH is faster than a list from about 50 primitives on for
-/// coherent packets, and from about 300 on for incoherent ones. For whole pictures, whose tiles
-/// have short candidate lists, the list is faster up to 95 (`benches/acceleration.rs`).
+/// Measured with spheres that fill a ball (`benches/acceleration.rs`): for whole pictures the list
+/// is faster up to 95 primitives. Without the lists of tiles, the BVH is faster from about 50
+/// primitives on for coherent packets, and from about 300 on for incoherent ones.
 pub const BVH_MIN_PRIMITIVES: usize = 96;
 
 impl PrimitiveSet {
-    /// Returns `true` if the set is empty.
+    /// Returns `true` if the set contains no primitive.
     pub fn is_empty(&self) -> bool {
         self.ranges.is_empty() && !self.tree
     }
 }
 
-/// A batch of primitives of one kind, with the range of their numbers in the aggregate.
+/// Batch of an aggregate (all primitives of one kind). The numbers of its primitives in the
+/// aggregate are from `base` up to, but not including, `end`.
 struct BatchRange<L: SimdFloat> {
     batch: PrimitiveBatch<L>,
     base: u32,
     end: u32,
 }
 
-/// All primitives of a scene, compiled for one lane type. A primitive of the aggregate is called an
-/// *item*. Items are numbered, and hits have the number of their item.
+/// All primitives of a scene, compiled for one SIMD type. Primitives are numbered; a primitive of
+/// the aggregate is also called an *item*. Hits have the number of their item.
 pub struct Aggregate<L: SimdFloat> {
     parts: Vec<BatchRange<L>>,
     all: PrimitiveSet,
     tree: Option<SceneBvh>,
-    /// Items of the BVH, each as the index of its batch and its number in the batch.
+    /// Primitives in the BVH, each as the index of its batch (the array of its kind) and its number
+    /// in the batch.
     tree_items: Vec<(u32, u32)>,
-    /// Bounding box of each item, which rays are tested against before the item itself; `None` for
-    /// an infinite item. The list is empty if no boxes are used.
+    /// Bounding box of each primitive, which rays are tested against before the primitive itself;
+    /// `None` for an infinite primitive. The list is empty if no boxes are used.
     extents: Vec<Option<ItemBox<L::Scalar>>>,
-    /// Origin of each item: the index of its form in the list given to [`Aggregate::new`], and its
-    /// part.
+    /// Origin of each primitive: the index of its canonical form in the list given to
+    /// [`Aggregate::new`], and the number of the part if the form is a compound.
     source: Vec<PrimitiveId>,
     counts: Vec<String>,
 }
 
-/// Subset of the items (primitives) of an [`Aggregate`], which queries are restricted to.
+/// Subset of the primitives of an [`Aggregate`] (all primitives of a scene), to which ray queries
+/// are restricted.
 #[derive(Clone, Debug, Default)]
 pub struct PrimitiveSet {
-    /// Items that are tested one by one: index of the batch, and range of numbers in the batch.
+    /// Primitives that are tested one by one. Each entry has the index of a batch (the array of one
+    /// kind of primitive) and a range of primitive numbers in this batch.
     ranges: Vec<(u32, Range<u32>)>,
-    /// `true` if the subset also includes all items of the BVH.
+    /// `true` if the subset also includes all primitives of the BVH.
     tree: bool,
 }
 
 impl<L: SimdFloat> Aggregate<L> {
-    /// Compiles `forms`, with a BVH if there are many.
+    /// Compiles the canonical forms `forms` to primitives, with a BVH if there are many.
     pub fn new(forms: &[Form]) -> Self {
         Self::accelerated(forms, Acceleration::Auto)
     }
 
-    /// Compiles `forms`. All bounded items are in a BVH if `tree` is `true`, and none otherwise.
+    /// Compiles the canonical forms `forms` to primitives. All bounded primitives are in a BVH if
+    /// `tree` is `true`, and none otherwise.
     pub fn with_tree(forms: &[Form], tree: bool) -> Self {
         Self::compiled(forms, if tree { Acceleration::Bvh } else { Acceleration::Auto }, tree)
     }
 
-    /// Compiles `forms` with the acceleration structure `acceleration`.
+    /// Compiles the canonical forms `forms` to primitives with the acceleration structure
+    /// `acceleration`.
     pub fn accelerated(forms: &[Form], acceleration: Acceleration) -> Self {
         let is_large =
             || forms.iter().filter(|f| f.bounds().is_some()).count() >= BVH_MIN_PRIMITIVES;
@@ -134,8 +142,9 @@ impl<L: SimdFloat> Aggregate<L> {
         out
     }
 
-    /// Returns the subset of the items outside of the BVH for which `wanted` is true, and of all
-    /// items of the BVH. The BVH needs no selection, because its traversal skips items.
+    /// Returns a subset of the primitives: all primitives in the BVH, and each primitive outside of
+    /// the BVH for whose number `wanted` returns `true`. Primitives in the BVH need no selection,
+    /// because traversal skips those that a ray misses.
     pub fn select(&self, wanted: impl Fn(u32) -> bool) -> PrimitiveSet {
         let mut ranges: Vec<(u32, Range<u32>)> = Vec::new();
         for (part, range) in &self.all.ranges {
@@ -150,8 +159,9 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, tree: self.all.tree }
     }
 
-    /// Returns the subset of all items outside of the BVH and of `items`, which are in the BVH.
-    /// These items are tested one by one.
+    /// Returns the subset of two groups of primitives: `items`, which are in the BVH, and all
+    /// primitives outside of the BVH. Rays are tested against the primitives of the subset one by
+    /// one, without traversal of the BVH.
     pub fn select_indices(&self, items: &[u32]) -> PrimitiveSet {
         let mut ranges = self.all.ranges.clone();
         for item in items {
@@ -163,7 +173,7 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, tree: false }
     }
 
-    /// Returns the numbers of the items in the BVH, in ascending order.
+    /// Returns the numbers of the primitives in the BVH, in ascending order.
     pub fn in_tree(&self) -> Vec<u32> {
         let item = |(part, i): &(u32, u32)| self.parts[*part as usize].base + i;
         self.tree_items.iter().map(item).collect()
@@ -179,29 +189,24 @@ impl<L: SimdFloat> Aggregate<L> {
         self.tree.is_none() && self.extents.is_empty()
     }
 
-    /// Returns the subset of all items.
+    /// Returns the set of all primitives of the aggregate.
     pub fn all(&self) -> &PrimitiveSet {
         &self.all
     }
 
-    /// Returns the number of items.
-    pub fn len(&self) -> usize {
-        self.source.len()
-    }
-
-    /// Returns `true` if there are no items.
+    /// Returns `true` if there are no primitives.
     pub fn is_empty(&self) -> bool {
         self.source.is_empty()
     }
 
-    /// Returns the origin of each item: form and part.
+    /// Returns the origin of each primitive: its canonical form, and its part of a compound.
     pub fn sources(&self) -> &[PrimitiveId] {
         &self.source
     }
 
-    /// Returns the closest hit of each ray with the items of `set`. At equal distances the item
-    /// with the lowest number is hit, so that the result is independent of the order of the BVH and
-    /// of the other rays of the packet.
+    /// Returns the closest hit of each ray with the primitives of `set`. At equal distances the
+    /// primitive with the lowest number is hit, so that the result is independent of the order of
+    /// the BVH and of the other rays of the packet.
     #[inline(always)]
     pub fn closest(&self, ray: &Ray<L>, set: &PrimitiveSet) -> Hit<L> {
         self.closest_masked(ray, set, L::mask(true))
@@ -221,8 +226,8 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns the result of [`Aggregate::closest_masked`] for the items outside of the BVH,
-    /// without box tests.
+    /// Returns the result of [`Aggregate::closest_masked`] for the primitives of `set` outside of
+    /// the BVH. Tests every one of them, without bounding boxes.
     #[inline(always)]
     pub fn closest_linear(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         let mut hit = nearest_wanted(wanted);
@@ -249,8 +254,9 @@ impl<L: SimdFloat> Aggregate<L> {
         hit
     }
 
-    /// Iterates over the items of `set` that are tested one by one: batch of the item, its number
-    /// in the batch, and its bounding box.
+    /// Iterates over the primitives of `set` that are tested one by one, without BVH. An element has
+    /// three values: the batch of the primitive (all primitives of its kind), its number in the
+    /// batch, and its bounding box; `None` for an infinite primitive.
     #[inline(always)]
     fn boxed<'a>(
         &'a self,
@@ -295,7 +301,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Returns the lanes of `wanted` that hit any item of `set` at a distance in (0, limit).
+    /// Returns the lanes of `wanted` whose ray hits any primitive of `set` at a distance between 0
+    /// and `limit`.
     #[inline(always)]
     pub fn occluded(&self, ray: &Ray<L>, limit: L, wanted: L::Mask, set: &PrimitiveSet) -> L::Mask {
         if !self.extents.is_empty() {
@@ -310,8 +317,8 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns the result of [`Aggregate::occluded`] for the items outside of the BVH, without box
-    /// tests.
+    /// Returns the lanes of `wanted` whose ray hits a primitive of `set` outside of the BVH at a
+    /// distance between 0 and `limit`. Tests every one of them, without bounding boxes.
     #[inline(always)]
     pub fn occluded_linear(
         &self,
@@ -332,8 +339,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Returns the result of [`Aggregate::occluded`] for one item of the BVH. `number` is its index
-    /// in [`Aggregate::in_tree`].
+    /// Returns the lanes of `wanted` whose ray hits one primitive of the BVH at a distance between
+    /// 0 and `limit`. `number` is the primitive's index in [`Aggregate::in_tree`].
     #[inline(always)]
     pub fn occluded_by(&self, number: u32, ray: &Ray<L>, limit: L, wanted: L::Mask) -> L::Mask {
         let (part, i) = self.tree_items[number as usize];
@@ -359,8 +366,8 @@ impl<L: SimdFloat> Aggregate<L> {
         occluded
     }
 
-    /// Returns the hits with the primitive `item` that are nearer than `limit`. The number of a
-    /// compound's first part means the compound with all parts.
+    /// Returns the hits of the rays with primitive number `item` that are nearer than `limit`. If
+    /// `item` is the first part of a compound, these are the hits with the whole compound.
     pub fn closest_to(&self, item: u32, ray: &Ray<L>, limit: L) -> Hit<L> {
         let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
         let (i, mut hit) = ((item - part.base) as usize, Hit::with_t_max(limit));
@@ -368,8 +375,8 @@ impl<L: SimdFloat> Aggregate<L> {
         hit
     }
 
-    /// Returns the surface of `item` at `point`, a hit point with rounding errors. `triangle_tag`
-    /// is the id of the hit triangle if the item is a mesh.
+    /// Returns the exact surface point and normal of primitive `item` at `point`, a hit point with
+    /// rounding errors. `triangle_tag` is the id of the hit triangle if the primitive is a mesh.
     #[inline(always)]
     pub fn surface(&self, item: u32, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         for part in &self.parts {
@@ -380,8 +387,9 @@ impl<L: SimdFloat> Aggregate<L> {
         unreachable!("every item belongs to a part")
     }
 
-    /// Returns the batch of meshes, and the number of its first item. Meshes have the largest
-    /// numbers.
+    /// Returns two values: all mesh primitives of the aggregate, and the number of the first one.
+    /// The others have the following numbers, which are the highest of the aggregate. Returns
+    /// `None` if there are no meshes.
     fn meshes(&self) -> Option<(&Meshes<L::Scalar>, u32)> {
         match self.parts.last()? {
             BatchRange { batch: PrimitiveBatch::Meshes(meshes), base, .. } => Some((meshes, *base)),
@@ -395,12 +403,13 @@ impl<L: SimdFloat> Aggregate<L> {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_smooth())
     }
 
-    /// Returns `true` if some primitive has a colour of its own; see [`Aggregate::color`].
+    /// Returns `true` if some primitive has vertex or face colours; see [`Aggregate::color`].
     pub fn is_colored(&self) -> bool {
         self.meshes().is_some_and(|(meshes, _)| meshes.is_colored())
     }
 
-    /// Returns the shading normal of `item` at a hit point. `at` is the hit point, with the
+    /// Returns the shading normal of primitive `item` at a hit point. `triangle_tag` is the id of
+    /// the hit triangle if the primitive is a mesh. `at` has two vectors: the hit point, and the
     /// geometric normal on the viewer's side. `direction` is the direction of the rays. The shading
     /// normal is on the viewer's side and faces the viewer.
     pub fn shading_normal(
@@ -417,23 +426,24 @@ impl<L: SimdFloat> Aggregate<L> {
         }
     }
 
-    /// Returns the primitive's own colour at the triangle with the id `triangle_tag`; `None` if it
-    /// has none.
+    /// Returns the colour that the mesh file of primitive `item` gives to the triangle with the id
+    /// `triangle_tag`. Returns `None` if the primitive is no mesh, or if the file has no colours.
     pub fn color(&self, item: u32, triangle_tag: L) -> Option<Vec3<L>> {
         let (meshes, base) = self.meshes()?;
         (item >= base).then(|| meshes.color((item - base) as usize, triangle_tag))?
     }
 
-    /// Returns the primitive's own texture coordinates at `point`, a point of the triangle with the
-    /// id `triangle_tag`; `None` if it has none.
+    /// Returns the texture coordinates that the geometry of primitive `item` defines at `point`;
+    /// `None` if it defines none. `triangle_tag` is the id of the triangle at `point` if the
+    /// primitive is a mesh.
     pub fn uv(&self, item: u32, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
         let part = &self.parts[self.parts.partition_point(|part| part.end <= item)];
         part.batch.uv((item - part.base) as usize, triangle_tag, point)
     }
 }
 
-/// Returns an empty hit with the lanes `wanted` active. Inactive lanes have a negative distance
-/// limit.
+/// Returns a miss in every lane. It accepts hits at any distance in the lanes of `wanted`, and none
+/// in the other lanes: their distance limit is negative.
 #[inline(always)]
 fn nearest_wanted<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
     Hit::with_t_max(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))

@@ -1,4 +1,4 @@
-//! Batches of compiled primitives: one list for each kind of primitive that the scene contains. A
+//! Batches of compiled primitives: one array for each kind of primitive that the scene contains. A
 //! kind that the scene does not contain costs nothing.
 
 use crate::bvh::{Hit, Ray};
@@ -15,24 +15,25 @@ use crate::primitive::sphere::Sphere;
 use crate::primitive::torus::Torus;
 use std::ops::Range;
 
-/// Surface of a primitive at a hit point.
+/// Point on the surface of a primitive where a ray hits it, one per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint<L> {
     /// Hit point, projected onto the surface as exactly as the precision allows.
     pub point: Vec3<L>,
     /// Unit geometric normal: outward for solids, on the front for flat shapes.
     pub normal: Vec3<L>,
-    /// Largest magnitude of the coordinates from which the point was computed. The rounding error
-    /// of the point is a few units in the last place of this value.
+    /// Largest magnitude of the coordinates from which the hit point was computed. The rounding
+    /// error of the point is a few units in the last place of this value.
     pub max_coordinate: L,
 }
 
-/// Texture coordinates of a primitive at one point.
+/// Texture coordinates at one point of a primitive, with their gradients.
 #[derive(Clone, Copy, Debug)]
 pub struct UvGradients<L> {
     /// Texture coordinates: u to the right, v up.
     pub uv: [L; 2],
-    /// Gradients of u and v along the surface, in the space of the shape.
+    /// Gradients of u and v along the surface, in the space of the shape: changes per unit of
+    /// length.
     pub gradients: [Vec3<L>; 2],
 }
 
@@ -45,17 +46,17 @@ impl<L: SimdFloat> SurfacePoint<L> {
     }
 }
 
-/// A primitive compiled for one lane type.
+/// Primitive compiled for the kernels of one SIMD type.
 pub trait Primitive<L: SimdFloat> {
-    /// Returns the smallest distance at which each ray hits the primitive, and the lanes that hit
-    /// it. Only distances greater than 0 are hits. Returns `None` if no lane hits.
+    /// Returns two values: the smallest distance at which each ray hits the primitive, and the
+    /// lanes that hit it. Only distances greater than 0 are hits. Returns `None` if no lane hits.
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;
 
-    /// Returns the surface at `point`, a hit point with rounding errors.
+    /// Returns the exact surface point and normal at `point`, a hit point with rounding errors.
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L>;
 
-    /// Returns the primitive's own texture coordinates at `point`. Forms whose default mapping is
-    /// [`DefaultMapping::Uv`](crate::primitive::DefaultMapping::Uv) have them.
+    /// Returns the texture coordinates, with gradients, that the primitive's own parametrisation
+    /// has at a point. Returns `None` for primitives that have no parametrisation.
     fn uv(&self, _point: Vec3<L>) -> Option<UvGradients<L>> {
         None
     }
@@ -63,17 +64,17 @@ pub trait Primitive<L: SimdFloat> {
 
 macro_rules! batches {
     ($($(#[$doc:meta])+ $kind:ident($item:ident)),+ $(,)?) => {
-        /// All primitives of one kind (a batch), compiled for one lane type.
+        /// Batch: all primitives of one kind, compiled for one SIMD type.
         pub enum PrimitiveBatch<L: SimdFloat> {
             $($(#[$doc])+ $kind(Vec<$item<L::Scalar>>),)+
-            /// Compounds. Each part of a compound is an item.
+            /// Batch of compound solids (CSG). Each part of a compound counts as a primitive.
             Compounds(Compounds<L::Scalar>),
-            /// Meshes.
+            /// Batch of triangle meshes; each mesh is one primitive.
             Meshes(Meshes<L::Scalar>),
         }
 
-        /// Evaluates an expression for a batch of any kind. Compounds and meshes have an expression
-        /// of their own.
+        /// Evaluates one of three expressions for a [`PrimitiveBatch`]: the first for an array of
+        /// primitives, the second for compounds, the third for meshes.
         macro_rules! each {
             ($batch:expr, $items:ident => $value:expr, $compounds:ident => $other:expr,
                 $meshes:ident => $third:expr) => {
@@ -85,7 +86,8 @@ macro_rules! batches {
             };
         }
 
-        /// Compiles `forms` into one batch for each kind of primitive that occurs.
+        /// Compiles the canonical forms `forms` into one batch for each kind of primitive that
+        /// occurs.
         pub fn compile<L: SimdFloat>(forms: &[Form]) -> Vec<LabelledBatch<L>> {
             let mut out = Vec::new();
             $(
@@ -116,25 +118,25 @@ macro_rules! batches {
 // The list of compiled primitives, in the order in which items are numbered: a new one is a line
 // here.
 batches! {
-    /// Parallelograms.
+    /// Batch of parallelograms, such as rectangles.
     Parallelograms(Parallelogram),
-    /// Infinite planes.
+    /// Batch of infinite planes.
     Planes(Plane),
-    /// Spheres.
+    /// Batch of spheres.
     Spheres(Sphere),
-    /// Ellipsoids.
+    /// Batch of ellipsoids.
     Ellipsoids(Ellipsoid),
-    /// Convex polyhedra.
+    /// Batch of convex polyhedra, such as boxes.
     ConvexPolyhedra(ConvexPolyhedron),
-    /// Conical frusta.
+    /// Batch of conical frusta: cylinders, cones and tapered cylinders.
     ConicalFrusta(ConicalFrustum),
-    /// Tori.
+    /// Batch of tori (rings).
     Tori(Torus),
 }
 
 impl<L: SimdFloat> PrimitiveBatch<L> {
-    /// Replaces `hit` in the lanes in which an item of `range` is nearer. The id of an item is
-    /// `base` plus its number.
+    /// Replaces `hit` in the lanes in which a primitive of the batch is nearer. `range` limits the
+    /// primitives that are tested. The id of a primitive is `base` plus its number in the batch.
     #[inline(always)]
     pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         each!(self,
@@ -143,8 +145,8 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.closest(range, base, ray, hit));
     }
 
-    /// Returns the lanes that hit an item of `range` at a distance between 0 and `limit`. The
-    /// search may stop once all lanes of `wanted` are occluded.
+    /// Returns the lanes whose ray hits a primitive of the batch, with a number in `range`, at a
+    /// distance between 0 and `limit`. The search may stop once all lanes of `wanted` are occluded.
     #[inline(always)]
     pub fn occluded(
         &self,
@@ -159,8 +161,8 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.occluded(range, ray, limit, wanted))
     }
 
-    /// Returns the surface of `item` at `point`, a hit point with rounding errors. `triangle_tag`
-    /// is the id of the hit triangle if the item is a mesh.
+    /// Returns the exact surface point and normal of primitive `item` at `point`, a hit point with
+    /// rounding errors. `triangle_tag` is the id of the hit triangle if the primitive is a mesh.
     #[inline(always)]
     pub fn surface(&self, item: usize, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         each!(self,
@@ -169,7 +171,9 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.surface(item, triangle_tag, point))
     }
 
-    /// Returns the texture coordinates of `item` at `point`; `None` if the item has none.
+    /// Returns the texture coordinates that the geometry of primitive `item` defines at `point`;
+    /// `None` if it defines none. `triangle_tag` is the id of the triangle at `point` if the
+    /// primitive is a mesh.
     pub fn uv(&self, item: usize, triangle_tag: L, point: Vec3<L>) -> Option<UvGradients<L>> {
         each!(self,
             items => items[item].uv(point),
@@ -206,32 +210,34 @@ fn occluded<L: SimdFloat>(
     occluded
 }
 
-/// Origin of an item: index of its form, and part of the form.
+/// Origin of a compiled primitive: index of its canonical form, and part of a compound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PrimitiveId {
-    /// Index of the form in the list given to `compile`.
+    /// Index of the canonical form in the list given to `compile`.
     pub form: usize,
-    /// Number of the part of a compound; 0 for other forms. In lists of items the first part means
-    /// the whole compound; further parts are never intersected on their own.
+    /// Number of the part if the form is a compound, counted from 0; otherwise 0. In lists of
+    /// primitives the first part stands for the whole compound; the other parts are not intersected
+    /// on their own.
     pub part: usize,
 }
 
-/// One compiled batch, with the origins of its items and its name.
+/// All primitives of one kind (a batch), with their origins and the name of the kind.
 pub struct LabelledBatch<L: SimdFloat> {
-    /// Compiled batch.
+    /// Compiled primitives of the batch, all of one kind.
     pub batch: PrimitiveBatch<L>,
-    /// Form and part of each item.
+    /// Origin of each primitive of the batch: its canonical form and compound part.
     pub sources: Vec<PrimitiveId>,
-    /// Noun for the items in the scene's inventory, singular and plural.
+    /// Noun for primitives of this kind in the scene's inventory: singular and plural.
     pub noun: (&'static str, &'static str),
-    /// Addition to the noun in the inventory.
+    /// Addition to the noun in the scene's inventory, such as a number of triangles.
     pub detail: String,
-    /// `true` if the items have no finite bounds, so that a BVH cannot hold them.
+    /// `true` if the primitives have no finite bounds, so that a BVH cannot hold them.
     pub infinite: bool,
 }
 
 impl<L: SimdFloat> LabelledBatch<L> {
-    /// Creates the batch of the primitives in `sources`. Returns `None` if there are none.
+    /// Creates the batch of the primitives with the origins `sources`, and its noun and detail for
+    /// the scene's inventory. Returns `None` if there are none.
     fn new(batch: PrimitiveBatch<L>, sources: Vec<PrimitiveId>, forms: &[Form]) -> Option<Self> {
         let noun = forms[sources.first()?.form].noun();
         let triangles: usize = sources.iter().map(|s| forms[s.form].triangles()).sum();
@@ -255,9 +261,4 @@ fn with_thousands_separators(n: usize) -> String {
         out.push(digit);
     }
     out
-}
-
-/// Returns the largest magnitude of a coordinate of a form with finite bounds.
-pub(crate) fn max_coordinate(form: &Form) -> f64 {
-    form.bounds().map_or(0.0, |(low, high)| low.abs().max(high.abs()).max_element())
 }

@@ -3,44 +3,45 @@
 //! never excluded.
 
 use crate::primitive::form::Form;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-/// Relative error of rays in single precision, with a safety margin. The true error is a few times
-/// 2^-24 of the largest coordinate.
+/// Largest error of rays in single precision, as a fraction of the largest coordinate. The true
+/// error is a few times 2^-24; the rest is a safety margin.
 pub const F32_RAY_ERROR: f64 = 1e-5;
 
-/// A ball.
+/// Bounding sphere of geometry that rays may hit.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundingSphere {
-    /// Centre, in scene coordinates.
+    /// Centre of the sphere, in scene coordinates.
     pub center: DVec3,
-    /// Radius; infinite for forms without finite bounds.
+    /// Radius of the sphere; infinite for geometry without finite bounds.
     pub radius: f64,
 }
 
-/// Target of shadow rays: the position of a light.
+/// Target of shadow rays: the position of a light, or the direction to it.
 #[derive(Clone, Copy, Debug)]
 pub enum LightTarget {
-    /// A point.
+    /// Position of a light at a finite distance, in scene coordinates.
     Point(DVec3),
-    /// A unit vector towards a distant light.
+    /// Unit vector towards a distant light.
     Direction(DVec3),
 }
 
-/// All rays from one point (the apex) through a convex quadrilateral. With a lens, also the rays
-/// from all points of the lens around the apex.
+/// Frustum: all rays from one point (the apex) through a convex quadrilateral. With a lens, also
+/// the rays from all points of the lens around the apex.
 ///
-/// A ray from the apex has the direction d, whose component along `forward` is 1. The ray from the
-/// point apex + o of the lens has the direction d - o / f. At the depth z the two are o (1 - z / f)
-/// apart. Within an interval of depths this distance is largest at one end.
+/// A ray from the apex has the direction d, whose component along `forward` is 1. It meets the ray
+/// from the point apex + o of the lens at the depth f = `focus`; this ray has the direction d - o /
+/// f. At the depth z the distance between the two rays is |o (1 - z / f)|. Within an interval of
+/// depths this distance is largest at one end.
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
     /// Common origin of the rays: the centre of the lens.
     pub apex: DVec3,
-    /// Forward direction, of unit length, perpendicular to the lens.
+    /// Forward direction of the frustum, of unit length, perpendicular to the lens.
     pub forward: DVec3,
-    /// Vectors from the apex to the corners of the quadrilateral, whose component along `forward`
-    /// is 1.
+    /// Vectors from the apex to the corners of the quadrilateral through which all rays pass. Their
+    /// component along `forward` is 1.
     pub corners: [DVec3; 4],
     /// Radius of the lens; 0 if all rays start at the apex.
     pub lens_radius: f64,
@@ -49,7 +50,9 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    /// Returns the largest displacement of rays by the lens between the depths `near` and `far`.
+    /// Returns the blur of the lens between the depths `near` and `far`: the largest distance
+    /// between a ray from the edge of the lens and the ray from the apex that it meets at the depth
+    /// `focus`.
     fn blur(&self, near: f64, far: f64) -> f64 {
         if self.lens_radius == 0.0 {
             return 0.0;
@@ -58,12 +61,13 @@ impl Frustum {
         self.lens_radius * at(near.max(0.0)).max(at(far.max(0.0))) * (1.0 + F32_RAY_ERROR)
     }
 
-    /// Returns the rounding error of the origins of rays.
+    /// Returns a bound of the rounding error of the origins of the frustum's rays in single
+    /// precision, in scene units.
     fn origin_error(&self) -> f64 {
         ray_error(self.apex) + F32_RAY_ERROR * self.lens_radius
     }
 
-    /// Returns the ball enlarged by the displacement of rays by the lens and by the rounding errors
+    /// Returns `ball`, enlarged by the displacement of rays by the lens and by the rounding errors
     /// of rays.
     fn blurred(&self, ball: &BoundingSphere) -> BoundingSphere {
         let depth = (ball.center - self.apex).dot(self.forward);
@@ -72,9 +76,10 @@ impl Frustum {
         BoundingSphere { radius: ball.radius + blur + F32_RAY_ERROR * self.lens_radius, ..*ball }
     }
 
-    /// Returns `true` if a ray may hit the ball. A frustum narrower than a half-space is replaced
-    /// by the cone around it. A wider one is tested by the four planes through the apex and
-    /// neighbouring corners, because a wider cone is not convex.
+    /// Returns `true` if a ray of the frustum may hit `ball`. A frustum is replaced by the cone
+    /// around it if this is narrower than a half-space. Otherwise `ball` is tested against the four
+    /// planes through the apex and neighbouring corners, because a cone wider than a half-space is
+    /// not convex.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let ball = &self.blurred(ball);
         let Self { apex, forward, corners, .. } = self;
@@ -95,15 +100,17 @@ impl Frustum {
     }
 }
 
-/// Bounding volume of one form.
+/// Bounding volume of the canonical form of one object.
 #[derive(Clone, Copy, Debug)]
 pub struct BoundingVolume {
-    ball: BoundingSphere,
-    /// Unit normal and offset of the plane that contains a flat form; `None` for other forms.
+    /// Sphere that contains the object.
+    pub ball: BoundingSphere,
+    /// Unit normal and offset of the plane that contains flat geometry; `None` for other geometry.
     plane: Option<(DVec3, f64)>,
-    /// `true` if no ray that leaves the form's outside hits the form again.
+    /// `true` if no ray that leaves the surface outwards hits the same object again.
     convex: bool,
-    /// Largest distance between the end of a shadow ray and the light.
+    /// Largest distance in scene units between the end of a shadow ray and the position of its
+    /// light. Occlusion is tested with this tolerance.
     slack: f64,
 }
 
@@ -114,15 +121,16 @@ impl BoundingSphere {
         Self { center, radius }
     }
 
-    /// Returns `true` if the balls overlap, with a margin for the rounding errors of rays that
-    /// start in `other`.
+    /// Returns `true` if the spheres `self` and `other` may overlap. The test has a margin for the
+    /// rounding errors of rays that start in `other`.
     pub fn overlaps(&self, other: &Self) -> bool {
         let errors = ray_error(self.center) + ray_error(other.center);
         self.center.distance(other.center)
             <= self.radius + errors + other.radius * (1.0 + F32_RAY_ERROR)
     }
 
-    /// Returns the radius with a margin for the rounding errors of rays from `apex`.
+    /// Returns the radius of the bounding sphere with a margin for the rounding errors of rays that
+    /// start at `apex`.
     fn reach(&self, apex: DVec3) -> f64 {
         self.radius * (1.0 + F32_RAY_ERROR) + ray_error(self.center) + ray_error(apex)
     }
@@ -133,30 +141,25 @@ fn ray_error(point: DVec3) -> f64 {
 }
 
 impl BoundingVolume {
-    /// Creates the bounding volume of a form.
+    /// Creates the bounding volume of the canonical form `form`.
     pub fn new(form: &Form) -> Self {
         let plane = form.plane().map(|plane| (plane.normal, plane.offset));
         let (ball, convex) = (form.bounding_sphere(), form.is_convex());
         Self { ball, plane, convex, slack: 0.0 }
     }
 
-    /// Returns a ball that contains the form.
-    pub fn ball(&self) -> BoundingSphere {
-        self.ball
-    }
-
-    /// Returns `true` if the form is flat, so that a ray that leaves it cannot hit it again.
+    /// Returns `true` if the object is flat, so that a ray that leaves it cannot hit it again.
     pub fn is_flat(&self) -> bool {
         self.plane.is_some()
     }
 
-    /// Returns `true` if no ray that leaves the form's outside hits the form again.
+    /// Returns `true` if no ray that leaves the surface outwards hits the same object again.
     pub fn is_convex(&self) -> bool {
         self.convex
     }
 
-    /// Returns a ball that contains the part of the form that rays of `frustum` can hit; `None` if
-    /// they cannot hit the form.
+    /// Returns a sphere that contains the part of the object that rays of `frustum` can hit; `None`
+    /// if they cannot hit the object.
     pub fn clip_to(&self, frustum: &Frustum) -> Option<BoundingSphere> {
         let Frustum { apex, forward, corners, .. } = frustum;
         let ball = self.ball;
@@ -204,15 +207,16 @@ impl BoundingVolume {
         Some(if part.radius < ball.radius { part } else { ball })
     }
 
-    /// Returns the volume with a larger margin, for shadow rays that end within the distance `by`
+    /// Returns the bounding volume enlarged by `by`, for shadow rays that end within this distance
     /// of their lights.
     pub fn grown(self, by: f64) -> Self {
         let ball = BoundingSphere { radius: self.ball.radius + by, ..self.ball };
         Self { ball, slack: self.slack + by, ..self }
     }
 
-    /// Returns the largest distance between a point and the plane of a flat form at which rounding
-    /// errors may let rays towards `point` hit the form.
+    /// Returns the tolerance for the height of `point` above the plane of this flat object, in
+    /// scene units. At larger heights, rounding errors cannot let a ray from or to `point` hit the
+    /// object.
     fn ray_error(&self, point: DVec3) -> f64 {
         let BoundingSphere { center, radius } = self.ball;
         let reach = if radius.is_finite() { center.abs().max_element() + radius } else { 0.0 };
@@ -220,9 +224,9 @@ impl BoundingVolume {
         self.slack + ray_error(point) + F32_RAY_ERROR * reach.max(offset)
     }
 
-    /// Returns `true` if the form is flat and the light and all points of `lit` are on the same
-    /// side of its plane. `above` returns, for a plane, the height of the light above it, and the
-    /// error of this height.
+    /// Returns `true` if the object is flat and the light and all points of the sphere `lit` are on
+    /// the same side of its plane. For a plane (unit normal, offset), `above` returns two values:
+    /// the height of the light above the plane, and the error of this height.
     fn is_beside(&self, lit: &BoundingSphere, above: impl Fn((DVec3, f64)) -> (f64, f64)) -> bool {
         let Some((normal, offset)) = self.plane else { return false };
         let height = normal.dot(lit.center) - offset;
@@ -232,7 +236,8 @@ impl BoundingVolume {
         sure && height.abs() > radius && height * beyond > 0.0
     }
 
-    /// Returns `true` if the form may be between some point of `lit` and some point of `light`.
+    /// Returns `true` if the object may be between some point of the sphere `lit` and some point of
+    /// the sphere `light`.
     pub fn may_occlude_ball(&self, lit: &BoundingSphere, light: &BoundingSphere) -> bool {
         let above = |(normal, offset): (DVec3, f64)| {
             let unsure = light.radius + self.ray_error(light.center);
@@ -251,7 +256,8 @@ impl BoundingVolume {
         distance_to_hull(self.ball.center, &grown(light), &grown(lit)) <= grown(&self.ball).radius
     }
 
-    /// Returns `true` if the form may be between some point of `lit` and the light.
+    /// Returns `true` if the object may be between some point of the sphere `lit` and the light
+    /// `towards`.
     pub fn may_occlude(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
         let slack = ray_error(lit.center) + F32_RAY_ERROR * lit.radius;
         let radius = lit.radius + slack;
@@ -291,8 +297,9 @@ impl BoundingVolume {
     }
 }
 
-/// Returns the distance between `point` and the convex hull of two balls; negative inside. The hull
-/// is the union of all balls whose centres and radii are interpolated between those of `a` and `b`.
+/// Returns the distance between `point` and the convex hull of the spheres `a` and `b`; negative
+/// inside. The hull is the union of all spheres whose centres and radii are interpolated between
+/// those of `a` and `b`.
 fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64 {
     let axis = b.center - a.center;
     let length = axis.length().max(f64::MIN_POSITIVE);
@@ -302,7 +309,7 @@ fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64
     // Distance from the ball at `x` along the axis, a convex function. Its derivative is zero where
     // the sine of the line to the point equals the slope of the hull's side.
     let slope = (b.radius - a.radius) / length;
-    let distance = |x: f64| across.hypot(along - x) - (a.radius + slope * x);
+    let distance = |x: f64| DVec2::new(across, along - x).length() - (a.radius + slope * x);
     let ends = distance(0.0).min(distance(length));
     if slope.abs() >= 1.0 {
         // One ball contains the other.
@@ -312,7 +319,8 @@ fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64
     distance(nearest.clamp(0.0, length)).min(ends)
 }
 
-/// Cone of all directions whose angle to an axis is below a limit (less than 90 degrees).
+/// Infinite cone: all directions from an apex whose angle to an axis is below a limit (less than 90
+/// degrees).
 struct Cone {
     apex: DVec3,
     axis: DVec3,
@@ -321,8 +329,9 @@ struct Cone {
 }
 
 impl Cone {
-    /// Returns `true` if a ball may overlap the cone. A part of the ball is then in front of the
-    /// apex, and its centre is no farther from the cone's side than its radius.
+    /// Returns `true` if `ball` may overlap the cone: a part of the ball is in front of the apex,
+    /// and its centre is no farther from the cone's side than its radius. The radius includes a
+    /// margin for rounding errors.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let to = ball.center - self.apex;
         let along = to.dot(self.axis);
@@ -376,8 +385,8 @@ mod tests {
         assert!(floor.radius.is_infinite());
     }
 
-    /// Checks that balls that intersect a segment between two points of the hull's balls are near
-    /// the hull. The distance to the hull is at most the sum of the radii.
+    /// Checks the distance between a point and the convex hull of two balls. No interpolated ball,
+    /// with a centre and a radius between those of the two, is nearer to the point.
     #[test]
     fn hull_of_two_balls_holds_every_segment_between_them() {
         let mut random = 7u64;
@@ -432,8 +441,8 @@ mod tests {
         }
     }
 
-    /// Checks a frustum of 175 degrees with rays in all of its directions. The apex is not in front
-    /// of the middle of the corners, which are more than 90 degrees from their mean direction.
+    /// Checks that a frustum of 175 degrees intersects every ball that one of its rays hits. One
+    /// corner of the frustum is more than 90 degrees from the mean direction of its corners.
     #[test]
     fn wide_frustum_meets_balls_that_its_rays_hit() {
         let apex = DVec3::new(1.0, -2.0, 5.0);
@@ -467,8 +476,8 @@ mod tests {
         assert!(!meets(apex + DVec3::Z, 0.5) && meets(apex + DVec3::Z, 2.0));
     }
 
-    /// Checks that a plane through the apex is never excluded. Its height above the apex is lost in
-    /// rounding, so that rays may hit either side.
+    /// Checks that a frustum never excludes a plane through its apex. The height of the plane above
+    /// the apex is lost in rounding, so that rays may hit either side.
     #[test]
     fn plane_through_apex_is_not_excluded() {
         for offset in [5.0 - 1e-7, 5.0, 5.0 + 1e-7] {
@@ -477,8 +486,8 @@ mod tests {
         }
     }
 
-    /// Checks that all points of a form that are inside of the frustum are inside of the clipped
-    /// ball.
+    /// Checks the bounding ball of the part of a surface in a frustum: all points of the surface
+    /// that are inside of the frustum are inside of the ball.
     #[test]
     fn clipped_ball_holds_all_visible_points() {
         let mut random = 1u64;

@@ -1,66 +1,69 @@
-//! Properties that every canonical form (kind of primitive) has. Each primitive implements all of
-//! them in its own file. None has a default, so that a new primitive must decide each of them.
+//! Trait of all canonical forms: the geometry of one kind of primitive, in double precision,
+//! between the description and the compiled kernel. Each kind implements all properties in its own
+//! file. A method has a default implementation only if this is right for most kinds.
 
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::form::Form;
 use glam::{DAffine3, DMat3, DVec3};
 
-/// Lowest and highest corner of an axis-parallel box.
+/// Axis-parallel box: its lowest and its highest corner.
 pub type Bounds = (DVec3, DVec3);
 
-/// One side of a plane: the points p with `normal . p <= offset`.
+/// Half-space: the points p with `normal . p <= offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {
-    /// Outward normal of unit length.
+    /// Unit normal of the boundary plane, which points out of the half-space.
     pub normal: DVec3,
-    /// Signed distance of the plane from the origin along `normal`.
+    /// Signed distance of the boundary plane from the origin along `normal`.
     pub offset: f64,
 }
 
-/// Default mapping of textures to a form, used if a material does not choose one.
+/// Texture mapping of a canonical form that is used if a material does not choose one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DefaultMapping {
-    /// Planar, for flat forms.
+    /// Planar mapping, for flat geometry.
     Planar,
-    /// Spherical, for forms that are round on all sides.
+    /// Spherical mapping, for geometry that is round on all sides.
     Spherical,
-    /// Cylindrical, for forms that are round about an axis.
+    /// Cylindrical mapping, for geometry that is round about an axis.
     Cylindrical,
-    /// Box, for forms with flat sides and for forms of any other kind.
+    /// Box mapping, for geometry with flat sides and of any other kind.
     Box,
-    /// The form's own texture coordinates.
+    /// Texture coordinates that the geometry itself has.
     Uv,
 }
 
-/// Face of a [`Proxy`]: a plane or a sphere in place of a part of the surface.
+/// Face of a [`Proxy`] (simplified geometry of an object): a plane or a sphere that replaces a part
+/// of the surface.
 #[derive(Clone, Copy, Debug)]
 pub enum ProxyFace {
-    /// A plane.
+    /// Plane that replaces a flat part of the surface, given as the half-space behind it.
     Flat(HalfSpace),
-    /// A sphere.
+    /// Sphere in place of a round part of the surface.
     Round(BoundingSphere),
 }
 
-/// Simplified form in the search for narrow gaps between objects: some faces, and a bounding box.
+/// Simplified geometry of an object, by which narrow gaps between objects are found: some faces,
+/// and a bounding box. The gaps decide whether single precision suffices.
 #[derive(Clone, Debug)]
 pub struct Proxy {
-    /// Faces that may be close to the faces of other forms.
+    /// Faces that may be close to the faces of other objects.
     pub faces: Vec<ProxyFace>,
-    /// Lowest corner of the box.
+    /// Lowest corner of the object's bounding box.
     pub low: DVec3,
-    /// Highest corner of the box.
+    /// Highest corner of the object's bounding box.
     pub high: DVec3,
 }
 
 impl Proxy {
-    /// Creates the proxy of a form with the given bounds; `None` for a form without finite bounds.
+    /// Creates the proxy of an object. `bounds` is `None` for an object without finite bounds.
     pub fn new(faces: Vec<ProxyFace>, bounds: Option<Bounds>) -> Self {
         let (low, high) = bounds.unwrap_or((DVec3::NEG_INFINITY, DVec3::INFINITY));
         Self { faces, low, high }
     }
 
-    /// Creates the proxy of a round form. Its faces are those of the form's bounding box, each of
-    /// which touches the form.
+    /// Creates the proxy of a round object. Its faces are those of the bounding box, each of which
+    /// touches the object.
     pub fn around((low, high): Bounds) -> Self {
         let faces = DVec3::AXES
             .into_iter()
@@ -73,74 +76,95 @@ impl Proxy {
 
 /// Geometry of one kind of primitive, in double precision and scene coordinates.
 pub trait CanonicalShape {
-    /// Noun for such primitives in the scene's inventory, singular and plural.
-    const NOUN: (&'static str, &'static str);
+    /// Returns the image of the geometry under the invertible affine map `map`.
+    fn transformed(self, map: &DAffine3) -> Form
+    where
+        Self: Sized;
 
-    /// Returns the image of the form under the invertible affine map `map`.
-    fn transformed(self, map: &DAffine3) -> Form;
+    /// Returns the number of parts that can have a material of their own: the number of a
+    /// compound's solids, 1 for all other geometry.
+    fn parts(&self) -> usize {
+        1
+    }
 
-    /// Number of parts that can have a material of their own.
-    fn parts(&self) -> usize;
-
-    /// Axis-parallel bounding box; `None` if the form has no finite bounds. It is the smallest one,
-    /// except for compounds.
+    /// Returns the axis-parallel bounding box; `None` if the geometry has no finite bounds. It is
+    /// the smallest one, except for compounds.
     fn bounds(&self) -> Option<Bounds>;
 
-    /// Bounding sphere; its radius is infinite if the form has no finite bounds.
-    fn bounding_sphere(&self) -> BoundingSphere;
+    /// Returns a bounding sphere; its radius is infinite if the geometry has no finite bounds. The
+    /// default is the sphere around the bounding box.
+    fn bounding_sphere(&self) -> BoundingSphere {
+        sphere_around_box(self.bounds())
+    }
 
-    /// Bounding box in the form's own space, with the map from this space to the scene; `None` if
-    /// the form has no space of its own.
-    fn oriented_box(&self) -> Option<(DAffine3, Bounds)>;
+    /// Returns two values: the map from the object space of the geometry to the scene, and the
+    /// bounding box in object space. The default, `None`, means that there is no object space.
+    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
+        None
+    }
 
-    /// Plane that contains the form, with its normal on the front; `None` if the form is not flat.
-    fn plane(&self) -> Option<HalfSpace>;
+    /// Returns the plane that contains flat geometry, with its normal on the front; `None` for
+    /// other geometry.
+    fn plane(&self) -> Option<HalfSpace> {
+        None
+    }
 
-    /// Returns `true` if no ray that leaves the form's outside hits the form again.
+    /// Returns `true` if no ray that leaves the surface outwards hits the same object again.
     fn is_convex(&self) -> bool;
 
-    /// Smallest thickness of a solid, or shorter edge of a flat form. For a compound it is that of
-    /// its thinnest part; thin remains of cuts are found by the search for gaps.
+    /// Returns the smallest thickness of a solid, or the shorter edge of flat geometry, in scene
+    /// units. For a compound it is that of its thinnest part; the search for narrow gaps finds
+    /// thinner pieces that cuts leave.
     fn thickness(&self) -> f64;
 
-    /// Lower bound of the distance between `point` and the surface; `None` if there is no surface.
-    /// It is exact for points close to the surface. For points outside of a box around the form it
-    /// may be the distance to the box.
+    /// Returns a lower bound of the distance between `point` and the surface; `None` if there is no
+    /// surface. It is exact for points close to the surface. For points outside of a box around the
+    /// geometry it may be the distance to the box.
     fn clearance(&self, point: DVec3) -> Option<f64>;
 
-    /// Unit normals of the surfaces within the distance `slack` of `point`, one list for each solid
-    /// that the form consists of. Empty if there are none.
+    /// Returns the unit normals of the surfaces that are at most `slack` from `point`: one list for
+    /// each solid that the geometry consists of. Empty if there are none.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
-    /// Smallest t > 0 at which `origin + t direction` is on the surface; `None` if there is none.
-    /// The unit of t is the length of `direction`.
+    /// Returns the smallest t > 0 at which `origin + t direction` is on the surface; `None` if
+    /// there is none. The unit of t is the length of `direction`.
     fn cast(&self, origin: DVec3, direction: DVec3) -> Option<f64>;
 
-    /// Default mapping of textures to the form, used if a material does not choose one.
+    /// Returns the texture mapping that is used if a material does not choose one.
     fn default_mapping(&self) -> DefaultMapping;
 
-    /// Proxies in the search for narrow gaps; empty for a form with too many details.
+    /// Returns proxies: simplified geometry for the search for narrow gaps between objects. Empty
+    /// for geometry with too many details.
     fn proxies(&self) -> Vec<Proxy>;
 
-    /// Smallest and largest value of `axis . p` over the points p of the form, or bounds of both;
-    /// `None` if the form is unbounded along the axis. `axis` is a unit vector.
-    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)>;
+    /// Returns two numbers, a low and a high one, between which `axis . p` is for all points p of
+    /// the geometry. Returns `None` if the geometry is unbounded along the unit vector `axis`. The
+    /// default is the extent of the bounding box.
+    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
+        extent_of_box(self.bounds(), axis)
+    }
 
-    /// Corners on which the form can stand when it is snapped to the ground.
-    fn corners(&self) -> Vec<DVec3>;
+    /// Returns the corners on which the object can stand when it is snapped to the ground. The
+    /// default is none.
+    fn corners(&self) -> Vec<DVec3> {
+        Vec::new()
+    }
 
-    /// Number of triangles; 0 except for meshes.
-    fn triangles(&self) -> usize;
+    /// Returns the number of triangles; 0 except for meshes.
+    fn triangles(&self) -> usize {
+        0
+    }
 }
 
-/// Returns the bounding box of points; `None` if there are none.
+/// Returns the axis-parallel bounding box of `points`; `None` if there are none.
 pub fn bounds_of_points(points: &[DVec3]) -> Option<Bounds> {
     let low = points.iter().copied().reduce(DVec3::min)?;
     let high = points.iter().copied().reduce(DVec3::max)?;
     Some((low, high))
 }
 
-/// Returns the sphere through the corners of a box.
+/// Returns the sphere through the corners of a box; for `None` (an infinite box) its radius is
+/// infinite.
 pub fn sphere_around_box(bounds: Option<Bounds>) -> BoundingSphere {
     match bounds {
         Some((low, high)) => {
@@ -150,24 +174,27 @@ pub fn sphere_around_box(bounds: Option<Bounds>) -> BoundingSphere {
     }
 }
 
-/// Returns the smallest and the largest value of `axis . p` over the points p.
+/// Returns the smallest and the largest value of `axis . p` over all p in `points`. Without points,
+/// these are infinity and minus infinity; the result is never `None`.
 pub fn extent_of_points(points: &[DVec3], axis: DVec3) -> Option<(f64, f64)> {
     let heights = points.iter().map(|p| axis.dot(*p));
     let low = heights.clone().fold(f64::INFINITY, f64::min);
     Some((low, heights.fold(f64::NEG_INFINITY, f64::max)))
 }
 
-/// Returns the smallest and the largest value of `axis . p` over the points p of a box.
-pub fn extent_of_box(bounds: Option<Bounds>, axis: DVec3) -> Option<(f64, f64)> {
+/// Returns the smallest and the largest value of `axis . p` over the points p of the box `bounds`;
+/// `None` without a box.
+fn extent_of_box(bounds: Option<Bounds>, axis: DVec3) -> Option<(f64, f64)> {
     let (low, high) = bounds?;
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     let (center, reach) = (axis.dot(middle), axis.abs().dot(half));
     Some((center - reach, center + reach))
 }
 
-/// Returns the normals of the sides of a convex solid that are within `slack` of a point. `sides`
-/// has, for each side, the height of the point above the side, and the normal. The largest height
-/// is the distance between the point and the solid.
+/// Returns the normals of the sides of a convex solid that are within the distance `slack` of a
+/// point, as a single list. Returns no list if there is no such side. `sides` has two values for
+/// each side: the height of the point above it, and its outward normal. The largest height counts
+/// as the distance between the point and the solid.
 pub fn normals_of_solid(sides: Vec<(f64, DVec3)>, slack: f64) -> Vec<Vec<DVec3>> {
     let near = sides.iter().all(|(height, _)| *height <= slack);
     let on = sides.into_iter().filter(|(height, _)| near && *height >= -slack);

@@ -1,14 +1,13 @@
 //! Conical frusta (tapered cylinders, including cylinders and cones) under any affine map. Rays are
-//! transformed into the space of the canonical solid, with the origin in the middle of its axis:
-//! x^2 + y^2 <= (middle + slope z)^2, |z| <= 1/2
+//! transformed into the space of the canonical solid x^2 + y^2 <= (m + k z)^2, |z| <= 1/2. The
+//! origin is the middle of its axis, m is the radius there, and k is the slope.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
-use crate::primitive::bounding::BoundingSphere;
+use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, bounds_of_points, box_distance,
-    extent_of_box, normals_of_solid, segment_distance, sphere_around_box,
+    Bounds, CanonicalShape, DefaultMapping, Proxy, bounds_of_points, box_distance,
+    normals_of_solid, segment_distance,
 };
 use crate::primitive::ellipsoid::{rows, times};
 use crate::primitive::form::{Form, cast_compiled};
@@ -16,19 +15,20 @@ use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::TAU;
 
-/// Image of the solid x^2 + y^2 <= (1 + (top - 1) z)^2, 0 <= z <= 1 under an invertible affine map.
+/// Canonical form of cylinders, cones and tapered cylinders: the image of the solid
+/// x^2 + y^2 <= (1 + (top_radius - 1) z)^2, 0 <= z <= 1 under an invertible affine map.
 /// [`Form::conical_frustum`] creates it for any proportions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConicalFrustumForm {
-    /// Map from the space of the solid to the scene.
+    /// Map from the space in which the frustum has base radius 1 and height 1 to the scene.
     pub scene_from_unit: DAffine3,
-    /// Radius at z = 1 divided by the radius at z = 0: between 0, a cone, and 1, a cylinder.
+    /// Radius at z = 1 divided by the radius at z = 0: from 0 (a cone) to 1 (a cylinder).
     pub top_radius: f64,
 }
 
 impl Form {
     /// Creates the image of the solid x^2 + y^2 <= (1 + (s - 1) z)^2, 0 <= z <= 1 under
-    /// `scene_from_canonical`, for any s >= 0.
+    /// `scene_from_canonical`. `s` is the radius at z = 1, at least 0; the radius at z = 0 is 1.
     pub fn conical_frustum(scene_from_canonical: DAffine3, s: f64) -> Self {
         let (scene_from_unit, top_radius) = if s <= 1.0 {
             (scene_from_canonical, s)
@@ -42,18 +42,12 @@ impl Form {
     }
 }
 
-/// Number of normals that sample the circle of normals at the tip of a cone.
+/// Number of normals that approximate the circle of normals at the tip of a cone.
 pub(crate) const AROUND_TIP: u32 = 64;
 
 impl CanonicalShape for ConicalFrustumForm {
-    const NOUN: (&'static str, &'static str) = ("tapered cylinder", "tapered cylinders");
-
     fn transformed(self, map: &DAffine3) -> Form {
         Self { scene_from_unit: *map * self.scene_from_unit, ..self }.into()
-    }
-
-    fn parts(&self) -> usize {
-        1
     }
 
     fn bounds(&self) -> Option<Bounds> {
@@ -70,16 +64,8 @@ impl CanonicalShape for ConicalFrustumForm {
         bounds_of_points(&[base - half, base + half, cap - narrow, cap + narrow])
     }
 
-    fn bounding_sphere(&self) -> BoundingSphere {
-        sphere_around_box(self.bounds())
-    }
-
     fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
         Some((self.scene_from_unit, (DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE)))
-    }
-
-    fn plane(&self) -> Option<HalfSpace> {
-        None
     }
 
     fn is_convex(&self) -> bool {
@@ -139,24 +125,12 @@ impl CanonicalShape for ConicalFrustumForm {
     fn proxies(&self) -> Vec<Proxy> {
         self.bounds().map(Proxy::around).into_iter().collect()
     }
-
-    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
-        extent_of_box(self.bounds(), axis)
-    }
-
-    fn corners(&self) -> Vec<DVec3> {
-        Vec::new()
-    }
-
-    fn triangles(&self) -> usize {
-        0
-    }
 }
 
-/// Returns the distance between `point` and the surface of the image of a frustum. In each
-/// half-plane through the axis, the surface has an outline of three segments: from the middle of
-/// the base over both rims to the middle of the cap. The radius of the base is 1, and `top` is the
-/// radius of the cap.
+/// Returns the distance between `point` and the surface of a conical frustum. In each half-plane
+/// through the axis, the surface has an outline of three segments: from the middle of the base over
+/// both rims to the middle of the cap. The radius of the base is 1, and `top` is the radius of the
+/// cap.
 fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
     const ANGLES: usize = 64;
     let place = |x, y, z| scene_from_unit.transform_point3(DVec3::new(x, y, z));
@@ -186,25 +160,26 @@ fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
     least
 }
 
-/// Compiled frustum. Matrices are stored by rows.
+/// Conical frustum compiled for ray intersection. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct ConicalFrustum<S> {
-    /// Image of the middle of the axis in the scene.
+    /// Position in the scene of the middle of the frustum's axis.
     center: [S; 3],
     unit_from_scene: [[S; 3]; 3],
-    /// Change of the radius along z, from -1 (a cone) to 0 (a cylinder).
+    /// Change of the radius per unit of length along the canonical z axis, from -1 (a cone) to 0 (a
+    /// cylinder).
     slope: S,
-    /// Radius at the middle of the axis.
+    /// Radius at the middle of the axis, in canonical space.
     mid_radius: S,
-    /// Unit normal of the plane z = 1/2, outward.
+    /// Outward unit normal, in the scene, of the cap at z = 1/2.
     cap_normal: [S; 3],
-    /// Distance in the scene between the planes of both ends.
+    /// Distance in the scene between the planes of the base and the cap.
     height: S,
     reach: S,
 }
 
-/// Squared radius of a ball around the middle of the axis that contains the solid in canonical
-/// space, with a margin for rounding errors.
+/// Squared radius, in canonical space, of a sphere around the middle of the axis that contains the
+/// frustum, with a margin for rounding errors.
 const AROUND2: f64 = 1.26;
 
 impl<S: Float> ConicalFrustum<S> {
@@ -224,25 +199,27 @@ impl<S: Float> ConicalFrustum<S> {
             mid_radius: S::from_f64(0.5 * (1.0 + top_radius)),
             cap_normal: up.normalize().to_array().map(S::from_f64),
             height: S::from_f64(up.length().recip()),
-            reach: S::from_f64(max_coordinate(form)),
+            reach: S::from_f64(form.max_coordinate()),
         })
     }
 }
 
-/// Chord: the segment of a line that is inside of a frustum.
+/// Chord: the segment of a ray's line that is inside of a frustum.
 struct Chord<L: SimdFloat> {
-    /// Point of the line closest to the middle of the axis, and the direction of the line, both in
-    /// canonical space. The direction has unit length there.
+    /// Point of the line closest to the middle of the frustum's axis, in canonical space.
     point: Vec3<L>,
+    /// Direction of the line, of unit length in canonical space.
     direction: Vec3<L>,
-    /// Distance in the scene from the ray's origin to `point`, and length in the scene of a step of
-    /// length 1 in canonical space.
+    /// Distance in the scene from the ray's origin to `point`.
     start: L,
+    /// Length in the scene of a step of length 1 in canonical space.
     scale: L,
-    /// Steps from `point` to both ends of the chord.
+    /// Distance in canonical space from `point` to the entry of the chord.
     enter: L,
+    /// Distance in canonical space from `point` to the exit of the chord.
     leave: L,
-    /// Lanes whose entry is on the side of the frustum; in the others it is on a flat end.
+    /// Lanes whose ray enters through the lateral surface. In other lanes it enters through the
+    /// base or the cap.
     enters_side: L::Mask,
     leaves_side: L::Mask,
     meets: L::Mask,
@@ -255,14 +232,15 @@ impl<L: SimdFloat> Chord<L> {
     }
 }
 
-/// Returns the chord of a line in the frustum.
+/// Returns the chord of each ray's line in the frustum; `None` if no line hits it.
 ///
 /// Distances are counted from the line's point closest to the solid's middle, so that a distant
-/// origin costs no precision. p is this point, d the direction, r the radius at p and k the slope.
-/// The line crosses the side where a t^2 + 2 b t + c = 0. The discriminant is computed as |r d' - k
-/// d_z p'|^2 - (p' x d')^2 (primes: without z). Unlike b^2 - a c, it does not cancel; for a
-/// cylinder it compares the radius with the line's distance from the axis. The roots are computed
-/// as q / a and c / q. One of them stays finite for a = 0, a line parallel to a generator.
+/// origin costs no precision. Let p be this point, d the direction, r the radius at p and k the
+/// slope; p' and d' are p and d without their z coordinates. The line crosses the lateral surface
+/// where a t^2 + 2 b t + c = 0. The discriminant is computed as |r d' - k d_z p'|^2 - (p' x d')^2.
+/// Unlike b^2 - a c, it does not cancel; for a cylinder it compares the radius with the line's
+/// distance from the axis. The roots are computed as q / a and c / q. One of them stays finite for
+/// a = 0, a line parallel to a generator.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let (zero, half) = (L::zero(), L::from_f64(0.5));
@@ -326,8 +304,9 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     })
 }
 
-/// Returns the outward normal of the side at the canonical point (x, y, z), in scene space and not
-/// normalised, and the distance of the point from the axis in canonical space.
+/// Returns two values for a point of the lateral surface with the canonical coordinates `x` and `y`:
+/// its outward normal in scene space, not normalised, and its distance from the axis in canonical
+/// space.
 #[inline(always)]
 fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3<L>, L) {
     let rho = x.mul_add(x, y * y).sqrt();
@@ -347,8 +326,8 @@ impl<L: SimdFloat> Primitive<L> for ConicalFrustum<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), chord.meets))
     }
 
-    /// Returns the surface of side, base or cap at `point`: of the face for which the point's
-    /// height is largest, which is the closest one.
+    /// Returns the surface point on the face that is closest to `point`: the lateral surface, the
+    /// base or the cap. It is the face above which `point` has the largest height.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let s = self;

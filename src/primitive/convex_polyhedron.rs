@@ -2,7 +2,7 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
+use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
@@ -12,18 +12,16 @@ use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
-/// A bounded convex solid: intersection of half-spaces, and its corners.
+/// Canonical form of a bounded convex solid: an intersection of half-spaces, with its corners.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConvexPolyhedronForm {
-    /// Half-space behind the plane of each face.
+    /// Half-space behind the plane of each face, in scene coordinates.
     pub faces: Vec<HalfSpace>,
-    /// Corners in scene coordinates.
+    /// Corners of the solid in scene coordinates.
     pub corners: Vec<DVec3>,
 }
 
 impl CanonicalShape for ConvexPolyhedronForm {
-    const NOUN: (&'static str, &'static str) = ("convex solid", "convex solids");
-
     fn transformed(self, map: &DAffine3) -> Form {
         let normals = map.matrix3.inverse().transpose();
         let face = |face: &HalfSpace| {
@@ -37,24 +35,12 @@ impl CanonicalShape for ConvexPolyhedronForm {
         .into()
     }
 
-    fn parts(&self) -> usize {
-        1
-    }
-
     fn bounds(&self) -> Option<Bounds> {
         bounds_of_points(&self.corners)
     }
 
     fn bounding_sphere(&self) -> BoundingSphere {
         BoundingSphere::around(&self.corners)
-    }
-
-    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
-        None
-    }
-
-    fn plane(&self) -> Option<HalfSpace> {
-        None
     }
 
     fn is_convex(&self) -> bool {
@@ -112,27 +98,25 @@ impl CanonicalShape for ConvexPolyhedronForm {
     fn corners(&self) -> Vec<DVec3> {
         self.corners.clone()
     }
-
-    fn triangles(&self) -> usize {
-        0
-    }
 }
 
-/// Slab: the points p with low <= normal . (p - center) <= high.
+/// Slab: the points p with low <= normal . (p - center) <= high. `center` is a field of
+/// [`ConvexPolyhedron`].
 struct Slab<S> {
     normal: [S; 3],
     low: S,
     high: S,
 }
 
-/// Half-space of a single face: the points p with normal . (p - center) <= high.
+/// Half-space of a single face: the points p with normal . (p - center) <= high. `center` is a
+/// field of [`ConvexPolyhedron`].
 struct Face<S> {
     normal: [S; 3],
     high: S,
 }
 
-/// Compiled polyhedron: its bounding sphere, its slabs (pairs of parallel faces), and its single
-/// faces.
+/// Convex polyhedron compiled for ray intersection: its bounding sphere, its slabs (pairs of
+/// parallel faces), and its single faces.
 pub struct ConvexPolyhedron<S> {
     center: [S; 3],
     radius2: S,
@@ -155,7 +139,7 @@ impl<S: Float> ConvexPolyhedron<S> {
             center: center.to_array().map(S::from_f64),
             // Rounded up: the test may pass a miss, but never rejects a hit.
             radius2: S::from_f64(radius2 * (1.0 + 8.0 * S::EPSILON)),
-            reach: S::from_f64(max_coordinate(form)),
+            reach: S::from_f64(form.max_coordinate()),
             slabs: Vec::new(),
             faces: Vec::new(),
         };
@@ -182,8 +166,8 @@ impl<S: Float> ConvexPolyhedron<S> {
 }
 
 impl<S: Float> ConvexPolyhedron<S> {
-    /// Returns the distances at which each line enters and leaves the solid, and the lanes that hit
-    /// it.
+    /// Returns three values: the distances at which each ray's line enters and leaves the solid,
+    /// and the lanes that hit it. Returns `None` if no line hits the bounding sphere.
     #[inline(always)]
     fn chord<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
         let from_center = ray.origin - Vec3::splat(self.center);
@@ -231,8 +215,8 @@ impl<L: SimdFloat> Primitive<L> for ConvexPolyhedron<L::Scalar> {
         Some((L::select(enter.gt(L::zero()), enter, leave), meets))
     }
 
-    /// Returns the surface of the face for which the point's height is largest, which is the
-    /// closest one.
+    /// Returns the surface point on the face that is closest to `point`. It is the face above which
+    /// `point` has the largest height.
     #[inline(always)]
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let from_center = point - Vec3::splat(self.center);

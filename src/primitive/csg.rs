@@ -2,17 +2,17 @@
 //! intervals (Roth 1982, *Ray Casting for Modeling Solids*).
 //!
 //! Each part returns the spans in which a line is inside of it. The sorted ends of all spans divide
-//! the line into gaps. Within a gap each part is either inside or outside, and so is the compound.
-//! A change from one gap to the next is a surface.
+//! the line into pieces. Within a piece each part is either inside or outside, and so is the
+//! compound. A change from one piece to the next is a surface.
 //!
 //! Ends closer to each other than [`TIE`] rounding errors, measured across the surface, coincide:
-//! there is no gap between them. A cut flush with a face therefore leaves no skin, and parts in
+//! there is no piece between them. A cut flush with a face therefore leaves no skin, and parts in
 //! contact leave no crack, whatever order rounding gives to equal faces. Parts thinner than this
 //! distance are dropped.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, UvGradients, max_coordinate};
+use crate::primitive::batch::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::canonical::CanonicalShape;
 use crate::primitive::conical_frustum::ConicalFrustum;
 use crate::primitive::convex_polyhedron::ConvexPolyhedron;
@@ -26,15 +26,16 @@ use crate::primitive::sphere::Sphere;
 use crate::primitive::torus::Torus;
 use std::ops::Range;
 
-/// Distance within which surfaces are taken as coincident, in rounding errors of the largest
-/// coordinate. It suffices for two faces whose coordinates differ by four units in the last place,
-/// each hit with a few rounding errors.
+/// Distance within which surfaces of a compound's parts count as coincident. The unit is the
+/// rounding error of the largest coordinate. The distance covers two faces whose coordinates differ
+/// by four units in the last place, each hit with a few rounding errors.
 const TIE: f64 = 16.0;
 
-/// Instruction of a stack machine that computes "inside the compound" from "inside each part".
+/// Operation of a stack machine, which computes whether a point is inside of a compound solid. Its
+/// input is whether the point is inside of each part.
 #[derive(Clone, Copy, Debug)]
 enum Op {
-    /// Pushes the value of the part with this number.
+    /// Pushes the mask of the lanes whose point is inside of the part with this number.
     Part(u32),
     /// Replaces the top two stack entries by their union.
     Or,
@@ -46,12 +47,12 @@ enum Op {
 
 macro_rules! leaves {
     ($($kind:ident($spans:literal)),+ $(,)?) => {
-        /// Compiled solid of one part.
+        /// Solid of one part of a compound, compiled for ray intersection.
         enum CsgLeaf<S> {
             $($kind($kind<S>),)+
         }
 
-        /// Evaluates one expression for a solid of any kind.
+        /// Evaluates one expression for the solid in any variant of [`CsgLeaf`].
         macro_rules! each {
             ($solid:expr, $item:ident => $value:expr) => {
                 match $solid {
@@ -61,12 +62,13 @@ macro_rules! leaves {
         }
 
         impl<S: Float> CsgLeaf<S> {
-            /// Compiles a part; `None` if compounds cannot contain its form.
+            /// Compiles the canonical form of a part; `None` if compounds cannot contain it.
             fn new(form: &Form) -> Option<Self> {
                 None$(.or_else(|| $kind::new(form).map(Self::$kind)))+
             }
 
-            /// Largest number of spans (intervals inside) of one line in this solid.
+            /// Returns the largest number of spans of one line in this solid. A span is an interval
+            /// in which the line is inside of the solid.
             fn max_spans(&self) -> usize {
                 match self {
                     $(Self::$kind(_) => $spans,)+
@@ -88,40 +90,44 @@ leaves! {
     Plane(1),
 }
 
-/// One part of a compound: a solid that the compound's expression combines with others.
+/// Part of a compound: one of the solids that the compound's set operations combine.
 struct Part<S> {
     solid: CsgLeaf<S>,
     /// `true` if the part is subtracted: the inside of its solid is outside of the compound.
     reversed: bool,
-    /// Range of the part's spans among those of the compound.
+    /// Range of the part's spans (intervals in which a line is inside of the part) in the list of
+    /// the spans of all parts of the compound.
     spans: Range<usize>,
 }
 
-/// One compound: a ball around it, and the ranges of its parts and instructions.
+/// Compound compiled for ray intersection: a bounding sphere, and the ranges of its parts and
+/// instructions in the lists of [`Compounds`].
 struct SolidOperand<S> {
     center: [S; 3],
     radius2: S,
     reach: S,
     parts: Range<usize>,
     ops: Range<usize>,
-    /// Total number of spans, at most, of all parts.
+    /// Largest total number of spans of all parts of the compound. A span is an interval in which a
+    /// line is inside of a part.
     spans: usize,
-    /// Number of entries on the stack, at most.
+    /// Largest number of entries on the stack while the compound's instructions are executed.
     depth: usize,
 }
 
-/// All compounds of a scene. Every part is an item, so that a hit identifies the part. In lists of
-/// items the first part means the whole compound.
+/// All compounds of a scene, compiled for ray intersection. Every part counts as a primitive, so
+/// that a hit identifies the part. In lists of primitives the first part means the whole compound.
 pub struct Compounds<S> {
     compounds: Vec<SolidOperand<S>>,
     parts: Vec<Part<S>>,
     ops: Vec<Op>,
-    /// Number of the compound, for parts that are the first of a compound; `None` for other parts.
+    /// For each part of all compounds: the number of its compound if it is the first part,
+    /// otherwise `None`.
     first: Vec<Option<u32>>,
 }
 
 impl<S: Float> Compounds<S> {
-    /// Compiles the compounds among `forms`, in order.
+    /// Compiles the compounds among the canonical forms `forms`, in order.
     pub fn new(forms: &[Form]) -> Self {
         let mut out =
             Self { compounds: Vec::new(), parts: Vec::new(), ops: Vec::new(), first: Vec::new() };
@@ -146,10 +152,11 @@ impl<S: Float> Compounds<S> {
         let depth = self.build(&compound.tree, first_part, false);
         let (low, high) = compound.bounds().unwrap_or_default();
         let radius = 0.5 * low.distance(high) * (1.0 + 8.0 * S::EPSILON);
+        let bounded = compound.parts.iter().filter(|part| part.bounds().is_some());
         self.compounds.push(SolidOperand {
             center: (0.5 * (low + high)).to_array().map(S::from_f64),
             radius2: S::from_f64(radius * radius),
-            reach: S::from_f64(compound.parts.iter().map(max_coordinate).fold(0.0, f64::max)),
+            reach: S::from_f64(bounded.map(|part| part.max_coordinate()).fold(0.0, f64::max)),
             parts: first_part..self.parts.len(),
             ops: first_op..self.ops.len(),
             spans,
@@ -157,8 +164,8 @@ impl<S: Float> Compounds<S> {
         });
     }
 
-    /// Appends the instructions of `tree` and returns the depth of the stack that they need.
-    /// `reversed` is `true` if the tree is subtracted from the compound.
+    /// Appends the instructions that evaluate `tree` and returns the depth of the stack that they
+    /// need. `reversed` is `true` if the tree is subtracted from the compound.
     fn build(&mut self, tree: &CsgTree, first_part: usize, reversed: bool) -> usize {
         let (list, op) = match tree {
             CsgTree::Part(i) => {
@@ -182,7 +189,8 @@ impl<S: Float> Compounds<S> {
         depth
     }
 
-    /// Returns the spans of part number `i` of a compound.
+    /// Returns the spans of part number `i` of a compound: the intervals of each line inside of the
+    /// part. `spans` are those of all parts.
     #[inline(always)]
     fn spans_of<'a, L>(
         &self,
@@ -193,7 +201,8 @@ impl<S: Float> Compounds<S> {
         &spans[self.parts[compound.parts.start + i as usize].spans.clone()]
     }
 
-    /// Returns the lanes in which the point at the distance `t` is inside of the compound.
+    /// Returns the lanes in which the point at the distance `t` along the ray is inside of the
+    /// compound. `spans` are those of all its parts.
     #[inline(always)]
     fn inside<L: SimdFloat<Scalar = S>>(
         &self,
@@ -221,8 +230,10 @@ impl<S: Float> Compounds<S> {
         })
     }
 
-    /// Returns the transition of the compound between the distances `before` and `after`, with the
-    /// surface that is visible there.
+    /// Returns the transition of the compound between the points at the distances `before` and
+    /// `after` along each line: whether each point is inside of the compound, and the surface
+    /// between the two. `spans` has the intervals of the lines inside each part of the compound.
+    /// The id of a part is `base` plus its number.
     fn change<L: SimdFloat<Scalar = S>>(
         &self,
         compound: &SolidOperand<S>,
@@ -265,7 +276,8 @@ impl<S: Float> Compounds<S> {
         })
     }
 
-    /// Replaces `hit` in the lanes of `wanted` in which `compound` is nearer.
+    /// Replaces `hit` in the lanes of `wanted` in which `compound` is nearer. The id of a part in
+    /// `hit` is `base` plus its number.
     fn intersect_item<L: SimdFloat<Scalar = S>>(
         &self,
         compound: &SolidOperand<S>,
@@ -311,12 +323,13 @@ impl<S: Float> Compounds<S> {
         });
     }
 
-    /// Replaces `hit` by the first surface of the compound in the lanes `open`. The function steps
-    /// along each line from gap to gap between the ends of spans.
+    /// Replaces `hit` by the first surface of the compound in the lanes of `open` in which this
+    /// surface is nearer. The function steps along each line through `ends`, the sorted ends of the
+    /// parts' spans.
     ///
     /// Coincident faces have the same angle to the line. Two ends therefore coincide only if each
-    /// is within the tie of the other, so that the wide tie of a grazing face does not absorb other
-    /// faces.
+    /// is within the tie (tolerance) of the other. Otherwise the wide tie of a grazing face would
+    /// absorb other faces.
     #[inline(always)]
     fn sweep_events<L: SimdFloat<Scalar = S>>(
         &self,
@@ -358,8 +371,8 @@ impl<S: Float> Compounds<S> {
 }
 
 impl<S: Float> Compounds<S> {
-    /// Replaces `hit` in the lanes in which a compound that begins in `range` is nearer. The id of
-    /// a part is `base` plus its number.
+    /// Replaces `hit` in the lanes in which a compound whose first part is in `range` is nearer.
+    /// The id of a part is `base` plus its number.
     #[inline(never)]
     pub fn closest<L: SimdFloat<Scalar = S>>(
         &self,
@@ -373,8 +386,8 @@ impl<S: Float> Compounds<S> {
         }
     }
 
-    /// Returns the lanes of `wanted` that hit a compound beginning in `range` at a distance between
-    /// 0 and `limit`.
+    /// Returns the lanes of `wanted` whose ray hits a compound, with its first part in `range`, at
+    /// a distance between 0 and `limit`.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
@@ -396,7 +409,8 @@ impl<S: Float> Compounds<S> {
         occluded
     }
 
-    /// Returns the surface of a part at `point`, with the normal outward of the compound.
+    /// Returns the surface point of a compound's part at `point`. Its normal points out of the
+    /// compound.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -409,7 +423,7 @@ impl<S: Float> Compounds<S> {
         SurfacePoint { normal, ..surface }
     }
 
-    /// Returns the texture coordinates of a part at `point`; `None` if it has none.
+    /// Returns the texture coordinates of a compound's part at `point`; `None` if it has none.
     pub fn uv<L: SimdFloat<Scalar = S>>(
         &self,
         part: usize,

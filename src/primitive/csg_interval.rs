@@ -1,20 +1,22 @@
-//! Intervals of compounds: sorted ends of spans, intervals inside of solids, and transitions
-//! between inside and outside.
+//! Intervals of lines for compound solids (CSG): sorted interval ends, intervals inside of solids,
+//! and transitions between inside and outside.
 
 use crate::lanes::SimdFloat;
 use crate::primitive::solid::Span;
 
-/// Smallest cosine by which ties are divided. At smaller angles the tie does not grow further.
+/// Smallest divisor of the tolerance of coincident faces. The tolerance is divided by the cosine
+/// between line and surface normal; at smaller cosines it does not grow further.
 const FLATTEST: f64 = 1e-9;
 
-/// End of a span: its distance, and its tie. Another end within the tie is taken as coincident.
+/// End of an interval in which a line is inside of a solid. `t` is its distance along the line.
+/// Other ends within the distance `tie` are taken as coincident.
 #[derive(Clone, Copy)]
 pub struct Event<L> {
     pub t: L,
     pub tie: L,
 }
 
-/// Interval of distances in which a line is inside of a part.
+/// Interval of distances in which a line is inside of a part of a compound.
 #[derive(Clone, Copy)]
 pub struct Interval<L> {
     pub enter: L,
@@ -28,12 +30,14 @@ impl<L: SimdFloat> Interval<L> {
     }
 }
 
-/// Transition of a subtree between inside and outside at a surface, by lane.
+/// Transition of a line through a surface, one per lane. `before` and `after` are the lanes in
+/// which the line is inside of the compound, or of an operand of its set operations, before and
+/// after the surface. `tag` is the id of the part to which the surface belongs.
 #[derive(Clone, Copy)]
 pub struct Transition<L: SimdFloat> {
     pub before: L::Mask,
     pub after: L::Mask,
-    /// Distance of the visible part; undefined in lanes without a transition.
+    /// Distance along the line to the visible surface; undefined in lanes without a transition.
     pub t: L,
     pub tag: L,
 }
@@ -43,9 +47,10 @@ impl<L: SimdFloat> Transition<L> {
         Self { before: !self.before, after: !self.after, ..self }
     }
 
-    /// Combines the transitions of two operands. `before` and `after` are the values of the
-    /// combination on both sides. The distance is that of `self` if it changes in the same sense,
-    /// otherwise that of `other`.
+    /// Combines `self` and `other`, the transitions of two operands, to the transition of the
+    /// result of a set operation. `before` and `after` are the lanes in which the result is inside
+    /// before and after the surface. The surface is that of `self` in lanes in which `self` changes
+    /// to the same side as the result, otherwise that of `other`.
     fn joined(self, other: Self, before: L::Mask, after: L::Mask) -> Self {
         let same = (self.after & after) | (!self.after & !after);
         let first = same & ((self.before & !self.after) | (!self.before & self.after));
@@ -66,8 +71,8 @@ impl<L: SimdFloat> Transition<L> {
     }
 }
 
-/// Calls `use_it` with a slice of `n` values `fill`. The slice is on the stack if `n` is at most
-/// `FEW`, otherwise on the heap.
+/// Calls `use_it` with a slice of `n` elements that equal `fill`. The slice is on the stack if `n`
+/// is at most `FEW`, otherwise on the heap.
 #[inline(always)]
 pub fn with_scratch<const FEW: usize, T: Copy, R>(
     n: usize,
@@ -84,8 +89,9 @@ pub fn with_scratch<const FEW: usize, T: Copy, R>(
     })
 }
 
-/// Returns the two ends of a span. In lanes that miss the solid they are farther than all other
-/// ends.
+/// Returns the start and the end of the interval `span`. `tie` is the tolerance of coincident faces
+/// for lines perpendicular to the face. In lanes that miss the solid, both have the largest
+/// possible distance.
 #[inline(always)]
 pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     let never = L::from_f64(L::MAX);
@@ -99,7 +105,8 @@ pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     [end(span.enter, span.enter_cosine), end(span.leave, span.leave_cosine)]
 }
 
-/// Inserts `end` into the first `count` elements of `ends`, which are sorted in every lane.
+/// Inserts `end` among the first `count` elements of `ends`, which are sorted by distance in every
+/// lane and stay so.
 #[inline(always)]
 pub fn insert<L: SimdFloat>(mut end: Event<L>, ends: &mut [Event<L>], count: usize) {
     for slot in &mut ends[..count] {

@@ -1,27 +1,25 @@
-//! Compound solids: their parts, and the tree that combines them.
+//! Compound solids (CSG): their parts, and the tree of set operations that combines them.
 
-use crate::primitive::bounding::BoundingSphere;
-use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, extent_of_box, sphere_around_box,
-};
+use crate::primitive::canonical::{Bounds, CanonicalShape, DefaultMapping, Proxy};
 use crate::primitive::form::{Form, cast_compiled};
 use glam::{DAffine3, DVec3};
 
 /// Tree of set operations on the parts of a compound.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CsgTree {
-    /// One part, by its index in [`CsgSolid::parts`].
+    /// One part of the solid (a single primitive), as its index in [`CsgSolid::parts`].
     Part(usize),
-    /// Points in any of the operands.
+    /// Union: points in any of the operands.
     Union(Vec<CsgTree>),
-    /// Points in all of the operands.
+    /// Intersection: points in all of the operands.
     Intersection(Vec<CsgTree>),
-    /// Points of the first operand that are in none of the others.
+    /// Difference: points of the first operand that are in none of the others.
     Difference(Vec<CsgTree>),
 }
 
 impl CsgTree {
-    /// Returns the tree with all part indices increased by `by`.
+    /// Returns the tree with all part indices increased by `by`, for use as an operand of a larger
+    /// compound.
     pub(crate) fn shifted(self, by: usize) -> Self {
         let all = |list: Vec<Self>| list.into_iter().map(|t| t.shifted(by)).collect();
         match self {
@@ -39,13 +37,11 @@ pub struct CsgSolid {
     /// Solids that are combined. Valid kinds are `Sphere`, `Ellipsoid`, `ConvexPolyhedron`,
     /// `ConicalFrustum`, `Torus`, and `Plane`, which means the half-space behind it.
     pub parts: Vec<Form>,
-    /// Tree of operations, in which every part occurs once, in the order of `parts`.
+    /// Tree of set operations, in which every part occurs once, in the order of `parts`.
     pub tree: CsgTree,
 }
 
 impl CanonicalShape for CsgSolid {
-    const NOUN: (&'static str, &'static str) = ("compound", "compounds");
-
     fn transformed(self, map: &DAffine3) -> Form {
         let parts = self.parts.into_iter().map(|p| p.transformed(map)).collect();
         Self { parts, tree: self.tree }.into()
@@ -59,24 +55,12 @@ impl CanonicalShape for CsgSolid {
         self.bounds_of(&self.tree)
     }
 
-    fn bounding_sphere(&self) -> BoundingSphere {
-        sphere_around_box(self.bounds())
-    }
-
-    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
-        None
-    }
-
-    fn plane(&self) -> Option<HalfSpace> {
-        None
-    }
-
     fn is_convex(&self) -> bool {
         false
     }
 
     fn thickness(&self) -> f64 {
-        self.parts.iter().map(Form::thickness).fold(f64::INFINITY, f64::min)
+        self.parts.iter().map(|form| form.thickness()).fold(f64::INFINITY, f64::min)
     }
 
     fn clearance(&self, point: DVec3) -> Option<f64> {
@@ -95,21 +79,10 @@ impl CanonicalShape for CsgSolid {
         DefaultMapping::Box
     }
 
-    /// Returns the proxies of all parts.
+    /// Returns the simplified geometry of all parts, for the search for narrow gaps between
+    /// objects.
     fn proxies(&self) -> Vec<Proxy> {
-        self.parts.iter().flat_map(Form::proxies).collect()
-    }
-
-    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
-        extent_of_box(self.bounds(), axis)
-    }
-
-    fn corners(&self) -> Vec<DVec3> {
-        Vec::new()
-    }
-
-    fn triangles(&self) -> usize {
-        0
+        self.parts.iter().flat_map(|form| form.proxies()).collect()
     }
 }
 

@@ -3,11 +3,10 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
+use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, box_distance, extent_of_box,
-    normals_of_solid,
+    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, normals_of_solid,
 };
 use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
@@ -22,14 +21,8 @@ pub struct EllipsoidForm {
 }
 
 impl CanonicalShape for EllipsoidForm {
-    const NOUN: (&'static str, &'static str) = ("ellipsoid", "ellipsoids");
-
     fn transformed(self, map: &DAffine3) -> Form {
         Self { scene_from_unit: *map * self.scene_from_unit }.into()
-    }
-
-    fn parts(&self) -> usize {
-        1
     }
 
     fn bounds(&self) -> Option<Bounds> {
@@ -50,10 +43,6 @@ impl CanonicalShape for EllipsoidForm {
 
     fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
         Some((self.scene_from_unit, (DVec3::NEG_ONE, DVec3::ONE)))
-    }
-
-    fn plane(&self) -> Option<HalfSpace> {
-        None
     }
 
     fn is_convex(&self) -> bool {
@@ -93,26 +82,14 @@ impl CanonicalShape for EllipsoidForm {
     fn proxies(&self) -> Vec<Proxy> {
         self.bounds().map(Proxy::around).into_iter().collect()
     }
-
-    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
-        extent_of_box(self.bounds(), axis)
-    }
-
-    fn corners(&self) -> Vec<DVec3> {
-        Vec::new()
-    }
-
-    fn triangles(&self) -> usize {
-        0
-    }
 }
 
 /// Returns the distance between `point` and the image of the unit sphere.
 ///
-/// Q is (M M^T)^-1 and p is the point relative to the centre. The closest point q of the surface
-/// q^T Q q = 1 is (I + l Q)^-1 p. There is only one number l for which q is on the surface and `I +
-/// l Q` is positive definite, and q^T Q q decreases with l. (Eberly 2013, *Distance from a Point to
-/// an Ellipse, an Ellipsoid, or a Hyperellipsoid*.)
+/// M is the linear part of the map, Q is (M M^T)^-1, and p is the point relative to the centre. The
+/// closest point q of the surface q^T Q q = 1 is (I + l Q)^-1 p. There is only one number l for
+/// which q is on the surface and `I + l Q` is positive definite, and q^T Q q decreases with l.
+/// (Eberly 2013, *Distance from a Point to an Ellipse, an Ellipsoid, or a Hyperellipsoid*.)
 fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_unit.matrix3.inverse();
     let q = inverse.transpose() * inverse;
@@ -140,7 +117,7 @@ fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     nearest.distance(p)
 }
 
-/// Compiled ellipsoid. Matrices are stored by rows.
+/// Ellipsoid compiled for ray intersection. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct Ellipsoid<S> {
     center: [S; 3],
@@ -168,13 +145,13 @@ impl<S: Float> Ellipsoid<S> {
             center: m.translation.to_array().map(S::from_f64),
             unit_from_scene: rows(m.matrix3.inverse()),
             scene_from_unit: rows(m.matrix3),
-            reach: S::from_f64(max_coordinate(form)),
+            reach: S::from_f64(form.max_coordinate()),
         })
     }
 }
 
-/// Returns the distances along the ray at which it enters and leaves the ellipsoid, and the lanes
-/// that hit it.
+/// Returns three values: the distances at which each ray's line enters and leaves the ellipsoid,
+/// and the lanes that hit it. Returns `None` if no line hits it.
 #[inline(always)]
 fn chord<L: SimdFloat>(e: &Ellipsoid<L::Scalar>, ray: &Ray<L>) -> Option<(L, L, L::Mask)> {
     let f = times(&e.unit_from_scene, ray.origin - Vec3::splat(e.center));

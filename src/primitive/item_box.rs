@@ -1,59 +1,40 @@
-//! Bounding boxes tested before a primitive's own intersection.
+//! Bounding boxes of single primitives, axis-aligned or oriented, which rays are tested against
+//! before the primitive's own intersection.
 
 use crate::bvh::Ray;
 use crate::bvh::packet::SlabPacket;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::form::Form;
-use crate::value::Choice;
+use crate::value::choices;
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
-/// Acceleration structure. Every choice renders the same image; only speed differs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Acceleration {
-    /// The fastest structure by measurement: a BVH for many primitives, otherwise candidate lists
-    /// for each tile.
-    #[default]
-    Auto,
-    /// No structure: every ray tests every primitive.
-    None,
-    /// Screen rectangles: camera rays test only the primitives whose rectangle contains their
-    /// pixel.
-    ScreenBounds,
-    /// A bounding box for each primitive in the primitive's own space (oriented bounding box).
-    Obb,
-    /// A bounding box for each primitive along the axes of the scene.
-    Aabb,
-    /// A bounding volume hierarchy over all primitives.
-    Bvh,
+choices! {
+    /// Acceleration structure. Every choice renders the same image; only speed differs.
+    pub enum Acceleration {
+        /// the fastest by measurement: `bvh` in scenes with many objects, otherwise a list for each
+        /// tile of the picture
+        Auto = "auto",
+        /// every ray tests every primitive
+        None = "none",
+        /// screen bounds of each primitive, for camera rays
+        ScreenBounds = "screen-bounds",
+        /// oriented bounding boxes: one per primitive, in its own space
+        Obb = "obb",
+        /// axis-aligned bounding boxes: one per primitive, in the scene's space
+        Aabb = "aabb",
+        /// a bounding volume hierarchy
+        Bvh = "bvh",
+    }
 }
 
 impl Acceleration {
-    /// All structures, in the order of [`Acceleration::CHOICES`].
-    pub const ALL: [Self; 6] =
-        [Self::Auto, Self::None, Self::ScreenBounds, Self::Obb, Self::Aabb, Self::Bvh];
-
-    /// Name and description of each structure.
-    pub const CHOICES: &'static [Choice] = &[
-        Choice { name: "auto", doc: "the fastest, by measurement" },
-        Choice { name: "none", doc: "every ray tests every primitive" },
-        Choice { name: "screen-bounds", doc: "screen bounds of each primitive, for camera rays" },
-        Choice { name: "obb", doc: "oriented bounding boxes: one per primitive, in its own space" },
-        Choice {
-            name: "aabb",
-            doc: "axis-aligned bounding boxes: one per primitive, in the scene's space",
-        },
-        Choice { name: "bvh", doc: "a bounding volume hierarchy" },
-    ];
-
-    /// Returns the name.
+    /// Returns the name of this acceleration structure in scene files and on the command line.
     pub fn name(self) -> &'static str {
         Self::CHOICES[self as usize].name
     }
 
-    /// Returns the name in earlier versions, which scene files and the command line still accept;
-    /// `None` if it was the same.
+    /// Returns the name that this structure had in earlier versions, which scene files and the
+    /// command line still accept; `None` if the name has not changed.
     pub fn former_name(self) -> Option<&'static str> {
         match self {
             Self::Auto | Self::None => None,
@@ -64,45 +45,49 @@ impl Acceleration {
         }
     }
 
-    /// Returns the structure whose name or former name is `name`.
+    /// Returns the structure whose name or former name is `name`; `None` if there is none.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|s| s.name() == name || s.former_name() == Some(name))
     }
 }
 
-/// A box around one primitive.
+/// Bounding box of one primitive.
 pub struct ItemBox<S> {
     low: [S; 3],
     high: [S; 3],
-    /// Space of the box; `None` if its axes are those of the scene.
+    /// Object space of the box; `None` if its axes are those of the scene.
     space: Option<BoxFrame<S>>,
 }
 
-/// Space of an oriented box. A point p of the scene has the coordinates `rows (p - center)` in it.
+/// Object space of an oriented bounding box. A point p of the scene has the coordinates
+/// `rows (p - center)` in it.
 struct BoxFrame<S> {
     center: [S; 3],
     rows: [[S; 3]; 3],
-    /// Sum of the magnitudes of each row: the largest factor by which a coordinate grows.
+    /// Sum of the magnitudes of each row of `rows`: the largest factor by which the map to object
+    /// space enlarges a rounding error.
     growth: [S; 3],
     /// Largest magnitude of a coordinate of the primitive in the scene.
     reach: S,
 }
 
-/// Returns the corners, moved outward by four times `epsilon` times the largest coordinate. This
-/// bounds rounding errors of the box and of the primitive's own intersection test.
+/// Returns the lowest and the highest corner of a bounding box, moved outward by 4 `epsilon` times
+/// the largest coordinate. This bounds rounding errors of the box and of the primitive's own
+/// intersection test.
 pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
     let reach = low.abs().max(high.abs()).max_element();
     let pad = DVec3::splat(reach * 4.0 * epsilon);
     [low - pad, high + pad]
 }
 
-/// Largest error of the corners of a solid relative to its faces, as a fraction of its extent. In a
-/// scene far from the origin of its file, both have been rounded in double precision.
+/// Assumed rounding error between a solid's bounding box and its faces, as a fraction of the box's
+/// largest coordinate. Far from the origin of the scene file, box and faces are rounded differently
+/// in double precision.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> ItemBox<S> {
-    /// Creates the box of a form. If `oriented` is `true` and the form has a space of its own, the
-    /// box is in that space. Returns `None` for a form without finite bounds.
+    /// Creates the bounding box of a canonical form. If `oriented` is `true` and the form has an
+    /// object space, the box is in that space. Returns `None` for a form without finite bounds.
     pub fn new(form: &Form, oriented: bool) -> Option<Self> {
         let bounds = form.bounds()?;
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
@@ -125,7 +110,7 @@ impl<S: Float> ItemBox<S> {
         Some(made((low - middle, high - middle), Some(space)))
     }
 
-    /// Returns the lanes whose ray may hit the primitive at a distance up to `limit`.
+    /// Returns the lanes whose ray may hit the primitive in this box at a distance up to `limit`.
     #[inline(always)]
     pub fn meets<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L) -> L::Mask {
         let far = ray.origin.max_abs();

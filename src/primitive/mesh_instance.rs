@@ -1,17 +1,15 @@
-//! Triangle meshes. A ray is transformed into the space of the mesh and traverses the mesh's BVH
-//! there; hits are transformed back.
+//! Triangle meshes as primitives. A ray is transformed into the space of the mesh and traverses the
+//! mesh's BVH there; hits are transformed back.
 //!
-//! Coordinates of a mesh are in single precision for every lane type; computation has the precision
+//! Coordinates of a mesh are in single precision for every SIMD type; computation has the precision
 //! of the lanes.
 
 use crate::asset;
 use crate::bvh::{Hit, LEAF_FLAG, Ray};
 use crate::lanes::{Float, MAX_WIDTH, Mask, SimdFloat, Vec3, array_from_fn};
-use crate::primitive::batch::{SurfacePoint, UvGradients, max_coordinate};
-use crate::primitive::bounding::BoundingSphere;
+use crate::primitive::batch::{SurfacePoint, UvGradients};
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, box_distance, extent_of_box,
-    segment_distance, sphere_around_box,
+    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, segment_distance,
 };
 use crate::primitive::form::{Form, cast_compiled};
 use crate::primitive::item_box::ItemBox;
@@ -21,14 +19,14 @@ use glam::{DAffine3, DVec3};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Assumed ratio of a mesh's extent to the size of its details. It determines the choice of single
-/// or double precision.
+/// Assumed ratio of a mesh's extent to the size of its smallest details. It determines the choice
+/// of single or double precision.
 const EXTENT_PER_DETAIL: f64 = 64.0;
 
-/// The image of a mesh under an invertible affine map.
+/// Canonical form of a mesh: the image of a triangle mesh under an invertible affine map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshForm {
-    /// The triangles.
+    /// Triangles in the space of the mesh.
     pub mesh: Arc<asset::Mesh>,
     /// Map from the space of the mesh to the scene.
     pub scene_from_mesh: DAffine3,
@@ -37,14 +35,8 @@ pub struct MeshForm {
 }
 
 impl CanonicalShape for MeshForm {
-    const NOUN: (&'static str, &'static str) = ("mesh", "meshes");
-
     fn transformed(self, map: &DAffine3) -> Form {
         Self { scene_from_mesh: *map * self.scene_from_mesh, ..self }.into()
-    }
-
-    fn parts(&self) -> usize {
-        1
     }
 
     fn bounds(&self) -> Option<Bounds> {
@@ -56,17 +48,9 @@ impl CanonicalShape for MeshForm {
         Some((m.translation + DVec3::from(low), m.translation + DVec3::from(high)))
     }
 
-    fn bounding_sphere(&self) -> BoundingSphere {
-        sphere_around_box(self.bounds())
-    }
-
     fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
         let [low, high] = self.mesh.mesh().bounds.map(|c| DVec3::from(c.map(f64::from)));
         Some((self.scene_from_mesh, (low, high)))
-    }
-
-    fn plane(&self) -> Option<HalfSpace> {
-        None
     }
 
     fn is_convex(&self) -> bool {
@@ -123,16 +107,9 @@ impl CanonicalShape for MeshForm {
         }
     }
 
-    /// Returns no proxies: a mesh has many faces, and its corners are in single precision.
+    /// Returns no proxies (simplified geometry for the search for narrow gaps): a mesh has many
+    /// faces, and its corners are in single precision.
     fn proxies(&self) -> Vec<Proxy> {
-        Vec::new()
-    }
-
-    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
-        extent_of_box(self.bounds(), axis)
-    }
-
-    fn corners(&self) -> Vec<DVec3> {
         Vec::new()
     }
 
@@ -141,8 +118,8 @@ impl CanonicalShape for MeshForm {
     }
 }
 
-/// Returns the unit normal of a triangle that is within the distance `slack` of `point`; `None` for
-/// other triangles.
+/// Returns the unit normal of the triangle `[a, b, c]` if the triangle is within the distance
+/// `slack` of `point`; otherwise `None`.
 fn normal_of_triangle([a, b, c]: [DVec3; 3], point: DVec3, slack: f64) -> Option<DVec3> {
     let normal = (b - a).cross(c - a).try_normalize()?;
     if normal.dot(point - a).abs() > slack {
@@ -170,7 +147,7 @@ fn triangle_distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Returns the distance between `point` and the closest triangle.
+/// Returns the distance between `point` and the closest triangle of the mesh, in scene units.
 fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_mesh.inverse();
     let inside = inverse.transform_point3(point);
@@ -213,28 +190,29 @@ fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3
     least
 }
 
-/// One mesh placed in the scene.
+/// Mesh placed in the scene, compiled for ray intersection.
 struct MeshInstance<S> {
     mesh: Arc<asset::Mesh>,
-    /// Bounding box in the scene. Rays that miss it are not transformed.
+    /// Bounding box of the mesh in the scene. Rays that miss it are not transformed.
     extent: ItemBox<S>,
     /// Columns of the linear map from scene space to mesh space.
     mesh_from_scene: [[S; 3]; 3],
-    /// Centre of the mesh's bounding box, in scene space and in mesh space. Points are transformed
-    /// relative to it, so that their rounding error is in proportion to the mesh's size and
-    /// distance.
+    /// Centre of the mesh's bounding box in scene space; `mesh_center` is the same point in mesh
+    /// space. Points are transformed relative to it, so that their rounding error is in proportion
+    /// to the mesh's size and distance.
     center: [S; 3],
     mesh_center: [S; 3],
     reach: S,
     smooth: bool,
 }
 
-/// All meshes of a scene. Each mesh is one item; a hit also has the id of a triangle.
+/// All meshes of a scene, compiled for ray intersection. Each mesh is one primitive; a hit also has
+/// the id of a triangle.
 pub struct Meshes<S> {
     items: Vec<MeshInstance<S>>,
 }
 
-/// Corners of one triangle per lane, in the space of the mesh.
+/// Corners of one mesh triangle per lane, in the space of the mesh.
 struct Triangle<L> {
     corners: [Vec3<L>; 3],
 }
@@ -253,7 +231,7 @@ impl<S: Float> MeshInstance<S> {
             .fold(0.0, f64::max);
         // Rounding in the space of the mesh is at most that of its corners.
         let inner = low.abs().max(high.abs()).max_element() * scale;
-        let outer = max_coordinate(form);
+        let outer = form.max_coordinate();
         Some(Self {
             mesh: mesh.clone(),
             extent: ItemBox::new(form, false)?,
@@ -271,8 +249,8 @@ impl<S: Float> MeshInstance<S> {
         x * v.x + y * v.y + z * v.z
     }
 
-    /// Transforms the normal `n` from the mesh to the scene, by the transpose of the inverse. The
-    /// result has any length.
+    /// Transforms the normal `n` from the mesh to the scene, by the transpose of the inverse map.
+    /// The result is not normalised.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(&self, n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = self.mesh_from_scene.map(Vec3::splat);
@@ -284,8 +262,8 @@ impl<S: Float> MeshInstance<S> {
         self.vector(p - Vec3::splat(self.center)) + Vec3::splat(self.mesh_center)
     }
 
-    /// Transforms a ray to the space of the mesh. The second value is the length in this space of
-    /// the ray's unit direction.
+    /// Returns two values: the rays in the space of the mesh, and the length in this space of a
+    /// step of length 1 in the scene along each ray.
     #[inline(always)]
     fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
         let direction = self.vector(ray.direction);
@@ -294,8 +272,8 @@ impl<S: Float> MeshInstance<S> {
         (Ray { origin: self.point(ray.origin), direction }, length)
     }
 
-    /// Returns, for each lane, the elements of `attributes` at the three vertices of the triangle
-    /// with the id `triangle_tag`.
+    /// Returns the values of the vertex attribute `attributes` at the three vertices of a mesh
+    /// triangle, which has the id `triangle_tag`. Each lane has its own triangle.
     #[inline(always)]
     fn vertices<L: SimdFloat<Scalar = S>>(
         &self,
@@ -321,8 +299,9 @@ impl<S: Float> MeshInstance<S> {
         })
     }
 
-    /// Returns, for each lane, the pairs of `attributes` at the three vertices of the triangle with
-    /// the id `triangle_tag`.
+    /// Returns the values of the vertex attribute `attributes`, which are pairs of numbers, at the
+    /// three vertices of a mesh triangle, which has the id `triangle_tag`. Each lane has its own
+    /// triangle.
     #[inline(always)]
     fn pairs<L: SimdFloat<Scalar = S>>(
         &self,
@@ -345,15 +324,15 @@ impl<S: Float> MeshInstance<S> {
 }
 
 impl<L: SimdFloat> Triangle<L> {
-    /// Returns the normal on the front, with twice the area as its length.
+    /// Returns the normal on the triangle's front, with twice the triangle's area as its length.
     #[inline(always)]
     fn normal(&self) -> Vec3<L> {
         let [a, b, c] = self.corners;
         (b - a).cross(c - a)
     }
 
-    /// Returns the gradients, in the plane of the triangle, of the barycentric weights of the
-    /// second and the third corner.
+    /// Returns two gradients in the plane of the triangle: those of the barycentric weights of the
+    /// second and of the third corner.
     #[inline(always)]
     fn gradients(&self) -> [Vec3<L>; 2] {
         let [a, b, c] = self.corners;
@@ -363,8 +342,8 @@ impl<L: SimdFloat> Triangle<L> {
         [to_c.cross(normal) * inverse, normal.cross(to_b) * inverse]
     }
 
-    /// Returns approximate barycentric weights of the triangle's point closest to `p`. They are
-    /// positive, and their sum is 1.
+    /// Returns approximate barycentric weights of the triangle's point closest to `p`. None is
+    /// negative, and their sum is 1.
     #[inline(always)]
     fn weights(&self, p: Vec3<L>) -> [L; 3] {
         let normal = self.normal();
@@ -377,13 +356,13 @@ impl<L: SimdFloat> Triangle<L> {
 }
 
 impl<S: Float> Meshes<S> {
-    /// Compiles the meshes among `forms`, in order.
+    /// Compiles the meshes among the canonical forms `forms`, in order.
     pub fn new(forms: &[Form]) -> Self {
         Self { items: forms.iter().filter_map(MeshInstance::new).collect() }
     }
 
-    /// Replaces `hit` in the lanes in which a mesh of `range` is nearer. The id of a mesh is `base`
-    /// plus its number.
+    /// Replaces `hit` in the lanes in which a mesh with a number in `range` is nearer. The id of a
+    /// mesh is `base` plus its number.
     #[inline(never)]
     pub fn closest<L: SimdFloat<Scalar = S>>(
         &self,
@@ -410,8 +389,8 @@ impl<S: Float> Meshes<S> {
         }
     }
 
-    /// Returns the lanes of `wanted` that hit a mesh of `range` at a distance between 0 and
-    /// `limit`.
+    /// Returns the lanes of `wanted` whose ray hits a mesh with a number in `range` at a distance
+    /// between 0 and `limit`.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
@@ -437,8 +416,8 @@ impl<S: Float> Meshes<S> {
         occluded
     }
 
-    /// Returns the surface of `item` at `point`, a hit point with rounding errors. `triangle_tag`
-    /// is the id of the hit triangle.
+    /// Returns the exact surface point and normal of mesh `item` at `point`, a hit point with
+    /// rounding errors. `triangle_tag` is the id of the hit triangle.
     #[inline(never)]
     pub fn surface<L: SimdFloat<Scalar = S>>(
         &self,
@@ -462,8 +441,8 @@ impl<S: Float> Meshes<S> {
         SurfacePoint { point, normal, max_coordinate: L::splat(item.reach) }
     }
 
-    /// Returns the shading normal of `item` at the hit point `point` on the triangle with the id
-    /// `triangle_tag`. `normal` is the geometric normal on the viewer's side; `direction` is the
+    /// Returns the shading normal of mesh `item` at the hit point `point` on the triangle with the
+    /// id `triangle_tag`. `normal` is the geometric normal on the viewer's side; `direction` is the
     /// direction of the rays.
     ///
     /// The shading normal is on the viewer's side. One that would turn away from the viewer is bent
@@ -488,7 +467,7 @@ impl<S: Float> Meshes<S> {
         keep_visible(smooth, normal, direction)
     }
 
-    /// Returns the texture coordinates of `item` at `point` in the triangle with the id
+    /// Returns the texture coordinates of mesh `item` at `point` in the triangle with the id
     /// `triangle_tag`; `None` if the mesh file has none.
     #[inline(never)]
     pub fn uv<L: SimdFloat<Scalar = S>>(
@@ -511,8 +490,8 @@ impl<S: Float> Meshes<S> {
         Some(UvGradients { uv: [u, v], gradients: [du, dv] })
     }
 
-    /// Returns the colour of the triangle with the id `triangle_tag` of `item`; `None` if the mesh
-    /// file has no colours.
+    /// Returns the colour of the triangle with the id `triangle_tag` of mesh `item`; `None` if the
+    /// mesh file has no colours.
     #[inline(never)]
     pub fn color<L: SimdFloat<Scalar = S>>(&self, item: usize, triangle_tag: L) -> Option<Vec3<L>> {
         let mesh = self.items[item].mesh.mesh();
@@ -529,7 +508,7 @@ impl<S: Float> Meshes<S> {
         self.items.iter().any(|item| item.smooth)
     }
 
-    /// Returns `true` if some mesh has colours.
+    /// Returns `true` if some mesh has vertex or face colours.
     pub fn is_colored(&self) -> bool {
         self.items.iter().any(|item| item.mesh.mesh().color(0).is_some())
     }

@@ -1,5 +1,7 @@
-//! Primitives that rays intersect. Each has one file with its canonical form, its compiled kernel
-//! and its tests.
+//! Primitives: compiled geometry that rays intersect. Each kind has one file with its canonical
+//! form, its intersection kernel and its tests. The module `shape` has the descriptions in scene
+//! files from which primitives are compiled; several kinds of shapes become the same kind of
+//! primitive.
 
 mod aggregate;
 pub(crate) mod batch;

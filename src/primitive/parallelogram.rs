@@ -2,7 +2,7 @@
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
+use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, bounds_of_points,
@@ -17,15 +17,13 @@ use glam::{DAffine3, DVec3};
 pub struct ParallelogramForm {
     /// Corner at which both edges start.
     pub corner: DVec3,
-    /// Edge from the corner for which the coordinate a goes from 0 to 1.
+    /// Edge u from the corner: the vector to the next corner.
     pub u: DVec3,
-    /// Edge from the corner for which the coordinate b goes from 0 to 1.
+    /// Edge v from the corner: the vector to the other adjacent corner.
     pub v: DVec3,
 }
 
 impl CanonicalShape for ParallelogramForm {
-    const NOUN: (&'static str, &'static str) = ("rectangle", "rectangles");
-
     fn transformed(self, map: &DAffine3) -> Form {
         let linear = map.matrix3;
         let (u, v) = (linear * self.u, linear * self.v);
@@ -35,20 +33,12 @@ impl CanonicalShape for ParallelogramForm {
         Self { corner, u, v }.into()
     }
 
-    fn parts(&self) -> usize {
-        1
-    }
-
     fn bounds(&self) -> Option<Bounds> {
         bounds_of_points(&self.corners())
     }
 
     fn bounding_sphere(&self) -> BoundingSphere {
         BoundingSphere::around(&self.corners())
-    }
-
-    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
-        None
     }
 
     fn plane(&self) -> Option<HalfSpace> {
@@ -121,14 +111,10 @@ impl CanonicalShape for ParallelogramForm {
         let Self { corner, u, v } = *self;
         vec![corner, corner + u, corner + v, corner + u + v]
     }
-
-    fn triangles(&self) -> usize {
-        0
-    }
 }
 
-/// Compiled parallelogram. A point p of its plane has two coordinates, (p - corner) . dual. Both
-/// are in 0..=1 inside.
+/// Parallelogram compiled for ray intersection. A point p of its plane has the coordinates (p -
+/// corner) . `dual_u` and (p - corner) . `dual_v`. Inside, both are in 0..=1.
 #[derive(Clone, Copy)]
 pub struct Parallelogram<S> {
     corner: [S; 3],
@@ -150,7 +136,7 @@ impl<S: Float> Parallelogram<S> {
             normal: rounded(n.normalize()),
             dual_u: rounded(v.cross(n) / area2),
             dual_v: rounded(n.cross(*u) / area2),
-            reach: S::from_f64(max_coordinate(form)),
+            reach: S::from_f64(form.max_coordinate()),
         })
     }
 }

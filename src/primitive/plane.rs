@@ -3,27 +3,23 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::batch::{Primitive, SurfacePoint};
-use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
     Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, half_space,
-    sphere_around_box,
 };
 use crate::primitive::form::Form;
 use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 
-/// An infinite plane. Its front is the side to which `normal` points.
+/// Canonical form of an infinite plane. Its front is the side to which `normal` points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneForm {
-    /// Unit normal.
+    /// Unit normal of the plane, on its front.
     pub normal: DVec3,
     /// Value of `normal . p` for all points p of the plane.
     pub offset: f64,
 }
 
 impl CanonicalShape for PlaneForm {
-    const NOUN: (&'static str, &'static str) = ("plane", "planes");
-
     fn transformed(self, map: &DAffine3) -> Form {
         let normals = map.matrix3.inverse().transpose();
         let on_plane = map.transform_point3(self.normal * self.offset);
@@ -31,19 +27,7 @@ impl CanonicalShape for PlaneForm {
         Self { normal, offset }.into()
     }
 
-    fn parts(&self) -> usize {
-        1
-    }
-
     fn bounds(&self) -> Option<Bounds> {
-        None
-    }
-
-    fn bounding_sphere(&self) -> BoundingSphere {
-        sphere_around_box(None)
-    }
-
-    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
         None
     }
 
@@ -86,17 +70,9 @@ impl CanonicalShape for PlaneForm {
         let parallel = along.abs() > 1.0 - 1e-12;
         parallel.then_some((along.signum() * self.offset, along.signum() * self.offset))
     }
-
-    fn corners(&self) -> Vec<DVec3> {
-        Vec::new()
-    }
-
-    fn triangles(&self) -> usize {
-        0
-    }
 }
 
-/// Compiled plane.
+/// Infinite plane compiled for ray intersection.
 #[derive(Clone, Copy)]
 pub struct Plane<S> {
     normal: [S; 3],

@@ -1,5 +1,5 @@
-//! BVH over the primitives of a scene. Coherent packets traverse it together, other packets ray by
-//! ray.
+//! BVH over the primitives of a scene. The rays of a coherent packet traverse it together, those of
+//! other packets one by one.
 
 use crate::bvh::Ray;
 use crate::bvh::packet::{PacketBounds, SlabPacket, traverse_packet, with_stack};
@@ -9,30 +9,36 @@ use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::primitive::item_box::padded;
 use glam::DVec3;
 
-/// Limit of the differences between rays up to which a packet traverses the BVH as a whole.
+/// Coherence limit of the scene's BVH: the bound of the differences between the rays of a packet
+/// that traverses it as a whole. The rays of other packets traverse it one by one.
 ///
-/// The differences are the length of the difference of unit directions, and the difference of
-/// origins as a fraction of the items' extent. Each may be up to this limit, times the number of
-/// lanes, divided by the square root of the number of items.
+/// A packet is coherent if two differences are within the bound: the length of the difference of
+/// two unit directions, and the difference of two origins, divided by the extent of the primitives.
+/// The bound is this number times the number of lanes, divided by the square root of the number of
+/// primitives.
 ///
-/// Measured with spheres in a ball and packets of eight: with 100 spheres whole packets of random
-/// rays are as fast as single rays; with 256 the same holds for rays that differ by 0.8, with 1000
-/// by 0.4, with 10,000 by 0.13. For packets of four the differences are up to half of that.
+/// Measured with spheres in a ball and packets of eight rays. A packet is as fast as single rays if
+/// its differences are 0.8 with 256 spheres, 0.4 with 1000 and 0.13 with 10,000. With 100 spheres,
+/// even packets of random rays are as fast as single rays. For packets of four rays the differences
+/// are at most half as large.
 const COHERENCE_LIMIT: f64 = 1.5;
 
-/// BVH over items (primitives), one item per leaf.
+/// BVH over the primitives of a scene, one primitive per leaf.
 pub struct SceneBvh {
     boxes: Bvh8,
-    /// Number of the item in each leaf.
+    /// Number of the primitive in each leaf of the BVH.
     items: Vec<u32>,
-    /// Largest difference between the rays of a coherent packet, in direction and in origin,
-    /// divided by the number of lanes.
+    /// Largest length of the difference between two ray directions of a coherent packet, divided by
+    /// the number of lanes.
     turn: f64,
+    /// Largest difference between two ray origins of a coherent packet along any axis, divided by
+    /// the number of lanes.
     shift: f64,
 }
 
 impl SceneBvh {
-    /// Builds the BVH over bounding boxes, one for each item and at least one.
+    /// Builds the BVH over `bounds`: the lowest and the highest corner of each primitive's bounding
+    /// box. There must be at least one.
     pub fn new(bounds: &[(DVec3, DVec3)]) -> Self {
         // The builder takes boxes in single precision.
         let corners = |i: usize| {
@@ -48,9 +54,10 @@ impl SceneBvh {
         Self { boxes, items, turn, shift: turn * (high - low).max_element() }
     }
 
-    /// Calls `leaf(item, limit)` for the items whose boxes a ray may enter within its limit,
-    /// approximately from near to far. `leaf` returns the new limits. Items at exactly the limit
-    /// are visited, too. Lanes with a negative limit are inactive.
+    /// Calls `leaf(item, limit)` for the primitives whose boxes a ray may enter at a distance up to
+    /// its `limit`, approximately from near to far. `item` is the position of the primitive's box
+    /// in the list given to [`SceneBvh::new`]. `leaf` returns the new limits. Boxes entered at
+    /// exactly the limit are visited, too. Lanes whose limit is not positive are inactive.
     #[inline(always)]
     pub fn traverse<L: SimdFloat>(
         &self,

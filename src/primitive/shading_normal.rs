@@ -2,7 +2,8 @@
 
 use crate::lanes::{SimdFloat, Vec3};
 
-/// Smallest cosine between a shading normal and the direction to the viewer.
+/// Smallest cosine between a shading normal and the direction to the viewer; smaller ones are
+/// raised to it.
 const LEAST_COSINE: f64 = 0.02;
 
 /// Returns `shading` as a unit vector on the viewer's side of the surface. `normal` is the

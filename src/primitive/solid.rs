@@ -1,29 +1,32 @@
-//! Spans of lines inside of solids, from which compounds are computed.
+//! Intervals of lines inside of solids, from which compounds (CSG) are computed.
 
 use crate::bvh::Ray;
 use crate::lanes::SimdFloat;
 use crate::primitive::batch::Primitive;
 
-/// Interval in which the line of each lane is inside of a solid.
+/// Interval of distances in which the line of each lane is inside of a solid.
 #[derive(Clone, Copy, Debug)]
 pub struct Span<L: SimdFloat> {
-    /// Distance at which the line enters; `-L::MAX` if the line starts inside.
+    /// Distance at which the line enters the solid; `-L::MAX` if the line has no entry.
     pub enter: L,
-    /// Distance at which the line leaves; `L::MAX` if the line stays inside.
+    /// Distance at which the line leaves the solid; `L::MAX` if the line has no exit.
     pub leave: L,
-    /// Absolute cosine of the angle between line and normal where the line enters.
+    /// Absolute cosine of the angle between line and surface normal at `enter`.
     pub enter_cosine: L,
-    /// Absolute cosine of the angle between line and normal where the line leaves.
+    /// Absolute cosine of the angle between line and surface normal at `leave`.
     pub leave_cosine: L,
-    /// Lanes that have such an interval; the other fields are undefined in other lanes.
+    /// Lanes whose line hits the solid; the other fields are undefined in other lanes.
     pub meets: L::Mask,
 }
 
-/// Primitive with a closed surface, which encloses a solid. Only these can be parts of a compound.
+/// Primitive with a closed surface, which encloses a solid. Only such primitives can be parts of a
+/// compound.
 pub trait SolidPrimitive<L: SimdFloat>: Primitive<L> {
-    /// Spans of one packet of lines, in ascending order and without overlap.
+    /// Intervals in which the lines of a packet are inside of the solid, in ascending order and
+    /// without overlap.
     type Spans: IntoIterator<Item = Span<L>>;
 
-    /// Returns the intervals of the packet's lines inside of the solid; none if no line hits it.
+    /// Returns the intervals in which the lines of a ray packet are inside of the solid; none if no
+    /// line hits it.
     fn spans(&self, ray: &Ray<L>) -> Self::Spans;
 }

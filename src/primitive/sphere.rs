@@ -1,12 +1,11 @@
-//! Spheres: canonical form and intersection.
+//! Spheres: canonical form and ray intersection.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, max_coordinate};
+use crate::primitive::batch::{Primitive, SurfacePoint};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, ProxyFace, normals_of_solid,
-    similarity,
+    Bounds, CanonicalShape, DefaultMapping, Proxy, ProxyFace, normals_of_solid, similarity,
 };
 use crate::primitive::ellipsoid::EllipsoidForm;
 use crate::primitive::form::Form;
@@ -16,15 +15,13 @@ use glam::{DAffine3, DVec3};
 /// Canonical form of a sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereForm {
-    /// Centre.
+    /// Centre of the sphere, in scene coordinates.
     pub center: DVec3,
-    /// Radius, greater than zero.
+    /// Radius of the sphere, greater than zero.
     pub radius: f64,
 }
 
 impl CanonicalShape for SphereForm {
-    const NOUN: (&'static str, &'static str) = ("sphere", "spheres");
-
     fn transformed(self, map: &DAffine3) -> Form {
         let Self { center, radius } = self;
         match similarity(&map.matrix3) {
@@ -40,24 +37,12 @@ impl CanonicalShape for SphereForm {
         }
     }
 
-    fn parts(&self) -> usize {
-        1
-    }
-
     fn bounds(&self) -> Option<Bounds> {
         Some((self.center - self.radius, self.center + self.radius))
     }
 
     fn bounding_sphere(&self) -> BoundingSphere {
         BoundingSphere { center: self.center, radius: self.radius }
-    }
-
-    fn oriented_box(&self) -> Option<(DAffine3, Bounds)> {
-        None
-    }
-
-    fn plane(&self) -> Option<HalfSpace> {
-        None
     }
 
     fn is_convex(&self) -> bool {
@@ -94,14 +79,6 @@ impl CanonicalShape for SphereForm {
         let middle = axis.dot(self.center);
         Some((middle - self.radius, middle + self.radius))
     }
-
-    fn corners(&self) -> Vec<DVec3> {
-        Vec::new()
-    }
-
-    fn triangles(&self) -> usize {
-        0
-    }
 }
 
 /// Returns the smallest t > 0 with |o + t d| = 1; `None` if there is none.
@@ -112,7 +89,7 @@ pub fn cast_at_unit_sphere(o: DVec3, d: DVec3) -> Option<f64> {
     [(-b - root) / a, (-b + root) / a].into_iter().find(|t| *t > 0.0 && t.is_finite())
 }
 
-/// Compiled sphere, rounded to the precision of the lanes.
+/// Sphere compiled for ray intersection, rounded to the precision of the lanes.
 #[derive(Clone, Copy)]
 pub struct Sphere<S> {
     center: [S; 3],
@@ -129,12 +106,13 @@ impl<S: Float> Sphere<S> {
             center: center.to_array().map(S::from_f64),
             radius: S::from_f64(*radius),
             radius2: S::from_f64(radius * radius),
-            reach: S::from_f64(max_coordinate(form)),
+            reach: S::from_f64(form.max_coordinate()),
         })
     }
 }
 
-/// Returns the distances at which each line enters and leaves a sphere, and the lanes that hit it.
+/// Returns three values: the distances at which each line enters and leaves a sphere, and the lanes
+/// that hit it. Returns `None` if no line hits it.
 ///
 /// `f` is the line's origin relative to the centre, and `d` is its unit direction. The discriminant
 /// is computed from the vector f - (f.d) d, whose length is the line's distance from the centre.

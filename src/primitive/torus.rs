@@ -1,22 +1,24 @@
 //! Tori under any affine map. Rays are transformed into the space of a torus about the y axis, with
 //! a ring of radius 1 and a tube of radius r: (rho - 1)^2 + y^2 <= r^2, rho^2 = x^2 + z^2
 //!
-//! Let s be the distance along the line from its point closest to the centre. Half the derivative
-//! of the left side is s - rho'(s). rho is the norm of an affine function: a hyperbola, whose
-//! second derivative is largest at the point closest to the axis and exceeds 1 between two known
-//! positions. The derivative is therefore monotone on three pieces of the line and has one or three
-//! zeros. The quartic is monotone between these zeros, so that each of its roots has a bracket, in
-//! which Newton's method finds it (bracketing by the derivative after Yuksel 2022,
-//! *High-Performance Polynomial Root Finding for Graphics*). The distance from the ring replaces
-//! polynomial coefficients, which cancel for thin tubes.
+//! The roots of a quartic are found by Newton's method in brackets, one root in each bracket. Let s
+//! be the distance along the line from its point closest to the centre. Half the derivative of the
+//! quartic is s - rho'(s). The distance rho(s) from the axis is a hyperbola. Its second derivative
+//! is largest at the point closest to the axis, and exceeds 1 between two known positions. The
+//! derivative of the quartic is therefore monotone on three pieces of the line, and has one or
+//! three zeros. The quartic is monotone between these zeros, which bracket its roots (after Yuksel
+//! 2022, *High-Performance Polynomial Root Finding for Graphics*).
+//!
+//! The quartic is computed from the distance to the ring. Its polynomial coefficients would cancel
+//! for thin tubes.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
-use crate::primitive::batch::{Primitive, SurfacePoint, UvGradients, max_coordinate};
+use crate::primitive::batch::{Primitive, SurfacePoint, UvGradients};
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::canonical::{
-    Bounds, CanonicalShape, DefaultMapping, HalfSpace, Proxy, box_distance, extent_of_box,
-    normals_of_solid, similarity, sphere_around_box,
+    Bounds, CanonicalShape, DefaultMapping, Proxy, box_distance, normals_of_solid, similarity,
+    sphere_around_box,
 };
 use crate::primitive::ellipsoid::{rows, times};
 use crate::primitive::form::{Form, cast_compiled};
@@ -24,10 +26,10 @@ use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DVec3};
 use std::f64::consts::TAU;
 
-/// Image of a torus about the y axis under an invertible affine map.
+/// Canonical form of a torus: the image of a torus about the y axis under an invertible affine map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorusForm {
-    /// Map from the space of the torus, whose centre is the origin there, to the scene.
+    /// Map to the scene from the space of the torus, in which its centre is the origin.
     pub scene_from_torus: DAffine3,
     /// Radius of the ring, the circle in the middle of the tube; greater than 0.
     pub ring: f64,
@@ -41,8 +43,8 @@ impl TorusForm {
         self.scene_from_torus * DAffine3::from_scale(DVec3::splat(self.ring))
     }
 
-    /// Returns the distance between the ring (the circle in the middle of the tube) and `point`,
-    /// which is in the space of the torus. Also returns the unit vector from the ring to `point`.
+    /// Returns two values for `point`, which is in the space of the torus: its distance from the
+    /// ring (the circle in the middle of the tube), and the unit vector from the ring to it.
     fn ring_distance(&self, point: DVec3) -> (f64, DVec3) {
         let outward = DVec3::new(point.x, 0.0, point.z).normalize_or(DVec3::X);
         let across = point - outward * self.ring;
@@ -51,18 +53,13 @@ impl TorusForm {
 }
 
 impl CanonicalShape for TorusForm {
-    const NOUN: (&'static str, &'static str) = ("torus", "tori");
-
     fn transformed(self, map: &DAffine3) -> Form {
         Self { scene_from_torus: *map * self.scene_from_torus, ..self }.into()
     }
 
-    fn parts(&self) -> usize {
-        1
-    }
-
-    /// Returns the bounding box: its half-widths are those of the ring plus those of a ball in the
-    /// tube, because the torus is the Minkowski sum of the two.
+    /// Returns the bounding box. The torus is the Minkowski sum of its ring and of a ball with the
+    /// radius of the tube. Each half-width of the box is therefore the sum of those of ring and
+    /// ball.
     fn bounds(&self) -> Option<Bounds> {
         let m = &self.scene_from_torus;
         let rows = m.matrix3.transpose();
@@ -88,24 +85,21 @@ impl CanonicalShape for TorusForm {
         Some((self.scene_from_torus, (-half, half)))
     }
 
-    fn plane(&self) -> Option<HalfSpace> {
-        None
-    }
-
     fn is_convex(&self) -> bool {
         false
     }
 
-    /// Returns the smallest side of the box around a ball in the tube.
+    /// Returns the thickness of the tube in the scene. It is the smallest distance between opposite
+    /// faces of a parallelepiped: the image of a cube around a ball with the radius of the tube.
     fn thickness(&self) -> f64 {
         let rows = self.scene_from_torus.matrix3.inverse().transpose();
         let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
         2.0 * self.tube / rows.map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
-    /// Returns the exact distance if the map is a similarity. Otherwise returns a lower bound: the
-    /// distance in the space of the torus times the smallest factor by which the map scales
-    /// lengths.
+    /// Returns the exact distance if the map to the scene is a similarity. Otherwise returns a
+    /// lower bound: the larger of the distance from the bounding box, and the distance in the space
+    /// of the torus times a lower bound of the factor by which the map scales lengths.
     fn clearance(&self, point: DVec3) -> Option<f64> {
         let inverse = self.scene_from_torus.inverse();
         let (distance, _) = self.ring_distance(inverse.transform_point3(point));
@@ -139,30 +133,18 @@ impl CanonicalShape for TorusForm {
     fn proxies(&self) -> Vec<Proxy> {
         self.bounds().map(Proxy::around).into_iter().collect()
     }
-
-    fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
-        extent_of_box(self.bounds(), axis)
-    }
-
-    fn corners(&self) -> Vec<DVec3> {
-        Vec::new()
-    }
-
-    fn triangles(&self) -> usize {
-        0
-    }
 }
 
-/// Compiled torus. Matrices are stored by rows.
+/// Torus compiled for ray intersection. Matrices are stored by rows.
 #[derive(Clone, Copy)]
 pub struct Torus<S> {
     center: [S; 3],
-    /// Map to the space in which the ring has radius 1.
+    /// Linear map from the scene to the space in which the ring has radius 1.
     unit_from_scene: [[S; 3]; 3],
     scene_from_unit: [[S; 3]; 3],
     /// Radius of the tube in the space in which the ring has radius 1.
     tube: S,
-    /// Reciprocal of the radius of the ring.
+    /// Reciprocal of the ring's radius.
     inverse_ring: S,
     reach: S,
 }
@@ -178,41 +160,45 @@ impl<S: Float> Torus<S> {
             scene_from_unit: rows(matrix3),
             tube: S::from_f64(torus.tube / torus.ring),
             inverse_ring: S::from_f64(torus.ring.recip()),
-            reach: S::from_f64(max_coordinate(form)),
+            reach: S::from_f64(form.max_coordinate()),
         })
     }
 }
 
-/// Margin around the torus in the bounds of the roots, in rounding errors of 1.
+/// Width of the margin around the torus in the search for intersections, as a multiple of the
+/// machine epsilon. The radius of the ring is 1.
 const ROOM: f64 = 64.0;
 
-/// Largest number of steps of a root search. Bisection alone needs 54 in double precision.
+/// Largest number of steps of the search for one intersection. Bisection alone needs 54 in double
+/// precision.
 const MAX_STEPS: usize = 64;
 
-/// Line in the space in which the ring has radius 1. A position on the line is a signed distance
-/// from `point`.
+/// Line of a ray in the space in which the torus's ring has radius 1. A position on the line is a
+/// signed distance from `point`.
 #[derive(Clone, Copy)]
 struct UnitLine<L: SimdFloat> {
     /// Point of the line closest to the torus's centre.
     point: Vec3<L>,
-    /// Unit direction.
+    /// Unit direction of the line.
     direction: Vec3<L>,
-    /// Squared length of the part of the direction that is perpendicular to the axis.
+    /// Squared length of the part of the direction that is perpendicular to the torus's axis.
     across2: L,
     /// Position of the ray's origin on the line, relative to `point`.
     origin: L,
     /// Length in the scene of a step of length 1 in the space of the torus.
     scale: L,
     tube: L,
-    /// Position before which the line is not close to the torus.
+    /// Position at which the line enters the region of the torus (see `near`).
     low: L,
+    /// Position at which the line leaves the region of the torus (see `near`).
     high: L,
-    /// Lanes whose line comes close to the torus.
+    /// Lanes whose line crosses the region of the torus: the part of its bounding sphere between
+    /// the two planes that touch the tube from below and above.
     near: L::Mask,
 }
 
-/// Positions on a line that separate its roots from each other, in ascending order, and the lanes
-/// in which each position is inside of the torus.
+/// Positions on a line that separate its intersections with the torus from each other, in ascending
+/// order. `inside` has the lanes in which each position is inside of the torus.
 struct Separators<L: SimdFloat> {
     places: [L; 5],
     inside: [L::Mask; 5],
@@ -220,7 +206,7 @@ struct Separators<L: SimdFloat> {
 
 impl<L: SimdFloat> UnitLine<L> {
     /// Transforms the lines of rays to the space of the torus. Returns `None` if no line of the
-    /// packet comes close to the torus.
+    /// packet crosses the region around the torus.
     #[inline(always)]
     fn new(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<Self> {
         let f = times(&torus.unit_from_scene, ray.origin - Vec3::splat(torus.center));
@@ -263,8 +249,9 @@ impl<L: SimdFloat> UnitLine<L> {
         })
     }
 
-    /// Returns four values at position `s` of the line: the distance from the axis minus 1, the
-    /// height, the derivative of the distance, and the reciprocal of the distance.
+    /// Returns four values at position `s` of the line: rho - 1, with rho the distance from the
+    /// torus's axis; the height above the plane of the ring; the derivative of rho by `s`; and 1 /
+    /// rho.
     #[inline(always)]
     fn place(&self, s: L) -> (L, L, L, L) {
         let p = self.direction.mul_add(s, self.point);
@@ -275,9 +262,9 @@ impl<L: SimdFloat> UnitLine<L> {
         (rho - L::one(), p.y, speed.max(-limit).min(limit), inward)
     }
 
-    /// Returns the height at position `s` of the line, and its derivative. The height is the
-    /// squared distance from the ring minus the squared radius of the tube: negative inside of the
-    /// torus.
+    /// Returns two values at position `s` of the line: its height over the torus's surface, and the
+    /// derivative of this height by `s`. The height is a quartic: the squared distance from the
+    /// ring minus the squared radius of the tube. It is negative inside of the torus.
     #[inline(always)]
     fn height(&self, s: L) -> (L, L) {
         let (beyond, y, speed, _) = self.place(s);
@@ -286,7 +273,8 @@ impl<L: SimdFloat> UnitLine<L> {
         (height, slope + slope)
     }
 
-    /// Returns half the derivative of [`UnitLine::height`], and its own derivative.
+    /// Returns two values at position `s` of the line: half the derivative of [`UnitLine::height`],
+    /// and the derivative of this half.
     #[inline(always)]
     fn slope(&self, s: L) -> (L, L) {
         let (beyond, y, speed, inward) = self.place(s);
@@ -300,8 +288,8 @@ impl<L: SimdFloat> UnitLine<L> {
         self.height(s).0.le(L::zero())
     }
 
-    /// Returns the positions of the extremes of the height: minimum, maximum, minimum. A single
-    /// extreme is repeated three times.
+    /// Returns the positions on the line of the extremes of [`UnitLine::height`]: minimum, maximum,
+    /// minimum. A single extreme is repeated three times.
     #[inline(always)]
     fn extremes(&self) -> [L; 3] {
         let (zero, one) = (L::zero(), L::one());
@@ -342,8 +330,9 @@ impl<L: SimdFloat> UnitLine<L> {
         [first, L::select(three, second, first), L::select(three, third, first)]
     }
 
-    /// Returns the zero of `function` in the lanes of `open`. `sign` times the function is negative
-    /// at `low` and positive at `high`.
+    /// Returns the zero of `function` between `low` and `high` in the lanes of `open`. `function`
+    /// returns its value and its derivative. `sign` times the value is negative at `low` and
+    /// positive at `high`.
     ///
     /// The search takes Newton steps. It bisects where Newton's step leaves the bracket or is slow.
     /// The steps of a lane do not depend on other lanes.
@@ -380,7 +369,8 @@ impl<L: SimdFloat> UnitLine<L> {
         place
     }
 
-    /// Returns the separators of the roots at positions from `start` on.
+    /// Returns the positions that separate the line's intersections with the torus from each other.
+    /// Only intersections at `start` or beyond count.
     #[inline(always)]
     fn separators(&self, start: L) -> Separators<L> {
         let within = |s: L| s.max(self.low).min(self.high).max(start);
@@ -483,7 +473,8 @@ impl<L: SimdFloat> SolidPrimitive<L> for Torus<L::Scalar> {
     }
 }
 
-/// Returns two spans of each line inside of the torus. The second one or both may be empty.
+/// Returns the two intervals in which each line is inside of the torus. The second one or both may
+/// be empty. Returns `None` if no line comes near the torus.
 #[inline(never)]
 fn spans<L: SimdFloat>(torus: &Torus<L::Scalar>, ray: &Ray<L>) -> Option<[Span<L>; 2]> {
     let line = UnitLine::new(torus, ray)?;

@@ -1,8 +1,8 @@
 //! Intersection of rays with the triangles of one mesh, in the space of the mesh.
 //!
-//! Coherent packets traverse the BVH together. Other packets traverse it ray by ray, eight boxes or
-//! triangles at a time. Both compute each triangle by the same operations, so that a ray hits the
-//! same triangle at the same distance either way.
+//! The rays of a coherent packet traverse the BVH together. Those of other packets traverse it one
+//! by one, and each tests eight boxes or triangles at a time. A triangle is tested by the same
+//! operations in both cases, so that a ray hits the same triangle at the same distance.
 
 use crate::asset::{Mesh, TriangleBlock};
 use crate::bvh::BVH_WIDTH;
@@ -13,40 +13,44 @@ use crate::bvh::packet::{
 use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 
-/// Limit of the differences between rays up to which a packet traverses the BVH as a whole.
+/// Coherence limit of a mesh's BVH: the bound of the differences between the rays of a packet that
+/// traverses it as a whole. The rays of other packets traverse it one by one.
 ///
-/// The differences are the length of the difference of unit directions, and the difference of
-/// origins as a fraction of the mesh's size. Each may be up to this limit, times the number of
-/// lanes, divided by the square root of the number of triangles.
+/// A packet is coherent if two differences are within the bound: the length of the difference of
+/// two unit directions, and the difference of two origins, divided by the size of the mesh. The
+/// bound is this number times the number of lanes, divided by the square root of the number of
+/// triangles.
 ///
-/// Measured by `benches/mesh.rs` (lines `together or apart`): packets of eight are faster up to
-/// differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million; packets of four
-/// up to half of that.
+/// Measured by `benches/mesh.rs` (lines `together or apart`): packets of eight rays are faster than
+/// single rays up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million.
+/// For packets of four the differences are at most half as large.
 const COHERENCE_LIMIT: f64 = 2.5;
 
-/// Largest difference, per lane, between the rays of a packet that traverses the BVH as a whole,
-/// for any number of triangles.
+/// Largest difference between the rays of a packet, divided by the number of lanes, for which the
+/// packet traverses a mesh's BVH as a whole. It replaces the bound of [`COHERENCE_LIMIT`] where
+/// that bound is larger: in meshes of few triangles.
 const MAX_COHERENT_SPREAD: f64 = 0.04;
 
-/// Closest triangle of each lane.
+/// Closest triangle of a mesh that each ray hits.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleHit<L> {
     /// Distance of the hit in units of the ray direction's length, or the limit if there is no
     /// nearer hit.
     pub t: L,
-    /// Id of the triangle; undefined without a hit.
+    /// Id of the triangle that is hit; undefined without a hit.
     pub triangle: L,
 }
 
-/// Rays with frames for triangle tests: those of a packet, or one ray in every lane.
+/// Rays with the coordinate frames of the watertight triangle test: those of a packet, or one ray
+/// repeated in every lane.
 #[derive(Clone, Copy)]
 struct ShearedRay<L> {
     origin: Vec3<L>,
     frame: Frame<L>,
 }
 
-/// Returns the packet for box tests. The boxes are enlarged by the rounding errors of the frames
-/// and of the corners' distances. A ray that passes an edge within rounding errors therefore tests
+/// Returns the ray packet for box tests of the mesh's BVH. The boxes are enlarged by the rounding
+/// errors of the triangle tests. A ray that passes an edge within rounding errors therefore tests
 /// the triangles at the edge.
 #[inline(always)]
 fn slab_packet<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
@@ -62,7 +66,8 @@ impl<L: SimdFloat> ShearedRay<L> {
         Self { origin: ray.origin, frame: Frame::around(ray.direction) }
     }
 
-    /// Returns origin and frame of each lane's ray.
+    /// Returns four vectors for each lane: the origin of its ray, and the three axes of the
+    /// coordinate frame around the ray's direction.
     #[inline(always)]
     fn each(&self) -> [[[L::Scalar; 3]; 4]; MAX_WIDTH] {
         let Frame { t, b, n } = self.frame;
@@ -73,15 +78,17 @@ impl<L: SimdFloat> ShearedRay<L> {
         each
     }
 
-    /// Returns one ray, given by its origin and frame, in every lane.
+    /// Returns rays that are equal in all lanes. `one` has the origin and the three frame axes of
+    /// the ray.
     #[inline(always)]
     fn only(one: &[[L::Scalar; 3]; 4]) -> Self {
         let [origin, t, b, n] = one.map(Vec3::splat);
         Self { origin, frame: Frame { t, b, n } }
     }
 
-    /// Returns the distance at which each ray hits a triangle, and the lanes that hit it. Hits have
-    /// a positive distance, and may be on either side.
+    /// Returns two values: the distance at which each ray hits the triangle with these corners, and
+    /// the lanes that hit it. Hits have a positive distance, and may be on either side of the
+    /// triangle.
     ///
     /// The corners are projected along the ray onto the plane through its origin. A corner has the
     /// same projection in all triangles that share it, and the computed sign of each edge's area is
@@ -102,8 +109,8 @@ impl<L: SimdFloat> ShearedRay<L> {
         (t, (left | right) & t.gt(zero))
     }
 
-    /// Returns the corners of the triangles in part `part` of a leaf. A leaf has eight triangles; a
-    /// part has as many as there are lanes.
+    /// Returns the corners of consecutive triangles of a BVH leaf, one triangle per lane. The first
+    /// one has the number `part` times the number of lanes.
     #[inline(always)]
     fn corners(leaf: &TriangleBlock, part: usize) -> [Vec3<L>; 3] {
         leaf.corners.each_ref().map(|c| {
@@ -113,14 +120,14 @@ impl<L: SimdFloat> ShearedRay<L> {
     }
 }
 
-/// Traversal of a mesh's BVH. If `ANY` is `true`, the first triangle that is hit ends the traversal
-/// of a ray.
+/// Traversal of a mesh's BVH. If `ANY` is `true`, it ends for a ray with the first triangle that
+/// the ray hits, which may not be the closest.
 struct MeshTraversal<'a, const ANY: bool> {
     mesh: &'a Mesh,
 }
 
 impl<const ANY: bool> MeshTraversal<'_, ANY> {
-    /// Traverses the BVH with the packet as a whole.
+    /// Traverses the mesh's BVH with the packet as a whole.
     #[inline(always)]
     fn traverse_as_packet<L: SimdFloat>(
         &self,
@@ -195,7 +202,7 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
         self.traverse_separately((ray, &packet), limit)
     }
 
-    /// Traverses the BVH with each ray of the packet separately.
+    /// Traverses the mesh's BVH with each ray of the packet separately.
     #[inline(always)]
     fn traverse_separately<L: SimdFloat>(
         &self,
@@ -247,8 +254,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
     }
 }
 
-/// Returns `true` if the rays in the lanes `wanted` are coherent enough to traverse the BVH as a
-/// packet.
+/// Returns `true` if the rays in the bit mask `wanted` are coherent enough to traverse the mesh's
+/// BVH as a packet.
 #[inline(always)]
 fn is_coherent<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     if L::WIDTH == 1 || wanted.count_ones() < 2 {
@@ -262,21 +269,22 @@ fn is_coherent<L: SimdFloat>(ray: &Ray<L>, wanted: u32, mesh: &Mesh) -> bool {
     ray.is_coherent(wanted, turn, turn * size)
 }
 
-/// Returns the closest triangle within `limit`, and at equal distances the one with the lowest
-/// number. Directions must have unit length. Lanes with a limit of 0 or less are inactive.
+/// Returns the closest triangle of the mesh that each ray hits within the distance `limit`. Of
+/// triangles at equal distances it is the one with the lowest number. Directions must have unit
+/// length. Lanes with a limit of 0 or less are inactive.
 #[inline(never)]
 pub fn closest<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> TriangleHit<L> {
     MeshTraversal::<false> { mesh }.run(ray, limit)
 }
 
-/// Returns the lanes that hit a triangle nearer than `limit`.
+/// Returns the lanes whose ray hits a triangle of the mesh nearer than `limit`.
 #[inline(never)]
 pub fn occluded<L: SimdFloat>(mesh: &Mesh, ray: &Ray<L>, limit: L) -> L::Mask {
     MeshTraversal::<true> { mesh }.run(ray, limit).t.lt(limit)
 }
 
-/// Returns the result of [`closest`], for tests and benches. The rays traverse the BVH as a packet
-/// if `all` is `true`, otherwise separately.
+/// Returns the result of [`closest`], for tests and benches. The rays traverse the mesh's BVH as a
+/// packet if `all` is `true`, otherwise separately.
 #[inline(never)]
 pub fn closest_with<L: SimdFloat>(
     mesh: &Mesh,

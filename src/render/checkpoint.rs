@@ -1,14 +1,15 @@
-//! Checkpoints: film files from which a later process continues a render, bit for bit.
+//! Checkpoints: film files from which a later process continues a render, with bit for bit the same
+//! result.
 //!
 //! A checkpoint has three chunks in addition to those of a film file. `SCEN` has the scene for
 //! which the samples were traced, and the other inputs of samples. `SCHD` has the state of the
 //! schedule. `TIME` has the seconds of rendering so far (f64). The seconds are no part of `SCHD`,
 //! because equal renders take different times.
 
-use crate::disk::WriteError;
+use crate::disk::{Existing, WriteError};
 use crate::film::file::{
-    Fields, FilmFileHeader, FilmReader, ReadError, Tag, create_film_file, encode_end, encode_tiles,
-    tile_chunks, write_film_file,
+    Fields, FilmFileHeader, FilmReader, ReadError, Tag, encode_end, encode_tiles, tile_chunks,
+    write_film_file,
 };
 use crate::film::{Film, LightWeights};
 use crate::render::export::{Provenance, metadata};
@@ -24,8 +25,8 @@ use std::sync::Arc;
 
 const SCENE: Tag = *b"SCEN";
 const SCHEDULE: Tag = *b"SCHD";
-/// Tag of the chunk with the seconds of rendering.
-pub(super) const CLOCK: Tag = *b"TIME";
+/// Tag of the checkpoint's chunk with the seconds of rendering.
+const CLOCK: Tag = *b"TIME";
 
 /// Version of this program. Another version may trace different samples.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
@@ -36,13 +37,14 @@ const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 /// preceded by its length (u32): the program's version, the sampler's name, the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampleInputs {
-    /// Hash of the contents of meshes and images, see [`Scene::contents_hash`].
+    /// Hash of the contents of meshes and images, see [`Scene::contents_hash`]. `None` if the scene
+    /// has neither.
     pub contents_hash: Option<u64>,
     /// Version of the program that traced the samples.
     pub program: String,
-    /// Name of the sampler.
+    /// Name of the kind of random numbers, see [`SamplerKind::name`].
     pub sampler: String,
-    /// The compiled scene, as text of a scene file.
+    /// Scene for which the samples were traced, as text of a scene file.
     pub scene: String,
 }
 
@@ -57,7 +59,8 @@ impl SampleInputs {
         }
     }
 
-    /// Encodes the inputs as a chunk: its tag and its contents.
+    /// Encodes the inputs of the render's samples as a chunk of a film file. Returns the chunk's tag
+    /// and its contents.
     pub fn encode(&self) -> (Tag, Vec<u8>) {
         let mut out = self.contents_hash.unwrap_or(0).to_le_bytes().to_vec();
         for text in [&self.program, &self.sampler, &self.scene] {
@@ -67,7 +70,9 @@ impl SampleInputs {
         (SCENE, out)
     }
 
-    /// Returns `true` if the samples are valid for `scene`. Its light weights may differ.
+    /// Returns `true` if samples with the inputs `self` are valid for `scene`. The lights of
+    /// `scene` may differ from those of [`Self::scene`] in colour and intensity if the film stores
+    /// their light separately.
     pub fn fit(&self, scene: &Scene) -> bool {
         let resolver = scene.resolver.clone();
         let Ok(compiled) = Scene::parse_in(&self.scene, "checkpoint", resolver) else {
@@ -79,8 +84,8 @@ impl SampleInputs {
                 .can_reuse(&compiled, scene)
     }
 
-    /// Reads the inputs from the header of a film file. Returns `None` if the header has no inputs,
-    /// or damaged ones.
+    /// Reads the inputs of the samples from the header of a film file. Returns `None` if the header
+    /// has none, or damaged ones.
     pub fn of(header: &FilmFileHeader) -> Option<Self> {
         let mut fields = Fields::new(header.chunks.get(&SCENE)?);
         let hash = fields.u64()?;
@@ -94,8 +99,8 @@ impl SampleInputs {
 pub struct EncodedCheckpoint(Vec<Vec<u8>>);
 
 impl EncodedCheckpoint {
-    /// Encodes the state of a render, on the threads of `pool`. `report` is the latest report on
-    /// this render.
+    /// Encodes the state of a render as a checkpoint, on the threads of `pool`. `report` is the
+    /// latest report on this render.
     pub(super) fn new(
         state: &RenderState,
         schedule: &Schedule,
@@ -127,20 +132,14 @@ impl EncodedCheckpoint {
         Self(pieces)
     }
 
-    /// Writes the checkpoint. The file at `path` is replaced when the new one is complete.
+    /// Writes the checkpoint to the file at `path`. `existing` decides about a file that exists
+    /// already: it is replaced once the new one is complete, or the function fails.
     ///
     /// # Errors
-    /// Fails if the file cannot be written; an existing file is then unchanged.
-    pub fn write(&self, path: &Path) -> Result<(), WriteError> {
-        write_film_file(path, &self.0)
-    }
-
-    /// Writes the checkpoint to a new file, and replaces none.
-    ///
-    /// # Errors
-    /// Fails if the file exists or cannot be written.
-    pub fn create(&self, path: &Path) -> Result<(), WriteError> {
-        create_film_file(path, &self.0)
+    /// Fails if the file cannot be written, or if it exists and must not be replaced. An existing
+    /// file is then unchanged.
+    pub fn write(&self, path: &Path, existing: Existing) -> Result<(), WriteError> {
+        write_film_file(path, &self.0, existing)
     }
 }
 
@@ -153,31 +152,30 @@ pub struct Checkpoint {
     film: Film,
 }
 
-/// State of a render that continues a checkpoint.
+/// State of a render that was restored from a checkpoint.
 pub(super) struct Resumed {
     pub state: RenderState,
     schedule: Vec<u8>,
     path: PathBuf,
-    /// Seconds of rendering so far.
+    /// Seconds that the render had taken, in all processes, when the checkpoint was written.
     pub seconds: f64,
-    /// `true` if light weights or display transform differ from those of the checkpoint.
+    /// `true` if the light weights or the display transform of the resumed render differ from those
+    /// of the checkpoint.
     pub is_relit: bool,
 }
 
 impl Resumed {
-    /// Restores the schedule, with new settings.
+    /// Restores the schedule of the checkpoint's render, with new settings.
     ///
     /// # Errors
     /// Fails if the state of the schedule does not belong to the film.
     pub fn schedule(&self, settings: Settings) -> Result<Schedule, ReadError> {
         let film = &self.state.film;
-        let counts = |tile| film.tile(tile).map_or([0; 2], |tile| tile.counts());
-        let counts: Vec<_> = (0..film.tile_count()).map(counts).collect();
+        let counts: Vec<_> = (0..film.tile_count()).map(|tile| film.counts(tile)).collect();
         let mut schedule = self.state.schedule(settings);
-        schedule.restore(&self.schedule, &counts).map(|()| schedule).ok_or_else(|| ReadError {
-            path: self.path.clone(),
-            what: "the state of its schedule does not belong to its samples".to_string(),
-            remedy: "copy it again, or use an older one".to_string(),
+        schedule.restore(&self.schedule, &counts).map(|()| schedule).ok_or_else(|| {
+            let what = "the state of its schedule does not belong to its samples";
+            ReadError::new(&self.path, what, "copy it again, or use an older one")
         })
     }
 }
@@ -191,44 +189,36 @@ impl Checkpoint {
         let (header, film) = FilmReader::open(path)?.read()?;
         let inputs = SampleInputs::of(&header).filter(|_| header.chunks.contains_key(&SCHEDULE));
         let Some(inputs) = inputs else {
-            return Err(ReadError {
-                path: path.to_path_buf(),
-                what: "it is a film without the state of a render".to_string(),
-                remedy: "name a file that `zerkalo render --checkpoint` has written".to_string(),
-            });
+            let what = "it is a film without the state of a render";
+            let remedy = "name a file that `zerkalo render --checkpoint` has written";
+            return Err(ReadError::new(path, what, remedy));
         };
         Ok(Self { path: path.to_path_buf(), header, inputs, film })
     }
 
-    /// Header of the checkpoint's film file: all contents except for the film.
+    /// Returns the header of the checkpoint's film file: all contents except for the film.
     pub fn header(&self) -> &FilmFileHeader {
         &self.header
     }
 
-    /// Seed and sampler of the samples.
+    /// Returns the random seed and the kind of random numbers of the samples.
     pub fn sampling(&self) -> SampleSettings {
-        let kind = [SamplerKind::Sobol, SamplerKind::Random]
-            .into_iter()
-            .find(|kind| kind.name() == self.inputs.sampler);
-        SampleSettings { seed: self.header.film.seed, kind: kind.unwrap_or(SamplerKind::Sobol) }
+        let kind = SamplerKind::from_name(&self.inputs.sampler).unwrap_or(SamplerKind::Sobol);
+        SampleSettings { seed: self.header.film.seed, kind }
     }
 
-    /// Inputs of the samples.
+    /// Returns the inputs of the samples: scene, sampler, program version.
     pub fn inputs(&self) -> &SampleInputs {
         &self.inputs
     }
 
-    /// The film.
-    pub fn film(&self) -> &Film {
-        &self.film
-    }
-
-    /// Weight of each light group in the picture of the checkpoint.
+    /// Returns the weight of each light group in the picture of the checkpoint.
     pub fn weights(&self) -> &LightWeights {
         &self.header.weights
     }
 
-    /// Compiles the scene of the checkpoint, and shows its samples as a picture of `scene`.
+    /// Compiles the scene of the checkpoint and restores the render, whose samples are then shown
+    /// as a picture of `scene`.
     ///
     /// # Errors
     /// Fails if the samples of the checkpoint are not those of `scene` and `options`.
@@ -267,15 +257,14 @@ impl Checkpoint {
             return Err(self.error(what, foreign));
         }
         let is_relit = state.mix != self.header.weights || state.display() != self.header.display;
-        let seconds = self.header.chunks.get(&CLOCK).and_then(|clock| Fields::new(clock).f64());
-        let seconds = seconds.filter(|seconds| *seconds >= 0.0 && seconds.is_finite());
+        let seconds = seconds_of(&self.header);
         let mut chunks = self.header.chunks;
         state.film = self.film;
         Ok(Resumed {
             state,
             schedule: chunks.remove(&SCHEDULE).unwrap_or_default(),
             path: self.path,
-            seconds: seconds.unwrap_or(0.0),
+            seconds,
             is_relit,
         })
     }
@@ -308,7 +297,12 @@ impl Checkpoint {
     }
 
     fn error(&self, what: impl Into<String>, remedy: &str) -> ReadError {
-        let (path, remedy) = (self.path.clone(), remedy.to_string());
-        ReadError { path, what: what.into(), remedy }
+        ReadError::new(&self.path, what, remedy)
     }
+}
+
+/// Returns the seconds that the render in a film file had taken; 0 if they are missing or invalid.
+pub(super) fn seconds_of(header: &FilmFileHeader) -> f64 {
+    let seconds = header.chunks.get(&CLOCK).and_then(|clock| Fields::new(clock).f64());
+    seconds.filter(|seconds| *seconds >= 0.0 && seconds.is_finite()).unwrap_or(0.0)
 }

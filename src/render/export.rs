@@ -1,8 +1,8 @@
-//! Export of pictures with metadata about their origin. The metadata hold no dates, durations or
-//! numbers of threads, so that equal pictures have equal metadata.
+//! Export of pictures as files, with metadata about their origin. The metadata hold no dates,
+//! durations or numbers of threads, so that equal pictures have equal metadata.
 
 use crate::disk::WriteError;
-use crate::film::{Depth, Display, ImageData, ImageOutput, Tone, WholeFilm};
+use crate::film::{Depth, Display, ImageData, ImageOutput, WholeFilm};
 use crate::render::render_state::RenderState;
 use crate::render::session::Report;
 use crate::sampling::SamplerKind;
@@ -14,17 +14,17 @@ use crate::value::Fnv1a64;
 pub struct Provenance {
     /// Path of the scene file as the user gave it.
     pub source: String,
-    /// Hash of the scene file's text, followed by that of the contents of meshes and images; see
-    /// [`scene_hash`].
+    /// Hash of the scene file's text and of the contents of meshes and images; see [`scene_hash`].
     pub scene_hash: String,
-    /// Kind of the sample sequence.
+    /// Kind of the random numbers of samples.
     pub sampler: SamplerKind,
     /// `true` if the picture was rendered with adaptive sampling.
     pub adaptive: bool,
 }
 
 impl RenderState {
-    /// Writes the current picture with its metadata. `report` is the latest report on this film.
+    /// Writes the current picture with its metadata to `output`. `report` is the latest report on
+    /// this film; its sample counts and noise become metadata.
     ///
     /// # Errors
     /// Fails if the file cannot be written.
@@ -44,8 +44,8 @@ impl RenderState {
     }
 }
 
-/// Returns the hash that identifies the scene of a picture: the hash of the scene file's text,
-/// followed by that of the contents of its meshes and images, if there are any.
+/// Returns the hash that identifies the scene of a picture, with the name of its algorithm. It
+/// covers the text of the scene file and the contents of its meshes and images.
 pub fn scene_hash(text: &str, scene: &Scene) -> String {
     let mut hash = Fnv1a64::default();
     hash.update(text.as_bytes());
@@ -55,61 +55,49 @@ pub fn scene_hash(text: &str, scene: &Scene) -> String {
     format!("fnv1a64:{:016x}", hash.value())
 }
 
-/// Returns the metadata as pairs of key and value.
+/// Returns the metadata of a picture file as pairs of key and value.
 pub fn metadata(
     rendering: &RenderState,
     report: &Report,
     provenance: &Provenance,
     display: &Display,
 ) -> Vec<(String, String)> {
-    let [spp, noise, bad_samples, saturated_samples, saturated_pixels] = film_entries(report);
     let biases = rendering.world.biases();
+    let biased = if biases.is_empty() { "no".to_string() } else { biases.join("; ") };
     let header = rendering.film.header();
-    let entries = [
+    let (sampler, adaptive) = (provenance.sampler.name(), provenance.adaptive);
+    let origin = [
         ("Software", format!("zerkalo {}", env!("CARGO_PKG_VERSION"))),
         ("Source", provenance.source.clone()),
         ("Scene hash", provenance.scene_hash.clone()),
         ("Seed", header.seed.to_string()),
-        spp,
-        noise,
-        bad_samples,
-        saturated_samples,
-        saturated_pixels,
-        ("Biased", if biases.is_empty() { "no".to_string() } else { biases.join("; ") }),
-        (
-            SETTINGS,
-            settings_text(
-                provenance.sampler.name(),
-                &header.precision,
-                provenance.adaptive,
-                display,
-            ),
-        ),
     ];
-    entries.into_iter().map(|(key, value)| (key.to_string(), value)).collect()
+    let settings = settings_text(sampler, &header.precision, adaptive, display);
+    let method = [("Biased", biased), (SETTINGS, settings)];
+    let entries = origin.into_iter().chain(film_entries(report)).chain(method);
+    entries.map(|(key, value)| (key.to_string(), value)).collect()
 }
 
-/// Formats the metadata entry `Settings`.
+/// Formats the picture metadata entry `Settings`: sampler, precision, sample allocation, display
+/// transform.
 pub fn settings_text(sampler: &str, precision: &str, adaptive: bool, display: &Display) -> String {
     let allocation = if adaptive { "adaptive" } else { "uniform" };
     let display = display_text(display);
     format!("sampler {sampler}, {precision} precision, {allocation}{display}")
 }
 
-/// Formats the display transform as the end of the entry [`SETTINGS`].
+/// Formats the end of the metadata entry [`SETTINGS`]: the display transform.
 fn display_text(display: &Display) -> String {
-    let tone =
-        Tone::NAMED.iter().find(|(_, tone)| *tone == display.tone).map_or("", |(name, _)| name);
-    format!("{DISPLAY}{} EV, tone {tone}", display.exposure_ev)
+    format!("{DISPLAY}{} EV, tone {}", display.exposure_ev, display.tone)
 }
 
 /// Key of the metadata entry that holds sampler, precision, sample allocation and display
 /// transform.
 const SETTINGS: &str = "Settings";
-/// Text before the display transform in the entry [`SETTINGS`].
+/// Text before the display transform in the metadata entry [`SETTINGS`].
 const DISPLAY: &str = ", exposure ";
 
-/// Returns the metadata entries that depend on the film alone.
+/// Returns the metadata entries of a picture that depend on the film alone: samples, rays, noise.
 fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     let spp = &report.spp;
     let noise = match report.noise {
@@ -135,7 +123,7 @@ pub fn update_metadata(metadata: &mut [(String, String)], report: &Report) {
     }
 }
 
-/// Replaces the display transform in `metadata`.
+/// Replaces the display transform in the metadata of a picture by `display`.
 pub fn update_display(metadata: &mut [(String, String)], display: &Display) {
     for (_, settings) in metadata.iter_mut().filter(|(key, _)| key == SETTINGS) {
         if let Some(end) = settings.find(DISPLAY) {

@@ -1,27 +1,27 @@
-//! First-hit buffer: the first hit of a camera ray in each cell of a display raster.
+//! First-hit buffer: the first hit of a camera ray in each cell of the dashboard's picture.
 
 use crate::world::FirstHit;
 use rayon::prelude::*;
 
-/// Number of rays that a thread traces at a time.
+/// Number of camera rays that a thread traces at a time for the first-hit buffer.
 const CHUNK: usize = 512;
 
-/// First hits of the camera rays through the centres of a raster's cells. The raster covers the
-/// whole picture. The dashboard shows objects, normals and distances from this buffer.
+/// First hits of the camera rays through the centres of the cells of a grid over the whole picture.
+/// The dashboard shows objects, normals and distances from this buffer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstHitBuffer {
-    /// Number of cells in a row.
+    /// Number of columns of the grid of cells, one camera ray per cell.
     pub columns: usize,
-    /// Number of rows.
+    /// Number of rows of the grid of cells, one camera ray per cell.
     pub rows: usize,
-    /// First hit of each cell, `[row][column]`.
+    /// First hit of each cell of the grid, `[row][column]`.
     texels: Vec<FirstHit>,
 }
 
 impl FirstHitBuffer {
-    /// Traces one ray through the centre of each cell of a raster of `columns` x `rows` cells over
-    /// a film of `width` x `height` pixels. `first_hits` receives points of the film in pixels, and
-    /// writes the first hits of their camera rays (see
+    /// Creates the buffer of a grid of `columns` x `rows` cells over a film of `width` x `height`
+    /// pixels, by one ray through the centre of each cell. `first_hits` receives points of the film
+    /// in pixels, and writes the first hits of their camera rays (see
     /// [`AnyWorld::first_hit`](crate::world::AnyWorld::first_hit)).
     pub fn new(
         [width, height]: [usize; 2],
@@ -45,7 +45,8 @@ impl FirstHitBuffer {
         Self { columns, rows, texels }
     }
 
-    /// Returns the first hit of a cell. Returns `None` if the cell is outside of the raster.
+    /// Returns the first hit in the cell at `column` and `row` of the grid. Returns `None` if the
+    /// cell is outside of the grid.
     pub fn at(&self, column: usize, row: usize) -> Option<&FirstHit> {
         if column >= self.columns {
             return None;
@@ -53,7 +54,7 @@ impl FirstHitBuffer {
         self.texels.get(row * self.columns + column)
     }
 
-    /// First hits of all cells, `[row][column]`.
+    /// Returns the first hits of all cells, `[row][column]`.
     pub fn texels(&self) -> &[FirstHit] {
         &self.texels
     }

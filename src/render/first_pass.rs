@@ -1,5 +1,5 @@
-//! First pass: traces the first sample of every pixel in stages, from a coarse lattice of pixels to
-//! all pixels.
+//! First pass over a picture: traces the first sample of every pixel in stages, from a coarse
+//! lattice of pixels to all pixels.
 
 use crate::film::{Film, TILE, TILE_PIXELS, Tile, TileHandle, lattice_pixels};
 use crate::lanes::SimdFloat;
@@ -9,9 +9,10 @@ use crate::world::{AnyWorld, Counts, TileTracer, World};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
-/// Traces the first sample of replicate A. The first stage traces every 8th pixel in x and y. Three
-/// further stages trace the pixels between, with steps of 4, 2 and 1. Each stage covers the whole
-/// picture. Calls `on_stage` with the film after every stage except the last. A cancelled pass
+/// Traces the first sample of every pixel in the tiles of `wave`, in replicate A (the first of two
+/// halves of the samples). The first stage traces every 8th pixel in x and y. Three further stages
+/// trace the pixels between, with steps of 4, 2 and 1. Each stage covers all tiles. Calls
+/// `on_stage` with the film after every stage except the last. If the pass is cancelled, it
 /// completes its first stage, starts no jobs of later stages, and returns `None`.
 pub fn run(
     world: &AnyWorld,
@@ -26,12 +27,13 @@ pub fn run(
     }
 }
 
-/// Number of adjacent tiles in a strip. The tiles of a strip share packets in stages that add only
-/// few pixels to each tile.
+/// Number of adjacent tiles in a strip. In stages of the first pass that add only few pixels to
+/// each tile, the tiles of a strip share packets.
 const STRIP_TILES: usize = 8;
 
-/// Lattice step \[pixels\] above which adjacent tiles share packets. At smaller steps the pixels of
-/// one tile fill packets.
+/// Step \[pixels\] of the first pass above which adjacent tiles share packets. A stage of the pass
+/// traces every n-th pixel in x and y, with n the step. Up to this step the pixels of one tile fill
+/// packets.
 const SHARED_ABOVE: usize = 2;
 
 fn trace_first_pass<L: SimdFloat>(
@@ -76,19 +78,20 @@ fn trace_first_pass<L: SimdFloat>(
     Some(WaveReport { reports: counts.into_iter().map(report).collect() })
 }
 
-/// A pixel of a strip of tiles.
+/// Pixel of a strip of adjacent tiles.
 struct StripPixel {
-    /// Index of the tile in the strip.
+    /// Index of the tile in its strip of adjacent tiles.
     tile: usize,
     /// Number of the pixel in its tile; pixels are numbered row by row.
     pixel: usize,
-    /// Column and row in the picture.
+    /// Column and row of the pixel in the picture.
     position: (u32, u32),
 }
 
-/// Returns the pixels that a stage adds to `tiles`, each given with its origin: the pixels of the
-/// lattice with step `step` that are not in the lattice with step `previous_step` (0: no earlier
-/// lattice).
+/// Returns the pixels that a stage of the first pass adds to `tiles`. A lattice with the step n
+/// holds every n-th pixel of the picture in x and y. The stage adds the pixels of the lattice with
+/// the step `step` that are not in the lattice with the step `previous_step` (0: no earlier
+/// lattice). `tiles` has each tile with the column and row of its first pixel.
 fn pixels_to_add(
     tiles: &[([usize; 2], &mut Tile)],
     (previous_step, step): (usize, usize),
@@ -106,9 +109,11 @@ fn pixels_to_add(
 }
 
 impl<L: SimdFloat> TileRenderer<'_, L> {
-    /// Traces the first sample of the pixels that the lattice with step `steps.1` adds to the
-    /// lattice with step `steps.0` (0: no earlier lattice). `slots` are adjacent tiles, which share
-    /// packets while they add only few pixels.
+    /// Traces the first sample of the pixels that one stage of the first pass adds. A lattice with
+    /// the step n holds every n-th pixel in x and y. `steps` has two steps: that of the previous
+    /// stage's lattice (0: none), and that of this one. `slots` are adjacent tiles, which share
+    /// packets while a stage adds only few pixels to each. `counts` receives the ray counts of the
+    /// tiles.
     fn lattice(&self, slots: Vec<TileHandle>, steps: (usize, usize), counts: &mut [Counts]) {
         let mut tiles: Vec<_> =
             slots.into_iter().map(|slot| (slot.origin, slot.prepare())).collect();
@@ -131,7 +136,7 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
     }
 
     /// Traces the first sample of each of `pixels` with `tracer`, which was created for them, and
-    /// adds it to the pixel's tile.
+    /// adds it to the pixel's tile. `counts` receives the ray counts of `tiles`.
     fn add_pixels(
         &self,
         tiles: &mut [([usize; 2], &mut Tile)],

@@ -5,7 +5,7 @@ mod checkpoint;
 pub mod export;
 mod first_hit_buffer;
 mod first_pass;
-pub mod memory;
+pub mod memory_budget;
 pub mod pass;
 pub mod plan;
 mod region_render;
@@ -14,6 +14,7 @@ mod render_state;
 pub mod schedule;
 pub mod session;
 mod sync_render;
+mod threads;
 pub mod wave;
 
 pub use checkpoint::{Checkpoint, EncodedCheckpoint, SampleInputs};

@@ -1,4 +1,6 @@
-//! Synchronous pass: traces the jobs of one wave and adds their samples to the film.
+//! Pass: traces the jobs of one wave and adds their samples to the film. A wave is a set of jobs
+//! that run concurrently, each with samples of one tile. The pass returns when all jobs are done or
+//! cancelled.
 
 use crate::film::{Estimator, Film, InvalidSample, TILE, TILE_PIXELS, Tile, TileHandle};
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -12,18 +14,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 const _: () = assert!(TILE_PIXELS <= MAX_BLOCK_PIXELS);
 
-/// Inputs that all jobs of a pass share.
+/// Inputs that all jobs of a tracing pass share.
 #[derive(Clone, Copy)]
 pub struct PassContext<'a> {
-    /// Seed and kind of the sample sequence.
+    /// Random seed and kind of random numbers.
     pub sampling: &'a SampleSettings,
-    /// Threads that trace the jobs.
+    /// Thread pool that traces the jobs.
     pub pool: &'a rayon::ThreadPool,
-    /// Cancels the pass if `true`: no further job starts.
+    /// Flag that cancels the pass: once it is `true`, no further job starts.
     pub cancel: &'a AtomicBool,
 }
 
-/// Traces the jobs of `wave` into `film`. The entry of a cancelled job in the report is `None`.
+/// Traces the jobs of `wave` (a set of jobs that run concurrently) and adds their samples to
+/// `film`. If `wave.estimate` is `true`, `estimator` computes the error of each tile. The report
+/// has an entry for each job, which is `None` if the job was cancelled.
 pub fn run(
     world: &AnyWorld,
     film: &mut Film,
@@ -37,7 +41,7 @@ pub fn run(
     }
 }
 
-/// Traces the jobs as [`run`] does, for one lane type.
+/// Traces the jobs of `wave` as [`run`] does, for one SIMD type.
 pub fn run_typed<L: SimdFloat>(
     world: &World<L>,
     film: &mut Film,
@@ -69,14 +73,15 @@ pub fn run_typed<L: SimdFloat>(
     WaveReport { reports }
 }
 
-/// Renderer of tiles: adds the radiance of samples to the film's fixed-point sums.
+/// Renderer of tiles: traces samples and adds their radiance to the film's integer sums.
 pub(super) struct TileRenderer<'a, L: SimdFloat> {
     pub(super) tracer: CameraTracer<'a, L>,
-    /// Scale of each light group: the number of integer steps per unit of radiance.
+    /// Scale of each light group: the number of the film's integer steps per unit of radiance.
     scales: &'a [f64],
-    /// Largest radiance of one sample that the film can hold, 2^49 steps, for each light group.
+    /// Largest radiance of one sample that the film can hold, for each light group: 2^49 of the
+    /// film's integer steps.
     limits: [L; MAX_GROUPS],
-    /// Pixels of a tile that is entirely inside the picture, see [`pixels_of`].
+    /// Indices of the pixels of a tile that is entirely inside the picture, see [`pixels_of`].
     whole_tile: Vec<u8>,
 }
 
@@ -94,8 +99,11 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Traces the samples of a job into its tile. Packets hold `WIDTH` samples of one pixel if
-    /// enough aligned indices remain, otherwise samples of several pixels.
+    /// Traces the samples of `job` and adds them to `tile`, whose first pixel is at `origin`. They
+    /// belong to the replicate (half of the samples) number `replicate`. Returns the ray counts. A
+    /// packet has `WIDTH` lanes. It holds `WIDTH` samples of one pixel if its first sample index is
+    /// a multiple of `WIDTH` and as many samples remain. Otherwise it holds samples of several
+    /// pixels.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
@@ -142,8 +150,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         tracer.counts()
     }
 
-    /// Traces the samples `first..first + COUNT` of all pixels of a tile. A packet holds several
-    /// pixels.
+    /// Traces the samples `first..first + COUNT` of the pixels `pixels` and adds them to their
+    /// tile. A packet holds several pixels. Samples that the film cannot hold are recorded in
+    /// `rejected`.
     #[inline(never)]
     fn trace_shared<const COUNT: usize>(
         &self,
@@ -163,8 +172,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         });
     }
 
-    /// Adds each light group's radiance over all lanes, in steps of the film, and calls `add(group,
-    /// sums)` with the result.
+    /// Sums the radiance of each light group over all lanes, in integer steps of the film. Calls
+    /// `add(group, sums)` with the sums of red, green and blue.
     #[inline(always)]
     fn sum(&self, radiance: &Radiance<L>, mut add: impl FnMut(usize, [i64; 3])) {
         for (group, scale) in self.scales.iter().enumerate() {
@@ -173,8 +182,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Adds each light group's radiance over the `COUNT` lanes of each pixel, in steps of the film,
-    /// and calls `add(pixel, group, sums)` with the result.
+    /// Sums the radiance of each light group over the lanes of each pixel, in integer steps of the
+    /// film. Each of `pixels` has `COUNT` consecutive lanes. Calls `add(pixel, group, sums)` with
+    /// the sums of red, green and blue.
     #[inline(always)]
     pub(super) fn sum_by_pixel<const COUNT: usize, P>(
         &self,
@@ -192,8 +202,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Replaces samples that the film cannot hold, and records them in `rejected`. `sample_of`
-    /// returns the pixel and the sample index of a lane.
+    /// Replaces the samples of a packet that the film cannot hold, and records them in `rejected`.
+    /// Valid samples, which are the usual case, cost only a comparison. `sample_of` receives a lane
+    /// and returns the position of its pixel and its sample index.
     #[inline(always)]
     pub(super) fn reject_invalid(
         &self,
@@ -215,8 +226,9 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Makes samples valid. A sample that is NaN or negative in a channel of a light group becomes
-    /// black in that group. A sample above the film's limit, or infinite, is reduced to the limit.
+    /// Implements [`Self::reject_invalid`] for a packet with at least one invalid sample. A sample
+    /// that is NaN or negative in a channel of a light group becomes black in that group. A channel
+    /// above the film's limit, even an infinite one, is reduced to the limit.
     #[cold]
     fn replace_invalid(
         &self,
@@ -244,9 +256,10 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
 /// Samples of one job that the film cannot hold.
 pub(super) struct RejectedSamples {
     replicate: usize,
-    /// Samples that are NaN or negative in some light group; they are stored as black.
+    /// Samples that are NaN or negative in some light group; the film stores black for this group
+    /// instead.
     pub(super) bad: Vec<InvalidSample>,
-    /// Samples above the film's limit in some light group; they are stored with the limit.
+    /// Samples above the film's limit in some light group; the film stores the limit instead.
     pub(super) saturated: Vec<InvalidSample>,
 }
 
@@ -256,15 +269,15 @@ impl RejectedSamples {
     }
 }
 
-/// Returns the number of samples of a pixel in the next packet, if the indices `first..end` are to
-/// be traced: a power of two that divides `first`, at most `width`.
+/// Returns the number of samples of one pixel in the next packet: the largest power of two, at most
+/// `width`, that divides `first` and fits into the sample indices `first..end`.
 fn samples_per_packet(first: u32, end: u32, width: usize) -> usize {
     let aligned = first | width as u32;
     1 << aligned.trailing_zeros().min((end - first).ilog2())
 }
 
-/// Pixels of a tile in Morton order, numbered row by row. Pixels that share a packet form a block
-/// of 2 x 1, 2 x 2, 4 x 2 or 4 x 4.
+/// Order of a tile's pixels along a Morton curve; pixels are numbered row by row. Pixels that share
+/// a packet then form a block of 2 x 1, 2 x 2, 4 x 2 or 4 x 4.
 const MORTON_ORDER: [u8; TILE_PIXELS] = {
     let mut order = [0; TILE_PIXELS];
     let mut i = 0;
@@ -281,7 +294,9 @@ const MORTON_ORDER: [u8; TILE_PIXELS] = {
     order
 };
 
-/// Returns the pixels of a tile with the given width and height, in [`MORTON_ORDER`].
+/// Returns the indices of the pixels of a tile with the given width and height, in
+/// [`MORTON_ORDER`]. An index counts the pixels of a whole tile row by row. Tiles at the right and
+/// lower edge of the picture are smaller than a whole tile.
 fn pixels_of([width, height]: [usize; 2]) -> Vec<u8> {
     let inside = |p: &u8| usize::from(*p) % TILE < width && usize::from(*p) / TILE < height;
     MORTON_ORDER.into_iter().filter(inside).collect()
@@ -290,12 +305,12 @@ fn pixels_of([width, height]: [usize; 2]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{Header, LightWeights};
+    use crate::film::Header;
     use crate::lanes::{Float, Single, Vec3};
     use crate::sampling::SamplerKind;
 
-    /// Checks that invalid samples are counted and stored as black, and that samples above the
-    /// film's limit are stored with the limit. The sums of other light groups are not affected.
+    /// Checks that invalid samples are counted and stored as black, and that the film stores its
+    /// limit in place of samples above it. The sums of other light groups are not affected.
     #[test]
     fn extreme_30_a_bad_sample_is_counted_and_leaves_the_pixel_finite() {
         let scene = crate::scene::Scene::parse(
@@ -337,7 +352,7 @@ mod tests {
             rejected.bad.into_iter().for_each(|bad| tile.record_bad(bad));
             tile.record_saturated(rejected.saturated.len() as u64);
             tile.advance(0, 1);
-            let only = |group| LightWeights::only(group, 2);
+            let only = |group| crate::film::testing::only(group, 2);
             assert_eq!(film.bad_samples().count + film.saturated_samples(), 1);
             assert_eq!(film.pixel(3, 0, &only(0)), [stored, 0.0, 0.0], "{value}");
             assert_eq!(film.pixel(4, 0, &only(0)), [0.5, 0.0, 0.0], "{value}");

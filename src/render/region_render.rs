@@ -2,16 +2,16 @@
 //! bottom.
 //!
 //! Each region has its own film and its own schedule. Its film uses the memory of the previous
-//! region's film. A sample is a function of seed, pixel, replicate and index; a uniform render in
-//! regions therefore equals a render of the whole picture, bit for bit. An adaptive render
-//! allocates samples within each region.
+//! region's film. A sample is a function of seed, pixel, replicate (half of the samples) and index;
+//! a uniform render in regions therefore equals a render of the whole picture, bit for bit. An
+//! adaptive render allocates samples within each region.
 
 use crate::disk::WriteError;
 use crate::film::{Bands, Depth, Display, Film, ImageData, ImageOutput, Noise, TileNoise};
 use crate::render::export::{Provenance, metadata};
 use crate::render::schedule::{SAMPLE_ALIGNMENT, Schedule, Settings, Spp, Step, Stop, StoppedBy};
 use crate::render::session::{Report, State};
-use crate::render::{Options, RenderState};
+use crate::render::{Options, RenderState, threads};
 use crate::scene::Scene;
 use std::io;
 use std::ops::Range;
@@ -19,19 +19,21 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// Target duration of a piece of a wave, in seconds. The observer is called between two pieces.
+/// Target duration in seconds of a piece of a render in regions. A piece is the work between two
+/// calls of the observer.
 const PIECE_SECONDS: f64 = 0.25;
-/// Number of samples, over all pixels, of the first piece. It measures the speed of tracing.
+/// Number of samples, over all pixels, of the first piece of a render in regions. A piece is the
+/// work between two calls of the observer. The first one measures the speed of tracing.
 const FIRST_PIECE_SAMPLES: u64 = 1 << 18;
-/// Largest number of samples per pixel of a job. Jobs are short, so that all threads have work
-/// until the end of a piece.
+/// Largest number of samples per pixel of a tracing job (samples of one tile) in a region. Jobs are
+/// short, so that all threads have work until the end of a piece.
 const LONGEST_JOB: u32 = 16 * SAMPLE_ALIGNMENT;
 
 /// Callback that receives a report between two pieces of work and before each row is written. If it
 /// returns an error, the render ends with this error.
 pub type Observer<'a> = &'a mut dyn FnMut(&Report) -> io::Result<()>;
 
-/// Render of a picture in regions.
+/// Render of a picture in regions: bands of rows, one after another.
 pub struct RegionRender<'a> {
     /// Compiled scene, with the film of the current region. `None` only while the film is
     /// exchanged.
@@ -42,7 +44,7 @@ pub struct RegionRender<'a> {
     display: Display,
     /// Number of rows of each region except the last, which may have fewer.
     rows: u32,
-    /// Number of rows of the finished regions.
+    /// Number of rows of the picture in the finished regions.
     finished_rows: u32,
     /// Estimated error of each tile of the finished regions, in row order.
     estimates: Vec<Option<TileNoise>>,
@@ -69,17 +71,16 @@ impl<'a> RegionRender<'a> {
         observer: Observer<'a>,
     ) -> Result<Self, String> {
         let start = Instant::now();
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(|e| format!("cannot start {threads} threads: {e}; try fewer by --threads"))?;
-        let state = RenderState::of_band(scene, options, 0..rows.min(scene.film.size[1]))?;
+        let pool = threads::pool(threads, 0).map_err(|error| error.to_string())?;
+        let rows_at_once = 0..rows.min(scene.film.size[1]);
+        let state = RenderState::compile(Arc::clone(scene), options, None, rows_at_once)?;
         let report = Report {
             compile_seconds: start.elapsed().as_secs_f64(),
             lanes: state.world.lanes(),
-            inventory: Arc::from(state.world.inventory().to_string()),
+            inventory: Arc::from(state.world.inventory()),
             spp: Spp { min: u32::MAX, mean: 0.0, max: 0 },
-            ..Report::idle(threads)
+            threads,
+            ..Report::default()
         };
         Ok(Self {
             state: Some(state),
@@ -114,7 +115,7 @@ impl<'a> RegionRender<'a> {
         Ok((self.report.clone(), self.stopped_by))
     }
 
-    /// Compiled scene, with the film of the current region.
+    /// Returns the compiled scene, with the film of the current region.
     pub fn state(&self) -> &RenderState {
         self.state.as_ref().expect("a region after a failed one is not rendered")
     }
@@ -180,8 +181,9 @@ impl<'a> RegionRender<'a> {
     }
 }
 
-/// Returns the report on a picture of `height` rows. `finished` is the report on the rows before
-/// `rows`. `schedule` belongs to the rows `rows`, which have been rendered for `seconds` seconds.
+/// Returns the report on a picture of `height` rows that is rendered in regions. `finished` is the
+/// report on the regions above the current one. `schedule` is that of the current region, which has
+/// the rows `rows` and has been rendered for `seconds` seconds.
 fn progress(
     finished: &Report,
     schedule: &Schedule,

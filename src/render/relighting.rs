@@ -1,12 +1,13 @@
-//! Relighting: shows the samples of one scene under the lights of another, by new weights of the
-//! light groups.
+//! Relighting: shows the samples of one scene under the lights of another scene. A film stores the
+//! light of each light group separately; relighting changes the weights of these groups.
 
 use crate::film::LightWeights;
 use crate::scene::Scene;
 use crate::world::LightGroups;
 use std::sync::Arc;
 
-/// Light groups of a film, and the scene for which its samples were traced.
+/// Light groups of a film (lights that share one weight), and the scene for which the film's
+/// samples were traced.
 #[derive(Clone, Debug)]
 pub struct Relighting {
     compiled: Arc<Scene>,
@@ -20,7 +21,7 @@ impl Relighting {
         Self { compiled, groups }
     }
 
-    /// Scene for which the samples were traced.
+    /// Returns the scene for which the samples were traced.
     pub fn compiled(&self) -> &Arc<Scene> {
         &self.compiled
     }
@@ -34,8 +35,8 @@ impl Relighting {
         can_reuse.then(|| LightWeights { weights: self.groups.mix(scene) })
     }
 
-    /// Returns the name of each light group, for layers of image files. `scene` is the scene that
-    /// the picture shows.
+    /// Returns the name of each light group. Image files store the light of each group in channels
+    /// with this name. `scene` is the scene that the picture shows.
     pub fn names(&self, scene: &Scene) -> Vec<String> {
         self.groups.names(scene)
     }

@@ -1,11 +1,11 @@
 //! State of one progressive render: compiled scene, film and noise estimator.
 
-use crate::film::{Display, Estimator, Film, Header, LightWeights, TILE};
+use crate::film::{Display, Estimator, Film, Header, LightWeights};
 use crate::render::pass::PassContext;
 use crate::render::relighting::Relighting;
 use crate::render::schedule::{Schedule, Settings};
 use crate::render::wave::{Wave, WaveReport};
-use crate::render::{first_pass, memory, pass};
+use crate::render::{first_pass, memory_budget, pass};
 use crate::sampling::SampleSettings;
 use crate::scene::Scene;
 use crate::world::{self, AnyWorld};
@@ -13,20 +13,20 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Settings of scene compilation, sampling and noise estimation.
+/// Options of a render: scene compilation, sampling and noise estimation.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Options of the compilation of the scene.
+    /// Options of scene compilation.
     pub world: world::Options,
-    /// Seed and kind of the sampler.
+    /// Random seed and kind of random numbers.
     pub sampling: SampleSettings,
     /// Display transform under which the noise is estimated, in 8-bit levels.
     pub display: Display,
 }
 
-/// Compiled scene, its film and the estimator of its noise.
+/// State of a progressive render: compiled scene, its film, and the estimator of the film's noise.
 pub struct RenderState {
-    /// The compiled scene.
+    /// Compiled scene.
     pub world: AnyWorld,
     /// Film that holds the samples.
     pub film: Film,
@@ -46,7 +46,9 @@ impl RenderState {
     /// # Panics
     /// Panics if there is not enough memory for the film.
     pub fn new(scene: &Scene, options: &Options, previous: Option<Self>) -> Self {
-        Self::compile(Arc::new(scene.clone()), options, previous).expect("memory for the film")
+        let rows = 0..scene.film.size[1];
+        Self::compile(Arc::new(scene.clone()), options, previous, rows)
+            .expect("memory for the film")
     }
 
     /// Compiles `scene` as [`RenderState::new`] does, after validation.
@@ -61,45 +63,31 @@ impl RenderState {
     ) -> Result<Self, String> {
         match scene.faults().first() {
             Some(fault) => Err(fault.to_string()),
-            None => Self::compile(Arc::clone(scene), options, previous),
+            None => Self::compile(Arc::clone(scene), options, previous, 0..scene.film.size[1]),
         }
     }
 
-    /// Compiles `scene`, which has no validation errors, and creates a film for the rows `rows` of
-    /// the picture. The first row is a multiple of [`TILE`].
+    /// Replaces the film by an empty film for a band of the picture, the rows `rows`, in the memory
+    /// of the old one.
     ///
     /// # Errors
-    /// Fails if there is not enough memory for the film.
-    pub(super) fn of_band(
-        scene: &Arc<Scene>,
-        options: &Options,
-        rows: Range<u32>,
-    ) -> Result<Self, String> {
-        Self::compile_rows(Arc::clone(scene), options, None, rows)
-    }
-
-    /// Replaces the film by an empty film for the rows `rows`, in the memory of the old one.
     ///
-    /// # Errors
-    /// Fails if there is not enough memory for the film. The state then has no film.
+    /// Fails if there is not enough memory for the film. The state is then lost.
     pub(super) fn into_band(self, rows: Range<u32>) -> Result<Self, String> {
         let size = [self.film.width() as u32, rows.len() as u32];
         let header = Header { height: rows.len(), ..self.film.header().clone() };
         let film = self.film.reuse_for(header);
-        let film = film.map_err(|_| memory::refused(size, self.mix.weights.len()))?;
+        let film = film.map_err(|_| memory_budget::refused(size, self.mix.weights.len()))?;
         Ok(Self { film: film.starting_at(rows.start as usize), ..self })
     }
 
-    fn compile(
-        scene: Arc<Scene>,
-        options: &Options,
-        previous: Option<Self>,
-    ) -> Result<Self, String> {
-        let rows = 0..scene.film.size[1];
-        Self::compile_rows(scene, options, previous, rows)
-    }
-
-    fn compile_rows(
+    /// Compiles `scene`, which has no validation errors, and creates a film for the rows `rows` of
+    /// the picture, in the memory of the film of `previous`. The first row is a multiple of
+    /// [`TILE`](crate::film::TILE).
+    ///
+    /// # Errors
+    /// Fails if there is not enough memory for the film.
+    pub(super) fn compile(
         scene: Arc<Scene>,
         options: &Options,
         previous: Option<Self>,
@@ -114,7 +102,7 @@ impl RenderState {
         };
         // Bands are part of a division for which the memory has been compared.
         if size == scene.film.size {
-            memory::check(size, groups, previous.as_ref().map_or(0, film_of))?;
+            memory_budget::check(size, groups, previous.as_ref().map_or(0, film_of))?;
         }
         let [width, height] = size.map(|n| n as usize);
         let header = Header {
@@ -130,7 +118,7 @@ impl RenderState {
             Some(previous) => previous.film.reuse_for(header),
             None => Film::try_new(header),
         };
-        let film = film.map_err(|_| memory::refused(size, groups))?;
+        let film = film.map_err(|_| memory_budget::refused(size, groups))?;
         let film = film.starting_at(rows.start as usize);
         let lighting = Relighting::new(Arc::clone(&scene), world.light_groups().clone());
         Ok(Self {
@@ -145,8 +133,9 @@ impl RenderState {
         })
     }
 
-    /// Shows `scene` from now on and returns `true`, if the samples of the film are valid for it.
-    /// Otherwise changes nothing and returns `false`.
+    /// Checks that the samples of the film are valid for `scene`. If they are, the film shows them
+    /// as a picture of `scene` from now on, and the function returns `true`. Otherwise it changes
+    /// nothing and returns `false`.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let Some(mix) = self.lighting.mix(scene).filter(|_| scene.faults().is_empty()) else {
             return false;
@@ -157,34 +146,36 @@ impl RenderState {
         true
     }
 
-    /// Scene that the picture shows. The colours and intensities of its lights may differ from
-    /// those of the compiled scene.
+    /// Returns the scene that the picture shows. The colours and intensities of its lights may
+    /// differ from those of the compiled scene.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
 
-    /// Name of each light group.
+    /// Returns the name of each light group. The lights of a group share one weight in the picture.
     pub fn group_names(&self) -> Vec<String> {
         self.lighting.names(&self.scene)
     }
 
-    /// Relighting of this film. It determines the scenes that the film's samples can show.
+    /// Returns the relighting of this film: its light groups, and the scene for which its samples
+    /// were traced.
     pub fn lighting(&self) -> &Arc<Relighting> {
         &self.lighting
     }
 
-    /// Display transform under which the noise is estimated.
+    /// Returns the display transform of the picture whose noise is estimated.
     pub fn display(&self) -> Display {
         self.display
     }
 
-    /// Sets the display transform under which the noise is estimated.
+    /// Sets the display transform of the picture whose noise is estimated.
     pub fn set_display(&mut self, display: Display) {
         self.display = display;
         self.rebuild_estimator();
     }
 
-    /// Estimator of the noise under the current light weights and display transform.
+    /// Returns the estimator of noise in the picture as displayed: with the current light weights
+    /// and display transform.
     pub fn estimator(&self) -> &Estimator {
         &self.estimator
     }
@@ -193,23 +184,20 @@ impl RenderState {
         self.estimator = Estimator::new(self.film.scales(), &self.mix, &self.display);
     }
 
-    /// Creates a schedule for the empty film of this render.
+    /// Creates the schedule of samples for the empty film of this render.
     pub fn schedule(&self, settings: Settings) -> Schedule {
         let film = &self.film;
-        let pixels_of_tile = |tile: usize| {
-            let [x, y] = film.tile_origin(tile);
-            ((film.width() - x).min(TILE) * (film.height() - y).min(TILE)) as u32
-        };
-        let pixels: Vec<u32> = (0..film.tile_count()).map(pixels_of_tile).collect();
+        let pixels = (0..film.tile_count()).map(|tile| film.tile_pixels(tile) as u32);
+        let pixels: Vec<u32> = pixels.collect();
         Schedule::new(&pixels, settings).with_light_period(self.world.light_period())
     }
 
-    /// Traces the first sample of every pixel, from coarse to fine. Calls `on_refined` with the
-    /// film after each stage except the last.
+    /// Traces the first sample of every pixel in stages: first for a coarse grid of pixels, finally
+    /// for all pixels. `wave` has the jobs of this pass. Calls `on_refined` with the film after
+    /// each stage except the last.
     ///
-    /// If `cancel_first_pass` becomes `true`, the pass ends after the first call of `on_refined`
-    /// and returns `None`. The film may then only be displayed; no further samples may be added to
-    /// it.
+    /// If `cancel_first_pass` becomes `true`, the pass ends after the first stage and returns
+    /// `None`. The film may then only be displayed; no further samples may be added to it.
     pub fn trace_first_pass(
         &mut self,
         wave: &Wave,
@@ -221,7 +209,8 @@ impl RenderState {
         first_pass::run(&self.world, &mut self.film, wave, context, on_refined)
     }
 
-    /// Traces a wave. If `cancel_wave` becomes `true`, no further job starts.
+    /// Traces a wave, a set of jobs that run concurrently, and adds the samples to the film. If
+    /// `cancel_wave` becomes `true`, no further job starts.
     pub fn trace_wave(
         &mut self,
         wave: &Wave,

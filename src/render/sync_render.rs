@@ -1,9 +1,9 @@
-//! Synchronous progressive render in the caller's thread. Measurements use it, because its
-//! decisions do not depend on the times of snapshots.
+//! Synchronous progressive render in the caller's thread. Measurements use it, because its result
+//! does not depend on the times of snapshots.
 
-use crate::render::schedule::{Schedule, Settings, Spp, Step, StoppedBy};
+use crate::render::schedule::{Schedule, Settings, Step, StoppedBy};
 
-use crate::render::{Options, RenderState};
+use crate::render::{Options, RenderState, threads};
 use crate::scene::Scene;
 use std::io;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ pub struct SyncRender {
 }
 
 impl SyncRender {
-    /// Compiles `scene`, which has no validation errors, for `threads` threads.
+    /// Compiles `scene`, which must be valid, and prepares a render with `threads` threads.
     ///
     /// # Errors
     /// Returns the operating system's error if a thread cannot be started, or an error if there is
@@ -30,10 +30,7 @@ impl SyncRender {
         settings: Settings,
         threads: usize,
     ) -> io::Result<Self> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(io::Error::other)?;
+        let pool = threads::pool(threads, 0)?;
         let rendering = RenderState::checked(&Arc::new(scene.clone()), options, None)
             .map_err(io::Error::other)?;
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
@@ -41,8 +38,9 @@ impl SyncRender {
         Ok(Self { rendering, schedule, pool, seconds: 0.0 })
     }
 
-    /// Traces the next decision of the schedule in both replicates and estimates the error of the
-    /// picture. Returns the stop criterion that ended the render, or `None` if it continues.
+    /// Traces the next allocation round: the samples that the schedule adds next, in both
+    /// replicates (halves of the samples). Then estimates the error of the picture. Returns the
+    /// stop criterion that ended the render, or `None` if it continues.
     pub fn step(&mut self) -> Option<StoppedBy> {
         loop {
             let wave = match self.schedule.next(self.seconds) {
@@ -59,39 +57,30 @@ impl SyncRender {
         }
     }
 
-    /// Seconds spent on tracing so far, without compilation.
+    /// Returns the seconds that the render has spent on tracing rays, without scene compilation.
     pub fn seconds(&self) -> f64 {
         self.seconds
     }
 
-    /// Number of samples traced so far, over all pixels.
-    pub fn samples(&self) -> u64 {
-        self.schedule.samples()
-    }
-
-    /// Samples per pixel so far.
-    pub fn spp(&self) -> Spp {
-        self.schedule.spp()
-    }
-
-    /// Estimated RMSE of the displayed picture, in 8-bit levels. `None` before the first estimate.
+    /// Returns the estimated RMSE of the displayed picture, in 8-bit levels. Returns `None` before
+    /// the first estimate.
     pub fn noise_codes(&self) -> Option<f64> {
         self.schedule.noise().map(|noise| noise.rmse_codes)
     }
 
-    /// Lower and upper estimate of the total seconds of tracing until the displayed RMSE is `codes`
-    /// 8-bit levels. `None` before the first estimate.
+    /// Returns a lower and an upper estimate of the total seconds of tracing until the displayed
+    /// RMSE is `codes` 8-bit levels. Returns `None` before the first estimate.
     pub fn seconds_to_noise(&self, codes: f64) -> Option<(f64, f64)> {
         let (low, high) = self.schedule.seconds_to_noise(codes, self.seconds)?;
         Some((self.seconds + low, self.seconds + high))
     }
 
-    /// The schedule, with its latest noise estimates.
+    /// Returns the schedule of the render, with its latest noise estimates.
     pub fn schedule(&self) -> &Schedule {
         &self.schedule
     }
 
-    /// The compiled scene and its film.
+    /// Returns the compiled scene and its film.
     pub fn rendering(&self) -> &RenderState {
         &self.rendering
     }

@@ -1,34 +1,39 @@
-//! Waves: sets of jobs that are traced concurrently. The schedule's decisions are traced as waves.
+//! Waves: sets of jobs that are traced concurrently. An allocation round (one decision of the
+//! schedule on the next samples of all tiles) is traced as two or more waves. Each replicate (half
+//! of the samples) has at least one of them.
 
 use crate::film::{TILE_PIXELS, TileNoise};
 
-/// Job: the samples `first..first + count` of one replicate, in every pixel of one tile.
+/// Tracing job: the samples `first..first + count` of one replicate (half of the samples), in every
+/// pixel of one tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Job {
-    /// Number of the tile; tiles are numbered row by row.
+    /// Number of the tile that the job samples; tiles are numbered row by row.
     pub tile: u32,
-    /// First sample index.
+    /// Index of the job's first sample in the sample sequence of each pixel.
     pub first: u32,
-    /// Number of samples, at least 1.
+    /// Number of samples per pixel, at least 1.
     pub count: u32,
 }
 
-/// Jobs that are traced concurrently. All jobs of a wave end before the next wave starts. A wave
-/// has at most one job for each tile.
+/// Set of jobs that are traced concurrently. All jobs of a wave end before the next wave starts. A
+/// wave has at most one job for each tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wave {
-    /// Replicate to which the samples are added: 0 for A, 1 for B.
+    /// Replicate (half of the samples) to which the samples are added: 0 for A, 1 for B.
     pub replicate: usize,
-    /// The jobs, in any order.
+    /// Tracing jobs of the wave, in any order.
     pub jobs: Vec<Job>,
-    /// `true` if each job ends with an estimate of its tile's error. Only waves of replicate B have
-    /// it: after them both replicates of the tile hold equally many samples.
+    /// `true` if each job ends with an estimate of its tile's error. Only waves of replicate B set
+    /// it, because the estimate needs equally many samples in both replicates (halves of the
+    /// samples).
     pub estimate: bool,
 }
 
 impl Wave {
-    /// Shortens the wave to its first jobs, at least one, with about `pixel_samples` samples over
-    /// all pixels. Shortens each job to at most `longest` samples per pixel.
+    /// Keeps only the first jobs of the wave (a set of concurrent jobs), at least one, with about
+    /// `pixel_samples` samples over all pixels together. Shortens each job to at most `longest`
+    /// samples per pixel.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;
@@ -42,23 +47,23 @@ impl Wave {
     }
 }
 
-/// Result of a finished job.
+/// Report on a finished job, which traced samples of one tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JobReport {
     /// Number of rays of every kind (camera, shadow, reflected, transmitted). It is the cost of the
     /// job, independent of the machine.
     pub rays: u64,
-    /// `true` if a path has sampled a glossy lobe.
+    /// `true` if a path of the job has sampled a glossy lobe.
     pub glossy: bool,
-    /// Estimated error of the tile's pixels. `None` unless [`Wave::estimate`] is set.
+    /// Estimated error of the job's tile. `None` unless [`Wave::estimate`] is set.
     pub error: Option<TileNoise>,
 }
 
-/// Result of a wave.
+/// Results of the jobs of a wave, a set of jobs that run concurrently.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaveReport {
-    /// One entry for each job, in the order of the wave. `None` for a job that was cancelled before
-    /// it started and therefore has added no samples.
+    /// Reports on the jobs of the wave, in the order of its jobs. `None` for a job that was
+    /// cancelled before it started and therefore has added no samples.
     pub reports: Vec<Option<JobReport>>,
 }
 

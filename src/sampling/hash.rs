@@ -1,4 +1,4 @@
-//! Integer hashes, for single words and for vectors of words.
+//! Integer hashes of 32-bit words and of SIMD vectors of them, for random numbers.
 
 use crate::lanes::SimdU32;
 
@@ -11,21 +11,21 @@ pub fn hash<B: SimdU32>(x: B) -> B {
     x ^ (x >> 16)
 }
 
-/// Hash of a single word: [`hash`] for one number.
+/// Hashes a single 32-bit word as [`hash`] does.
 pub const fn hash_scalar(mut x: u32) -> u32 {
     x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
     x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
     x ^ (x >> 16)
 }
 
-/// Hash of several words.
+/// Returns a 32-bit hash of `words`. It depends on their order.
 pub fn hash_words(words: &[u32]) -> u32 {
     words.iter().fold(0x9e37_79b9, |h, w| {
         hash_scalar(h.rotate_left(5).wrapping_add(0x85eb_ca6b) ^ hash_scalar(*w))
     })
 }
 
-/// Owen scrambling of numbers whose first binary digit is in bit 0. A digit is flipped or not,
+/// Owen scrambling of binary fractions whose first digit is in bit 0. It flips each digit or not,
 /// depending on `seed` and on all preceding digits.
 ///
 /// Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
@@ -34,21 +34,21 @@ pub fn owen<B: SimdU32>(x: B, seed: B) -> B {
     owen_scramble_suffix(owen_scramble_prefix(x), seed, owen_factor(seed))
 }
 
-/// First part of [`owen`], which does not depend on the seed. Samples with equal points and
-/// different seeds share its result.
+/// Computes the first part of [`owen`], which does not depend on the seed. Its result can be reused
+/// for equal points with different seeds.
 #[inline(always)]
 pub fn owen_scramble_prefix<B: SimdU32>(x: B) -> B {
     x ^ (x * B::splat(0x3d20_adea))
 }
 
-/// Multiplier of [`owen`], which depends only on the seed.
+/// Returns the factor of the multiplication in [`owen`]. It is odd and depends only on the seed.
 #[inline(always)]
 pub fn owen_factor<B: SimdU32>(seed: B) -> B {
     (seed >> 16) | B::splat(1)
 }
 
-/// Second part of [`owen`]. `prefix` is the result of [`owen_scramble_prefix`], and `factor` that
-/// of [`owen_factor`].
+/// Computes the second part of [`owen`]. `prefix` is the result of [`owen_scramble_prefix`], and
+/// `factor` that of [`owen_factor`].
 #[inline(always)]
 pub fn owen_scramble_suffix<B: SimdU32>(prefix: B, seed: B, factor: B) -> B {
     let x = (prefix + seed) * factor;

@@ -1,5 +1,6 @@
-//! Random numbers of samples. They are pure functions of seed, pixel, replicate and sample index,
-//! and do not depend on threads, order or time.
+//! Random numbers of camera samples. They are pure functions of seed, pixel, replicate and sample
+//! index, and do not depend on threads, order or time. The replicates A and B are two independent
+//! halves of the samples, from whose difference the film estimates the error.
 
 mod hash;
 mod packet_sampler;

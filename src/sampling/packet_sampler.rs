@@ -7,48 +7,57 @@ use crate::sampling::hash::{
 use crate::sampling::sobol;
 use crate::sampling::sobol::DIMENSIONS;
 
-/// Sample sequence.
+/// Kind of the random numbers: Sobol points or independent numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SamplerKind {
-    /// Owen-scrambled Sobol points in eight dimensions (the joint set). Further dimensions are
-    /// taken from further sets of the same points with shuffled indices (the padded sets).
+    /// Owen-scrambled Sobol points. The first eight dimensions come from one set of points (the
+    /// joint set). Further dimensions come from further sets of the same points with shuffled
+    /// indices (the padded sets).
     Sobol,
-    /// Independent random numbers.
+    /// Independent random numbers for all dimensions.
     Random,
 }
 
 impl SamplerKind {
-    /// Name on the command line and in file headers.
+    /// Returns the name of the kind on the command line and in file headers.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sobol => "sobol",
             Self::Random => "random",
         }
     }
+
+    /// Returns the kind with the name `name`; `None` if there is no such kind.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Self::Sobol, Self::Random].into_iter().find(|kind| kind.name() == name)
+    }
 }
 
-/// Settings that determine all samples of a picture. A sample depends only on these settings, its
-/// pixel, its replicate and its index.
+/// Settings that determine the random numbers of all samples of a picture. A sample depends only on
+/// these settings, its pixel, its replicate (half of the samples, A or B) and its index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleSettings {
     /// Random seed. The errors of pictures with different seeds are independent.
     pub seed: u64,
-    /// Sample sequence.
+    /// Kind of the random numbers: Sobol points or independent ones.
     pub kind: SamplerKind,
 }
 
-/// Number of dimensions of the joint set that are reserved for the first branch choices of a path
-/// (reflection or transmission). They are its last dimensions.
+/// Number of Sobol dimensions for the first reflect-or-transmit choices of a path, one dimension a
+/// choice. They are the last dimensions of the joint set: the first eight dimensions of a sample,
+/// which are stratified together.
 const CHOICES: u32 = 2;
 
-/// Largest number of lobes in the joint set.
+/// Largest number of a path's surfaces at which the sampled direction uses the joint set (the first
+/// eight Sobol dimensions of a sample).
 const MAX_JOINT_LOBES: u32 = 2;
 
-/// Number of powers of two up to the widest packet: the possible numbers of samples of one pixel in
-/// a packet.
+/// Number of possible values of k if a packet has 2^k samples of each of its pixels: from 0 to log2
+/// of the widest packet.
 const PACKET_SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
 
-/// Choice of the camera's random numbers: each takes two dimensions at the start of the joint set.
+/// Choice of the random positions that the camera rays of a picture need. Each position takes two
+/// dimensions of a sample's Sobol point, from dimension 0 on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraDimensions {
     /// `true` if samples are distributed over the area of their pixel.
@@ -57,38 +66,42 @@ pub struct CameraDimensions {
     pub lens: bool,
 }
 
-/// Sampler of a picture: tables and constants that all packets share.
+/// Sampler of a picture: tables and constants for the random numbers that all packets share.
 pub struct Sampler<L: SimdFloat> {
     settings: SampleSettings,
-    /// Two words per replicate, hashed from the seed.
+    /// Hash words derived from the random seed: `seeds[replicate]` has two words for replicate 0
+    /// (A) or 1 (B), the two halves of the samples.
     seeds: [[u32; 2]; 2],
-    /// First dimension of the position on the lens. If samples are distributed over the pixel, the
-    /// two dimensions before it are the position in the pixel.
+    /// First Sobol dimension of the position on the lens. If samples are distributed over the
+    /// pixel, the two dimensions before it are the position in the pixel.
     lens: usize,
-    /// First dimension of the first lobe.
+    /// First Sobol dimension of the direction sampled at a path's first surface.
     first_lobe: usize,
-    /// Number of lobes in the joint set. Further lobes belong to the padded sets.
+    /// Number of a path's surfaces whose sampled directions use the joint set of Sobol dimensions.
+    /// Those of later surfaces use the padded sets.
     joint_lobes: u32,
-    /// `low_bits[k][d]` holds the Sobol points 0..2^k in dimension d, repeated over the lanes.
+    /// Sobol points of the first indices: `low_bits[k][d]` holds the points 0..2^k in dimension d,
+    /// repeated over the lanes. A packet with 2^k samples of each pixel uses them.
     low_bits: [[L::SimdU32; DIMENSIONS]; PACKET_SHAPES],
     /// Lane indices 0, 1, 2 and so on.
     ramp: L::SimdU32,
-    /// Constant for each dimension, so that dimensions are scrambled independently.
+    /// Hash constant of each Sobol dimension, so that dimensions are scrambled independently.
     dimension_salt: [u32; DIMENSIONS],
 }
 
-/// Part of a packet's random numbers that depends on the sample indices and not on the pixels.
+/// Sobol points of a block of successive sample indices. They do not depend on pixels, so that all
+/// packets with these indices share them.
 pub struct SampleBlock<'a, L: SimdFloat> {
     sampler: &'a Sampler<L>,
-    /// Sample index in each lane.
+    /// Sample index of each lane, within the sequence of its pixel.
     index: L::SimdU32,
-    /// `owen_prefix[d]`: Sobol points of the indices in dimension d, after
-    /// [`owen_scramble_prefix`].
+    /// Sobol points before scrambling by pixel: `owen_prefix[d]` holds the points of the lanes'
+    /// sample indices in dimension d, after [`owen_scramble_prefix`].
     owen_prefix: [L::SimdU32; DIMENSIONS],
 }
 
 impl<L: SimdFloat> Sampler<L> {
-    /// Creates the sampler of a picture. `camera` are the dimensions that its camera rays use.
+    /// Creates the sampler of a picture. `camera` states which dimensions the camera rays use.
     pub fn new(settings: SampleSettings, camera: CameraDimensions) -> Self {
         let lens = if camera.pixel { 2 } else { 0 };
         let first_lobe = lens + if camera.lens { 2 } else { 0 };
@@ -111,9 +124,9 @@ impl<L: SimdFloat> Sampler<L> {
         }
     }
 
-    /// Creates the block of the indices `first..first + count` for packets of `WIDTH / count`
-    /// pixels: lane i has index `first + i % count`. `count` is a power of two, at most `WIDTH`,
-    /// and `first` a multiple of it.
+    /// Creates a block of samples: the Sobol points of the sample indices `first..first + count`,
+    /// for packets of `WIDTH / count` pixels. Lane i has index `first + i % count`. `count` is a
+    /// power of two, at most `WIDTH`, and `first` a multiple of it.
     pub fn block(&self, first: u32, count: usize) -> SampleBlock<'_, L> {
         debug_assert!(count.is_power_of_two() && count <= L::WIDTH);
         debug_assert!((first as usize).is_multiple_of(count));
@@ -125,8 +138,9 @@ impl<L: SimdFloat> Sampler<L> {
         SampleBlock { sampler: self, index: L::SimdU32::splat(first) + within, owen_prefix }
     }
 
-    /// Key of a pixel's samples in one replicate (0: A, 1: B). Keys are distinct for all pixels of
-    /// a picture up to 65536 x 65536, because every step is a bijection of the packed coordinates.
+    /// Returns the scrambling key of the samples of pixel (`x`, `y`) in one replicate (half of the
+    /// samples; 0: A, 1: B). Keys are distinct for all pixels of a picture up to 65536 x 65536,
+    /// because every step is a bijection of the packed coordinates.
     #[inline(always)]
     pub fn key(&self, (x, y): (u32, u32), replicate: usize) -> u32 {
         let [before, after] = self.seeds[replicate];
@@ -155,32 +169,35 @@ impl<L: SimdFloat> SampleBlock<'_, L> {
     }
 }
 
-/// Number of lobes, and of branch choices, that are reserved for each generation of a path with
-/// diffuse bounces.
+/// Number of directions, and of choices between reflection and transmission, for which random
+/// numbers are reserved in each segment of a path. Diffuse bounces divide a path into segments.
 const PER_GENERATION: u32 = 1 << 16;
 
-/// Number of the first of the branch choices that select the hit of a diffuse bounce (reservoir
-/// sampling).
+/// Smallest number of a random choice by reservoir sampling, which selects the hit at which a
+/// diffuse bounce starts. Choices with smaller numbers are between reflection and transmission.
 const RESERVOIR: u32 = 1 << 31;
 
-/// Random numbers of one packet.
+/// Random numbers of the samples in one packet. Each method returns those for one purpose.
 #[derive(Clone, Copy)]
 pub struct PacketSampler<'a, L: SimdFloat> {
     points: &'a SampleBlock<'a, L>,
-    /// Key of the pixel in each lane.
+    /// Scrambling key of each lane's pixel, by which pixels get different random numbers.
     key: L::SimdU32,
-    /// Key of the pixel, if all lanes have the same one.
+    /// Scrambling key of the pixel if all lanes belong to the same pixel; otherwise `None`.
     single_key: Option<u32>,
-    /// Number that is added to the numbers of lobes.
+    /// Number of the first sampled direction in the current path segment. Diffuse bounces divide a
+    /// path into segments; directions are numbered through all segments.
     first_lobe: u32,
-    /// Number that is added to the numbers of branch choices.
+    /// Number of the first choice between reflection and transmission in the current path segment.
+    /// Diffuse bounces divide a path into segments; choices are numbered through all segments.
     first_choice: u32,
 }
 
 impl<L: SimdFloat> PacketSampler<'_, L> {
-    /// Returns the random numbers of one generation of a path with diffuse bounces: the part after
-    /// `generation` diffuse bounces. The direction of the first diffuse bounce uses the dimensions
-    /// of the first branch choices.
+    /// Returns the random numbers for the segment of each path after `generation` diffuse bounces.
+    /// Each segment has numbers of its own for sampled directions and choices. The choices use only
+    /// padded sets (Sobol points with shuffled indices), because the first diffuse bounce uses the
+    /// last two of the first eight Sobol dimensions, which belong to choices before it.
     #[inline(always)]
     pub fn generation(&self, generation: u32) -> Self {
         let first_lobe = generation * PER_GENERATION;
@@ -199,55 +216,55 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns a number in [0, 1) for candidate `number` of the reservoir that selects the hit of
-    /// this generation's diffuse bounce.
+    /// Returns a random number in [0, 1) for candidate `number` of a reservoir. The reservoir
+    /// selects the hit at which the path continues with a diffuse bounce.
     #[inline(always)]
     pub fn reservoir_1d(&self, number: u32) -> L {
         self.padded_choice(RESERVOIR + self.first_choice + number)
     }
 
-    /// Returns the position of each sample in its pixel, two coordinates in [0, 1).
+    /// Returns the position of each sample in its pixel: two coordinates in [0, 1).
     #[inline(always)]
     pub fn pixel(&self) -> (L, L) {
         (self.joint(0, 0), self.joint(1, 0))
     }
 
-    /// Returns two numbers in [0, 1) for the position of each sample on the lens.
+    /// Returns two random numbers in [0, 1) for the position of each sample on the camera's lens.
     #[inline(always)]
     pub fn lens(&self) -> (L, L) {
         let d = self.points.sampler.lens;
         (self.joint(d, 0), self.joint(d + 1, 0))
     }
 
-    /// Returns two numbers in [0, 1) for the lobe of the surface that a path hits after `bounce`
-    /// reflections.
+    /// Returns two random numbers in [0, 1) for the direction sampled at the surface that a path
+    /// hits after `bounce` reflections.
     #[inline(always)]
     pub fn lobe_2d(&self, bounce: u32) -> (L, L) {
         self.pair_2d(bounce, 0)
     }
 
-    /// Returns two numbers in [0, 1) for emitter `light` at the surface that a path hits after
-    /// `bounce` reflections.
+    /// Returns two random numbers in [0, 1) for a point on emitter `light`, as seen from the
+    /// surface that a path hits after `bounce` reflections.
     ///
-    /// They are the numbers of the lobe at this surface with another scrambling, so that both are
-    /// stratified together with the position in the pixel and with the lobes of earlier surfaces.
-    /// Light from an emitter and light along the lobe are added, never multiplied, so that they may
-    /// share dimensions.
+    /// They are the numbers of [`Self::lobe_2d`] at this surface with another scrambling. Both are
+    /// therefore stratified together with the position in the pixel and with the directions sampled
+    /// at earlier surfaces. They may share dimensions, because light from an emitter and reflected
+    /// light are added, never multiplied.
     #[inline(always)]
     pub fn light_2d(&self, bounce: u32, light: u32) -> (L, L) {
         self.pair_2d(bounce, hash_scalar(light + 1))
     }
 
-    /// Returns a number in [0, 1) for the choice of point lights at the surface that a path hits
-    /// after `bounce` reflections. It is a number of [`Self::light_2d`] under a scrambling of its
-    /// own.
+    /// Returns a random number in [0, 1) for the random choice of a point light at the surface that
+    /// a path hits after `bounce` reflections. It uses a dimension of [`Self::light_2d`] with a
+    /// scrambling of its own.
     #[inline(always)]
     pub fn light_choice_1d(&self, bounce: u32) -> L {
         self.light_2d(bounce, u32::MAX - 1).0
     }
 
-    /// Returns the lobe's two dimensions at the surface after `bounce` reflections, scrambled with
-    /// `salt`.
+    /// Returns two random numbers in [0, 1) for the surface that a path hits after `bounce`
+    /// reflections. They have the dimensions of [`Self::lobe_2d`], scrambled with `salt`.
     #[inline(always)]
     fn pair_2d(&self, bounce: u32, salt: u32) -> (L, L) {
         let Sampler { first_lobe, joint_lobes, .. } = self.points.sampler;
@@ -259,8 +276,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns a number in [0, 1) for branch choice `number` of a path: reflection or transmission.
-    /// Choices are numbered from 0.
+    /// Returns a random number in [0, 1) for a path's choice `number` between reflection and
+    /// transmission. Choices are numbered from 0.
     #[inline(always)]
     pub fn branch_1d(&self, number: u32) -> L {
         let number = number + self.first_choice;
@@ -271,8 +288,8 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns dimension `d` of the joint set. Different values of `salt` give independent
-    /// scramblings.
+    /// Returns dimension `d` of the joint Sobol set, the first eight dimensions of a sample, in [0,
+    /// 1). Different values of `salt` give independent scramblings.
     #[inline(always)]
     fn joint(&self, d: usize, salt: u32) -> L {
         let points = self.points;
@@ -289,8 +306,9 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         }
     }
 
-    /// Returns two numbers for lobe number `pair` of the padded sets, scrambled with `salt`. Four
-    /// lobes share a set.
+    /// Returns two random numbers in [0, 1) for the sampled direction with the number `pair`,
+    /// scrambled with `salt`. They come from a padded set: Sobol points with shuffled indices. Four
+    /// directions share a set.
     #[cold]
     fn padded(&self, pair: u32, salt: u32) -> (L, L) {
         let d = 2 * (pair % 4) as usize;
@@ -298,7 +316,9 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         (a, b)
     }
 
-    /// Returns a number for branch choice `number` of the padded sets. Eight choices share a set.
+    /// Returns a random number in [0, 1) for the choice with the number `number` between reflection
+    /// and transmission. It comes from a padded set: Sobol points with shuffled indices. Eight
+    /// choices share a set.
     #[cold]
     fn padded_choice(&self, number: u32) -> L {
         let per_set = DIMENSIONS as u32;
@@ -307,8 +327,9 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
         x
     }
 
-    /// Returns the given `dimensions` of the padded set `set`, scrambled with `salt`. Each padded
-    /// set shuffles the sample indices by a key of its own.
+    /// Returns the dimensions `dimensions` of the padded set with the number `set`, in [0, 1),
+    /// scrambled with `salt`. A padded set consists of the Sobol points in an order of its own: a
+    /// hash shuffles their indices.
     #[inline(always)]
     fn padded_set<const N: usize>(&self, set: u32, dimensions: [usize; N], salt: u32) -> [L; N] {
         let SampleBlock { sampler, index, .. } = self.points;

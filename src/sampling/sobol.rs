@@ -1,34 +1,36 @@
 //! Sobol points in eight dimensions with a 32-bit index. The dimensions form four pairs. Each pair
 //! consists of the first two dimensions of the Sobol sequence, a (0, 2)-sequence in base 2.
 //!
-//! Pair k uses the points of that sequence in an order of its own: the index is `M_k i`, where
-//! `M_k` is an upper triangular matrix of bits with ones on its diagonal. Such a matrix permutes
-//! the first 2^m indices for every m, so that each pair is still a (0, 2)-sequence (Faure and
-//! Tezuka 2002, *Another Random Scrambling of Digital (t,s)-Sequences*). With the usual direction
-//! numbers (Joe and Kuo 2008) only the first pair is a (0, 2)-sequence. The image in a mirror
-//! depends on single pairs: the position in the pixel, and the direction in the lobe.
-//! docs/accuracy.md has the measured benefit.
+//! Pair k has the points of that sequence in an order of its own: its point i is point `M_k i` of
+//! the sequence. Here i is a vector of bits, and `M_k` is an upper triangular matrix of bits with
+//! ones on its diagonal. Such a matrix permutes the first 2^m indices for every m, so that each
+//! pair is still a (0, 2)-sequence (Faure and Tezuka 2002, *Another Random Scrambling of Digital
+//! (t,s)-Sequences*). With the usual direction numbers (Joe and Kuo 2008) only the first pair is a
+//! (0, 2)-sequence. The image in a mirror depends on single pairs: the position in the pixel, and
+//! the direction in the lobe. docs/accuracy.md has the measured benefit.
 //!
 //! The first columns of the matrices were found by search, one column after the other. The search
-//! minimised the errors of two estimates from 2^m randomly scrambled points: the volume on one side
-//! of a random plane that leans towards the axes of several pairs, and the mean of a smooth product
-//! over several pairs. Further columns are random.
+//! minimised the errors of two estimates from 2^m randomly scrambled points. One is the volume on
+//! one side of a random plane that leans towards the axes of several pairs. The other is the mean
+//! of a smooth product over several pairs. Further columns are random.
 //!
 //! Values are stored with the first binary digit in bit 0, as the scrambling hash requires.
 
 use crate::sampling::hash::hash_scalar;
 
-/// Number of dimensions of one set of points.
+/// Number of dimensions of the Sobol points.
 pub const DIMENSIONS: usize = 8;
 
-/// First columns of `M_1`, `M_2` and `M_3`, found by a search. Bit r of a column is its row r.
+/// First columns of the bit matrices `M_1`, `M_2` and `M_3`, which permute the indices of the Sobol
+/// points in dimensions 2 to 7. They were found by a search. Bit r of a column is its row r.
 const COLUMNS: [&[u32]; 3] = [
     &[1, 3, 4, 13, 22, 46, 65, 179, 390, 573, 1694, 2956, 5907],
     &[1, 2, 6, 15, 22, 33, 100, 158, 457, 810],
     &[1, 2, 7, 12, 22, 39, 88, 191, 277],
 ];
 
-/// Returns column `bit` of the matrix of pair `pair`.
+/// Returns column `bit` of the bit matrix `M_k` with k = `pair`, which permutes the indices of the
+/// Sobol points in dimensions 2k and 2k + 1. Bit r of the result is row r.
 const fn column(pair: usize, bit: usize) -> u32 {
     let diagonal = 1 << bit;
     if pair == 0 {
@@ -41,8 +43,8 @@ const fn column(pair: usize, bit: usize) -> u32 {
     diagonal | (hash_scalar((32 * (pair - 1) + bit) as u32) & (diagonal - 1))
 }
 
-/// Returns a direction number of the Sobol sequence in dimension 0 or 1. The first binary digit is
-/// in bit 0.
+/// Returns direction number `bit` of the Sobol sequence in dimension 0 or 1. The first binary digit
+/// is in bit 0.
 const fn direction(dimension: usize, bit: usize) -> u32 {
     let mut row = 1 << bit;
     if dimension == 1 {
@@ -57,7 +59,7 @@ const fn direction(dimension: usize, bit: usize) -> u32 {
     row
 }
 
-/// Returns all direction numbers of a dimension. The first binary digit is in bit 0.
+/// Returns all 32 direction numbers of a dimension, 0 to 7. The first binary digit is in bit 0.
 const fn directions(dimension: usize) -> [u32; 32] {
     let mut v = [0; 32];
     let mut bit = 0;
@@ -74,8 +76,8 @@ const fn directions(dimension: usize) -> [u32; 32] {
 
 type Tables = [[[u32; 256]; 4]; DIMENSIONS];
 
-/// Lookup tables: `TABLES[d][k][byte]` is the contribution (XOR) of byte k of the index to
-/// dimension d. The first binary digit is in bit 0.
+/// Lookup tables of Sobol points: `TABLES[d][k][byte]` is the contribution (XOR) of byte k of the
+/// index to dimension d. The first binary digit is in bit 0.
 static TABLES: Tables = {
     let mut tables = [[[0u32; 256]; 4]; DIMENSIONS];
     let mut d = 0;
@@ -96,8 +98,8 @@ static TABLES: Tables = {
     tables
 };
 
-/// Returns point `index` of the sequence in `dimension` (below [`DIMENSIONS`]). The first binary
-/// digit is in bit 0.
+/// Returns Sobol point `index` in `dimension` (below [`DIMENSIONS`]), as a binary fraction of 32
+/// digits. The first binary digit is in bit 0.
 #[inline(always)]
 pub fn point(dimension: usize, index: u32) -> u32 {
     let t = &TABLES[dimension];
@@ -118,9 +120,9 @@ mod tests {
         point(dimension, index).reverse_bits()
     }
 
-    /// Every pair is a (0, m, 2)-net for every m: each elementary interval of volume 2^-m holds
-    /// exactly one of the first 2^m points. The same is true for later aligned groups of 2^m
-    /// points.
+    /// Checks that each pair of dimensions is a (0, m, 2)-net for every m: each elementary interval
+    /// of volume 2^-m contains exactly one of the first 2^m points. The same is checked for later
+    /// runs of 2^m points that begin at a multiple of 2^m.
     #[test]
     fn elementary_intervals_hold_one_point_each() {
         for (pair, m) in (0..DIMENSIONS / 2).flat_map(|pair| (0..=12u32).map(move |m| (pair, m))) {
@@ -141,7 +143,8 @@ mod tests {
         }
     }
 
-    /// First points of the Sobol sequence, as published with the direction numbers.
+    /// Checks that the first points of the Sobol sequence are those that were published with its
+    /// direction numbers.
     #[test]
     fn first_points_are_the_published_ones() {
         let row = |i| [0, 1].map(|d| f64::from(digits(d, i)) / 4_294_967_296.0);
@@ -150,9 +153,11 @@ mod tests {
         (0..).zip(rows).for_each(|(i, published)| assert_eq!(row(i), published));
     }
 
-    /// Compares the error of estimated volumes of random half-spaces with that of independent
-    /// points. The error is measured in the plane of one pair (where the usual second pair of Sobol
-    /// dimensions has 0.30 and 0.23), and over the first four dimensions.
+    /// Checks that scrambled points estimate the volumes of random half-spaces better than
+    /// independent points. The limits are for the RMS error of scrambled points divided by that of
+    /// independent points. The half-spaces are those of the plane of dimensions 2 and 3 (named "the
+    /// lobe"), or those of the space of dimensions 0 to 3. In that plane the usual Sobol points
+    /// have the ratios 0.30 (64 points) and 0.23 (256 points).
     #[test]
     fn scrambled_points_estimate_half_spaces_better_than_random_points() {
         use crate::lanes::{SimdFloat, SimdU32};
@@ -206,13 +211,14 @@ mod tests {
         }
     }
 
-    /// Largest gain coefficient of two dimensions: the ratio of the variance of the first 2^m
-    /// scrambled points to that of independent points, for the worst integrand of both dimensions
-    /// (Owen 1997, *Monte Carlo Variance of Scrambled Net Quadrature*).
+    /// Returns the largest gain coefficient of the dimensions `a` and `b` (Owen 1997, *Monte Carlo
+    /// Variance of Scrambled Net Quadrature*): the variance of the first 2^m scrambled points
+    /// divided by that of independent points, for the worst integrand of both dimensions.
     ///
-    /// It is the maximum over the Haar components (j, k) of a mean over the pairs of points p, q.
-    /// Each term of the mean is a product over both dimensions of 2 [p and q are in the same cell
-    /// of 2^-(j+1)] - [in the same cell of 2^-j].
+    /// It is the maximum over all levels (j, k) of the mean over points p of the sum over points q
+    /// of psi_j psi_k. Here psi_j = 2 [the first j + 1 digits of p and q are equal] - [the first j
+    /// digits are equal] in dimension `a`, where [...] is 1 if true and 0 otherwise. psi_k is the
+    /// same in dimension `b`.
     fn gain(a: usize, b: usize, m: u32) -> f64 {
         let count = 1u32 << m;
         let alike = |d: usize| {
@@ -231,8 +237,8 @@ mod tests {
         levels.map(|(j, k)| component(j, k)).fold(0.0, f64::max)
     }
 
-    /// Checks the table in docs/accuracy.md. The worst pairs are among dimensions 4 to 7, which the
-    /// second lobe and the branch choices use.
+    /// Checks the table of the worst pairs of Sobol dimensions in docs/accuracy.md. They are among
+    /// dimensions 4 to 7, which the second lobe of a material and the branch choices use.
     #[test]
     fn worst_pairs_of_dimensions_are_the_documented_ones() {
         for (m, worst, first_lobes) in [
@@ -253,8 +259,8 @@ mod tests {
         assert!((0..4).all(|pair| gain(2 * pair, 2 * pair + 1, 6) <= 2.0));
     }
 
-    /// Checks that sixteen points at aligned indices are one point XOR sixteen constants.
-    /// [`Sampler::block`] relies on this.
+    /// Checks that the points of sixteen successive indices from a multiple of 16 on are the first
+    /// of them XOR sixteen constants. [`Sampler::block`] relies on this.
     #[test]
     fn aligned_points_are_one_point_and_constants() {
         for d in 0..DIMENSIONS {

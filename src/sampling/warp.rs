@@ -1,14 +1,13 @@
-//! Sample warps: maps from the unit square to directions. They sample lobes of reflected rays and
-//! microfacet normals; their densities are included.
+//! Sample warps: maps from the unit square to directions, with their densities. They sample
+//! reflected directions and microfacet normals.
 //!
-//! Directions are in the local frame of the lobe. The z axis is the mirror direction for cone and
-//! square lobes, and the surface normal for microfacets.
+//! Directions are in a local frame. Its z axis is the mirror direction for cone and square lobes,
+//! and the surface normal for microfacets.
 
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI, TAU};
 
-/// Maps the unit square to the unit disk with uniform density. Returns the point and its squared
-/// distance from the centre.
+/// Maps the unit square to the unit disk with uniform density. Returns `(x, y, x^2 + y^2)`.
 ///
 /// Concentric squares become concentric circles, so that neighbouring points stay neighbours. An
 /// integrand with an edge across the disk needs as many samples as one with an edge across the
@@ -26,8 +25,10 @@ pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
     (far * L::select(wide, c, s), far * L::select(wide, s, c), far * far)
 }
 
-/// Returns the coefficients of the power series in x^2 of the sine (`first` is 1) or cosine
-/// (`first` is 0) of x eighths of a full turn.
+/// Returns the coefficients `c` of a power series. The series is, with `first` as 1 and as 0:
+///
+/// - sin(pi x / 4) = x (`c[0]` + `c[1]` x^2 + `c[2]` x^4 + ...),
+/// - cos(pi x / 4) = `c[0]` + `c[1]` x^2 + `c[2]` x^4 + ...
 const fn series(first: u32) -> [f64; 8] {
     let mut terms = [0.0; 8];
     let (mut k, mut n, mut term) = (0, 0, 1.0);
@@ -42,8 +43,8 @@ const fn series(first: u32) -> [f64; 8] {
     terms
 }
 
-/// Sine and cosine of `x` eighths of a full turn, for x in [-1, 1]. The error of the eight terms of
-/// the series is 1e-15.
+/// Returns `(sin(pi x / 4), cos(pi x / 4))` for x in [-1, 1]. The series of eight terms has an
+/// error of 1e-15.
 #[inline(always)]
 fn sin_cos_eighth<L: SimdFloat>(x: L) -> (L, L) {
     const SINE: [f64; 8] = series(1);
@@ -52,7 +53,7 @@ fn sin_cos_eighth<L: SimdFloat>(x: L) -> (L, L) {
     (x * polynomial(&SINE, x2), polynomial(&COSINE, x2))
 }
 
-/// Polynomial `k[0] + k[1] x + k[2] x^2 + ...`.
+/// Returns the polynomial `k[0] + k[1] x + k[2] x^2 + ...`.
 #[inline(always)]
 fn polynomial<L: SimdFloat>(k: &[f64], x: L) -> L {
     k.iter().rev().fold(L::zero(), |sum, k| sum.mul_add(x, L::from_f64(*k)))
@@ -60,7 +61,8 @@ fn polynomial<L: SimdFloat>(k: &[f64], x: L) -> L {
 
 /// Samples a direction uniformly in the cone with half-angle theta around z.
 ///
-/// `one_minus_cos` is 1 - cos(theta), in [0, 2]. It is computed most exactly as 2 sin^2(theta / 2).
+/// `one_minus_cos` is 1 - cos(theta), in [0, 2]. For narrow cones, callers compute it as 2
+/// sin^2(theta / 2), which is more exact.
 #[inline(always)]
 pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     let (x, y, r2) = disk(u, v);
@@ -71,32 +73,33 @@ pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     Vec3::new(x * scale, y * scale, L::one() - drop)
 }
 
-/// Samples a direction in the hemisphere around z with the density cos / pi \[1/sr\] (Malley's
-/// method: a uniform point of the disk, lifted to the hemisphere).
+/// Samples a direction in the hemisphere around z with the density cos(theta) / pi \[1/sr\], where
+/// theta is the angle to z. Malley's method: a uniform point of the disk, lifted to the hemisphere.
 #[inline(always)]
 pub fn cosine_hemisphere<L: SimdFloat>(u: L, v: L) -> Vec3<L> {
     let (x, y, r2) = disk(u, v);
     Vec3::new(x, y, (L::one() - r2).max(L::zero()).sqrt())
 }
 
-/// Density of [`cone`] [1/sr] around the unit vector `axis`: constant inside of the cone, 0
-/// outside. The test compares the squared distance between the ends of both unit vectors with the
-/// limit: in narrow cones it has more digits than the cosine.
+/// Returns the density [1/sr] of [`cone`] around the unit vector `axis` at `direction`: constant
+/// inside of the cone, 0 outside. `direction` is inside if |direction - axis|^2 <= 2
+/// `one_minus_cos`. In narrow cones this comparison is more exact than one of cosines.
 #[inline(always)]
 pub fn cone_pdf<L: SimdFloat>(axis: Vec3<L>, direction: Vec3<L>, one_minus_cos: L) -> L {
     let drop = (direction - axis).length_squared() * L::from_f64(0.5);
     (L::one() / (one_minus_cos * L::from_f64(TAU))).masked(drop.le(one_minus_cos))
 }
 
-/// Samples the direction through a uniform point of a square. The square has the side `side`, is
-/// perpendicular to z at unit distance, and is centred on z.
+/// Samples the direction through a uniform point of a square with the side `side`. The square is
+/// perpendicular to z at unit distance, and centred on z.
 #[inline(always)]
 pub fn square<L: SimdFloat>(u: L, v: L, side: L) -> Vec3<L> {
     let half = L::from_f64(0.5);
     Vec3::new((u - half) * side, (v - half) * side, L::one()).normalize()
 }
 
-/// Density of [`square`] [1/sr]: 1 / (side^2 cos^3) inside of the square, 0 outside.
+/// Returns the density [1/sr] of [`square`] at `direction`: 1 / (side^2 cos^3(theta)) inside of the
+/// square, 0 outside. Here theta is the angle between `direction` and z.
 #[inline(always)]
 pub fn square_pdf<L: SimdFloat>(direction: Vec3<L>, side: L) -> L {
     let Vec3 { x, y, z } = direction;
@@ -104,8 +107,8 @@ pub fn square_pdf<L: SimdFloat>(direction: Vec3<L>, side: L) -> L {
     (L::one() / (side * side * z * z * z)).masked(inside)
 }
 
-/// Returns the azimuth of `view` as a unit vector (x, y), and the sine of its angle to z. The
-/// azimuth of a view along z is the x axis.
+/// Returns `(x, y, sine)`: the azimuth of the unit vector `view` as a unit vector (x, y), and the
+/// sine of the angle between `view` and z. The azimuth of a view along z is the x axis.
 #[inline(always)]
 fn azimuth<L: SimdFloat>(view: Vec3<L>) -> (L, L, L) {
     let sin = view.x.mul_add(view.x, view.y * view.y).sqrt();
@@ -115,14 +118,14 @@ fn azimuth<L: SimdFloat>(view: Vec3<L>) -> (L, L, L) {
 }
 
 /// Samples a microfacet normal h of the Beckmann distribution that is visible from `view` (unit
-/// vector with a positive z), with the density D_v(h) = G_1(view, h) D(h) view.h / view.z. G_1 is
+/// vector with a positive z). The density is D_v(h) = G_1(view, h) D(h) view.h / view.z. G_1 is
 /// that of V-cavities if `v_cavity` is `true`, otherwise Smith's.
 ///
-/// First, the slopes of any microfacet along x and y, in units of `alpha`, are sampled: independent
-/// normal deviates with the variance 1/2, one from each random number. Their component along the
-/// azimuth of the view is then replaced by the slope at the same quantile of the visible
-/// microfacets. At views near the normal the difference is small, so that reflections of edges
-/// along the mirror's axes depend almost entirely on one number.
+/// First, the slopes of any microfacet along x and y are sampled, in units of `alpha`. They are
+/// independent normal deviates with the variance 1/2, one computed from `u` and one from `v`. Then
+/// the component of the slope along the azimuth of the view is replaced by the slope that has the
+/// same quantile among the visible microfacets. At views near the normal this changes little, so
+/// that reflections of edges along the mirror's axes depend almost entirely on one random number.
 #[inline(always)]
 pub fn beckmann_visible<L: SimdFloat>(
     u: L,
@@ -171,10 +174,15 @@ fn scaled_erfc<L: SimdFloat>(x: L) -> L {
     polynomial(&K, at) / x.mul_add(L::from_f64(1.5), L::one())
 }
 
-/// Largest r for which [`small_r_shift`] is used.
+/// Largest value of r = alpha tan(theta) for which [`small_r_shift`] computes the slope of a
+/// visible microfacet. Here alpha is the roughness, and theta is the angle between view and surface
+/// normal.
 const SMALL_R: f64 = 0.25;
 
-/// Returns (t - x) / r of the slopes in [`visible_slope`], given r t and r^2, for r <= [`SMALL_R`].
+/// Returns (t - x) / r for a given slope t of microfacets and the slope x that has the same
+/// quantile among the visible microfacets as t has among all. Both are in units of alpha. `rt` is r
+/// times t, and `r2` is r^2. Here r = alpha tan(theta), at most [`SMALL_R`], and theta is the angle
+/// between view and surface normal. [`visible_slope`] computes x for larger r.
 ///
 /// The polynomial is a fit for the smallest error of the quantile, which is 3e-6. The masked
 /// microfacets, 1e-9 of all, are neglected.
@@ -187,21 +195,24 @@ fn small_r_shift<L: SimdFloat>(rt: L, r2: L) -> L {
     rt.mul_add(rt.mul_add(rt.mul_add(higher, square), linear), constant)
 }
 
-/// Returns the slope x, away from the view, of the visible microfacets at the quantile that `t` has
-/// among all microfacets. Slopes are in units of alpha; r = alpha tan(theta) in [[`SMALL_R`], 1e6],
-/// with the angle theta of the view; a smaller r counts as [`SMALL_R`]. The quantiles of x and t
-/// differ by 3e-5 at most.
+/// Returns the slope x that has the same quantile among the visible microfacets as `t` has among
+/// all microfacets. The quantiles of x and t differ by 3e-5 at most.
 ///
-/// All microfacets have the density exp(-t^2) / sqrt(pi). With Smith's masking the visible ones
-/// have a density in proportion to (1 - r x) exp(-x^2), for x < 1 / r (Heitz and d'Eon 2014,
-/// *Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible Normals*). With
-/// V-cavities it is 2 exp(-x^2) instead for x < -1 / r, where the other side of the groove is
-/// invisible.
+/// Slopes are along the view's azimuth, away from the view, in units of alpha. `r` is alpha
+/// tan(theta), where theta is the angle between view and surface normal. It is at most 1e6; values
+/// below [`SMALL_R`] count as [`SMALL_R`].
 ///
-/// The distribution function is erfc(-x) + r exp(-x^2) / sqrt(pi), up to constants. Newton's method
-/// is applied to its logarithm below the median. Above, where its derivative falls to 0 at x = 1 /
-/// r, it is applied to the square root of the complement. It starts at a value that is exact to
-/// first order in r. It takes two steps for r <= 2, else three.
+/// Among all microfacets, slopes have the density exp(-t^2) / sqrt(pi). Among the visible ones,
+/// with Smith's masking, the density is in proportion to (1 - r x) exp(-x^2), for x < 1 / r (Heitz
+/// and d'Eon 2014, *Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible
+/// Normals*). With V-cavities it is 2 exp(-x^2) instead for x < -1 / r, where the other side of the
+/// groove is invisible.
+///
+/// The distribution function of visible slopes is erfc(-x) + r exp(-x^2) / sqrt(pi), up to
+/// constants. Newton's method inverts it. Below the median, it is applied to the logarithm of the
+/// function. Above, it is applied to the square root of the complement, because the derivative of
+/// the function falls to 0 at x = 1 / r. It starts at a value that is exact to first order in r. It
+/// takes two steps for r <= 2, else three.
 #[inline(always)]
 fn visible_slope<L: SimdFloat>(t: L, r: L, v_cavity: bool) -> L {
     let (one, two) = (L::one(), L::from_f64(2.0));
@@ -262,8 +273,9 @@ fn visible_slope<L: SimdFloat>(t: L, r: L, v_cavity: bool) -> L {
     x
 }
 
-/// Inverse of the error function at 2 u - 1, for u in [0, 1). The relative error is at most 4e-7,
-/// in double precision 1.4e-7. At u = 0, where the inverse is infinite, the result is -4.7.
+/// Returns the inverse of the error function at 2 u - 1, for u in [0, 1). The relative error is at
+/// most 4e-7, in double precision 1.4e-7. At u = 0, where the inverse is infinite, the result is
+/// -4.7.
 ///
 /// The form is that of Giles 2010, *Approximating the erfinv Function*, GPU Computing Gems, chapter
 /// 10: (2 u - 1) times a function of `w = -ln(1 - (2 u - 1)^2)`. The polynomials were fitted for
@@ -306,8 +318,9 @@ fn erf_inverse<L: SimdFloat>(u: L) -> L {
     ratio * (u + u - L::one())
 }
 
-/// Samples a microfacet normal of the GGX distribution that is visible from `view` (unit vector, z
-/// >= 0), with the density D_v(h).
+/// Samples a microfacet normal h of the GGX distribution that is visible from `view`, a unit vector
+/// with z >= 0. The density is that of visible normals: G_1(view, h) D(h) view.h / view.z, with
+/// Smith's G_1.
 ///
 /// Dupuy and Benyoub 2023, *Sampling Visible GGX Normals with Spherical Caps*. The spherical cap is
 /// sampled by the map from the disk.
@@ -322,15 +335,16 @@ pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L>
     Vec3::new(h.x * alpha, h.y * alpha, h.z.max(L::zero())).normalize()
 }
 
-/// Samples a microfacet normal of the GGX distribution in V-cavities that is visible from `view`
-/// (unit vector with a positive z), with the density of [`beckmann_visible`].
+/// Samples a microfacet normal of the GGX distribution in V-cavities that is visible from `view`, a
+/// unit vector with a positive z. The density is that of [`beckmann_visible`], with the D of GGX.
 ///
-/// The microfacets with the slopes s / sqrt(1 - |s|^2), in units of alpha, are uniform in the unit
-/// disk of s. On the chord along the azimuth of the view, in units of its half length, the visible
-/// ones have the distribution function s + sqrt(1 - s^2) tan(theta) up to a constant, where both
-/// sides of the groove are visible, and twice that of all microfacets where one side is. theta is
-/// the angle of the stretched view. Both functions are inverted in closed form: with s = sin(a) the
-/// first one is sin(a + theta) / cos(theta).
+/// A point (s, s') of the unit disk stands for the microfacet with the slopes (s, s') / sqrt(1 -
+/// s^2 - s'^2), in units of alpha. All microfacets are uniform in the disk. Coordinate s is along
+/// the azimuth of the view and is scaled by half the chord of the disk at s'. Where both sides of
+/// the groove are visible, the visible microfacets have the distribution function s + sqrt(1 - s^2)
+/// tan(theta), up to a constant; theta is the angle between the stretched view and z. Where one
+/// side is visible, the function is twice that of all microfacets. Both functions are inverted in
+/// closed form: with s = sin(a) the first one is sin(a + theta) / cos(theta).
 #[inline(always)]
 pub fn ggx_visible_v_cavity<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
     let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();
@@ -357,7 +371,8 @@ pub fn ggx_visible_v_cavity<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -
 }
 
 /// Beckmann distribution D [1/sr] of microfacet normals: exp(-tan2 / alpha^2) / (pi alpha^2 cos^4).
-/// `tan2` is the squared tangent of the angle to the surface normal, and 1 / cos^2 = 1 + tan2.
+/// `tan2` is the squared tangent of the angle to the surface normal, with 1 / cos^2 = 1 + tan2.
+/// `inverse_alpha2` is 1 / alpha^2.
 #[inline(always)]
 pub fn beckmann_d<L: SimdFloat>(tan2: L, inverse_alpha2: L) -> L {
     let secant2 = tan2 + L::one();
@@ -379,8 +394,8 @@ mod tests {
     use super::*;
     use crate::lanes::{Double, Float, Single};
 
-    /// Complementary error function 1 - erf(x) for x >= 0, computed by its series or its continued
-    /// fraction.
+    /// Returns the complementary error function 1 - erf(x) for x >= 0, computed by its series or
+    /// its continued fraction.
     fn erfc(x: f64) -> f64 {
         let two_over_root_pi = 2.0 / PI.sqrt();
         if x < 2.0 {
@@ -396,8 +411,8 @@ mod tests {
         0.5 * two_over_root_pi * (-x * x).exp() / fraction
     }
 
-    /// Checks that the error function inverts `erf_inverse`, from the middle to the last number in
-    /// the tails.
+    /// Checks that `erf_inverse` inverts the error function at each of `numbers`, with a relative
+    /// error below `max_error`.
     fn check_erf_inverse<L: SimdFloat>(numbers: &[f64], max_error: f64) {
         for u in numbers {
             let x: f64 = erf_inverse(L::from_f64(*u)).lane(0).to_f64();
@@ -435,7 +450,8 @@ mod tests {
         assert!((-5.0..-4.5).contains(&inverse(0.0)), "{}", inverse(0.0));
     }
 
-    /// Checks that concentric squares become circles, and that the ratios of areas are preserved.
+    /// Checks that the concentric map turns squares around the centre into circles, and that areas
+    /// keep their ratios.
     fn check_disk<L: SimdFloat>(max_error: f64) {
         let point = |u: f64, v: f64| {
             let (x, y, r2) = disk(L::from_f64(u), L::from_f64(v));
@@ -464,7 +480,8 @@ mod tests {
         check_disk::<Double>(1e-14);
     }
 
-    /// Checks that the quantile of a slope among the visible microfacets is that of `t` among all.
+    /// Checks that the sampled slope has the same quantile among the visible microfacets as `t` has
+    /// among all microfacets.
     fn check_visible_slope<L: SimdFloat>(max_error: f64) {
         let full_erfc = |x: f64| if x < 0.0 { 2.0 - erfc(-x) } else { erfc(x) };
         let mut worst = 0f64;

@@ -14,8 +14,8 @@ pub struct AssetResolver {
     assets: Arc<Assets>,
 }
 
-/// All resolvers are equal: scenes with the same description are equal even if their files are in
-/// different folders.
+/// Equality of resolvers: all are equal, so that scenes with the same description are equal even if
+/// their files are in different folders.
 impl PartialEq for AssetResolver {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -31,7 +31,7 @@ impl AssetResolver {
         out
     }
 
-    /// Returns the cache, for use by other scenes.
+    /// Returns the cache of asset files, for use by other scenes.
     pub fn assets(&self) -> Arc<Assets> {
         self.assets.clone()
     }
@@ -41,17 +41,18 @@ impl AssetResolver {
         *self.folder.write().unwrap_or_else(PoisonError::into_inner) = folder_of(scene);
     }
 
-    /// Returns the mesh in the file `name`.
+    /// Returns the mesh in the file `name`. The cache reads the file if necessary.
     pub(super) fn mesh(&self, name: &str) -> Result<Arc<Mesh>, AssetError> {
         self.assets.mesh(&self.folder().join(name))
     }
 
-    /// Returns the image in the file `name`.
+    /// Returns the image in the file `name`. The cache reads the file if necessary.
     pub(super) fn image(&self, name: &str) -> Result<Arc<Image>, AssetError> {
         self.assets.image(&self.folder().join(name))
     }
 
-    /// Returns the image of radiance in the file `name`.
+    /// Returns the radiance map (for an environment light) in the file `name`. The cache reads the
+    /// file if necessary.
     pub(super) fn radiance_map(&self, name: &str) -> Result<Arc<RadianceMap>, AssetError> {
         self.assets.radiance_map(&self.folder().join(name))
     }

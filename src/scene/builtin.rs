@@ -16,7 +16,7 @@ pub fn built_in() -> Scene {
     Scene::parse(BUILT_IN, "mirror-room.toml").expect("the built-in scene is tested")
 }
 
-/// Returns the commented text of a small scene to start from.
+/// Returns the text of a small scene with comments, from which users start a scene of their own.
 pub fn starter() -> &'static str {
     include_str!("starter.toml")
 }

@@ -4,10 +4,10 @@ use crate::scene::format::source_map::LineCounter;
 use crate::value::sanitized;
 use std::fmt;
 
-/// One error or warning about a scene file.
+/// Error or warning about a scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// Name of the file as the user gave it.
+    /// Name of the scene file as the user gave it.
     pub file: String,
     /// Line and column, both counted from 1; the column counts characters. `None` if the diagnostic
     /// is about the whole file.
@@ -15,9 +15,9 @@ pub struct Diagnostic {
     /// Table that the diagnostic is about, such as `object "queen"`. Empty for the scene as a
     /// whole.
     pub subject: String,
-    /// Finding, as a phrase.
+    /// Phrase that states the error, such as `radius is -1`.
     pub found: String,
-    /// Remedy, in sentences; may be empty.
+    /// Expected value and remedy, in sentences; may be empty.
     pub help: String,
 }
 
@@ -45,29 +45,31 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// Largest number of errors of a file that are reported. Further ones are only counted.
+/// Largest number of errors of a scene file that are reported. Further ones are only counted.
 pub(crate) const MAX_REPORTED: usize = 100;
 
 /// Errors of one scene file: at least one, sorted by location.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SceneErrors {
     messages: Vec<Diagnostic>,
-    /// Number of errors that are not in `messages`.
+    /// Number of errors of the scene file that are not in `messages`.
     more: usize,
 }
 
-/// Collector of the first [`MAX_REPORTED`] diagnostics by their byte offset in the file.
+/// Collector of the diagnostics of a scene file. It stores the [`MAX_REPORTED`] diagnostics with
+/// the smallest byte offsets in the file, and only counts the others.
 #[derive(Default)]
 pub(super) struct FirstDiagnostics {
     found: Vec<(usize, Diagnostic)>,
     more: usize,
-    /// Offset above which no diagnostic is stored.
+    /// Byte offset above which further diagnostics are only counted; `None` as long as all are
+    /// stored.
     last: Option<usize>,
 }
 
 impl FirstDiagnostics {
-    /// Adds a diagnostic at the offset `at`, which `make` creates without line and column. `make`
-    /// is not called if there are enough diagnostics at smaller offsets.
+    /// Adds a diagnostic at the byte offset `at`, which `make` creates without line and column.
+    /// `make` is not called if there are enough diagnostics at smaller offsets.
     pub fn add(&mut self, at: usize, make: impl FnOnce() -> Diagnostic) {
         if self.skips(at) {
             return;
@@ -78,8 +80,8 @@ impl FirstDiagnostics {
         }
     }
 
-    /// Returns `true`, and counts a diagnostic at the offset `at`, if there are enough diagnostics
-    /// at smaller offsets. Returns `false` otherwise.
+    /// Returns `true` if the diagnostic at the byte offset `at` need not be created, because there
+    /// are enough diagnostics at smaller offsets. It is then only counted.
     pub fn skips(&mut self, at: usize) -> bool {
         let skips = self.last.is_some_and(|last| at > last);
         self.more += usize::from(skips);
@@ -100,13 +102,13 @@ impl FirstDiagnostics {
         }
     }
 
-    /// Returns `true` if nothing was added.
+    /// Returns `true` if no diagnostic about the scene file was added.
     pub fn is_empty(&self) -> bool {
         self.found.is_empty()
     }
 
-    /// Returns the diagnostics with lines and columns in `text`, sorted by location, and the number
-    /// of those that were not stored.
+    /// Returns `(diagnostics, number)`: the stored diagnostics with lines and columns in `text`,
+    /// sorted by location, and the number of those that were not stored.
     pub fn located(mut self, text: &str) -> (Vec<Diagnostic>, usize) {
         self.keep_first();
         let mut lines = LineCounter::new(text);
@@ -122,20 +124,16 @@ impl FirstDiagnostics {
 const MAX_SHOWN: usize = 20;
 
 impl SceneErrors {
-    /// Creates the errors from `messages`, at least one, sorted by location. Removes messages that
-    /// equal the previous one. `more` is the number of errors that `messages` leaves out.
+    /// Creates the errors of a scene file. `messages` are at least one, sorted by location;
+    /// repetitions of the previous message are removed. `more` is the number of errors that are not
+    /// in `messages`.
     pub(super) fn new((mut messages, more): (Vec<Diagnostic>, usize)) -> Self {
         debug_assert!(!messages.is_empty(), "errors without a message");
         messages.dedup();
         Self { messages, more }
     }
 
-    /// Creates an error about the file as a whole.
-    pub(super) fn of_file(file: &str, found: String, help: &str) -> Self {
-        Self::at(file, None, found, help)
-    }
-
-    /// Creates an error about one location in the file.
+    /// Creates the errors of a scene file that has one error, at the given location.
     pub(super) fn at(
         file: &str,
         line_column: Option<(usize, usize)>,
@@ -154,7 +152,7 @@ impl SceneErrors {
         &self.messages
     }
 
-    /// Returns the number of errors that [`SceneErrors::messages`] does not have.
+    /// Returns the number of errors of the scene file beyond those of [`SceneErrors::messages`].
     pub fn more(&self) -> usize {
         self.more
     }

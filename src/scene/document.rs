@@ -13,19 +13,22 @@ use std::path::Path;
 use std::sync::Arc;
 use toml_edit::DocumentMut;
 
-/// The text of a scene file and the scene that it describes. Edits of the scene change only the
-/// values that differ. Comments, order and layout of the rest of the text are kept.
+/// Text of a scene file and the scene that it describes. Edits of the scene change only the values
+/// that differ. Comments, order and layout of the rest of the text are kept.
 #[derive(Clone, Debug)]
 pub struct Document {
     name: String,
-    /// Text and scene as read. [`Document::apply`] changes a copy of this text each time, so that
-    /// an undone removal restores comments.
+    /// Text and scene as read: the origin of each change. [`Document::apply`] always changes a copy
+    /// of this text, not the result of the previous change. Undoing a removal therefore restores
+    /// its comments.
     origin: (Arc<String>, Arc<Scene>),
-    /// Former keys and values in the text as read: names from earlier versions of the program.
+    /// Former words in the text as read: keys and values under names from earlier versions of the
+    /// scene format.
     former_words: Vec<FormerWord>,
-    /// Warnings about the text as read.
+    /// Warnings about the text of the scene file as read.
     warnings: Vec<Diagnostic>,
-    /// The warning in `warnings` about names from earlier versions.
+    /// Warning that the file uses names of keys or values from earlier versions of the program. It
+    /// is also one of the `warnings`. `None` if the file uses none of them.
     migration_warning: Option<Diagnostic>,
     text: Arc<String>,
     scene: Arc<Scene>,
@@ -116,13 +119,13 @@ impl Document {
         self.scene = Arc::new(scene.clone());
     }
 
-    /// Returns the document with another name for diagnostics.
+    /// Returns the document with the file name `name` in diagnostics.
     pub(super) fn renamed(mut self, name: &str) -> Self {
         self.name = name.to_string();
         self
     }
 
-    /// Returns the name that diagnostics use.
+    /// Returns the file name that diagnostics use.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -138,7 +141,7 @@ impl Document {
         Arc::unwrap_or_clone(self.scene)
     }
 
-    /// Returns the text.
+    /// Returns the text of the scene file.
     pub fn text(&self) -> &str {
         &self.text
     }

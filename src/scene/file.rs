@@ -1,7 +1,7 @@
 //! Scene files on disk: opening, atomic saving, detection of changes by other programs.
 
 use crate::asset::Assets;
-use crate::disk::{Existing, Replacement, WriteError, open_regular};
+use crate::disk::{Existing, WriteError, open_regular, replace_file};
 use crate::scene::{Document, Scene, SceneErrors};
 use crate::value::{fnv1a64, sanitized};
 use std::fmt;
@@ -9,7 +9,7 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A scene document and the path of its file.
+/// Scene as last read or saved, with its text and the path of its file.
 #[derive(Clone, Debug)]
 pub struct SceneFile {
     path: Option<PathBuf>,
@@ -18,31 +18,31 @@ pub struct SceneFile {
     fingerprint: u64,
 }
 
-/// State of the file relative to the bytes that this program last read or wrote.
+/// State of a scene file on disk relative to the bytes that this program last read or wrote.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DiskState {
-    /// The file has the same bytes, or the scene has no file yet.
+    /// State: the file has the same bytes, or the scene has no file yet.
     Unchanged,
-    /// Another program has written the file, or the file is no longer a readable regular file.
+    /// State: another program has written the file, or it is no longer a readable regular file.
     Changed,
-    /// The file has been deleted or moved.
+    /// State: the scene file has been deleted or moved.
     Missing,
 }
 
 /// Reason why a scene was not saved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SaveError {
-    /// The scene has no file yet.
+    /// Error: the scene has no file yet, and no path was given.
     Untitled,
-    /// Another program has written the file since it was read.
+    /// Error: another program has written the file since it was read. The value is its path.
     Changed(PathBuf),
-    /// The file exists, and overwriting was not requested.
+    /// Error: a file with this path exists, and overwriting was not requested.
     Exists(PathBuf),
-    /// The file cannot be written.
+    /// The scene file cannot be written.
     Failed {
-        /// The file.
+        /// Path of the scene file.
         path: PathBuf,
-        /// Cause, as a clause.
+        /// Cause of the failure, as a clause for the error message.
         what: String,
     },
 }
@@ -96,11 +96,11 @@ impl SceneFile {
         Ok(Self { path: None, document: Document::parse(text, name)?, fingerprint: 0 })
     }
 
-    /// Creates a scene from `text`, the recovered edits of the file at `path`. The file has other
-    /// content now; saving replaces it.
+    /// Creates a scene from `text`, the unsaved edits in a recovery file. `path` is the scene file
+    /// that was edited. It has other content now; saving replaces that.
     ///
     /// # Errors
-    /// The errors of [`Scene::parse`].
+    /// Returns the errors of [`Scene::parse`].
     pub fn recovered(path: &Path, text: String) -> Result<Self, SceneErrors> {
         let document = Document::parse(text, &path.display().to_string())?;
         let fingerprint = content(path).ok().flatten().unwrap_or_default();
@@ -138,17 +138,17 @@ impl SceneFile {
         document.text().to_string()
     }
 
-    /// Returns the path of the file; `None` if the scene has no file.
+    /// Returns the path of the scene file; `None` if the scene has no file.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()
     }
 
-    /// Returns the document as last read or saved.
+    /// Returns the scene and its text, as last read or saved.
     pub fn document(&self) -> &Document {
         &self.document
     }
 
-    /// Reads the file and compares it with the bytes that this program last read or wrote.
+    /// Reads the scene file and compares it with the bytes that this program last read or wrote.
     pub fn on_disk(&self) -> DiskState {
         self.path.as_deref().map_or(DiskState::Unchanged, |path| self.state_of(&content(path)))
     }
@@ -161,11 +161,12 @@ impl SceneFile {
         }
     }
 
-    /// Reads the file again.
+    /// Reads the scene file again.
     ///
     /// # Errors
-    /// The errors of [`Scene::read`]; the document then stays unchanged. The fingerprint is updated
-    /// even then, so that a broken file is reported only once.
+    /// Returns the errors of [`Scene::read`]; the document then stays unchanged. The fingerprint
+    /// (hash of the file's bytes) is updated even then, so that a broken file is reported only
+    /// once.
     pub fn reload(&mut self) -> Result<(), SceneErrors> {
         let Some(path) = self.path.clone() else { return Ok(()) };
         if let Ok(Some(found)) = content(&path) {
@@ -239,7 +240,7 @@ impl SceneFile {
     }
 }
 
-/// Returns the fingerprint of the file's content; `None` if there is no file.
+/// Returns the fingerprint (hash) of the content of the file at `path`; `None` if there is no file.
 ///
 /// # Errors
 /// Returns [`ErrorKind::InvalidInput`] if the path leads to something other than a regular file.
@@ -255,14 +256,11 @@ fn content(path: &Path) -> io::Result<Option<u64>> {
     }
 }
 
-/// Replaces the content of `path` by `text` atomically and durably.
+/// Replaces the content of the file at `path` by `text` atomically and durably. If `overwrite` is
+/// `false`, fails if the file exists.
 fn replace(path: &Path, text: &str, overwrite: bool) -> Result<(), SaveError> {
     let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
-    let written = Replacement::begin(path, existing).and_then(|mut replacement| {
-        let written = replacement.temporary().write_all(text.as_bytes());
-        written.map_err(|error| replacement.explain(&error))?;
-        replacement.commit()
-    });
+    let written = replace_file(path, existing, |file| file.write_all(text.as_bytes()));
     written.map_err(|WriteError { kind, what, remedy, .. }| match kind {
         ErrorKind::AlreadyExists => SaveError::Exists(path.to_path_buf()),
         _ => SaveError::Failed {

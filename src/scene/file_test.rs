@@ -1,10 +1,11 @@
-//! Saving and reloading on a real file system.
+//! Tests of saving and reloading scene files, on a real file system.
 
 use crate::scene::{BUILT_IN, DiskState, SaveError, Scene, SceneFile};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Writes the built-in scene to a file and opens it.
+/// Writes the built-in scene to a file in `directory` and opens it. Returns the path of the file
+/// and the opened file.
 fn opened(directory: &Path) -> (PathBuf, SceneFile) {
     let path = directory.join("scene.toml");
     fs::write(&path, BUILT_IN).unwrap();
@@ -12,7 +13,7 @@ fn opened(directory: &Path) -> (PathBuf, SceneFile) {
     (path, file)
 }
 
-/// Returns the scene of `file` with another `max_depth`.
+/// Returns the scene of `file`, edited: its `max_depth` is `depth`.
 fn edited(file: &SceneFile, depth: u32) -> Scene {
     let mut scene = file.document().scene().clone();
     scene.trace.max_depth = depth;
@@ -128,7 +129,8 @@ fn saving_keeps_links_and_permissions() {
     assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o640);
 }
 
-/// Checks that a pipe is refused. Opening a pipe without another end would block.
+/// Checks that a named pipe at the path of a scene file is refused. Opening a pipe without another
+/// end would block.
 #[test]
 fn pipe_in_place_of_the_file_is_refused_without_blocking() {
     use rustix::fs::{CWD, FileType, Mode, mknodat};

@@ -9,19 +9,21 @@ use std::sync::Arc;
 
 /// Largest estimated memory of all scenes in the history [bytes].
 const MAX_BYTES: usize = 64 << 20;
-/// Largest number of steps that can be undone.
+/// Largest number of edits that can be undone.
 const MAX_STEPS: usize = 10_000;
 
-/// Undo history of an editor. Each step has a label; the steps of one gesture (a drag, a held key)
-/// are coalesced.
-#[derive(Clone, Debug)]
+/// Undo history of an editor. Each step has a label. The steps of one gesture (a drag, a held key)
+/// are merged into one.
+#[derive(Clone, Debug, Default)]
 pub struct History {
-    /// Scenes before each step that can be undone, the oldest first.
+    /// Scenes to which undo returns, the oldest first: one for each step, as it was before the
+    /// step.
     past: VecDeque<HistoryEntry>,
     now: Arc<Scene>,
-    /// Scenes after each step that can be redone; the step to redo next is the last entry.
+    /// Scenes to which redo returns: one for each undone step, as it was after the step. The step
+    /// to redo next is the last entry.
     future: Vec<HistoryEntry>,
-    /// `true` while a gesture lasts, so that its next step is coalesced with its previous one.
+    /// `true` during a gesture (a drag, a held key): its next step is merged with its previous one.
     open: bool,
     saved: Arc<Scene>,
 }
@@ -41,20 +43,21 @@ impl HistoryEntry {
 }
 
 impl History {
-    /// Creates a history without steps; `scene` is the saved one.
+    /// Creates an undo history without steps. `scene` is the current and the saved scene.
     pub fn new(scene: Arc<Scene>) -> Self {
         let saved = Arc::clone(&scene);
         Self { past: VecDeque::new(), now: scene, future: Vec::new(), open: false, saved }
     }
 
-    /// Returns the current scene.
+    /// Returns the scene after the edits that are not undone.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.now
     }
 
-    /// Makes `scene` the current scene. `held` is `true` for a step of a gesture, which is
-    /// coalesced with the previous step if that belongs to the same gesture and has the same label.
-    /// Returns `false`, and records nothing, if the scene has not changed.
+    /// Makes `scene` the current scene, by a step with the label `label`. `held` is `true` if the
+    /// step belongs to a gesture (a drag, a held key). It is then merged with the previous step, if
+    /// that belongs to the same gesture and has the same label. Returns `false`, and records
+    /// nothing, if the scene has not changed.
     pub fn record(&mut self, scene: Arc<Scene>, label: &str, held: bool) -> bool {
         if *scene == *self.now {
             return false;
@@ -76,12 +79,12 @@ impl History {
         true
     }
 
-    /// Ends a gesture: the next step is not coalesced with it.
+    /// Ends a gesture (a drag, a held key): the next step is not merged with its steps.
     pub fn end_gesture(&mut self) {
         self.open = false;
     }
 
-    /// Undoes the last step and returns its label; `None` if no step can be undone.
+    /// Undoes the last step of the history and returns its label; `None` if no step can be undone.
     pub fn undo(&mut self) -> Option<String> {
         self.open = false;
         let HistoryEntry { scene, label, .. } = self.past.pop_back()?;
@@ -105,18 +108,17 @@ impl History {
         self.open = false;
     }
 
-    /// Returns `true` if the current scene equals the saved one, independent of the steps between
-    /// them.
+    /// Returns `true` if the current scene equals the saved one, even if steps lie between them.
     pub fn is_saved(&self) -> bool {
         Arc::ptr_eq(&self.saved, &self.now) || *self.saved == *self.now
     }
 
-    /// Drops all steps and makes `scene` the current and the saved scene.
+    /// Drops all steps of the undo history and makes `scene` the current and the saved scene.
     pub fn restart(&mut self, scene: Arc<Scene>) {
         *self = Self::new(scene);
     }
 
-    /// Drops the oldest steps until the history is within its memory limit.
+    /// Drops the oldest steps until the undo history is within its memory limit.
     fn forget(&mut self) {
         let mut total: usize = self.past.iter().map(|entry| entry.bytes).sum();
         while self.past.len() > 1 && (total > MAX_BYTES || self.past.len() > MAX_STEPS) {
@@ -125,7 +127,7 @@ impl History {
     }
 }
 
-/// Returns the estimated memory of a scene [bytes].
+/// Returns the estimated memory of a scene in bytes.
 fn bytes(scene: &Scene) -> usize {
     let objects: usize = scene
         .objects

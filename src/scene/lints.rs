@@ -6,9 +6,9 @@ use crate::scene::validate::Problem;
 use crate::value::{Color, number};
 
 impl Scene {
-    /// Returns one warning for each kind of doubtful value. The warning states the first such value
-    /// and the number of others. [`Document::warnings`](crate::scene::Document::warnings) adds
-    /// file, line and column.
+    /// Returns one warning for each kind of doubtful value in the scene. The warning states the
+    /// first such value and the number of others.
+    /// [`Document::warnings`](crate::scene::Document::warnings) adds file, line and column.
     pub fn warnings(&self) -> Vec<Problem> {
         let materials = |lint: &dyn Fn(&Material) -> Option<(&'static str, String)>| {
             let mut cases = self.materials.iter().filter_map(|(n, m)| Some((n, lint(m)?)));
@@ -94,9 +94,11 @@ impl Scene {
     }
 }
 
-/// Finds a material that may reflect more light than it receives: the sum of its diffuse, highlight
-/// and reflection parts exceeds 1. A Cook-Torrance highlight is the reflection of a light, so that
-/// only the larger of highlight and reflection is included.
+/// Returns an error if a material may reflect more light than it receives: if the weights of its
+/// diffuse, highlight, reflection and transmission parts may add up to more than 1. Otherwise
+/// returns `None`. The error is `(key, phrase)`: the key that it refers to, and a statement of the
+/// sum. A Cook-Torrance highlight is the reflection of a light, so that only the larger weight of
+/// highlight and reflection is added.
 fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     let mirrored = match m.highlight {
         Highlight::Phong => m.specular + m.reflection,

@@ -1,8 +1,8 @@
-//! The scene: the user's description, validated, in double precision, editable.
+//! Scene as the user describes it: editable, in double precision, with validation.
 //!
 //! [`Document`] parses and validates a file once; every edit ([`edit::Edit`]) is validated once,
-//! too. The fields of [`Scene`] are public and may be set to invalid values in between, so that a
-//! render session validates the scene that it is given.
+//! too. The fields of [`Scene`] are public and may be set to invalid values in between. A render
+//! session therefore validates the scene that it is given.
 
 mod asset_resolver;
 mod builtin;
@@ -16,7 +16,6 @@ mod history;
 mod lints;
 mod object;
 mod recovery;
-mod reference;
 mod settings;
 mod validate;
 
@@ -29,12 +28,10 @@ pub use diagnostic::{Diagnostic, SceneErrors};
 pub use document::Document;
 pub use file::{DiskState, SaveError, SceneFile};
 pub use history::History;
-pub use object::{OBJECT_FIELDS, Object};
+pub use object::Object;
 pub use recovery::{Orphan, Recovery, RecoveryFile, kept_in, remove_stale, state_folder};
-pub use reference::reference;
 pub use settings::{
-    AMBIENT_FIELDS, Ambient, BACKGROUND_FIELDS, Background, BelowHorizon, FILM_FIELDS,
-    FilmSettings, Filter, IntegratorSettings, RayTypes, TRACE_FIELDS,
+    Ambient, Background, BelowHorizon, FilmSettings, Filter, IntegratorSettings, RayTypes,
 };
 pub use validate::Problem;
 
@@ -44,31 +41,31 @@ use crate::material::Material;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A whole scene, valid or not: see [`Scene::faults`].
+/// Description of a whole scene, valid or not: see [`Scene::faults`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Default)]
 #[serde(default, deny_unknown_fields)]
 pub struct Scene {
-    /// Film settings.
+    /// Film settings: size, pixel filter, sample limit.
     pub film: FilmSettings,
-    /// Integrator settings.
+    /// Integrator settings: kinds of rays, limits of paths, acceleration structure.
     pub trace: IntegratorSettings,
-    /// The current camera.
+    /// Current camera of the scene.
     pub camera: Camera,
-    /// Stored cameras by name.
+    /// Stored cameras, by name.
     pub cameras: BTreeMap<String, Camera>,
     /// Radiance of rays that hit no surface.
     pub background: Background,
-    /// Ambient light.
+    /// Ambient light: uniform, without shadows.
     pub ambient: Ambient,
-    /// Lights.
+    /// Lights of the scene, in the order of the file.
     #[serde(rename = "light")]
     pub lights: Vec<Light>,
-    /// Materials by name.
+    /// Materials of the scene, by name.
     pub materials: BTreeMap<String, Material>,
-    /// Objects.
+    /// Objects of the scene, in the order of the file.
     #[serde(rename = "object")]
     pub objects: Vec<Object>,
-    /// Resolver of the files that the scene names.
+    /// Loader of the files (meshes, images) to which the scene refers.
     #[serde(skip)]
     pub resolver: AssetResolver,
 }

@@ -1,30 +1,27 @@
-//! Objects: a shape with a transform and a material.
+//! Objects of a scene: a shape with a transform and a material.
 
 use crate::primitive::Form;
 use crate::shape::{Shape, TransformOp, compose, ill_conditioned};
-use crate::value::{Description, Field, ValidationError, description};
+use crate::value::{Description, ValidationError, description};
 use glam::DAffine3;
 
 description! {
     /// An object: a shape with a transform and a material.
     pub struct Object {
-        /// Name; no two objects have the same.
+        /// Name of the object; no two objects have the same.
         name: String, or "a number";
-        /// Name of one of the `[materials.NAME]`.
+        /// Name of the object's material, one of the `[materials.NAME]`.
         material: String, or "a matt light grey, the default of every material key";
         /// Shape of the object: exactly one kind.
         shape: Shape;
-        /// Steps that move, rotate and scale it, in order.
+        /// Steps that move, rotate and scale the object, in order.
         transform: Vec<TransformOp>, or "it stays as its shape says";
     }
 }
 
-/// Keys of `[[object]]`.
-pub const OBJECT_FIELDS: &[Field] = Object::FIELDS;
-
 impl Object {
-    /// Returns the material name of each part of the compiled form. An object that is no compound
-    /// has one part.
+    /// Returns the material name of each part of the object, in the order of the parts of
+    /// [`Object::form`]. An object that is no compound has one part.
     pub fn materials(&self) -> Vec<&str> {
         self.shape.part_materials(&self.material)
     }
@@ -43,12 +40,14 @@ impl Object {
         }
     }
 
-    /// Returns the transform as one affine map.
+    /// Returns the object's transform as one affine map.
     pub fn scene_from_object(&self) -> DAffine3 {
         compose(&self.transform)
     }
 
-    /// Returns the geometry in the scene's space, in double precision. The object must be valid.
+    /// Returns the object's canonical form: its geometry as one of the kinds of primitives that
+    /// rays intersect. The form is in the scene's space and in double precision. The object must be
+    /// valid.
     pub fn form(&self) -> Form {
         match self.transform.is_empty() {
             true => self.shape.form(),

@@ -20,25 +20,28 @@ use tempfile::NamedTempFile;
 /// Largest number of recovery files of one scene in one folder, from crashed or concurrent
 /// sessions.
 const MAX_FILES: u32 = 9;
-/// Beginning of the first line of a recovery file. The fingerprint of the scene file follows.
+/// Beginning of the first line of a recovery file. The fingerprint (hash) of the scene file
+/// follows.
 const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
-/// Word in place of the fingerprint if the scene has no file.
+/// Word in the first line of a recovery file in place of the fingerprint, if the scene has no file.
 const NO_FILE: &str = "none";
-/// Age after which an unlocked temporary file is removed.
+/// Age after which an unlocked temporary file of a killed process is removed.
 const STALE_AFTER: Duration = Duration::from_secs(60);
 
 /// Writer and finder of the recovery files of one scene.
 #[derive(Debug)]
 pub struct Recovery {
-    /// Folder of the scene file, and name of the recovery file in it; `None` for a scene without a
-    /// file.
+    /// Folder of the scene file, and name of the recovery file in this folder. `None` for a scene
+    /// without a file.
     beside: Option<(PathBuf, OsString)>,
-    /// State folder, and name of the recovery file in it. It is used if `beside` is not possible.
+    /// Program's folder in the user's state folder, and name of the recovery file in it. It is used
+    /// if the recovery file cannot be written `beside` the scene file. `None` if the user has no
+    /// state folder.
     state: Option<(PathBuf, OsString)>,
     saved: Option<Saved>,
 }
 
-/// A recovery file and the handle that holds its lock.
+/// Recovery file that this process has written, and the handle that holds its lock.
 #[derive(Debug)]
 struct Saved {
     path: PathBuf,
@@ -48,11 +51,12 @@ struct Saved {
 /// Result of the search for recovery files of a scene.
 #[derive(Debug, Default)]
 pub struct RecoveryFile {
-    /// Orphaned edits, the newest first.
+    /// Unsaved edits of processes that were killed, in recovery files; the newest first.
     pub orphans: Vec<Orphan>,
-    /// Recovery files that cannot be read, each with the reason. These files stay on disk.
+    /// Recovery files that cannot be read, each as `(path, reason)`. These files stay on disk.
     pub unreadable: Vec<(PathBuf, String)>,
-    /// Recovery files of other users, each with the user's name or number. They are not read.
+    /// Recovery files of other users, each as `(path, name or number of the user)`. They are not
+    /// read.
     pub foreign: Vec<(PathBuf, String)>,
     /// `true` if another running process has unsaved edits of the scene.
     pub elsewhere: bool,
@@ -65,16 +69,18 @@ pub struct Orphan {
     kept: Saved,
     /// Text that saving would have written to the scene file.
     pub text: String,
-    /// Fingerprint of the edited file (see [`crate::scene::SceneFile::fingerprint`]); `None` if
-    /// there was no file or the fingerprint cannot be read.
+    /// Fingerprint of the scene file that was edited (see
+    /// [`crate::scene::SceneFile::fingerprint`]); `None` if there was no file or the fingerprint
+    /// cannot be read.
     pub base: Option<u64>,
-    /// Time of writing.
+    /// Time at which the recovery file was written.
     pub written: SystemTime,
 }
 
-/// Returns the user's state folder (XDG Base Directory Specification); `None` if the environment
-/// does not define it. `variable` returns the value of an environment variable. The folder is for
-/// the recovery files of scenes without a file, or in a folder that is not writable.
+/// Returns the program's folder for recovery files in the user's state folder (XDG Base Directory
+/// Specification). It is used for scenes without a file, or in a folder that is not writable.
+/// `variable` returns the value of an environment variable. Returns `None` if the environment does
+/// not define the folder.
 pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathBuf> {
     let absolute = |name| variable(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let folder = absolute("XDG_STATE_HOME");
@@ -83,8 +89,8 @@ pub fn state_folder(variable: impl Fn(&str) -> Option<OsString>) -> Option<PathB
 }
 
 impl Recovery {
-    /// Creates the recovery of the scene in the file at `path`, or of a scene without a file and
-    /// with the name `name`. `state` is the folder from [`state_folder`].
+    /// Creates the writer and finder of the recovery files for a scene. The scene is in the file at
+    /// `path`, or has no file and the name `name`. `state` is the folder from [`state_folder`].
     pub fn new(path: Option<&Path>, name: &str, state: Option<&Path>) -> Self {
         let mut beside = None;
         let stem = match path {
@@ -107,12 +113,14 @@ impl Recovery {
         Self { beside, state, saved: None }
     }
 
-    /// Returns the candidate folders and file names, in order of preference.
+    /// Returns the places where the recovery file may be written, each as `(folder, file name)`,
+    /// the preferred one first: beside the scene file, then in the state folder.
     fn candidates(&self) -> impl Iterator<Item = &(PathBuf, OsString)> {
         self.beside.iter().chain(&self.state)
     }
 
-    /// Returns a recovery of the same scene that uses only the state folder.
+    /// Returns a writer and finder of recovery files for the same scene that uses only the state
+    /// folder.
     pub fn elsewhere(&self) -> Self {
         Self { beside: None, state: self.state.clone(), saved: None }
     }
@@ -126,7 +134,8 @@ impl Recovery {
     /// fingerprint of the scene file that saving would replace.
     ///
     /// # Errors
-    /// Fails if no candidate folder is writable; the previous recovery file then stays.
+    ///
+    /// Fails if none of the possible folders is writable; the previous recovery file then stays.
     pub fn keep(&mut self, text: &str, base: Option<u64>) -> io::Result<()> {
         let base = base.map_or(NO_FILE.to_string(), |base| format!("{base:016x}"));
         let text = format!("{HEAD}{base}.\n{text}");
@@ -135,19 +144,13 @@ impl Recovery {
             saved.file = locked_temporary(folder, &text)?.persist(&saved.path)?;
             return Ok(());
         }
-        let mut saved = None;
-        let mut failed = io::Error::new(ErrorKind::NotFound, "no folder to keep them in");
+        self.saved = None;
+        let mut kept = Err(io::Error::new(ErrorKind::NotFound, "no folder to keep them in"));
         for (folder, name) in self.candidates() {
-            match create_numbered(folder, name, &text) {
-                Ok(kept) => {
-                    saved = Some(kept);
-                    break;
-                }
-                Err(error) => failed = error,
-            }
+            kept = kept.or_else(|_| create_numbered(folder, name, &text));
         }
-        self.saved = saved;
-        if self.saved.is_some() { Ok(()) } else { Err(failed) }
+        self.saved = Some(kept?);
+        Ok(())
     }
 
     /// Removes the recovery file. Callers use this when no edits are unsaved.
@@ -157,8 +160,8 @@ impl Recovery {
         }
     }
 
-    /// Finds the orphaned edits of the scene. Empty files are removed. Files of other users are not
-    /// read, because they are not this user's work.
+    /// Finds the unsaved edits of the scene that killed processes have left. Empty files are
+    /// removed. Files of other users are not read, because they are not this user's work.
     pub fn find(&self) -> RecoveryFile {
         let mut found = RecoveryFile::default();
         for (folder, name) in self.candidates() {
@@ -181,7 +184,7 @@ impl Recovery {
         found
     }
 
-    /// Takes over the recovery file of `lost`: this session writes to it from now on.
+    /// Takes over the recovery file of `lost`: this process writes to it from now on.
     pub fn adopt(&mut self, lost: Orphan) {
         self.forget();
         self.saved = Some(lost.kept);
@@ -189,12 +192,12 @@ impl Recovery {
 }
 
 impl Orphan {
-    /// Returns the path of the file.
+    /// Returns the path of the recovery file.
     pub fn path(&self) -> &Path {
         &self.kept.path
     }
 
-    /// Removes the file.
+    /// Removes the recovery file of these unsaved edits.
     pub fn discard(self) {
         self.kept.remove();
     }
@@ -208,7 +211,7 @@ impl Saved {
         self.file.metadata().is_ok_and(|saved| named.is_ok_and(|named| is_same(&saved, &named)))
     }
 
-    /// Removes the file, then releases its lock.
+    /// Removes the recovery file, then releases its lock.
     fn remove(self) {
         if self.has_its_name() {
             // A file that cannot be removed is found, and reported, at the next start.
@@ -240,7 +243,8 @@ fn locked_temporary(folder: &Path, text: &str) -> io::Result<NamedTempFile> {
     Ok(file)
 }
 
-/// Writes `text` to a new file under the first free name.
+/// Writes `text` to a new recovery file in `folder` and returns the file, which is locked. Its name
+/// is the first free one of `name`, `name-2`, `name-3` and so on.
 fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved> {
     let mut folders = DirBuilder::new();
     folders.recursive(true);
@@ -263,22 +267,22 @@ fn create_numbered(folder: &Path, name: &OsStr, text: &str) -> io::Result<Saved>
     ))
 }
 
-/// Opens the file at `path` for reading and writing, because some file systems lock only files that
-/// are open for writing.
+/// Opens the recovery file at `path` for reading and writing, because some file systems lock only
+/// files that are open for writing.
 fn open(path: &Path) -> io::Result<File> {
     open_regular_with(File::options().read(true).write(true), path)
 }
 
-/// Result of opening a recovery file.
+/// Result of opening a recovery file for reading: its edits, or a reason why there are none.
 enum Found {
-    /// There is no such file.
+    /// No recovery file exists at the path.
     Nothing,
-    /// The file belongs to the user with this number.
+    /// The recovery file belongs to the user with this number.
     OfUser(u32),
     Orphan(Orphan),
 }
 
-/// Reads the orphaned edits in the file at `path`.
+/// Reads the unsaved edits in the recovery file at `path`.
 ///
 /// # Errors
 /// [`ErrorKind::WouldBlock`] if a running process holds the lock; any other error if the file

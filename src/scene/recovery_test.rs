@@ -1,5 +1,5 @@
-//! Recovery files on a real file system. Two instances in one process behave as two processes do,
-//! since a lock belongs to an open file.
+//! Tests of recovery files on a real file system. Two instances in one process behave as two
+//! processes do, since a lock belongs to an open file.
 
 use crate::scene::{Recovery, RecoveryFile, remove_stale, state_folder};
 use std::ffi::OsString;
@@ -221,7 +221,8 @@ fn only_old_unlocked_temporary_files_are_removed() {
     remove_stale(&folder.path().join("nowhere"));
 }
 
-/// Only the superuser can give a file to another user.
+/// Checks that a recovery file of another user is not offered. Only the superuser can create one;
+/// for other users the test ends before that.
 #[test]
 fn recovery_file_of_another_user_is_not_offered() {
     use std::os::unix::fs::chown;

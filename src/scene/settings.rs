@@ -1,8 +1,7 @@
 //! Settings of the whole picture: film, integrator, background, ambient light.
 
 use crate::primitive::Acceleration;
-use crate::value::{Color, Description, Field, FieldValue, ValidationError, ValueType};
-use crate::value::{choices, description};
+use crate::value::{Color, choices, description};
 
 description! {
     /// Film settings: size, pixel filter, sample limit of glossy pixels.
@@ -11,7 +10,7 @@ description! {
         size: [u32; 2] = [640, 480], in closed(1.0, 16384.0) "pixels";
         /// Distribution of samples over a pixel.
         filter: Filter = "box";
-        /// Largest number of samples per pixel spent on glossy pictures; 0 is no cap.
+        /// Largest number of samples of a pixel that shows glossy reflections; 0 is no cap.
         rays_per_pixel: u32 = 0, in closed(0.0, 1e9) "samples";
     }
 }
@@ -19,9 +18,9 @@ description! {
 choices! {
     /// Distribution of samples over a pixel.
     pub enum Filter {
-        /// uniform over the pixel's square
+        /// samples uniform over the pixel's square
         Box = "box",
-        /// all at the pixel's centre: no anti-aliasing
+        /// all samples at the pixel's centre: no anti-aliasing
         Point = "point",
     }
 }
@@ -40,7 +39,7 @@ description! {
         /// Mirrors reflect and glass transmits after a diffuse bounce, too; false leaves this light
         /// out.
         caustics: bool = true;
-        /// Paths whose throughput is smaller end.
+        /// Smallest throughput of a path; a path with less ends.
         min_throughput: f64 = 0.0, in SHARE;
         /// Treatment of sampled reflections below the surface's horizon.
         below_horizon: BelowHorizon = "fold";
@@ -65,9 +64,9 @@ choices! {
 choices! {
     /// Treatment of sampled reflections below the surface's horizon.
     pub enum BelowHorizon {
-        /// mirrored at the surface: no light is lost
+        /// directions below the horizon are mirrored at the surface: no light is lost
         Fold = "fold",
-        /// dropped: its light is lost
+        /// directions below the horizon are dropped: their light is lost
         Absorb = "absorb",
     }
 }
@@ -83,58 +82,7 @@ description! {
 description! {
     /// Ambient light: uniform, without shadows.
     pub struct Ambient: Default {
-        /// Ambient light from all directions, without shadows: i_a of k_a i_a.
+        /// Ambient light i_a from all directions, without shadows. Materials multiply it by k_a.
         color: Color = [0.0, 0.0, 0.0], in LIGHT "radiance";
-    }
-}
-
-impl FieldValue for Acceleration {
-    type Written = &'static str;
-    const TYPE: ValueType = ValueType::Choice(Self::CHOICES);
-
-    fn from_written(written: &'static str) -> Self {
-        let named = |choice: &Self| choice.name() == written;
-        Self::ALL.into_iter().find(named).unwrap_or_default()
-    }
-
-    fn errors(&self, _: &Field) -> Vec<ValidationError> {
-        Vec::new()
-    }
-}
-
-/// Keys of `[film]`.
-pub const FILM_FIELDS: &[Field] = FilmSettings::FIELDS;
-/// Keys of `[trace]`.
-pub const TRACE_FIELDS: &[Field] = IntegratorSettings::FIELDS;
-/// Keys of `[background]`.
-pub const BACKGROUND_FIELDS: &[Field] = Background::FIELDS;
-/// Keys of `[ambient]`.
-pub const AMBIENT_FIELDS: &[Field] = Ambient::FIELDS;
-
-impl FilmSettings {
-    /// Returns the validation errors of the film settings.
-    pub fn faults(&self) -> Vec<ValidationError> {
-        self.validator().errors()
-    }
-}
-
-impl IntegratorSettings {
-    /// Returns the validation errors of the integrator settings.
-    pub fn faults(&self) -> Vec<ValidationError> {
-        self.validator().errors()
-    }
-}
-
-impl Background {
-    /// Returns the validation errors of the background settings.
-    pub fn faults(&self) -> Vec<ValidationError> {
-        self.validator().errors()
-    }
-}
-
-impl Ambient {
-    /// Returns the validation errors of the ambient light settings.
-    pub fn faults(&self) -> Vec<ValidationError> {
-        self.validator().errors()
     }
 }

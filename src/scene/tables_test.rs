@@ -1,9 +1,9 @@
-//! Field tables compared with what serde reads and writes.
+//! Comparison of the tables of documented keys with the keys that serde reads and writes.
 
 use crate::material::{Bump, Checker, HeightImage, ImageTexture, Texture};
 use crate::scene::*;
 use crate::shape::{CsgOperand, EXAMPLES, KINDS, MAX_DEPTH, Shape};
-use crate::value::{DefaultValue, Field, ValueType};
+use crate::value::{DefaultValue, Description, Field, ValueType};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -26,7 +26,8 @@ fn same_keys<T: DeserializeOwned>(what: &str, fields: &[Field]) {
 }
 
 /// Checks that the documented defaults of `fields` are those that serde uses for missing keys.
-/// `needed` is a table with only the required keys.
+/// `needed` is a TOML table with only the required keys. `what` is the name of the table in
+/// messages.
 fn same_defaults<T: DeserializeOwned + Serialize>(what: &str, fields: &[Field], needed: &str) {
     let read: T = toml::from_str(needed).unwrap_or_else(|e| panic!("{what}: {e}"));
     let written = toml::Table::try_from(&read).unwrap();
@@ -61,7 +62,8 @@ fn inner(fields: &[Field], name: &str) -> &'static [Field] {
     }
 }
 
-/// Returns the keys of a kind of texture or bump.
+/// Returns the documented keys of one kind of texture or bump map of a material. `key` is `texture`
+/// or `bump`; `kind` is its kind, such as `image`.
 fn texture(key: &str, kind: &str) -> &'static [Field] {
     inner(inner(crate::material::FIELDS, key), kind)
 }
@@ -69,10 +71,10 @@ fn texture(key: &str, kind: &str) -> &'static [Field] {
 #[test]
 fn field_tables_match_deserialised_keys() {
     same_keys::<Scene>("scene", FIELDS);
-    same_keys::<FilmSettings>("film", FILM_FIELDS);
-    same_keys::<IntegratorSettings>("trace", TRACE_FIELDS);
-    same_keys::<Background>("background", BACKGROUND_FIELDS);
-    same_keys::<Ambient>("ambient", AMBIENT_FIELDS);
+    same_keys::<FilmSettings>("film", FilmSettings::FIELDS);
+    same_keys::<IntegratorSettings>("trace", IntegratorSettings::FIELDS);
+    same_keys::<Background>("background", Background::FIELDS);
+    same_keys::<Ambient>("ambient", Ambient::FIELDS);
     same_keys::<Camera>("camera", crate::camera::FIELDS);
     same_keys::<crate::camera::ViewAngle>("view_angle", inner(crate::camera::FIELDS, "view_angle"));
     same_keys::<crate::camera::Aperture>("aperture", inner(crate::camera::FIELDS, "aperture"));
@@ -100,7 +102,7 @@ fn field_tables_match_deserialised_keys() {
     same_keys::<ImageTexture>("texture.image", texture("texture", "image"));
     same_keys::<Checker>("texture.checker", texture("texture", "checker"));
     same_keys::<HeightImage>("bump.image", texture("bump", "image"));
-    same_keys::<Object>("object", OBJECT_FIELDS);
+    same_keys::<Object>("object", Object::FIELDS);
     same_keys::<Shape>("shape", KINDS);
     same_keys::<CsgOperand>("part", inner(inner(KINDS, "union"), "of"));
     same_keys::<TransformOp>("step", TRANSFORM_OP_FIELDS);
@@ -109,10 +111,10 @@ fn field_tables_match_deserialised_keys() {
 
 #[test]
 fn field_tables_match_defaults() {
-    same_defaults::<FilmSettings>("film", FILM_FIELDS, "");
-    same_defaults::<IntegratorSettings>("trace", TRACE_FIELDS, "");
-    same_defaults::<Background>("background", BACKGROUND_FIELDS, "");
-    same_defaults::<Ambient>("ambient", AMBIENT_FIELDS, "");
+    same_defaults::<FilmSettings>("film", FilmSettings::FIELDS, "");
+    same_defaults::<IntegratorSettings>("trace", IntegratorSettings::FIELDS, "");
+    same_defaults::<Background>("background", Background::FIELDS, "");
+    same_defaults::<Ambient>("ambient", Ambient::FIELDS, "");
     same_defaults::<Camera>("camera", crate::camera::FIELDS, "");
     same_defaults::<Light>("light", crate::light::FIELDS, "");
     same_defaults::<crate::light::Environment>(
@@ -124,7 +126,7 @@ fn field_tables_match_defaults() {
     same_defaults::<ImageTexture>("texture.image", texture("texture", "image"), "");
     same_defaults::<Checker>("texture.checker", texture("texture", "checker"), "");
     same_defaults::<HeightImage>("bump.image", texture("bump", "image"), "");
-    same_defaults::<Object>("object", OBJECT_FIELDS, EXAMPLES[0].1);
+    same_defaults::<Object>("object", Object::FIELDS, EXAMPLES[0].1);
     same_defaults::<Rotate>(
         "rotate",
         inner(TRANSFORM_OP_FIELDS, "rotate"),
@@ -151,8 +153,8 @@ fn every_documented_choice_is_read() {
             }
         }
     }
-    words::<FilmSettings>(FILM_FIELDS);
-    words::<IntegratorSettings>(TRACE_FIELDS);
+    words::<FilmSettings>(FilmSettings::FIELDS);
+    words::<IntegratorSettings>(IntegratorSettings::FIELDS);
     words::<Light>(crate::light::FIELDS);
     words::<Material>(crate::material::FIELDS);
     words::<ImageTexture>(texture("texture", "image"));
@@ -160,7 +162,7 @@ fn every_documented_choice_is_read() {
     words::<HeightImage>(texture("bump", "image"));
 }
 
-/// Returns the example of a shape as a table of its own keys.
+/// Returns the documented example of a shape as a table with only the keys of the shape.
 fn example(kind: &Field, text: &str) -> toml::Table {
     let table: toml::Table = text.parse().unwrap();
     table["shape"][kind.name].as_table().unwrap().clone()
@@ -251,7 +253,8 @@ fn every_shape_number_is_range_checked() {
     }
 }
 
-/// Returns the validation errors of a union of a ball and `part`, as key and message.
+/// Returns the validation errors of a union of a ball and the part with the TOML text `part`. Each
+/// error is a pair `(key, message)`.
 fn faults_of(part: &str) -> Vec<(String, String)> {
     let ball = "{ shape.sphere = { center = [0, 0, 0], radius = 1 } }";
     let shape: Shape = toml::from_str(&format!("union.of = [{ball}, {part}]")).unwrap();

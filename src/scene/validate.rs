@@ -4,20 +4,21 @@ use crate::material::Mapping;
 use crate::scene::Scene;
 use crate::scene::diagnostic::MAX_REPORTED;
 use crate::scene::format::suggest::nearest;
-use crate::value::{ValidationError, truncated};
+use crate::value::{Description, ValidationError, truncated};
 use std::collections::HashMap;
 use std::fmt;
 
-/// An error or a warning about a scene, without file and line.
+/// Problem of a scene (error or warning), without file and line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Path to the value: keys and list indices (from 0), such as `object`, `3`, `shape`, `sphere`.
+    /// Path to the value in question: keys and list indices (from 0), such as `object`, `3`,
+    /// `shape`, `sphere`.
     pub path: Vec<String>,
     /// Table that the problem is about, such as `object "queen"`. Empty for the scene as a whole.
     pub subject: String,
-    /// Finding, as a phrase.
+    /// Phrase that states the problem, such as `radius is -1`.
     pub found: String,
-    /// Remedy, in sentences.
+    /// Expected value and remedy, in sentences.
     pub help: String,
 }
 
@@ -32,7 +33,7 @@ impl fmt::Display for Problem {
 }
 
 /// Returns the name that diagnostics use for the table at `path`: `object "queen"`, `light 2`.
-/// `name` returns the name of a list entry, if it has one.
+/// `name` returns the name of the entry at an index in a list; `None` if there is no such entry.
 pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<String>) -> String {
     match path {
         [list, index, ..] if list == "object" || list == "light" => {
@@ -53,12 +54,12 @@ pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<Stri
 struct Problems<'a> {
     scene: &'a Scene,
     found: Vec<Problem>,
-    /// Number of further problems.
+    /// Number of further problems of the scene, which are only counted.
     more: usize,
 }
 
 impl Problems<'_> {
-    /// Adds the errors of the table at `path`.
+    /// Adds the validation errors `errors` of the scene's table at `path`.
     fn add(&mut self, path: &[&str], errors: Vec<ValidationError>) {
         for error in errors {
             if self.is_full() {
@@ -71,20 +72,21 @@ impl Problems<'_> {
         }
     }
 
-    /// Adds the errors of an entry of a list.
+    /// Adds the validation errors of the entry at `index` in the scene's list `list`.
     fn add_entry(&mut self, list: &str, index: usize, errors: Vec<ValidationError>) {
         if !errors.is_empty() {
             self.add(&[list, &index.to_string()], errors);
         }
     }
 
-    /// Returns `true`, and counts a problem, if there are enough. Returns `false` otherwise.
+    /// Returns `true` if no further problem can be stored. The caller then drops one problem, which
+    /// is counted here.
     fn is_full(&mut self) -> bool {
         self.is_full_with(0)
     }
 
-    /// Returns `true`, and counts a problem, if there are enough together with `others`, the number
-    /// of problems that are not added yet. Returns `false` otherwise.
+    /// Returns `true` if no problem can be stored in addition to the stored ones and `others` more.
+    /// The caller then drops one problem, which is counted here.
     fn is_full_with(&mut self, others: usize) -> bool {
         let is_full = self.found.len() + others >= MAX_REPORTED;
         self.more += usize::from(is_full);
@@ -97,7 +99,7 @@ fn keys(parts: &[&str]) -> Vec<String> {
 }
 
 impl Scene {
-    /// Returns the name that diagnostics use for the table at `path`.
+    /// Returns the name that diagnostics use for the table at `path`: `object "queen"`, `light 2`.
     pub(super) fn subject(&self, path: &[String]) -> String {
         subject(path, |list, index| match list {
             "object" => self.objects.get(index).map(|o| o.name.clone()),
@@ -131,17 +133,18 @@ impl Scene {
         self.check().0
     }
 
-    /// Returns the first 100 validation errors of the scene, and the number of further ones.
+    /// Returns `(errors, number)`: the first 100 validation errors of the scene, and the number of
+    /// further ones.
     pub(super) fn check(&self) -> (Vec<Problem>, usize) {
         let mut problems = Problems { scene: self, found: Vec::new(), more: 0 };
-        problems.add(&["film"], self.film.faults());
-        problems.add(&["trace"], self.trace.faults());
+        problems.add(&["film"], self.film.validator().errors());
+        problems.add(&["trace"], self.trace.validator().errors());
         problems.add(&["camera"], self.camera.faults());
         for (name, view) in &self.cameras {
             problems.add(&["cameras", name], view.faults());
         }
-        problems.add(&["background"], self.background.faults());
-        problems.add(&["ambient"], self.ambient.faults());
+        problems.add(&["background"], self.background.validator().errors());
+        problems.add(&["ambient"], self.ambient.validator().errors());
         for (i, light) in self.lights.iter().enumerate() {
             problems.add_entry("light", i, light.faults());
         }
@@ -160,8 +163,8 @@ impl Scene {
         (problems.found, problems.more)
     }
 
-    /// Adds a problem for each material whose textures need coordinates, on objects whose shape
-    /// does not have them. The shapes must be valid.
+    /// Adds a problem for each object whose material needs texture coordinates (for a texture or a
+    /// bump map) that the shape does not have. The shapes must be valid.
     fn missing_coordinates(&self, problems: &mut Problems) {
         let uv_key = |name: &str| {
             let material = self.materials.get(name)?;

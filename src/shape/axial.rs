@@ -3,7 +3,7 @@
 
 use crate::primitive::Form;
 use crate::shape::texture_space::around_axis;
-use crate::value::{ValidationError, unit};
+use crate::value::{ValidationError, Validator, unit};
 use glam::{DAffine3, DMat3, DVec3};
 
 /// Returns a conical frustum around the axis from `base` to `top`, which are different points. The
@@ -27,35 +27,33 @@ pub(super) fn frustum_between(
     Form::conical_frustum(DAffine3::from_mat3_translation(linear, start), narrow / wide)
 }
 
-/// Returns texture axes whose y axis points from `base` to `top`.
+/// Returns texture axes whose y axis points from `base` to `top`, as the columns of a rotation
+/// matrix.
 pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
     let axis = DVec3::from_array(top) - DVec3::from_array(base);
     around_axis(unit(axis).unwrap_or(DVec3::Y))
 }
 
-/// Returns an error for the key `name`, which gives one end of the axis, if the axis has length 0.
-pub(super) fn degenerate_axis(
-    base: [f64; 3],
-    top: [f64; 3],
-    name: &str,
-) -> Option<ValidationError> {
-    (base == top).then(|| {
-        ValidationError::new(
-            name,
-            format!("{name} is the same point as base"),
-            "a point away from base",
-        )
-    })
+/// Returns the errors of `checks`, and those of a solid around the axis from `base` to `top`: an
+/// axis of length 0, and coordinates that are too large relative to `sizes` or the length of the
+/// axis. `sizes` are pairs `(key, value)`. `name` is the key of `top` in scene files.
+pub(super) fn axis_faults(
+    checks: Validator,
+    [base, top]: [[f64; 3]; 2],
+    name: &'static str,
+    mut sizes: Vec<(&'static str, f64)>,
+) -> Vec<ValidationError> {
+    let no_axis = (base == top).then(|| {
+        let found = format!("{name} is the same point as base");
+        ValidationError::new(name, found, "a point away from base")
+    });
+    sizes.push((name, DVec3::from_array(base).distance(DVec3::from_array(top))));
+    checks.and(no_axis).ratio(&sizes, &[base, top].concat()).errors()
 }
 
-/// Returns `true` if the axis is vertical.
+/// Returns `true` if the axis from `base` to `top` is vertical.
 pub(super) fn is_upright(base: [f64; 3], top: [f64; 3]) -> bool {
     base[0] == top[0] && base[2] == top[2]
-}
-
-/// Returns the length of the axis.
-pub(super) fn height(base: [f64; 3], top: [f64; 3]) -> f64 {
-    DVec3::from_array(base).distance(DVec3::from_array(top))
 }
 
 #[cfg(test)]

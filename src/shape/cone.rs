@@ -2,7 +2,7 @@
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::axial::{axes_between, degenerate_axis, frustum_between, height, is_upright};
+use crate::shape::axial::{axes_between, axis_faults, frustum_between, is_upright};
 use crate::value::{Description, ValidationError, description};
 use glam::{DMat3, DVec3};
 
@@ -11,7 +11,7 @@ description! {
     pub struct Cone {
         /// Centre of the base.
         base: [f64; 3], in COORDINATE "scene units";
-        /// The apex.
+        /// Apex of the cone.
         apex: [f64; 3], in COORDINATE "scene units";
         /// Radius of the base.
         radius: f64, in SIZE "scene units";
@@ -27,11 +27,8 @@ impl ShapeDesc for Cone {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        let sizes = [("radius", self.radius), ("apex", height(self.base, self.apex))];
-        self.validator()
-            .and(degenerate_axis(self.base, self.apex, "apex"))
-            .ratio(&sizes, &[self.base, self.apex].concat())
-            .errors()
+        let sizes = vec![("radius", self.radius)];
+        axis_faults(self.validator(), [self.base, self.apex], "apex", sizes)
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

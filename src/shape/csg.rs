@@ -15,11 +15,11 @@ use serde::{Deserialize, Serialize};
 /// Largest depth of compounds nested in compounds.
 pub const MAX_DEPTH: usize = 64;
 
-/// One part of a compound.
+/// Part of a compound: a solid with its own material and transform.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CsgOperand {
-    /// Shape of the part: a solid, or a plane, which means the half-space behind the plane.
+    /// Solid of the part. A plane stands for the half-space behind it.
     pub shape: Shape,
     /// Name of one of the scene's materials; empty for the material of the whole compound.
     #[serde(default, skip_serializing_if = "String::is_empty")]
@@ -54,7 +54,7 @@ static PART_FIELDS: [Field; 3] = [
     ),
 ];
 
-/// Keys of a union, an intersection or a difference.
+/// Keys of a compound (a union, an intersection or a difference): its list of parts.
 pub(super) static OF_FIELDS: [Field; 1] = [Field::required(
     "of",
     ValueType::Tables(&PART_FIELDS),
@@ -68,7 +68,7 @@ macro_rules! compounds {
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields)]
         pub struct $kind {
-            /// The parts.
+            /// Parts of the compound, two or more.
             pub of: Vec<CsgOperand>,
         }
 
@@ -105,13 +105,6 @@ macro_rules! compounds {
                 Self { of: fitted_to(base, size).map(CsgOperand::new).into() }
             }
 
-            fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
-                Vec::new()
-            }
-
-            fn rotate_y(&mut self, _: f64) -> bool {
-                false
-            }
         }
     )+};
 }
@@ -138,8 +131,9 @@ compounds! {
 ]";
 }
 
-/// Returns the example parts of a new compound: a block on `base` of nine tenths of `size`, and a
-/// ball that protrudes from the block at its upper right near corner.
+/// Returns the example parts of a new compound. The first is a block that stands on `base` and is
+/// nine tenths of `size`. The second is a ball that protrudes from the block at its upper right
+/// near corner.
 fn fitted_to(base: DVec3, size: DVec3) -> [Shape; 2] {
     let block = Cuboid::fitted_to(base, size * 0.9);
     let radius = 0.4 * size.min_element();
@@ -149,7 +143,7 @@ fn fitted_to(base: DVec3, size: DVec3) -> [Shape; 2] {
 }
 
 impl CsgOperand {
-    /// Creates a part without a transform, with the material of the whole.
+    /// Creates a part of a compound without a transform, with the material of the whole.
     pub fn new(shape: Shape) -> Self {
         Self { shape, material: String::new(), transform: Vec::new() }
     }
@@ -165,7 +159,7 @@ pub(super) fn parts_of(shape: &Shape) -> Option<&[CsgOperand]> {
     }
 }
 
-/// Returns the parts of a compound for changes; empty if the shape is no compound.
+/// Returns the mutable parts of a compound; empty if the shape is no compound.
 fn parts_of_mut(shape: &mut Shape) -> &mut [CsgOperand] {
     match shape {
         Shape::Union(Union { of })
@@ -175,7 +169,8 @@ fn parts_of_mut(shape: &mut Shape) -> &mut [CsgOperand] {
     }
 }
 
-/// Compiles the parts of a compound to one solid. `join` combines the CSG trees of the parts.
+/// Combines the parts of a compound to one solid. `join` creates the CSG tree of the compound from
+/// those of its parts.
 fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     let mut parts = Vec::new();
     let mut trees = Vec::new();
@@ -205,8 +200,8 @@ fn unfit_reason(shape: &Shape) -> Option<&'static str> {
     }
 }
 
-/// Returns the validation errors of `of`, the parts of a compound. `depth` is the nesting depth of
-/// the compound.
+/// Returns the validation errors of `of`, the parts of a compound. `depth` is its nesting depth: 1
+/// for a compound that is no part of another one.
 fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     let mut faults = Vec::new();
     if of.len() < 2 {
@@ -246,14 +241,14 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     faults
 }
 
-/// A reference to a material from inside a compound: its dotted key, relative to the shape, and the
-/// name of the material.
+/// Reference to a material from a part of a compound: `(key, material)`. The key is the dotted key
+/// in scene files, relative to the shape; the material is given by its name.
 pub type Named<'a> = (String, &'a str);
 
 impl Shape {
-    /// Returns the material name of each part of the shape's form, in the order of
-    /// [`CsgSolid::parts`]. A part without a material has that of the innermost enclosing part with
-    /// one, or `whole` if there is none. A shape that is no compound has one part.
+    /// Returns the material name of each solid of which the shape consists, in the order of
+    /// [`CsgSolid::parts`]. A solid without a material has that of the innermost enclosing compound
+    /// with one, or `whole` if there is none. A shape that is no compound is one solid.
     pub fn part_materials<'a>(&'a self, whole: &'a str) -> Vec<&'a str> {
         match parts_of(self) {
             None => vec![whole],
@@ -267,7 +262,8 @@ impl Shape {
         }
     }
 
-    /// Returns the material names of all parts; the name of a part without a material is empty.
+    /// Returns the mutable material names of all parts; the name of a part without a material is
+    /// empty.
     pub fn part_names_mut(&mut self) -> Vec<&mut String> {
         let mut names = Vec::new();
         for part in parts_of_mut(self) {
@@ -277,7 +273,8 @@ impl Shape {
         names
     }
 
-    /// Returns the references to materials in the parts of the shape; empty if it is no compound.
+    /// Returns the references to materials in all nested parts of a compound, except for parts
+    /// without a material of their own. Empty if the shape is no compound.
     pub fn named_materials(&self) -> Vec<Named<'_>> {
         let mut named = Vec::new();
         for (i, part) in parts_of(self).into_iter().flatten().enumerate() {

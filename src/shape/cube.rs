@@ -1,12 +1,10 @@
-//! Upright cube.
+//! Shape `cube`: an upright cube that can be rotated about the vertical.
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::prismoid::{corner_of_centered, prismoid};
-use crate::shape::registry::turned_rotation;
-use crate::shape::texture_space::turned_axes;
+use crate::shape::prismoid::{by_corner_and_rotation, corner_of_centered, prismoid};
 use crate::value::{Description, ValidationError, description};
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 description! {
     /// A cube that stands upright.
@@ -39,21 +37,11 @@ impl ShapeDesc for Cube {
         Self { corner, edge, rotation: 0.0 }
     }
 
-    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
-        vec![&mut self.corner]
-    }
-
-    fn rotate_y(&mut self, degrees: f64) -> bool {
-        self.rotation = turned_rotation(self.rotation, degrees);
-        true
-    }
-
-    fn texture_axes(&self) -> DMat3 {
-        turned_axes(self.rotation)
-    }
+    by_corner_and_rotation!();
 }
 
-/// Returns a square base with its lower left near corner at the origin.
+/// Returns the corners of a square, as (x, z) offsets from its lower left near corner (near is +z).
+/// `side` is the length of a side.
 pub(super) fn square(side: f64) -> [DVec2; 4] {
     [(0.0, 0.0), (side, 0.0), (side, -side), (0.0, -side)].map(DVec2::from)
 }

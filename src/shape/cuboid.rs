@@ -13,9 +13,9 @@ use glam::{DVec2, DVec3};
 description! {
     /// A box with sides parallel to the axes; an object's `transform` can rotate it.
     pub struct Cuboid {
-        /// Centre of the solid.
+        /// Centre of the box.
         center: [f64; 3], in COORDINATE "scene units";
-        /// Lengths along x, y and z.
+        /// Lengths of the box along x, y and z.
         size: [f64; 3], in SIZE "scene units";
     }
 }
@@ -41,9 +41,5 @@ impl ShapeDesc for Cuboid {
 
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.center]
-    }
-
-    fn rotate_y(&mut self, _: f64) -> bool {
-        false
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::axial::{axes_between, degenerate_axis, frustum_between, height, is_upright};
+use crate::shape::axial::{axes_between, axis_faults, frustum_between, is_upright};
 use crate::value::{Description, ValidationError, description};
 use glam::{DMat3, DVec3};
 
@@ -13,7 +13,7 @@ description! {
         base: [f64; 3], in COORDINATE "scene units";
         /// Centre of the other end.
         top: [f64; 3], in COORDINATE "scene units";
-        /// Radius.
+        /// Radius of the cylinder.
         radius: f64, in SIZE "scene units";
     }
 }
@@ -27,11 +27,8 @@ impl ShapeDesc for Cylinder {
     }
 
     fn faults(&self) -> Vec<ValidationError> {
-        let sizes = [("radius", self.radius), ("top", height(self.base, self.top))];
-        self.validator()
-            .and(degenerate_axis(self.base, self.top, "top"))
-            .ratio(&sizes, &[self.base, self.top].concat())
-            .errors()
+        let sizes = vec![("radius", self.radius)];
+        axis_faults(self.validator(), [self.base, self.top], "top", sizes)
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

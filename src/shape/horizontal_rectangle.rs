@@ -9,9 +9,9 @@ use glam::{DMat3, DVec3};
 description! {
     /// A horizontal rectangle that faces up, such as the ground.
     pub struct HorizontalRectangle {
-        /// Centre.
+        /// Centre of the rectangle.
         center: [f64; 3], in COORDINATE "scene units";
-        /// Lengths along x and z.
+        /// Lengths of the rectangle along x and z.
         size: [f64; 2], in SIZE "scene units";
     }
 }
@@ -33,17 +33,13 @@ impl ShapeDesc for HorizontalRectangle {
         self.validator().ratio(&self.size.map(|s| ("size", s)), &self.center).errors()
     }
 
-    /// Creates the rectangle that is the top of the given box.
+    /// Creates the rectangle that is the upper side of a box; see [`ShapeDesc::fitted_to`].
     fn fitted_to(base: DVec3, size: DVec3) -> Self {
         Self { center: [base.x, base.y + size.y, base.z], size: [size.x, size.z] }
     }
 
     fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
         vec![&mut self.center]
-    }
-
-    fn rotate_y(&mut self, _: f64) -> bool {
-        false
     }
 
     fn texture_axes(&self) -> DMat3 {

@@ -22,11 +22,12 @@ description! {
 }
 
 choices! {
-    /// Shading normals of a mesh.
+    /// Kind of the shading normals of a mesh.
     pub enum Normals {
-        /// interpolated between the vertices: the file's, else the mean of the triangles around
+        /// normals of the vertices, interpolated: those of the file, else the means of the adjacent
+        /// triangles
         Smooth = "smooth",
-        /// each triangle's own
+        /// normal of each triangle, without interpolation
         Flat = "flat",
     }
 }
@@ -110,24 +111,16 @@ impl ShapeDesc for MeshDesc {
         }
     }
 
-    /// Creates a mesh without a file: the placeholder at the origin. The box is ignored, because
-    /// only a transform moves a mesh.
+    /// Creates a mesh without a file: the placeholder at the origin. The box to fill is ignored,
+    /// because only a transform moves a mesh.
     fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self::default()
-    }
-
-    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
-        Vec::new()
-    }
-
-    fn rotate_y(&mut self, _: f64) -> bool {
-        false
     }
 }
 
 impl Shape {
-    /// Calls `load` with the file that the shape names and stores the result. Does nothing if a
-    /// result is stored already, or the shape names no file.
+    /// Calls `load` with the mesh file that the shape names and stores the result. Does nothing if
+    /// a result is stored already, or the shape names no file.
     pub fn resolve(&mut self, load: impl Fn(&str) -> Result<Arc<Mesh>, AssetError>) {
         if let Self::MeshDesc(mesh) = self
             && !mesh.file.is_empty()
@@ -137,7 +130,7 @@ impl Shape {
         }
     }
 
-    /// Copies the loaded file from `other`, if both shapes name the same file.
+    /// Copies the loaded mesh from `other`, if both shapes name the same file.
     pub fn resolve_as(&mut self, other: &Self) {
         if let (Self::MeshDesc(new), Self::MeshDesc(old)) = (self, other)
             && new.file == old.file
@@ -146,7 +139,7 @@ impl Shape {
         }
     }
 
-    /// Returns the file that the shape names; `None` if the shape is no mesh or names no file.
+    /// Returns the mesh file that the shape names; `None` if the shape is no mesh or names no file.
     pub fn file(&self) -> Option<&str> {
         match self {
             Self::MeshDesc(mesh) if !mesh.file.is_empty() => Some(&mesh.file),

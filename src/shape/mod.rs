@@ -1,5 +1,7 @@
-//! Shapes as users describe them, one kind per file. The module `primitive` has the compiled
-//! geometry that rays intersect.
+//! Shapes: descriptions of geometry in scene files, one kind per file, with keys, ranges and help.
+//! Rays do not intersect descriptions. Each description is converted to a canonical form: one of a
+//! few kinds of primitives with the same geometry. The module `primitive` has these forms and their
+//! intersection kernels.
 
 mod axial;
 mod cone;

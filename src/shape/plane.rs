@@ -1,4 +1,4 @@
-//! Infinite plane.
+//! Shape `plane`: an infinite plane.
 
 use crate::primitive::{Form, PlaneForm};
 use crate::shape::ShapeDesc;

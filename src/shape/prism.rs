@@ -1,12 +1,10 @@
-//! Right prism over a regular triangle.
+//! Shape `prism`: a right prism over a regular triangle.
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::prismoid::{corner_of_centered, prismoid};
-use crate::shape::registry::turned_rotation;
-use crate::shape::texture_space::turned_axes;
+use crate::shape::prismoid::{by_corner_and_rotation, corner_of_centered, prismoid};
 use crate::value::{Description, ValidationError, description};
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 description! {
     /// A right prism on a base with three equal sides. Unturned, the base has an edge along +x from
@@ -14,9 +12,9 @@ description! {
     pub struct Prism {
         /// Lower left near corner of the base, before the rotation (near is +z).
         corner: [f64; 3], in COORDINATE "scene units";
-        /// Side of the base.
+        /// Length of a side of the base.
         side: f64, in SIZE "scene units";
-        /// Height.
+        /// Height of the prism.
         height: f64, in SIZE "scene units";
         /// Rotation about the vertical through the base's centroid, counter-clockwise seen from
         /// above.
@@ -46,16 +44,5 @@ impl ShapeDesc for Prism {
         Self { corner, side, height: size.y, rotation: 0.0 }
     }
 
-    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
-        vec![&mut self.corner]
-    }
-
-    fn rotate_y(&mut self, degrees: f64) -> bool {
-        self.rotation = turned_rotation(self.rotation, degrees);
-        true
-    }
-
-    fn texture_axes(&self) -> DMat3 {
-        turned_axes(self.rotation)
-    }
+    by_corner_and_rotation!();
 }

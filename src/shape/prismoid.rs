@@ -4,9 +4,29 @@ use crate::primitive::{ConvexPolyhedronForm, Form, HalfSpace};
 use crate::value::{round_nice, sin_cos_degrees};
 use glam::{DVec2, DVec3};
 
-/// A convex solid over a horizontal base.
+/// Implements the methods of [`ShapeDesc`](crate::shape::ShapeDesc) that depend only on the keys
+/// `corner` and `rotation` of an upright solid.
+macro_rules! by_corner_and_rotation {
+    () => {
+        fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
+            vec![&mut self.corner]
+        }
+
+        fn rotate_y(&mut self, degrees: f64) -> bool {
+            self.rotation = $crate::shape::registry::turned_rotation(self.rotation, degrees);
+            true
+        }
+
+        fn texture_axes(&self) -> glam::DMat3 {
+            $crate::shape::texture_space::turned_axes(self.rotation)
+        }
+    };
+}
+pub(super) use by_corner_and_rotation;
+
+/// Returns a convex solid over a horizontal polygon (a prism, a pyramid, or a frustum).
 ///
-/// `base` is the list of the base's corners as (x, z) offsets from `corner`, in order around it.
+/// `base` is the list of the polygon's corners as (x, z) offsets from `corner`, in order around it.
 /// `top_over_base` is the size of the top relative to the base, from 0 (an apex) to 1 (upright
 /// sides). `rotation` is the angle in degrees about the vertical through the base's centroid,
 /// counter-clockwise seen from above.
@@ -54,8 +74,9 @@ pub(super) fn prismoid(
     Form::ConvexPolyhedron(ConvexPolyhedronForm { faces, corners })
 }
 
-/// Returns the corner of a base with the centre `base`, rounded to short decimals. The corner is
-/// half of `width` from the centre towards -x and half of `depth` towards +z.
+/// Returns the lower left near corner (towards -x and +z) of a horizontal rectangle with the centre
+/// `base`. `width` is its length along x, `depth` along z. The x and z of the corner are rounded to
+/// short decimals.
 pub(super) fn corner_of_centered(base: DVec3, width: f64, depth: f64) -> [f64; 3] {
     let scale = width.min(depth);
     [round_nice(base.x - width / 2.0, scale), base.y, round_nice(base.z + depth / 2.0, scale)]

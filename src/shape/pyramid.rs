@@ -3,11 +3,9 @@
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
 use crate::shape::cube::square;
-use crate::shape::prismoid::{corner_of_centered, prismoid};
-use crate::shape::registry::turned_rotation;
-use crate::shape::texture_space::turned_axes;
+use crate::shape::prismoid::{by_corner_and_rotation, corner_of_centered, prismoid};
 use crate::value::{Description, ValidationError, description};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 description! {
     /// A regular pyramid on a square base, truncated at `height`. If `apex_height` is not larger
@@ -15,7 +13,7 @@ description! {
     pub struct Pyramid {
         /// Lower left near corner of the base, before the rotation (near is +z).
         corner: [f64; 3], in COORDINATE "scene units";
-        /// Side of the base.
+        /// Length of a side of the base.
         side: f64, in SIZE "scene units";
         /// Height of the untruncated pyramid.
         apex_height: f64, in SIZE "scene units";
@@ -50,16 +48,5 @@ impl ShapeDesc for Pyramid {
         Self { corner, side, apex_height: size.y, height: size.y, rotation: 0.0 }
     }
 
-    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
-        vec![&mut self.corner]
-    }
-
-    fn rotate_y(&mut self, degrees: f64) -> bool {
-        self.rotation = turned_rotation(self.rotation, degrees);
-        true
-    }
-
-    fn texture_axes(&self) -> DMat3 {
-        turned_axes(self.rotation)
-    }
+    by_corner_and_rotation!();
 }

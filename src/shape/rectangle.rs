@@ -8,9 +8,9 @@ use glam::{DMat3, DVec3};
 description! {
     /// A flat rectangle, such as a mirror. Its front is the side that `normal` points to.
     pub struct Rectangle {
-        /// Centre.
+        /// Centre of the rectangle.
         center: [f64; 3], in COORDINATE "scene units";
-        /// Width (across) and height (along `up`).
+        /// Width and height of the rectangle; the height is along `up`.
         size: [f64; 2], in SIZE "scene units";
         /// Direction in which the front faces.
         normal: [f64; 3], as Direction;
@@ -24,8 +24,8 @@ fn up() -> [f64; 3] {
 }
 
 impl Rectangle {
-    /// Returns unit vectors to the right (seen from the front), up and to the front. Returns `None`
-    /// if `up` is parallel to the normal.
+    /// Returns the rectangle's axes as unit vectors: to the right (seen from the front), up and to
+    /// the front. Returns `None` if `up` is parallel to the normal.
     fn frame(&self) -> Option<[DVec3; 3]> {
         let front = unit(self.normal)?;
         let right = unit(self.up)?.cross(front);

@@ -11,12 +11,13 @@ use crate::value::{Description, Field, FieldValue, ValidationError, ValueType, r
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// Description of one kind of shape.
+/// Description of one kind of shape, as scene files have it.
 pub trait ShapeDesc: Description {
     /// Example of the shape as TOML, for help and documentation.
     const EXAMPLE: &'static str;
 
-    /// Compiles the geometry in double precision. The description must be valid.
+    /// Converts the description to its canonical form: the geometry as one of the kinds of
+    /// primitives, in double precision. The description must be valid.
     fn form(&self) -> Form;
 
     /// Returns the validation errors of the description.
@@ -28,30 +29,35 @@ pub trait ShapeDesc: Description {
     /// lower side. `size` is its lengths along x, y and z, all greater than 0.
     fn fitted_to(base: DVec3, size: DVec3) -> Self;
 
-    /// Returns the points that determine the position: adding a vector to all of them moves the
-    /// shape by that vector. Empty if only a transform can move the shape.
-    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]>;
+    /// Returns the points that determine the shape's position: adding a vector to all of them moves
+    /// the shape by that vector. Empty if only a transform can move the shape.
+    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
+        Vec::new()
+    }
 
     /// Rotates the shape by `degrees` about the vertical through its centre, counter-clockwise seen
     /// from above. Returns `false`, without a change, if the keys of the kind cannot express the
     /// rotation.
-    fn rotate_y(&mut self, degrees: f64) -> bool;
+    fn rotate_y(&mut self, _degrees: f64) -> bool {
+        false
+    }
 
-    /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace), as right-handed,
-    /// orthonormal vectors in the shape's space.
+    /// Returns the axes of the [`TextureSpace`](crate::shape::TextureSpace) as the columns of a
+    /// matrix. They are right-handed, orthonormal vectors in the shape's space.
     fn texture_axes(&self) -> DMat3 {
         DMat3::IDENTITY
     }
 }
 
-/// Returns the angle `rotation + degrees` in the range of scene files: above -180, at most 180.
+/// Returns the angle `rotation + degrees`, reduced to the range above -180 and at most 180 degrees.
 pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
     let angle = rounded_to((rotation + degrees).rem_euclid(360.0), -6);
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
 }
 
-/// Converts the keys of a kind to an expression for the table. A compound passes the name of a
-/// static with its keys: a constant cannot be part of a table that refers to itself.
+/// Expands to the keys of the shape kind `$kind`, for the table of kinds. A compound has parts of
+/// every kind, so that its keys refer to this table. They are therefore in a static, `$fields`: a
+/// constant cannot refer to itself.
 macro_rules! keys {
     ($kind:ident) => {
         $kind::FIELDS
@@ -63,7 +69,8 @@ macro_rules! keys {
 
 macro_rules! kinds {
     ($($key:literal => $kind:ident $(with $fields:path)?),+ $(,)?) => {
-        /// Shape of an object: one kind with its parameters. In scene files a table with one key.
+        /// Shape of an object: one kind of shape with its parameters. In scene files it is a table
+        /// with one key, the name of the kind.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         pub enum Shape {
             $(
@@ -79,10 +86,11 @@ macro_rules! kinds {
             $(Field::required($key, ValueType::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
         ];
 
-        /// Every kind with its key, its fields and its help text.
+        /// Every kind of shape, with its key, its fields and its help text.
         pub const KINDS: &[Field] = &KIND_TABLE;
 
-        /// Every kind's key with an example for an `[[object]]`.
+        /// Pairs `(key, example)`: the key of every kind of shape, and an example in TOML for an
+        /// `[[object]]`.
         pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE),)+];
 
         impl Shape {
@@ -93,8 +101,8 @@ macro_rules! kinds {
                 }
             }
 
-            /// Compiles the geometry in double precision, before the object's transform. The shape
-            /// must be valid.
+            /// Converts the shape to its canonical form in double precision, before the object's
+            /// transform. The shape must be valid.
             pub fn form(&self) -> Form {
                 match self {
                     $(Self::$kind(kind) => kind.form(),)+
@@ -110,15 +118,15 @@ macro_rules! kinds {
                 faults.into_iter().map(|f| f.prefixed(self.key())).collect()
             }
 
-            /// Returns the axes of the texture space in the shape's space.
+            /// Returns the axes of the shape's texture space, as the columns of a rotation matrix.
             pub(super) fn texture_axes(&self) -> DMat3 {
                 match self {
                     $(Self::$kind(kind) => kind.texture_axes(),)+
                 }
             }
 
-            /// Creates a shape of the kind `key` by [`ShapeDesc::fitted_to`]; `None` if there is no
-            /// such kind.
+            /// Creates a shape of the kind `key` that roughly fills a box, see
+            /// [`ShapeDesc::fitted_to`]; `None` if there is no such kind.
             pub fn fitted_to(key: &str, base: DVec3, size: DVec3) -> Option<Self> {
                 match key {
                     $($key => Some(Self::$kind($kind::fitted_to(base, size))),)+
@@ -126,8 +134,8 @@ macro_rules! kinds {
                 }
             }
 
-            /// Returns the points that determine the position: adding a vector to all of them moves
-            /// the shape by that vector. Empty if only a transform can move the shape.
+            /// Returns the points that determine the shape's position: adding a vector to all of
+            /// them moves the shape by that vector. Empty if only a transform can move the shape.
             pub fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
                 match self {
                     $(Self::$kind(kind) => kind.anchor_points_mut(),)+
@@ -180,7 +188,8 @@ impl FieldValue for Shape {
 }
 
 impl Shape {
-    /// Returns the first of the points that determine the position; the origin if there is none.
+    /// Returns the first of the points that determine the shape's position; the origin if there is
+    /// none.
     pub fn position(&self) -> DVec3 {
         self.clone()
             .anchor_points_mut()

@@ -8,9 +8,9 @@ use glam::DVec3;
 description! {
     /// A sphere.
     pub struct Sphere {
-        /// Centre.
+        /// Centre of the sphere.
         center: [f64; 3], in COORDINATE "scene units";
-        /// Radius.
+        /// Radius of the sphere.
         radius: f64, in SIZE "scene units";
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;
-use crate::shape::axial::{axes_between, degenerate_axis, frustum_between, height, is_upright};
+use crate::shape::axial::{axes_between, axis_faults, frustum_between, is_upright};
 use crate::value::{Description, NumberRange, ValidationError, description};
 use glam::{DMat3, DVec3};
 
@@ -13,9 +13,9 @@ description! {
         base: [f64; 3], in COORDINATE "scene units";
         /// Centre of the other end.
         top: [f64; 3], in COORDINATE "scene units";
-        /// Radius at `base`; 0: an apex.
+        /// Radius of the end at `base`; 0 makes an apex.
         base_radius: f64, in closed(0.0, NumberRange::SIZE.high) "scene units";
-        /// Radius at `top`; 0: an apex.
+        /// Radius of the end at `top`; 0 makes an apex.
         top_radius: f64, in closed(0.0, NumberRange::SIZE.high) "scene units";
     }
 }
@@ -30,7 +30,7 @@ impl ShapeDesc for TaperedCylinder {
 
     fn faults(&self) -> Vec<ValidationError> {
         let radii = [("base_radius", self.base_radius), ("top_radius", self.top_radius)];
-        let mut sizes: Vec<_> = radii.into_iter().filter(|(_, r)| *r != 0.0).collect();
+        let sizes: Vec<_> = radii.into_iter().filter(|(_, r)| *r != 0.0).collect();
         let both_zero = sizes.is_empty().then(|| {
             ValidationError::new(
                 "top_radius",
@@ -38,12 +38,7 @@ impl ShapeDesc for TaperedCylinder {
                 "a radius greater than 0 at one end at least",
             )
         });
-        sizes.push(("top", height(self.base, self.top)));
-        self.validator()
-            .and(degenerate_axis(self.base, self.top, "top"))
-            .and(both_zero)
-            .ratio(&sizes, &[self.base, self.top].concat())
-            .errors()
+        axis_faults(self.validator().and(both_zero), [self.base, self.top], "top", sizes)
     }
 
     fn fitted_to(base: DVec3, size: DVec3) -> Self {

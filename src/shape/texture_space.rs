@@ -6,12 +6,13 @@ use crate::shape::csg::parts_of;
 use crate::shape::transform::compose;
 use glam::{DAffine3, DMat3, DVec3};
 
-/// Texture space of a shape that is no compound: x to the right, y up or along the axis of the
-/// shape, z to the front or along its normal. The unit is the scene unit before the object's
-/// transform.
+/// Texture space of a shape that is no compound. Its x axis points to the right, its y axis up or
+/// along the axis of the shape, its z axis to the front or along the normal. The unit is the scene
+/// unit before the object's transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureSpace {
-    /// Map from the texture space to the space of the whole shape.
+    /// Map from the texture space to the space of the shape. For a part of a compound, it maps to
+    /// the space of the whole compound.
     pub shape_from_texture: DAffine3,
     /// Lowest and highest corner of the shape's bounding box, in texture space. For a plane, both
     /// corners are its `point`.
@@ -32,8 +33,8 @@ impl TextureSpace {
         Self { shape_from_texture, corners: corners.into(), default_mapping }
     }
 
-    /// Returns `true` if the shape has texture coordinates: a mesh whose file has them, or a flat
-    /// shape with edges.
+    /// Returns `true` if the shape itself defines texture coordinates. A mesh does if its file has
+    /// them, and a flat shape with edges does.
     pub fn has_uv(&self) -> bool {
         let [low, high] = self.corners;
         match self.default_mapping {
@@ -46,7 +47,7 @@ impl TextureSpace {
 
 impl Shape {
     /// Returns the texture space of each part of the shape, in the order of
-    /// [`Form::parts`](crate::primitive::Form::parts). The shape must be valid.
+    /// [`CanonicalShape::parts`](crate::primitive::CanonicalShape::parts). The shape must be valid.
     pub fn texture_spaces(&self) -> Vec<TextureSpace> {
         let Some(of) = parts_of(self) else { return vec![TextureSpace::new(self)] };
         let inner = |part: &crate::shape::CsgOperand| {
@@ -78,7 +79,8 @@ pub(super) fn on_plane(z: DVec3) -> DMat3 {
     DMat3::from_cols(x, z.cross(x), z)
 }
 
-/// Returns the axes of a shape rotated about the vertical, counter-clockwise seen from above.
+/// Returns the axes of a shape rotated by `degrees` about the vertical, counter-clockwise seen from
+/// above, as the columns of a matrix.
 pub(super) fn turned_axes(degrees: f64) -> DMat3 {
     let (sin, cos) = crate::value::sin_cos_degrees(degrees);
     DMat3::from_cols(DVec3::new(cos, 0.0, -sin), DVec3::Y, DVec3::new(sin, 0.0, cos))

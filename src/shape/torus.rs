@@ -10,7 +10,7 @@ use glam::{DAffine3, DMat3, DVec3};
 description! {
     /// A torus: a tube along a circle about `axis`.
     pub struct Torus {
-        /// Centre.
+        /// Centre of the ring.
         center: [f64; 3], in COORDINATE "scene units";
         /// Direction of the axis, which is perpendicular to the plane of the ring.
         axis: [f64; 3], as Direction;
@@ -30,8 +30,8 @@ impl ShapeDesc for Torus {
         TorusForm { scene_from_torus, ring: self.ring, tube: self.tube }.into()
     }
 
-    /// Returns the validation errors. A tube wider than the ring is an error: the surface would
-    /// intersect itself (a spindle torus).
+    /// Returns the validation errors of the torus. A tube wider than the ring is an error: the
+    /// surface would intersect itself (a spindle torus).
     fn faults(&self) -> Vec<ValidationError> {
         let spindle = (self.ring > 0.0 && self.tube > self.ring).then(|| {
             let found = format!("tube ({}) is larger than ring ({})", self.tube, self.ring);
@@ -43,8 +43,8 @@ impl ShapeDesc for Torus {
             .errors()
     }
 
-    /// Creates a torus that lies flat. The radius of its tube is at most a third of that of its
-    /// ring.
+    /// Creates a torus that lies flat in a box (see [`ShapeDesc::fitted_to`]). The radius of its
+    /// tube is at most a third of that of its ring.
     fn fitted_to(base: DVec3, size: DVec3) -> Self {
         let across = size.x.min(size.z);
         let tube = round_nice((across / 8.0).min(size.y / 2.0), across);

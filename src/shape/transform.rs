@@ -15,17 +15,18 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TransformOp {
-    /// Moves by this vector.
+    /// Moves the object by this vector, in scene units.
     Translate([f64; 3]),
-    /// Rotates about the x axis.
+    /// Rotates the object about the x axis by this angle in degrees.
     RotateX(f64),
-    /// Rotates about the y axis, the vertical: counter-clockwise seen from above.
+    /// Rotates the object about the y axis, the vertical, by this angle in degrees:
+    /// counter-clockwise seen from above.
     RotateY(f64),
-    /// Rotates about the z axis.
+    /// Rotates the object about the z axis by this angle in degrees.
     RotateZ(f64),
-    /// Rotates about any axis through the origin.
+    /// Rotates the object about any axis through the origin.
     Rotate(Rotate),
-    /// Scales away from the origin.
+    /// Scales the object about the origin, by one factor or by three factors along the axes.
     Scale(Scale),
 }
 
@@ -39,7 +40,7 @@ description! {
     }
 }
 
-/// Factors along x, y and z. In scene files one number means three equal factors.
+/// Scaling by factors along x, y and z. In scene files one number means three equal factors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale(pub [f64; 3]);
 
@@ -78,7 +79,7 @@ impl<'de> Deserialize<'de> for Scale {
     }
 }
 
-/// Keys of a step; each step has exactly one.
+/// Keys of a transform's step; each step has exactly one.
 pub const TRANSFORM_OP_FIELDS: &[Field] = &[
     Field::required(
         "translate",
@@ -106,7 +107,7 @@ pub const TRANSFORM_OP_FIELDS: &[Field] = &[
 const ANGLE: ValueType = ValueType::Number(NumberRange::FINITE);
 
 impl TransformOp {
-    /// Returns the step as an affine map. The step must be valid.
+    /// Returns the transform step as an affine map. The step must be valid.
     pub fn map(&self) -> DAffine3 {
         match *self {
             Self::Translate(by) => DAffine3::from_translation(DVec3::from_array(by)),
@@ -120,7 +121,7 @@ impl TransformOp {
         }
     }
 
-    /// Returns the validation errors of the step.
+    /// Returns the validation errors of the transform step.
     pub fn faults(&self) -> Vec<ValidationError> {
         let checks = Validator::new(TRANSFORM_OP_FIELDS);
         match self {
@@ -165,8 +166,9 @@ fn rotation(axis: DVec3, degrees: f64) -> DAffine3 {
     DAffine3::from_mat3(DMat3::from_cols(rotated(DVec3::X), rotated(DVec3::Y), rotated(DVec3::Z)))
 }
 
-/// Returns `true` if an affine map can be inverted with usable precision. Such a map is finite, and
-/// the ratio of its largest to its smallest stretch is at most 1e12.
+/// Returns `true` if an affine map can be inverted with usable precision. Such a map is finite. The
+/// largest absolute element of its matrix is within 1e-12..=1e12. The product of this element and
+/// the largest absolute element of the inverse is at most 1e12.
 fn is_well_conditioned(map: &DAffine3) -> bool {
     let linear = map.matrix3;
     let largest = linear.to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));
@@ -177,14 +179,14 @@ fn is_well_conditioned(map: &DAffine3) -> bool {
     inverse.is_finite() && inverse.to_cols_array().iter().all(|x| x.abs() <= 1e12)
 }
 
-/// Returns the composition of the steps, the first step applied first.
+/// Returns the affine map that applies the steps in order, the first step first.
 pub fn compose(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |map, step| step.map() * map)
 }
 
-/// Returns an error if the composition of `steps` flattens `shape` or stretches it out of range,
-/// moves it beyond the largest coordinate, or makes it too small for its distance from the origin.
-/// Each single step must be valid.
+/// Returns an error if the composition of `steps` places `shape` badly: it flattens the shape,
+/// stretches it out of range, moves it beyond the largest coordinate, or makes it too small for its
+/// distance from the origin. Otherwise returns `None`. Each single step must be valid.
 pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<ValidationError> {
     if steps.is_empty() {
         return None;

@@ -23,18 +23,10 @@ impl ShapeDesc for UnitFrustum {
         Form::conical_frustum(DAffine3::IDENTITY, self.s)
     }
 
-    /// Creates a cylinder at the origin. The box is ignored, because only a transform can move and
-    /// scale this shape.
+    /// Creates a cylinder at the origin. The box to fill is ignored, because only a transform can
+    /// move and scale this shape.
     fn fitted_to(_: DVec3, _: DVec3) -> Self {
         Self { s: 1.0 }
-    }
-
-    fn anchor_points_mut(&mut self) -> Vec<&mut [f64; 3]> {
-        Vec::new()
-    }
-
-    fn rotate_y(&mut self, _: f64) -> bool {
-        false
     }
 
     fn texture_axes(&self) -> DMat3 {

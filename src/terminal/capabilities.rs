@@ -7,61 +7,69 @@ use std::time::Duration;
 /// Terminal multiplexer: a program between the dashboard and the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Multiplexer {
-    /// tmux.
+    /// The multiplexer tmux.
     Tmux,
-    /// GNU Screen.
+    /// The multiplexer GNU Screen.
     Screen,
 }
 
-/// Environment variables that describe the terminal.
+/// Values of the environment variables that describe the terminal.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Environment {
-    /// `TERM`.
+    /// Value of `TERM`, the name of the terminal's type.
     pub term: String,
-    /// `COLORTERM`.
+    /// Value of the environment variable `COLORTERM`, such as `truecolor`.
     pub color_term: String,
     /// `true` if `NO_COLOR` is set and not empty.
     pub no_color: bool,
-    /// `SSH_CONNECTION`: address and port of the client, then of the server. `None` without SSH.
+    /// Value of `SSH_CONNECTION`: address and port of the client, then of the server. `None`
+    /// without SSH.
     pub ssh: Option<String>,
-    /// Multiplexer, recognised by `TMUX`, `STY` or `TERM`.
+    /// Multiplexer around the program, recognised by `TMUX`, `STY` or `TERM`; `None` if there is
+    /// none.
     pub multiplexer: Option<Multiplexer>,
 }
 
 /// Capabilities of the terminal. A field is `None` if the terminal has not replied to its request.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Capabilities {
-    /// Environment variables.
+    /// Environment variables that describe the terminal.
     pub environment: Environment,
-    /// Number of colours, derived from environment and replies.
+    /// Set of colours that the terminal shows. It is derived from the environment variables and the
+    /// terminal's replies.
     pub colors: Colors,
     /// `true` if the terminal supports synchronised updates (mode 2026).
     pub synchronised: bool,
-    /// Name and version (XTVERSION).
+    /// Name and version of the terminal, as its reply to XTVERSION states them. `None` without a
+    /// reply.
     pub version: Option<String>,
-    /// Background colour, 8-bit sRGB (OSC 11).
+    /// Background colour of the terminal, 8-bit sRGB, as its reply to OSC 11 states it. `None`
+    /// without a reply.
     pub background: Option<[u8; 3]>,
     /// `true` if the terminal supports kitty's graphics protocol.
     pub kitty_graphics: bool,
     /// `true` if kitty's images can be placed by Unicode placeholders, as tmux requires.
     pub placeholders: bool,
-    /// `true` if the terminal supports sixel.
+    /// `true` if the terminal supports sixel images.
     pub sixel: bool,
-    /// Largest number of colours of a sixel image.
+    /// Largest number of colours of a sixel image. `None` if the terminal has not replied.
     pub sixel_colors: Option<u16>,
-    /// Largest width and height of a sixel image in pixels.
+    /// Largest width and height of a sixel image in pixels. `None` if the terminal has not replied.
     pub sixel_px: Option<[u16; 2]>,
-    /// Width and height of a cell in pixels.
+    /// Width and height of a terminal cell in pixels. `None` if the terminal has not replied.
     pub cell_px: Option<[u16; 2]>,
-    /// Time from the first request to its reply. Inside a multiplexer, the multiplexer replies.
+    /// Time from the first request to the terminal's first reply. Inside a multiplexer, the
+    /// multiplexer replies. `None` if the terminal has not replied.
     pub round_trip: Option<Duration>,
-    /// Round trip of a request that the multiplexer passes through to the terminal outside it.
-    /// `None` if it was not measured or the multiplexer passes no requests through.
+    /// Time from a request to the reply of the terminal outside of the multiplexer. The multiplexer
+    /// passes such requests through. `None` if the time was not measured or the multiplexer passes
+    /// no requests through.
     pub passthrough: Option<Duration>,
 }
 
 impl Environment {
-    /// Reads the environment. `variable` returns the value of the variable with a given name.
+    /// Reads the environment variables that describe the terminal. `variable` returns the value of
+    /// the variable with a given name.
     pub fn of(variable: impl Fn(&str) -> Option<String>) -> Self {
         let variable = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = variable("TERM").unwrap_or_default();
@@ -81,7 +89,8 @@ impl Environment {
         }
     }
 
-    /// Returns the number of colours that the environment alone indicates.
+    /// Returns the set of colours that the terminal is expected to show, according to the
+    /// environment variables alone.
     pub fn colors(&self) -> Colors {
         /// Values of `TERM` with 24-bit colour that do not end in `-direct` or `-truecolor`.
         const TRUE: [&str; 8] = [
@@ -113,21 +122,7 @@ impl Environment {
 impl Capabilities {
     /// Creates the capabilities of a terminal that has not replied yet.
     pub fn from_environment(environment: Environment) -> Self {
-        Self {
-            colors: environment.colors(),
-            environment,
-            synchronised: false,
-            version: None,
-            background: None,
-            kitty_graphics: false,
-            placeholders: false,
-            sixel: false,
-            sixel_colors: None,
-            sixel_px: None,
-            cell_px: None,
-            round_trip: None,
-            passthrough: None,
-        }
+        Self { colors: environment.colors(), environment, ..Self::default() }
     }
 }
 

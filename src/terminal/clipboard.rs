@@ -1,10 +1,10 @@
-//! Clipboard of the terminal, on the user's machine.
+//! Clipboard on the user's machine, written through the terminal.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-/// Returns the sequence that copies `text` to the clipboard (OSC 52), if the terminal permits this.
-/// `text` is encoded in base64, so that its control characters cannot end the sequence.
+/// Returns the escape sequence OSC 52, which copies `text` to the clipboard if the terminal permits
+/// it. `text` is encoded in base64, so that its control characters cannot end the sequence.
 pub(crate) fn copied(text: &str) -> String {
     format!("\x1b]52;c;{}\x07", STANDARD.encode(text))
 }

@@ -23,15 +23,16 @@ use crate::terminal::sequence::{Interpreter, console_key, single_shift, x10_mous
 use crate::terminal::{Event, Key, Reply};
 use std::time::Duration;
 
-/// Longest pause after an introducer (`ESC [`, `ESC O`, …). After a longer pause it is a key
-/// pressed with Alt.
+/// Longest pause after the first two bytes of an escape sequence (`ESC [`, `ESC O`, …). After a
+/// longer pause they are a key pressed with Alt.
 const INTRODUCER_WAIT: Duration = Duration::from_millis(500);
-/// Longest pause inside of any other sequence except for pasted text.
+/// Longest pause inside of an escape sequence, except for its first two bytes and for pasted text.
 const SEQUENCE_WAIT: Duration = Duration::from_secs(2);
 /// Longest pause inside of pasted text. After a longer pause the text so far is reported; later
 /// bytes are still pasted text.
 const PASTE_WAIT: Duration = Duration::from_secs(10);
-/// Largest number of bytes of a string that are kept. Further bytes are skipped.
+/// Largest number of bytes of a control string (reply of the terminal) that are kept. Further bytes
+/// are skipped.
 const MAX_STRING: usize = 4096;
 /// Largest number of bytes of pasted text that are kept. Further bytes are skipped.
 const MAX_PASTE: usize = 1 << 20;
@@ -43,44 +44,48 @@ const CAN: u8 = 0x18;
 const SUB: u8 = 0x1a;
 const PASTE_END: &[u8] = b"\x1b[201~";
 
-/// State of the decoder: the kind of sequence that the next byte belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// State of the input decoder: the kind of character or escape sequence that the next byte belongs
+/// to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum State {
+    #[default]
     Ground,
-    /// Inside of a UTF-8 character.
+    /// State inside of a UTF-8 character of several bytes.
     Character,
     Escape,
-    /// After ESC and this byte, which begin a sequence or are a key pressed with Alt.
+    /// State after ESC and this byte, which begin a sequence or are a key pressed with Alt.
     Introducer(u8),
-    /// After `ESC O` and this number, which gives the modifiers.
+    /// State after `ESC O` and a number, which gives the modifiers of the key that follows.
     SingleShift(u16),
-    /// Inside of a control sequence.
+    /// State inside of a control sequence, which began with `ESC [`.
     ControlSequence,
-    /// After `ESC [ [`.
+    /// State after `ESC [ [`, with which function keys begin on the Linux console.
     Console,
-    /// After `ESC [ M`.
+    /// State after `ESC [ M`, with which mouse reports of the X10 protocol begin.
     X10Mouse,
-    /// Inside of a string that began with ESC and this byte.
+    /// State inside of a control string, which began with ESC and this byte.
     String(u8),
-    /// After ESC inside of a string that began with ESC and this byte.
+    /// State after ESC inside of a control string, which began with ESC and this byte.
     StringEscape(u8),
     Paste,
-    /// Inside of pasted text whose first part was reported after a pause.
+    /// State inside of pasted text whose first part was reported after a pause.
     PausedPaste,
 }
 
 /// Decoder of terminal input. The caller measures time: if no byte arrives within
 /// [`Decoder::patience`], it calls [`Decoder::give_up`].
+#[derive(Default)]
 pub struct Decoder {
     parser: vte::Parser,
     interpreter: Interpreter,
     state: State,
     /// Bytes of the pasted text or of the X10 mouse report that is being decoded.
     taken: Vec<u8>,
-    /// Number of bytes of the current string so far.
+    /// Number of bytes of the current control string (a reply of the terminal) that have been read
+    /// so far.
     string_length: usize,
     escape_wait: Duration,
-    /// `true` if the last byte was an ESC that became the key Escape.
+    /// `true` if the last byte was an ESC that was reported as the key Escape after a pause.
     escape_given_up: bool,
 }
 
@@ -88,15 +93,7 @@ impl Decoder {
     /// Creates a decoder. `escape_wait` is the longest pause between ESC and the next byte of its
     /// sequence. After a longer pause, ESC is the key Escape.
     pub fn new(escape_wait: Duration) -> Self {
-        Self {
-            parser: vte::Parser::new(),
-            interpreter: Interpreter::default(),
-            state: State::Ground,
-            taken: Vec::new(),
-            string_length: 0,
-            escape_wait,
-            escape_given_up: false,
-        }
+        Self { escape_wait, ..Self::default() }
     }
 
     /// Decodes `bytes`, the result of one read, and returns the events that they complete.
@@ -110,8 +107,8 @@ impl Decoder {
         std::mem::take(&mut self.interpreter.events)
     }
 
-    /// Longest time to wait for the next byte before [`Decoder::give_up`]. Returns `None` between
-    /// sequences.
+    /// Returns the longest time to wait for the next byte of the current sequence. After this time
+    /// the caller calls [`Decoder::give_up`]. Returns `None` between sequences.
     pub fn patience(&self) -> Option<Duration> {
         match self.state {
             State::Ground => None,
@@ -243,7 +240,7 @@ impl Decoder {
         self.parser.advance(&mut self.interpreter, bytes);
     }
 
-    /// Resets the decoder and the parser to the ground state.
+    /// Resets the decoder and the parser to the state between escape sequences.
     fn restart(&mut self) {
         self.parser = vte::Parser::new();
         self.interpreter.alt = false;
@@ -251,7 +248,8 @@ impl Decoder {
         self.taken.clear();
     }
 
-    /// Decodes `byte` as the first one after a complete sequence.
+    /// Resets the decoder, except for a pending Alt modifier, and decodes `byte` as the first one
+    /// of a new character or escape sequence.
     fn in_ground(&mut self, byte: u8) {
         let alt = self.interpreter.alt;
         self.restart();
@@ -259,16 +257,17 @@ impl Decoder {
         self.byte(byte);
     }
 
-    /// Ends a sequence that `vte` does not parse.
+    /// Ends an escape sequence that `vte` does not parse, and adds its event.
     fn complete(&mut self, event: Option<Event>) {
         self.interpreter.events.extend(event);
         self.restart();
     }
 
-    /// Ends a string. The parser reports the string to the interpreter when it reads `terminator`.
+    /// Ends a control string, which is a reply of the terminal, and adds the event of this reply.
+    /// `terminator` ends the string for the parser.
     fn end_string(&mut self, terminator: &[u8]) {
         self.parse(terminator);
-        let reply = std::mem::replace(&mut self.interpreter.reply, Reply::Other);
+        let reply = std::mem::take(&mut self.interpreter.reply);
         self.complete(Some(Event::Reply(reply)));
     }
 
@@ -289,8 +288,8 @@ impl Decoder {
         self.complete(Some(Event::Paste(text)));
     }
 
-    /// Reports the pasted text so far after a pause. Escape or Ctrl-C, pressed after an earlier
-    /// pause, ends the paste.
+    /// Reports the pasted text so far, after a pause in it. If there was a pause before, and the
+    /// last byte is Escape or Ctrl-C, the paste ends with this key.
     fn pause_paste(&mut self) {
         let is_paused = self.state == State::PausedPaste;
         let key = self.taken.pop_if(|last| is_paused && [ESC, ETX].contains(last));
@@ -308,8 +307,8 @@ impl Decoder {
         }
     }
 
-    /// Reports the key Alt-`[`, Alt-`O` or a similar one if the incomplete sequence is only an
-    /// introducer.
+    /// Ends an incomplete escape sequence. If only its first two bytes have arrived, reports the
+    /// key Alt-`[`, Alt-`O` or a similar one.
     fn abandon(&mut self) {
         if let State::Introducer(introducer) = self.state {
             self.interpreter.alt = true;
@@ -318,8 +317,8 @@ impl Decoder {
     }
 }
 
-/// Returns `true` if `bytes`, the result of one read after a lone ESC, can only be the rest of a
-/// reply. Typed characters would arrive in several reads.
+/// Returns `true` if `bytes` can only be the rest of a reply whose ESC was read alone. `bytes` is
+/// the result of one read; typed characters would arrive in several reads.
 fn is_reply_without_escape(bytes: &[u8]) -> bool {
     matches!(
         bytes,

@@ -6,48 +6,48 @@ use std::str::FromStr;
 /// Key without modifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Code {
-    /// A character as typed. `shift` is `false` for a capital letter.
+    /// Character as typed. The modifier `shift` is `false` for a capital letter.
     Char(char),
-    /// Enter.
+    /// Enter key.
     Enter,
-    /// Escape.
+    /// Escape key.
     Esc,
-    /// Tab. Together with `shift` it is back-tab.
+    /// Tab key. Together with `shift` it is back-tab.
     Tab,
-    /// Backspace.
+    /// Backspace key.
     Backspace,
-    /// Delete.
+    /// Delete key.
     Delete,
-    /// Arrow.
+    /// Left arrow key.
     Left,
-    /// Arrow.
+    /// Right arrow key.
     Right,
-    /// Arrow.
+    /// Up arrow key.
     Up,
-    /// Arrow.
+    /// Down arrow key.
     Down,
-    /// Home.
+    /// Home key.
     Home,
-    /// End.
+    /// End key.
     End,
-    /// Page up.
+    /// Page up key.
     PageUp,
-    /// Page down.
+    /// Page down key.
     PageDown,
     /// Function key with its number, 1 for F1.
     F(u8),
 }
 
-/// A key press with its modifiers.
+/// Key press with its modifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Key {
-    /// Key without modifiers.
+    /// Key that was pressed, without its modifiers.
     pub code: Code,
-    /// Control is pressed.
+    /// `true` if Control is pressed.
     pub ctrl: bool,
-    /// Alt is pressed.
+    /// `true` if Alt is pressed.
     pub alt: bool,
-    /// Shift is pressed. Always `false` for characters.
+    /// `true` if Shift is pressed. Always `false` for characters.
     pub shift: bool,
 }
 
@@ -61,35 +61,35 @@ impl Key {
 /// Kind of a mouse event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MouseKind {
-    /// A button was pressed.
+    /// Press of a mouse button.
     Press(Button),
-    /// The mouse moved while a button was pressed.
+    /// Movement of the mouse while a button was pressed.
     Drag(Button),
-    /// A button was released.
+    /// Release of a mouse button.
     Release(Button),
     /// The wheel was turned by this number of ticks: positive away from the user, negative towards.
     Scroll(i32),
 }
 
-/// A mouse button.
+/// Mouse button.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Button {
-    /// Left.
+    /// Left mouse button.
     Left,
-    /// Middle.
+    /// Middle mouse button.
     Middle,
-    /// Right.
+    /// Right mouse button.
     Right,
 }
 
-/// Mouse event.
+/// Mouse event with the cell under the pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mouse {
-    /// Kind.
+    /// Kind of the mouse event: press, drag, release or scroll.
     pub kind: MouseKind,
-    /// Column of the cell, counted from 0.
+    /// Column of the cell under the pointer, counted from 0.
     pub column: u16,
-    /// Row of the cell, counted from 0.
+    /// Row of the cell under the pointer, counted from 0.
     pub row: u16,
     /// `true` if Control or Alt is pressed. Terminals do not report Shift, which they use
     /// themselves.

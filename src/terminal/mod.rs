@@ -1,9 +1,9 @@
-//! Terminal driver: decoding of input, probing of capabilities, raw mode and restoration, cells and
-//! images as bytes, frame differences, flow control. The module is independent of scenes and of the
-//! renderer.
+//! Terminal driver: decoding of input, query of capabilities, raw mode and its restoration,
+//! encoding of cells and images, frame differences, flow control. The module is independent of
+//! scenes and of the renderer.
 
-mod area;
 mod capabilities;
+mod capability_query;
 pub mod cells;
 mod clipboard;
 mod decode;
@@ -11,8 +11,7 @@ pub mod diff;
 pub mod event;
 pub mod flow;
 pub mod image;
-mod keyboard;
-mod probe;
+mod input_reader;
 mod restorer;
 mod screen;
 mod sequence;
@@ -20,21 +19,20 @@ mod sequence;
 mod tests;
 
 use crate::terminal::event::{Key, Mouse};
-pub use area::Area;
 pub use capabilities::{Capabilities, Environment, Multiplexer};
+pub(crate) use capability_query::cursor_request;
+pub use capability_query::query_capabilities;
 pub(crate) use clipboard::copied;
 pub use decode::Decoder;
-pub use keyboard::{Keyboard, Timed};
-pub(crate) use probe::cursor_request;
-pub use probe::probe;
+pub use input_reader::{InputReader, TimedEvent};
 pub use screen::{ENTER, LEAVE, Screen, Tty, cell_px, size};
 
-/// Input of a terminal.
+/// Event to which terminal input is decoded.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// Key press.
+    /// Key press by the user.
     Key(Key),
-    /// Mouse event.
+    /// Mouse button, drag or wheel event.
     Mouse(Mouse),
     /// Pasted text.
     Paste(String),
@@ -42,39 +40,40 @@ pub enum Event {
     Reply(Reply),
 }
 
-/// Reply of a terminal to a request.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Reply of the terminal to a request of the program.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Reply {
     /// Position of the cursor, counted from 1 (CPR).
     Cursor {
-        /// Row.
+        /// Row of the cursor, counted from 1.
         row: u16,
-        /// Column.
+        /// Column of the cursor, counted from 1.
         column: u16,
     },
     /// Device attributes (DA1): numbers of the supported features, such as 4 for sixel.
     Attributes(Vec<u16>),
-    /// State of a private mode (DECRPM).
+    /// State of a private mode of the terminal (DECRPM).
     Mode {
-        /// Number of the mode.
+        /// Number of the terminal's private mode (DEC).
         mode: u16,
-        /// State: 0 unknown, 1 set, 2 reset, 3 permanently set, 4 permanently reset.
+        /// State of the mode: 0 unknown, 1 set, 2 reset, 3 permanently set, 4 permanently reset.
         setting: u16,
     },
     /// Default background colour, 8-bit sRGB (OSC 11).
     Background([u8; 3]),
-    /// Name and version (XTVERSION).
+    /// Name and version of the terminal (XTVERSION).
     Version(String),
-    /// Current value of a setting, in a valid reply to DECRQSS.
+    /// Current value of a terminal setting, in a valid reply to DECRQSS.
     Setting(String),
-    /// Reply of kitty's graphics protocol. `true` means `OK`.
+    /// Result of a command of kitty's graphics protocol. `true` means `OK`.
     Graphics(bool),
-    /// Width and height of a cell in pixels.
+    /// Width and height of a terminal cell in pixels.
     CellSize([u16; 2]),
     /// Largest number of colours of a sixel image (XTSMGRAPHICS).
     SixelColors(u16),
     /// Largest width and height of a sixel image in pixels (XTSMGRAPHICS).
     SixelSize([u16; 2]),
-    /// Any other reply.
+    /// Reply that the program does not use.
+    #[default]
     Other,
 }

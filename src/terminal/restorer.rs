@@ -1,8 +1,9 @@
-//! Restoration of the terminal after an end that runs no code of the program: an allocation that
-//! fails in a library, SIGKILL, a fault of the processor.
+//! Restoration of the terminal if the program ends without running its own restoration: an
+//! allocation that fails in a library, SIGKILL, a fault of the processor.
 //!
-//! A shell waits at the other end of a pipe, which closes with the process. Signal handlers cannot
-//! replace it: after the handler of SIGABRT returns, the process ends at once.
+//! A helper process, a shell that runs a script, waits at the other end of a pipe, which closes
+//! when the program ends. Signal handlers cannot replace it: after the handler of SIGABRT returns,
+//! the process ends at once.
 
 use crate::terminal::LEAVE;
 use rustix::termios::{InputModes, LocalModes, OutputModes, Termios};
@@ -10,24 +11,27 @@ use std::io::{self, Write};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, ChildStdin, Command, Stdio};
 
-/// Shell script that restores the terminal; `$0` is [`LEAVE`], the other arguments are those of
-/// `stty`. At its regular end, this process sends a line to the script, which then exits. The
-/// script restores modes only if they are still those of full-screen use, because the user's shell
-/// may have set its own. In that case output is processed (`opost`).
+/// Script of the helper process, a shell that restores the terminal if the program is killed. `$0`
+/// is [`LEAVE`]; the other arguments are those of `stty`. When the program ends regularly, it sends
+/// a line to the script, which then exits. Otherwise the script restores the terminal modes, but
+/// only if output is still unprocessed (`-opost`), as in full-screen use. If it is processed, the
+/// user's shell has set modes of its own.
 const PROGRAM: &str = "\
 trap '' INT QUIT TERM HUP TSTP TTIN TTOU
 read -r _ && exit
 case $(stty -a </dev/tty) in *-opost*) stty \"$@\" </dev/tty ;; esac
 printf %s \"$0\" >/dev/tty";
 
-/// Shell process that restores the terminal if this process ends without dropping the value.
+/// Helper process that restores the terminal if the program is killed. It is a shell that waits
+/// until this value is dropped or the program ends.
 pub struct Restorer {
     shell: Child,
     messages: ChildStdin,
 }
 
 impl Restorer {
-    /// Starts the shell. It will restore `modes_before`.
+    /// Starts the helper process, a shell that sets the terminal modes `modes_before` if the
+    /// program is killed.
     ///
     /// # Errors
     /// Fails if there is no shell.
@@ -46,7 +50,8 @@ impl Restorer {
     }
 }
 
-/// Returns the modes that raw mode changes, in the notation of POSIX `stty`.
+/// Returns the arguments of POSIX `stty` that set the modes which raw mode changes to their values
+/// in `modes`: `echo` for a mode that is set, `-echo` for one that is not.
 fn stty_arguments(modes: &Termios) -> Vec<String> {
     let inputs = [
         ("ignbrk", InputModes::IGNBRK),
@@ -78,7 +83,8 @@ fn stty_arguments(modes: &Termios) -> Vec<String> {
 }
 
 impl Drop for Restorer {
-    /// Ends the shell, because the terminal is restored already.
+    /// Ends the helper process, the shell that would restore the terminal if the program were
+    /// killed. The terminal is restored already at this point.
     fn drop(&mut self) {
         let _ = self.messages.write_all(b"\n");
         let _ = self.shell.try_wait();

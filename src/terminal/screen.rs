@@ -17,9 +17,9 @@ use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Command that enables or disables bracketed paste and mouse reports. Reports cover buttons, the
-/// wheel and drags (mode 1002), with decimal coordinates (mode 1006). `EnableMouseCapture` of
-/// crossterm would also set mode 1003, which reports every motion.
+/// Command of crossterm that enables or disables bracketed paste and mouse reports. Reports cover
+/// buttons, the wheel and drags (mode 1002), with decimal coordinates (mode 1006).
+/// `EnableMouseCapture` of crossterm would also set mode 1003, which reports every motion.
 struct Input {
     is_on: bool,
 }
@@ -61,15 +61,18 @@ pub(crate) fn append(out: &mut String, command: impl Command) {
     command.write_ansi(out).expect("a `String` takes any text");
 }
 
-/// Longest time that restoration waits for a slow terminal to read the frame being written.
+/// Longest time that restoration of the terminal waits until a slow terminal has read the frame
+/// that is being written.
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Full-screen use of the terminal. Dropping this value restores the terminal, as does a panic in
-/// any thread. After any other end of the process, a `Restorer` restores it, if one could be
-/// started.
+/// any thread. If the process ends in another way, a helper process (`Restorer`) restores it, if
+/// one could be started.
 pub struct Screen {
     tty: Arc<Tty>,
-    left: Receiver<()>,
+    /// Channel that receives a message when [`Tty::leave`] has restored the terminal, for example
+    /// after a panic in another thread.
+    pub left: Receiver<()>,
     restorer: Option<Restorer>,
 }
 
@@ -77,10 +80,11 @@ pub struct Screen {
 pub struct Tty {
     out: Mutex<Box<dyn Write + Send>>,
     entered: AtomicBool,
-    /// Terminal modes of stdin before [`Screen::enter`].
+    /// Terminal modes of stdin before [`Screen::enter`]; `None` in tests, which write to memory.
     modes_before: Option<Termios>,
     leaving: Sender<()>,
-    /// Bytes to send before [`LEAVE`].
+    /// Bytes that are sent before [`LEAVE`] when the terminal is restored, such as the removal of
+    /// an image.
     exit_sequence: Mutex<Vec<u8>>,
 }
 
@@ -94,8 +98,8 @@ pub fn size() -> io::Result<[u16; 2]> {
     Ok(if is_known { [size.columns, size.rows] } else { [80, 24] })
 }
 
-/// Returns the width and height of a cell in pixels. Returns `None` if the terminal does not report
-/// its size in pixels.
+/// Returns the width and height of a terminal cell in pixels. Returns `None` if the terminal does
+/// not report its size in pixels.
 pub fn cell_px() -> Option<[u16; 2]> {
     let size = terminal::window_size().ok()?;
     let cell = |px: u16, cells: u16| px.checked_div(cells).filter(|px| *px > 0);
@@ -112,8 +116,8 @@ fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Sets raw mode. crossterm later restores the modes that it finds here. A shell may have set its
-/// own in the meantime; `modes_before` is therefore set first.
+/// Sets raw mode. crossterm stores the terminal modes that it finds, and restores them when raw
+/// mode ends. `modes_before` is therefore set first, in case that a shell has set other modes.
 fn set_raw_mode(modes_before: &Termios) -> io::Result<()> {
     uninterrupted(terminal::disable_raw_mode)?;
     uninterrupted(|| Ok(tcsetattr(io::stdin(), OptionalActions::Now, modes_before)?))?;
@@ -159,12 +163,6 @@ impl Screen {
         Ok(screen)
     }
 
-    /// Channel that receives a message when [`Tty::leave`] has restored the terminal, for example
-    /// after a panic in another thread.
-    pub fn left(&self) -> &Receiver<()> {
-        &self.left
-    }
-
     /// Returns the writer to the terminal.
     pub fn tty(&self) -> Arc<Tty> {
         Arc::clone(&self.tty)
@@ -178,7 +176,7 @@ impl Drop for Screen {
 }
 
 impl Tty {
-    /// Writes `bytes` in one call. Does nothing while the terminal is restored.
+    /// Writes `bytes` to the terminal in one call. Does nothing while the terminal is restored.
     ///
     /// # Errors
     /// Fails if the terminal is closed.
@@ -291,7 +289,8 @@ mod tests {
         (Screen::over(Box::new(out.clone()), None).unwrap(), out, turn)
     }
 
-    /// Returns `parts` with each `[` replaced by [`ENTER`] and each `]` by [`LEAVE`].
+    /// Returns the expected output of a screen. Each character of `parts` stands for a part of it:
+    /// `[` for [`ENTER`], `]` for [`LEAVE`], any other character for itself.
     fn expected(parts: &str) -> String {
         parts.replace(']', "LEAVE").replace('[', &ENTER).replace("LEAVE", &LEAVE)
     }
@@ -334,7 +333,7 @@ mod tests {
         tty.write(b"a frame while suspended").unwrap();
         tty.resume().unwrap();
         tty.write(b"frame").unwrap();
-        assert!(screen.left().try_recv().is_err());
+        assert!(screen.left.try_recv().is_err());
         drop(screen);
         assert_eq!(out.text(), expected("[][frame]"));
     }
@@ -360,9 +359,9 @@ mod tests {
     #[test]
     fn panic_in_any_thread_restores_the_terminal_and_is_reported() {
         let (screen, out, _turn) = screen();
-        assert!(screen.left().try_recv().is_err());
+        assert!(screen.left.try_recv().is_err());
         thread::spawn(|| panic!("as the test wants it")).join().unwrap_err();
-        screen.left().recv_timeout(Duration::from_secs(10)).expect("a message about the panic");
+        screen.left.recv_timeout(Duration::from_secs(10)).expect("a message about the panic");
         assert_eq!(out.text(), expected("[]"));
         drop(screen);
         assert_eq!(out.text(), expected("[]"));

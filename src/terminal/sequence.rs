@@ -1,45 +1,32 @@
-//! Interpretation of characters and escape sequences: ECMA-48 and the extensions of xterm and kitty
-//! ("Control Sequences", invisible-island.net/xterm/ctlseqs;
+//! Interpretation of terminal input, that is, of characters and escape sequences: ECMA-48 and the
+//! extensions of xterm and kitty ("Control Sequences", invisible-island.net/xterm/ctlseqs;
 //! sw.kovidgoyal.net/kitty/keyboard-protocol).
 
 use crate::terminal::event::{Button, Code, Key, Mouse, MouseKind};
 use crate::terminal::{Event, Reply};
 use vte::{Params, Perform};
 
-/// Interpreter of characters and sequences: converts the results of [`vte::Parser`] to events.
-#[derive(Debug)]
+/// Interpreter of terminal input: converts the results of [`vte::Parser`] to events.
+#[derive(Debug, Default)]
 pub struct Interpreter {
-    /// Events in the order of input.
+    /// Events of the input so far, in order.
     pub events: Vec<Event>,
     /// `true` if the next key is pressed with Alt, because ESC preceded it.
     pub alt: bool,
-    /// `true` if the last UTF-8 character is complete or invalid.
+    /// `true` if the last byte completed a UTF-8 character or made it invalid.
     pub is_character_complete: bool,
     /// `true` if the last control sequence begins a bracketed paste.
     pub is_paste: bool,
-    /// `true` if the device control string that is being parsed was an APC string in the input.
+    /// `true` if the control string that is being parsed began as an APC string (`ESC _`). The
+    /// decoder passes it to the parser as a device control string.
     pub is_apc: bool,
-    /// Reply decoded from the last string.
+    /// Reply of the terminal, decoded from the last control string.
     pub reply: Reply,
     /// Data of the device control string being parsed.
     data: Vec<u8>,
-    /// Function that converts `data` to a reply.
-    to_reply: fn(String) -> Reply,
-}
-
-impl Default for Interpreter {
-    fn default() -> Self {
-        Self {
-            events: Vec::new(),
-            alt: false,
-            is_character_complete: false,
-            is_paste: false,
-            is_apc: false,
-            reply: Reply::Other,
-            data: Vec::new(),
-            to_reply: |_| Reply::Other,
-        }
-    }
+    /// Function that converts `data`, the data of the control string, to a reply. `None` if the
+    /// program does not use the reply.
+    to_reply: Option<fn(String) -> Reply>,
 }
 
 impl Interpreter {
@@ -74,10 +61,10 @@ impl Perform for Interpreter {
         let first = params.iter().next().map_or(0, |param| param[0]);
         self.data.clear();
         self.to_reply = match (self.is_apc, first, intermediates, last) {
-            (true, 0, b"", 'G') => |data| Reply::Graphics(data.ends_with(";OK")),
-            (false, 0, b">", '|') => Reply::Version,
-            (false, 1, b"$", 'r') => Reply::Setting,
-            _ => |_| Reply::Other,
+            (true, 0, b"", 'G') => Some(|data| Reply::Graphics(data.ends_with(";OK"))),
+            (false, 0, b">", '|') => Some(Reply::Version),
+            (false, 1, b"$", 'r') => Some(Reply::Setting),
+            _ => None,
         };
     }
 
@@ -87,7 +74,7 @@ impl Perform for Interpreter {
 
     fn unhook(&mut self) {
         let data = String::from_utf8_lossy(&self.data).into_owned();
-        self.reply = (self.to_reply)(data);
+        self.reply = self.to_reply.map_or(Reply::Other, |to_reply| to_reply(data));
     }
 
     fn osc_dispatch(&mut self, params: &[&[u8]], _: bool) {
@@ -98,7 +85,8 @@ impl Perform for Interpreter {
     }
 }
 
-/// Returns the key of a character. Returns `None` for control characters without a key.
+/// Returns the key that types the character `c`. Returns `None` for control characters without a
+/// key.
 fn character(c: char) -> Option<Key> {
     let ctrl = |c: char| Key { ctrl: true, ..Key::plain(Code::Char(c)) };
     Some(match c {
@@ -114,7 +102,8 @@ fn character(c: char) -> Option<Key> {
 }
 
 /// Interprets a control sequence. `params` are its parameters with their subparameters,
-/// `intermediates` its private marker and intermediate bytes, and `last` its final byte.
+/// `intermediates` its private marker and intermediate bytes, and `last` its final byte. Returns
+/// `None` for unknown keys and mouse reports.
 fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Option<Event> {
     let numbers: Vec<_> = params.iter().map(|param| param[0]).collect();
     let reply = match (intermediates, last, &numbers[..]) {
@@ -135,8 +124,8 @@ fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Opti
     Some(Event::Reply(reply))
 }
 
-/// Returns the key of a control sequence. Returns `None` for the release of a key and for unknown
-/// keys.
+/// Returns the key of a control sequence with the parameters `params` and the final byte `last`.
+/// Returns `None` for the release of a key and for unknown keys.
 fn key(params: &[&[u16]], last: char) -> Option<Key> {
     let number = params[0][0];
     let key = match (last, number) {
@@ -165,7 +154,8 @@ fn key(params: &[&[u16]], last: char) -> Option<Key> {
     }
 }
 
-/// Interprets `ESC O modifiers last` (SS3), which keypads and some function keys send.
+/// Interprets `ESC O modifiers last` (SS3), which keypads and some function keys send. Returns
+/// `None` for an unknown `last`.
 pub fn single_shift(modifiers: u16, last: u8) -> Option<Event> {
     let code = match last {
         b'M' => Code::Enter,
@@ -177,12 +167,14 @@ pub fn single_shift(modifiers: u16, last: u8) -> Option<Event> {
     Some(Event::Key(modified(Key::plain(code), modifiers)))
 }
 
-/// Interprets the byte after `ESC [ [` (Linux console).
+/// Returns the event of the function key that sends `ESC [ [` and the byte `last` on the Linux
+/// console. Returns `None` for an unknown `last`.
 pub fn console_key(last: u8) -> Option<Event> {
     (b'A'..=b'E').contains(&last).then(|| Event::Key(Key::plain(Code::F(last - b'A' + 1))))
 }
 
-/// Interprets the bytes for button, column and row after `ESC [ M` (X10 mouse protocol).
+/// Interprets an X10 mouse report: `bytes` are the three bytes for button, column and row after
+/// `ESC [ M`. Returns `None` if the report is not valid.
 pub fn x10_mouse(bytes: &[u8]) -> Option<Event> {
     let [button, column, row] =
         bytes.iter().map(|b| b.checked_sub(32).map(u16::from)).collect::<Option<Vec<_>>>()?[..]
@@ -194,7 +186,7 @@ pub fn x10_mouse(bytes: &[u8]) -> Option<Event> {
     mouse(button, [column, row], is_release).map(Event::Mouse)
 }
 
-/// Returns the key that the final byte of a control sequence denotes.
+/// Returns the key whose control sequence has the final byte `last`; `None` for an unknown one.
 fn named(last: char) -> Option<Code> {
     Some(match last {
         'A' => Code::Up,
@@ -231,7 +223,7 @@ fn modified(key: Key, modifiers: u16) -> Key {
 
 /// Interprets a mouse report. `button` is the number of the button, 0 to 2, plus the bits 4 for
 /// Shift, 8 for Alt, 16 for Control, 32 for motion and 64 for the wheel. `column` and `row` count
-/// from 1.
+/// from 1. Returns `None` for an unknown button.
 fn mouse(button: u16, [column, row]: [u16; 2], is_release: bool) -> Option<Mouse> {
     let pressed = match button & 0b11 {
         0 => Button::Left,
@@ -254,7 +246,8 @@ fn mouse(button: u16, [column, row]: [u16; 2], is_release: bool) -> Option<Mouse
     Some(Mouse { kind, column: column.checked_sub(1)?, row: row.checked_sub(1)?, modified })
 }
 
-/// Parses `rgb:RRRR/GGGG/BBBB` as 8-bit sRGB. Each channel has 1 to 4 hexadecimal digits.
+/// Parses the colour `rgb:RRRR/GGGG/BBBB` of a terminal's reply as 8-bit sRGB. Each channel has 1
+/// to 4 hexadecimal digits. Returns `None` if `text` has another form.
 fn parse_color(text: &[u8]) -> Option<[u8; 3]> {
     let channel = |digits: &str| {
         let max = 16u32.checked_pow(digits.len() as u32).filter(|_| digits.len() <= 4)? - 1;

@@ -1,4 +1,5 @@
-//! Decoding of keys and replies in any order and any split: no key is lost and none is invented.
+//! Tests of the decoding of terminal input: keys and replies in any order, divided anywhere. No key
+//! is lost and none is invented.
 
 use crate::terminal::cells::Colors;
 use crate::terminal::event::{Button, Code, MouseKind};
@@ -61,8 +62,8 @@ const KEYS: &[(&str, &str)] = &[
     ("\x1b[27;5;97~", "Ctrl-a"),
 ];
 
-/// Replies of terminals, also to requests that the program does not send. Other decoders lose or
-/// invent keys on them.
+/// Replies of terminals to requests of this and of other programs. Some decoders lose or invent
+/// keys on them.
 const REPLIES: &[&str] = &[
     "\x1b[?2026;2$y",
     "\x1b[?2026;0$y",
@@ -339,8 +340,8 @@ fn reply_flood_hides_no_key() {
     assert_eq!(keys(&decoder.take(b"\x07q")), ["q"]);
 }
 
-/// Strategy for a key or a reply: its bytes, and the name of the key. The name of a reply is
-/// `None`.
+/// Strategy for a key or a reply. The two values are its bytes, and the name of the key; the name
+/// is `None` for a reply.
 fn key_or_reply() -> impl Strategy<Value = (&'static str, Option<&'static str>)> {
     prop_oneof![
         select(KEYS).prop_map(|(bytes, name)| (bytes, Some(name))),
@@ -378,7 +379,7 @@ fn in_pieces(decoder: &mut Decoder, bytes: &[u8], cuts: &[usize]) -> Vec<Event> 
     cuts.windows(2).flat_map(|piece| decoder.take(&bytes[piece[0]..piece[1]])).collect()
 }
 
-/// Checks sequences that `vte` alone would decode differently (see the module `decode`).
+/// Checks input that the parser `vte` alone would decode differently (see the module `decode`).
 #[test]
 fn keyboard_sequences_beyond_vte_are_decoded() {
     for (bytes, expected) in [
@@ -422,8 +423,8 @@ proptest! {
         prop_assert_eq!(decoder.patience(), None);
     }
 
-    /// Checks that the division of the input into reads has no influence. The input mixes
-    /// sequences, their beginnings and random bytes.
+    /// Checks that the division of the input into reads has no influence on the decoded events. The
+    /// input mixes sequences, their beginnings and random bytes.
     #[test]
     fn any_split_of_any_bytes_yields_the_same_events(
         input in vec(any_input(), 0..40),

@@ -3,14 +3,15 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 
-/// Linear red, green, blue; no upper bound. In files `[r, g, b]` (linear) or `"#rrggbb"` (sRGB).
+/// Linear RGB colour: red, green, blue, without an upper bound. In scene files `[r, g, b]` (linear)
+/// or `"#rrggbb"` (sRGB).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Color(pub [f64; 3]);
 
 impl Color {
-    /// Zero in every channel.
+    /// Black: zero in every channel.
     pub const BLACK: Self = Self([0.0; 3]);
-    /// One in every channel.
+    /// White: one in every channel.
     pub const WHITE: Self = Self([1.0; 3]);
 
     /// Returns the colour with each channel multiplied by `s`.
@@ -18,7 +19,7 @@ impl Color {
         Self(self.0.map(|c| c * s))
     }
 
-    /// Returns the largest channel.
+    /// Returns the largest of the three channels.
     pub fn largest(self) -> f64 {
         self.0.into_iter().fold(f64::NEG_INFINITY, f64::max)
     }

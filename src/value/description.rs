@@ -1,41 +1,45 @@
-//! One declaration per table of a scene file.
+//! Declaration of the tables of scene files, each in one place.
 //!
-//! [`description!`] generates the struct from the declaration, with its serde implementation, its
+//! [`description!`] generates a struct from the declaration, with its serde implementation, its
 //! defaults, its table of fields and the checks of its ranges. [`choices!`] does this for a fixed
 //! set of words.
 
 use crate::value::{Color, Field, NumberRange, ValidationError, Validator, ValueType};
 
-/// A table of a scene file: the keys that it has and the checks of their values.
+/// Table of a scene file: the keys that it has and the checks of their values.
 pub trait Description {
-    /// Help text of the table.
+    /// Help text of the table, for the dashboard and the documentation.
     const DOC: &'static str;
-    /// Keys of the table, in the order of the declaration.
+    /// Keys of this kind of table, in the order of their declaration.
     const FIELDS: &'static [Field];
 
-    /// Checks each value against its field. Callers can add checks across several fields.
+    /// Checks each value of the table against the range of its key. Callers can add checks that
+    /// involve several keys to the returned validator.
     fn validator(&self) -> Validator;
 }
 
-/// A Rust type that values of keys in scene files are read into.
+/// Rust type to which the values of keys in scene files are converted.
 pub trait FieldValue {
-    /// Type of default values in a declaration, which are written as in a scene file.
+    /// Type in which declarations write the default values of keys, such as `[f64; 3]` for a
+    /// colour.
     type Written;
 
-    /// Type that the table of fields shows. The range of numbers is [`NumberRange::FINITE`] unless
-    /// the declaration gives another.
+    /// Type of the values in scene files. The range of numbers is [`NumberRange::FINITE`] unless
+    /// the declaration of a key gives another.
     const TYPE: ValueType;
 
     /// Converts a default value of a declaration to this type.
     ///
     /// # Panics
-    /// If `written` is not valid for the type, which is an error in the declaration.
+    /// Panics if `written` is not valid for the type, which is an error in the declaration.
     fn from_written(written: Self::Written) -> Self;
 
-    /// Returns the validation errors of the value. Each key begins with the key of `field`.
+    /// Returns the validation errors of `self`, the value of the key that `field` describes. The
+    /// key of each error begins with the name of that key.
     fn errors(&self, field: &Field) -> Vec<ValidationError>;
 
-    /// Returns `true` if the key is omitted when the value is written to a file.
+    /// Returns `true` if the value stands for an omitted key. Files are then written without the
+    /// key.
     fn is_absent(&self) -> bool {
         false
     }
@@ -46,12 +50,13 @@ pub(crate) fn is_absent(value: &impl FieldValue) -> bool {
     value.is_absent()
 }
 
-/// Returns the text of a doc comment from `#[doc]` without its leading space.
+/// Returns `doc`, the text of a doc comment as `#[doc]` gives it, without the leading space.
 pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
     doc.split_at(1).1
 }
 
-/// Implements [`FieldValue`] for number types, which scene files write as Rust does.
+/// Implements [`FieldValue`] for number types. Declarations write the default values of number keys
+/// as Rust literals.
 macro_rules! numeric {
     ($([$($n:ident)?] $type:ty => $value_type:expr, $numbers:expr;)+) => {$(
         impl $(<const $n: usize>)? FieldValue for $type {
@@ -137,7 +142,7 @@ impl<T: FieldValue> FieldValue for Option<T> {
     }
 }
 
-/// Implements [`FieldValue`] for a table inside a table.
+/// Implementation of [`FieldValue`] for a table inside a table.
 impl<T: Description> FieldValue for T {
     type Written = Self;
     const TYPE: ValueType = ValueType::Table(T::FIELDS);

@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-/// Lower limit of the largest component (by magnitude) for which the squared length of a vector has
-/// full precision. The reciprocal is the upper limit.
+/// Smallest magnitude at which the largest component of a vector can be squared with full
+/// precision. The largest such magnitude is the reciprocal of this number.
 const MIN_EXACT: f64 = 1e-100;
 
-/// Scale factor for vectors outside of that range: small vectors are multiplied by it, large ones
-/// divided. It is a power of two, 2^600, so that scaling is exact.
+/// Scale factor for vectors whose squared length would lose precision: small vectors are multiplied
+/// by it, large ones divided. It is a power of two, 2^600, so that scaling is exact.
 const RESCALE: f64 = f64::from_bits((1023 + 600) << 52);
 
 /// Returns `direction` scaled to length 1; `None` if its length is 0 or not finite.

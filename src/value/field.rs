@@ -1,83 +1,83 @@
-//! Tables of keys: one [`Field`] per key of a description. Parser, messages, range checks, the
-//! generated reference and the editing forms all use these tables.
+//! Tables of keys: one [`Field`] per key of a table in scene files. Parser, messages, range checks,
+//! the generated manual and the editing forms all use these tables.
 
 use crate::value::{NumberRange, ValidationError, number};
 use std::fmt;
 
-/// One key of a description.
+/// Properties of one key in scene files.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
-    /// The key.
+    /// Name of the key as scene files write it.
     pub name: &'static str,
-    /// Type of the key's value.
+    /// Type and range of the key's value.
     pub takes: ValueType,
     /// Unit of the numbers in the value; empty if there is none.
     pub unit: &'static str,
-    /// Default if the key is left out.
+    /// Default value of the key, or the result of omitting it.
     pub preset: DefaultValue,
-    /// Help text, one sentence.
+    /// Help text of the key, one sentence.
     pub doc: &'static str,
 }
 
-/// Default of a key.
+/// Default value of a key in scene files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DefaultValue {
-    /// The key has no default: it is required.
+    /// No default: the key is required.
     Required,
-    /// The key has a default value, given as TOML text.
+    /// Default value of the key, given as TOML text.
     Is(&'static str),
-    /// The key may be omitted and has no default value. The phrase describes the result of omitting
-    /// it.
+    /// No default value: the key may be omitted. The value is a phrase that describes the result of
+    /// omitting it.
     Without(&'static str),
 }
 
 /// One of the words that a key accepts, such as `"ggx"`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Choice {
-    /// The word, as scene files write it.
+    /// Word that the key accepts, as scene files write it.
     pub name: &'static str,
-    /// Help text, a phrase.
+    /// Help text of the word, a phrase.
     pub doc: &'static str,
 }
 
-/// Type and range of a key's value.
+/// Type and range of the value of a key in scene files.
 #[derive(Clone, Copy, Debug)]
 pub enum ValueType {
-    /// A string.
+    /// String, such as a name.
     Text,
-    /// `true` or `false`.
+    /// Switch: `true` or `false`.
     Switch,
-    /// One of these words.
+    /// One of the listed words, as a string.
     Choice(&'static [Choice]),
-    /// A whole number.
+    /// Whole number in the given range.
     Whole(NumberRange),
-    /// A list of this many whole numbers, each in the range.
+    /// List of whole numbers. The values are the length of the list and the range of each number.
     Wholes(usize, NumberRange),
-    /// A number.
+    /// Number in the given range.
     Number(NumberRange),
-    /// A list of this many numbers, each in the range.
+    /// List of numbers. The values are the length of the list and the range of each number.
     Numbers(usize, NumberRange),
-    /// Three numbers that are not all zero; the vector may have any length.
+    /// Direction: three numbers that are not all zero. The vector may have any length.
     Direction,
-    /// One factor other than zero, or three.
+    /// Scale factor other than zero: one number, or one for each of the three axes.
     Factor,
-    /// A linear colour or `"#rrggbb"`; each channel in the range.
+    /// Linear colour or `"#rrggbb"`, with the range of each channel.
     Color(NumberRange),
-    /// A table with these keys.
+    /// Table with the listed keys.
     Table(&'static [Field]),
-    /// A table with exactly one of these keys.
+    /// Table with exactly one of the listed keys.
     OneOf(&'static [Field]),
-    /// A list of tables, each with exactly one of these keys.
+    /// List of tables, each with exactly one of the listed keys.
     ListOf(&'static [Field]),
-    /// `[[name]]` tables with these keys.
+    /// List of `[[name]]` tables, each with the listed keys.
     Tables(&'static [Field]),
-    /// Tables `[name.NAME]` with these keys. The scene file chooses each NAME, as in
+    /// Tables `[name.NAME]` with the listed keys. The scene file chooses each NAME, as in
     /// `[materials.gold]`.
     Named(&'static [Field]),
 }
 
 impl Field {
-    /// Creates a required key.
+    /// Creates the description of a required key of scene files.
     pub const fn required(
         name: &'static str,
         takes: ValueType,
@@ -110,7 +110,8 @@ impl Field {
         Self { preset: DefaultValue::Without(instead), ..self }
     }
 
-    /// Checks `values` against the value type. Returns an error if one of them is out of range.
+    /// Checks the numbers `values` against the range of the key's value type. Returns an error if
+    /// one of them is out of range, otherwise `None`.
     pub fn check(&self, values: &[f64]) -> Option<ValidationError> {
         let each = |range: NumberRange| values.iter().all(|x| range.holds(*x));
         let valid = match self.takes {
@@ -148,8 +149,8 @@ impl ValueType {
         }
     }
 
-    /// Returns `other`. Declarations call it to replace the value type of the Rust type by an
-    /// explicit one.
+    /// Returns `other`. `self` is the value type that follows from the Rust type of a key; `other`
+    /// is the value type that the key's declaration gives instead.
     pub(crate) const fn replaced(self, other: Self) -> Self {
         other
     }
@@ -157,7 +158,7 @@ impl ValueType {
 
 const COUNTS: [&str; 5] = ["no", "one", "two", "three", "four"];
 
-/// Formats the type as the object of the phrase "Expected ...": `a number from 0 to 1`.
+/// Formats the type as a phrase that continues "Expected", such as `a number from 0 to 1`.
 impl fmt::Display for ValueType {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {

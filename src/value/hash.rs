@@ -1,4 +1,4 @@
-//! A hash that is stable across platforms and versions.
+//! 64-bit FNV-1a hash, which is stable across platforms and versions.
 
 /// Incremental 64-bit FNV-1a hash (Fowler, Noll, Vo), with the offset basis and prime of
 /// draft-eastlake-fnv.
@@ -12,13 +12,13 @@ impl Default for Fnv1a64 {
 }
 
 impl Fnv1a64 {
-    /// Adds bytes.
+    /// Adds `bytes` to the hashed data.
     pub fn update(&mut self, bytes: &[u8]) {
         const PRIME: u64 = 0x0000_0100_0000_01b3;
         self.0 = bytes.iter().fold(self.0, |h, byte| (h ^ u64::from(*byte)).wrapping_mul(PRIME));
     }
 
-    /// Hash of all bytes added so far.
+    /// Returns the hash of all bytes added so far.
     pub fn value(self) -> u64 {
         self.0
     }
@@ -35,7 +35,7 @@ pub fn fnv1a64(bytes: &[u8]) -> u64 {
 mod tests {
     use super::fnv1a64;
 
-    /// Test vectors of the draft.
+    /// Checks the hashes of the test vectors in the FNV draft (draft-eastlake-fnv).
     #[test]
     fn fnv1a64_matches_reference_values() {
         assert_eq!(fnv1a64(b""), 0xcbf2_9ce4_8422_2325);

@@ -8,7 +8,6 @@ mod description;
 mod direction;
 mod field;
 mod hash;
-mod memory;
 mod number_range;
 mod round;
 mod text;
@@ -21,10 +20,6 @@ pub(crate) use description::{choices, description, doc_text, is_absent};
 pub use direction::unit;
 pub use field::{Choice, DefaultValue, Field, ValueType};
 pub use hash::{Fnv1a64, fnv1a64};
-pub use memory::{
-    Available, ResidentMemory, address_space_is_limited, available_memory, megabytes,
-    missing_memory, resident_memory,
-};
 pub use number_range::{NumberRange, number};
 pub use round::{floor_log10, round_nice, round_significant, rounded_to, turned};
 pub use text::{sanitized, truncated};

@@ -1,15 +1,15 @@
-//! Intervals of valid numbers.
+//! Intervals of numbers that are valid as values of keys in scene files.
 
 use std::fmt;
 
 /// An interval of finite numbers; NaN and the infinities are outside of every interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NumberRange {
-    /// Lower bound; negative infinity for none.
+    /// Lower bound of the interval; negative infinity for none.
     pub low: f64,
     /// `true` if `low` belongs to the interval.
     pub low_in: bool,
-    /// Upper bound; infinity for none.
+    /// Upper bound of the interval; infinity for none.
     pub high: f64,
     /// `true` if `high` belongs to the interval.
     pub high_in: bool,
@@ -19,19 +19,20 @@ pub struct NumberRange {
 const MAX_COORDINATE: f64 = 1e9;
 
 impl NumberRange {
-    /// Any finite number.
+    /// Range of all finite numbers.
     pub const FINITE: Self =
         Self { low: f64::NEG_INFINITY, low_in: false, high: f64::INFINITY, high_in: false };
-    /// A coordinate: from -1e9 to 1e9.
+    /// Range of coordinates: from -1e9 to 1e9.
     pub const COORDINATE: Self = Self::closed(-MAX_COORDINATE, MAX_COORDINATE);
-    /// A size: greater than 0, at most 1e9.
+    /// Range of sizes: greater than 0, at most 1e9.
     pub const SIZE: Self = Self::above(0.0, MAX_COORDINATE);
-    /// A fraction: from 0 to 1.
+    /// Range of fractions: from 0 to 1.
     pub const SHARE: Self = Self::closed(0.0, 1.0);
 
-    /// A coefficient or a channel of a surface colour: from 0 to 1e6. Values above 1 are allowed.
+    /// Range of coefficients and of the channels of surface colours: from 0 to 1e6. Values above 1
+    /// are allowed.
     pub const COEFFICIENT: Self = Self::closed(0.0, 1e6);
-    /// An amount of light: from 0 to 1e15.
+    /// Range of amounts of light, such as radiance: from 0 to 1e15.
     pub const LIGHT: Self = Self::closed(0.0, 1e15);
 
     /// Creates the interval from `low` to `high`, both included.
@@ -57,7 +58,7 @@ impl NumberRange {
     }
 }
 
-/// Formats the interval to complete the phrase `a number ...`: `from 0 to 1`.
+/// Formats the interval as the continuation of the phrase `a number`, such as `from 0 to 1`.
 impl fmt::Display for NumberRange {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let (low, high) = (number(self.low), number(self.high));
@@ -79,8 +80,8 @@ impl fmt::Display for NumberRange {
     }
 }
 
-/// Formats a number in short form: `0.5`, `-3`, `1e9`, `NaN`. Numbers below 1e-4 and from 1e6 have
-/// an exponent.
+/// Formats a number in short form: `0.5`, `-3`, `1e9`, `NaN`. Magnitudes below 1e-4, except 0, and
+/// magnitudes from 1e6 on have an exponent.
 pub fn number(x: f64) -> String {
     let plain = x == 0.0 || !x.is_finite() || (1e-4..1e6).contains(&x.abs());
     if plain { format!("{x}") } else { format!("{x:e}") }

@@ -31,16 +31,17 @@ pub fn floor_log10(x: f64) -> i32 {
     format!("{:e}", x.abs()).rsplit_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0)
 }
 
-/// Rounds the coordinate `x` of a scene of size `scale`. The step is a ten-thousandth of the
-/// largest power of ten that is at most `scale`.
+/// Rounds the coordinate `x` to a multiple of 10^(k - 4). 10^k is the largest power of ten that is
+/// at most `scale`, the size of the scene.
 pub fn round_nice(x: f64, scale: f64) -> f64 {
     rounded_to(x, floor_log10(scale) - 4)
 }
 
 /// Rotates the direction `v` by `degrees` about the vertical, counter-clockwise seen from above.
 ///
-/// Components are rounded to about a millionth of the length. The heading is rounded to thousandths
-/// of a degree, so that rounding errors do not add up over repeated rotations.
+/// The components of the result are rounded to about a millionth of its length. Its heading (angle
+/// about the vertical) is rounded to thousandths of a degree, so that rounding errors do not add up
+/// over repeated rotations.
 pub fn turned(v: [f64; 3], degrees: f64) -> [f64; 3] {
     let [x, y, z] = v;
     let horizontal = x.hypot(z);

@@ -1,4 +1,4 @@
-//! Untrusted text for output on a terminal.
+//! Sanitising of untrusted text for output on a terminal.
 
 use std::fmt::Write as _;
 

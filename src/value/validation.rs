@@ -1,12 +1,12 @@
-//! Validation errors of a description, without their position in a file.
+//! Validation errors of a table in a scene file, without their position in the file.
 
 use crate::value::{Field, FieldValue, number};
 
-/// One error in a description. The module `scene` adds file, line, column and object.
+/// Validation error of a table in a scene file. The module `scene` adds file, line, column and
+/// object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ValidationError {
-    /// Dotted key inside the description (`center`, `shape.sphere.radius`); empty for the whole
-    /// description.
+    /// Dotted key inside the table (`center`, `shape.sphere.radius`); empty for the whole table.
     pub key: String,
     /// Phrase that states the error: `radius is -1`.
     pub found: String,
@@ -15,13 +15,13 @@ pub struct ValidationError {
 }
 
 impl ValidationError {
-    /// Creates an error from its three parts.
+    /// Creates a validation error from key, error phrase and phrase of the valid values.
     pub fn new(key: &str, found: impl Into<String>, expected: impl Into<String>) -> Self {
         Self { key: key.to_string(), found: found.into(), expected: expected.into() }
     }
 
-    /// Returns the error with `outer` before its key. `outer` is the key that has the description
-    /// as its value.
+    /// Returns the error with `outer` and a dot before its key. `outer` is the key whose value is
+    /// the table with the error.
     pub fn prefixed(mut self, outer: &str) -> Self {
         self.key =
             if self.key.is_empty() { outer.to_string() } else { format!("{outer}.{}", self.key) };
@@ -29,8 +29,8 @@ impl ValidationError {
     }
 }
 
-/// Collector of the validation errors of one description, which is checked against its table of
-/// fields.
+/// Collector of validation errors. It checks the values of one table of a scene file against the
+/// ranges of the table's keys.
 #[derive(Debug)]
 pub struct Validator {
     fields: &'static [Field],
@@ -38,7 +38,7 @@ pub struct Validator {
 }
 
 impl Validator {
-    /// Creates a validator without errors.
+    /// Creates a validator of a table with the keys `fields`, without errors.
     pub fn new(fields: &'static [Field]) -> Self {
         Self { fields, errors: Vec::new() }
     }
@@ -46,7 +46,7 @@ impl Validator {
     /// Checks the value of the key `name`.
     ///
     /// # Panics
-    /// If the table has no such key.
+    /// Panics if the table has no such key.
     pub fn field(mut self, name: &str, value: &impl FieldValue) -> Self {
         let errors = value.errors(self.find(name));
         self.errors.extend(errors);
@@ -59,8 +59,9 @@ impl Validator {
     }
 
     /// Checks that no size or coordinate is more than 1e12 times as large as the smallest of
-    /// `sizes`. Beyond that ratio, a coordinate has no digits left for the size. The check is
-    /// skipped if there are errors already.
+    /// `sizes`. Beyond that ratio, double precision leaves less than four decimal digits for the
+    /// smallest size. `sizes` lists keys and their values. The check is skipped if there are errors
+    /// already.
     pub fn ratio(mut self, sizes: &[(&str, f64)], coordinates: &[f64]) -> Self {
         let smallest = sizes.iter().copied().reduce(|a, b| if b.1 < a.1 { b } else { a });
         let largest = sizes
@@ -85,24 +86,24 @@ impl Validator {
         self
     }
 
-    /// Adds `error` if there is one.
+    /// Adds the validation error `error` if there is one.
     pub fn and(mut self, error: Option<ValidationError>) -> Self {
         self.errors.extend(error);
         self
     }
 
-    /// Adds the errors of the description that is the value of the key `outer`.
+    /// Adds the validation errors of the table that is the value of the key `outer`.
     pub fn nested(mut self, outer: &str, errors: Vec<ValidationError>) -> Self {
         self.errors.extend(errors.into_iter().map(|f| f.prefixed(outer)));
         self
     }
 
-    /// Returns `true` if there are no errors so far.
+    /// Returns `true` if no validation errors were found so far.
     pub fn is_clean(&self) -> bool {
         self.errors.is_empty()
     }
 
-    /// Returns the errors that were found.
+    /// Returns the validation errors that were found.
     pub fn errors(self) -> Vec<ValidationError> {
         self.errors
     }

@@ -1,23 +1,23 @@
-//! Worlds in single or double precision behind one type.
+//! Compiled scenes (worlds) in single or double precision behind one type.
 
 use crate::lanes::{Double, SimdFloat, Single};
 use crate::scene::Scene;
 use crate::world::compile::RecenteredGeometry;
 use crate::world::integrator::first_hit::FirstHit;
-use crate::world::inventory::Inventory;
 use crate::world::light_choice::LightChoice;
 use crate::world::light_groups::LightGroups;
 use crate::world::precision;
 use crate::world::world::World;
 
-/// Floating-point precision in which a scene is traced.
+/// Floating-point precision in which a scene is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Precision {
-    /// 24-bit significands, eight or sixteen lanes.
+    /// Single precision: 24-bit significands, eight or sixteen SIMD lanes.
     Single,
-    /// 53-bit significands, four or eight lanes.
+    /// Double precision: 53-bit significands, four or eight SIMD lanes.
     Double,
-    /// Single precision where the scene's proportions allow it, double precision elsewhere.
+    /// Single precision if it is accurate enough for the proportions of the scene, otherwise double
+    /// precision.
     #[default]
     Auto,
 }
@@ -25,18 +25,19 @@ pub enum Precision {
 /// Options of scene compilation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Precision in which the world is compiled.
+    /// Floating-point precision for which the scene is compiled.
     pub precision: Precision,
-    /// `true` if all lights share one light group, which makes the film smaller. The samples then
-    /// contain the colours and intensities of the lights.
+    /// `true` if all lights and emissive materials share one light group (part of the picture that
+    /// the film stores separately). The film is then smaller, but a change of a light's colour or
+    /// intensity requires new samples.
     pub merge_lights: bool,
 }
 
-/// A world in the precision that the scene requires or that the user has chosen.
+/// Compiled scene in the precision that the scene requires or that the user has chosen.
 pub enum AnyWorld {
-    /// Single precision.
+    /// Scene compiled for single precision.
     Single(World<Single>),
-    /// Double precision.
+    /// Scene compiled for double precision.
     Double(World<Double>),
 }
 
@@ -51,7 +52,7 @@ macro_rules! dispatch {
 }
 
 impl AnyWorld {
-    /// Compiles `scene`, which has no validation errors.
+    /// Compiles `scene`, which has no validation errors, with the given options.
     pub fn compile(scene: &Scene, options: &Options) -> Self {
         let geometry = RecenteredGeometry::new(scene);
         let single = match options.precision {
@@ -69,7 +70,7 @@ impl AnyWorld {
         }
     }
 
-    /// Name of the precision: `single` or `double`.
+    /// Returns the name of the precision: `single` or `double`.
     pub fn precision(&self) -> &'static str {
         match self {
             Self::Single(_) => "single",
@@ -77,7 +78,7 @@ impl AnyWorld {
         }
     }
 
-    /// Name of the lane type, such as `f32x8`.
+    /// Returns the name of the SIMD type, such as `f32x8`.
     pub fn lanes(&self) -> &'static str {
         match self {
             Self::Single(_) => Single::NAME,
@@ -85,42 +86,45 @@ impl AnyWorld {
         }
     }
 
-    /// Name of each light group.
+    /// Returns the name of each light group (part of the picture that the film stores separately).
     pub fn group_names(&self) -> Vec<String> {
         dispatch!(self, world => world.group_names.clone())
     }
 
-    /// Light groups of the world: the parts of the picture that the film stores separately.
+    /// Returns the light groups of the compiled scene: the parts of the picture that the film
+    /// stores separately.
     pub fn light_groups(&self) -> &LightGroups {
         dispatch!(self, world => &world.groups)
     }
 
     /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
-    /// same length. A point is a column and a row of the raster in pixels, with fractions.
+    /// same length. A point is a position in the picture: a column and a row in pixels, with
+    /// fractions.
     pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
         dispatch!(self, world => world.first_hit(points, hits))
     }
 
-    /// Scale of each light group: the number of integer steps per unit of radiance in the film, a
-    /// power of two.
+    /// Returns the scale of each light group: the number of integer steps per unit of radiance in
+    /// the film, a power of two.
     pub fn group_scales(&self) -> Vec<f64> {
         dispatch!(self, world => world.scales.clone())
     }
 
-    /// Weight of each light group in the picture of `scene`. The scene may differ from the compiled
-    /// one in colours, intensities and switches of lights.
+    /// Returns the weight (red, green, blue) of each light group in the picture of `scene`. The
+    /// scene may differ from the compiled one in colours, intensities and on/off switches of
+    /// lights.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         dispatch!(self, world => world.groups.mix(scene))
     }
 
-    /// Number of successive samples of a pixel that ask each light once; 1 if every sample asks all
-    /// lights.
+    /// Returns the number of successive samples of a pixel that together trace a shadow ray to each
+    /// light once; 1 if every sample traces shadow rays to all lights.
     pub fn light_period(&self) -> u32 {
         dispatch!(self, world => world.light_choice.as_ref().map_or(1, LightChoice::period))
     }
 
-    /// Features that the world contains.
-    pub fn inventory(&self) -> &Inventory {
+    /// Returns the list of features that the compiled scene contains.
+    pub fn inventory(&self) -> &str {
         dispatch!(self, world => &world.inventory)
     }
 

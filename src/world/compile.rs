@@ -1,5 +1,5 @@
-//! Compilation of a scene into a world, step by step: recentred geometry, materials, lights,
-//! transmission, culling.
+//! Compilation of a scene into a [`World`], step by step: geometry translated to the scene's
+//! centre, materials, lights, transmission, culling.
 
 use crate::camera::PerspectiveCamera;
 use crate::lanes::{Float, SimdFloat};
@@ -15,11 +15,11 @@ use crate::world::culling::tile::{CullingMode, FrustumCuller, TileCandidates, ou
 use crate::world::integrator::indirect_diffuse::DiffuseLimits;
 use crate::world::integrator::nested_dielectrics::{NestedDielectrics, StartRegion};
 use crate::world::integrator::surface_textures::SurfaceTextures;
-use crate::world::inventory::{Inventory, InventorySources};
 use crate::world::light_choice::LightChoice;
 use crate::world::light_groups::{LightGroupSource, LightGroups};
 use crate::world::lights_on_surfaces::OnSurface;
 use crate::world::radiance_range::SceneDistances;
+use crate::world::scene_inventory::inventory;
 use crate::world::surface_emission::SurfaceEmission;
 use crate::world::truncation_bias;
 use crate::world::world::{
@@ -31,11 +31,12 @@ use std::collections::HashMap;
 /// Geometry of all objects in double precision, translated so that the scene's centre is the
 /// origin.
 pub(super) struct RecenteredGeometry {
-    /// Scene coordinates of the new origin.
+    /// Point, in scene coordinates, that becomes the origin of the compiled geometry.
     pub origin: DVec3,
-    /// Shape of each object in canonical form, with its transform applied.
+    /// Geometry of each object in canonical form, with its transform applied.
     pub forms: Vec<Form>,
-    /// Largest magnitude of a coordinate of the lens and of all shapes with finite bounds.
+    /// Largest magnitude of a coordinate of the camera's lens and of all shapes with finite bounds,
+    /// relative to the origin.
     pub extent: f64,
 }
 
@@ -46,7 +47,7 @@ impl RecenteredGeometry {
             .iter()
             .map(|object| object.shape.form().transformed(&object.scene_from_object()))
             .collect();
-        let bounds = || forms.iter().filter_map(Form::bounds);
+        let bounds = || forms.iter().filter_map(|form| form.bounds());
         let low = bounds().map(|b| b.0).reduce(DVec3::min);
         let high = bounds().map(|b| b.1).reduce(DVec3::max);
         let scene_eye = DVec3::from(scene.camera.eye);
@@ -56,8 +57,10 @@ impl RecenteredGeometry {
         };
         let to_origin = DAffine3::from_translation(-origin);
         let forms: Vec<Form> = forms.into_iter().map(|f| f.transformed(&to_origin)).collect();
-        let farthest_corners =
-            forms.iter().filter_map(Form::bounds).map(|(low, high)| low.abs().max(high.abs()));
+        let farthest_corners = forms
+            .iter()
+            .filter_map(|form| form.bounds())
+            .map(|(low, high)| low.abs().max(high.abs()));
         let lens = (scene_eye - origin).abs() + DVec3::splat(scene.camera.lens_radius());
         let extent = farthest_corners.fold(lens, DVec3::max).max_element();
         Self { origin, forms, extent }
@@ -71,7 +74,7 @@ impl RecenteredGeometry {
     }
 }
 
-/// The distinct materials of a scene and their BSDFs.
+/// Distinct materials of a scene and their BSDFs.
 struct CompiledMaterials<'a, S> {
     /// Distinct materials, in order of first use.
     materials: Vec<&'a Material>,
@@ -82,8 +85,8 @@ struct CompiledMaterials<'a, S> {
 }
 
 impl<'a, S: Float> CompiledMaterials<'a, S> {
-    /// Compiles the materials of all parts. `default` is the material of names that the scene does
-    /// not define.
+    /// Compiles the materials of all objects and their parts. `default` replaces materials whose
+    /// names the scene does not define.
     fn new(scene: &'a Scene, default: &'a Material) -> Self {
         let mut materials: Vec<&Material> = Vec::new();
         let mut index_of_name: HashMap<&'a str, u32> = HashMap::new();
@@ -118,12 +121,12 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         self.materials[self.index(primitive) as usize]
     }
 
-    /// Materials of the parts of an object.
+    /// Returns the materials of the parts of object number `object`.
     fn of_parts(&self, object: usize) -> Vec<&'a Material> {
         self.of_object[object].iter().map(|index| self.materials[*index as usize]).collect()
     }
 
-    /// Returns `true` if some material reflects direct light of lights.
+    /// Returns `true` if some material reflects light that arrives directly from lights.
     fn has_direct(&self) -> bool {
         self.bsdfs.iter().any(|bsdf| bsdf.has_direct)
     }
@@ -133,8 +136,9 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
         self.materials.iter().any(|m| m.ambient > 0.0 && m.color.0 != [0.0; 3])
     }
 
-    /// Returns the limits of diffuse bounces. Returns `None` if the scene has indirect diffuse
-    /// light switched off, or if no material is matt.
+    /// Returns the limits of indirect diffuse light: the largest number of bounces, and whether
+    /// caustics are included. Returns `None` if the scene switches indirect diffuse light off, or
+    /// if no material is matt.
     fn diffuse_limits(&self, scene: &Scene) -> Option<DiffuseLimits> {
         let IntegratorSettings { max_diffuse_depth: depth, caustics, .. } = scene.trace;
         let is_matt = |m: &&Material| m.diffuse > 0.0 && m.color.0 != [0.0; 3];
@@ -148,19 +152,21 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
     }
 }
 
-/// Height of emitters (lights with a size) above objects that they touch, in rounding errors of the
-/// scene's extent. Rays that leave a surface start at half of this height.
+/// Height of emitters (lights with a size) above objects that they touch. The unit is the rounding
+/// error of the scene's extent. Rays that leave a surface start at half this height, so that they
+/// reach the emitter.
 const EMITTER_LIFT: f64 = 16.0;
 
-/// Returns the distance by which emitters are moved off the surfaces that they touch; see
+/// Returns the distance by which lights with a size are moved off the surfaces that they touch; see
 /// [`Emitter::new`].
 fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
     EMITTER_LIFT * (S::EPSILON * geometry.extent).max(geometry.input_error())
 }
 
-/// Compiles lights of one kind. `emitting` lists all lights that emit: index in the scene, light
-/// group, and emission that the group's samples contain. Lights for which `compile` returns `None`
-/// are left out.
+/// Compiles the lights for which `compile` returns a result, such as all lights with a size; other
+/// lights are left out. `emitting` has three values for each light that emits: its index in the
+/// scene, the index of its light group, and its emission. The film's samples of the light are
+/// multiplied by the emission.
 fn light_sources<T, S: Float>(
     scene: &Scene,
     emitting: &[(usize, usize, [f64; 3])],
@@ -174,7 +180,8 @@ fn light_sources<T, S: Float>(
     emitting.iter().filter_map(source).collect()
 }
 
-/// The lights of a scene, their groups, and the groups' fixed-point scales.
+/// Lights of a scene and their light groups, with the scale of each group: the number of integer
+/// steps per unit of radiance in the film.
 struct CompiledLights<S> {
     groups: LightGroups,
     scales: Vec<f64>,
@@ -224,37 +231,37 @@ impl<S: Float> CompiledLights<S> {
         Self { groups, scales, sources, choice, emitters, environments, emission }
     }
 
-    /// Returns the target of the shadow rays (a point or a direction) for each light without a
-    /// size.
+    /// Returns the target of the shadow rays (a point or a direction) to each light without a size.
     fn targets(&self) -> Vec<LightTarget> {
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let target_of_source = |source: &DeltaSource<S>| match &source.light.light {
-            DeltaLight::InverseSquare { position }
-            | DeltaLight::Constant { position }
-            | DeltaLight::Spot { position, .. } => LightTarget::Point(vector(position)),
+            DeltaLight::Point { position, .. } => LightTarget::Point(vector(position)),
             DeltaLight::Directional { wi } => LightTarget::Direction(vector(wi)),
         };
         self.sources.iter().map(target_of_source).collect()
     }
 
-    /// Bounding sphere of each emitter and of each object from which light is sampled.
+    /// Returns the bounding spheres of the lights with a size, then of the objects from which light
+    /// is sampled, then of the strata (spatial groups) of lights in `choice`.
     fn emitter_bounds(&self) -> Vec<BoundingSphere> {
         let emitters = self.emitters.iter().map(|source| &source.light);
         let emitters = emitters.map(|light| (light.center(), light.radius()));
-        let objects = self.emission.emitters().map(|light| (light.center(), light.radius()));
+        let objects = self.emission.emitters().map(|light| (light.center, light.radius));
         let balls = emitters.chain(objects);
         let balls = balls.map(|(center, radius)| BoundingSphere { center, radius });
         balls.chain(self.choice.iter().flat_map(LightChoice::balls)).collect()
     }
 
-    /// Number of lights without a size, of emitters and of objects from which light is sampled.
-    /// Environments have no lists of occluders.
+    /// Returns the number of lists of possible occluders: one for each light in `sources`, each
+    /// light with a size, each object from which light is sampled, and each stratum (spatial group
+    /// of lights) of `choice`. Environments have no list.
     fn count(&self) -> usize {
         let strata = self.choice.as_ref().map_or(0, LightChoice::strata);
         self.sources.len() + self.emitters.len() + self.emission.counts()[0] + strata
     }
 
-    /// Largest distance between a light and the end point of its shadow rays.
+    /// Returns the largest distance between a light on a surface and the end point of its shadow
+    /// rays; 0 if no light is on a surface.
     fn max_end_offset(&self) -> f64 {
         let on_surfaces = self.sources.iter().filter_map(|source| source.light.on_surface.as_ref());
         on_surfaces.map(OnSurface::farthest).fold(0.0, f64::max)
@@ -270,8 +277,8 @@ struct CompiledCulling<S> {
 }
 
 impl<S: Float> CompiledCulling<S> {
-    /// Compiles the culling of a scene. `outside_only` has one entry for each primitive: `true` if
-    /// rays hit it only from outside.
+    /// Compiles the culling data of a scene. `outside_only` has one entry for each primitive:
+    /// `true` if rays hit it only from outside.
     fn new<L: SimdFloat<Scalar = S>>(
         scene: &Scene,
         recentered: &RecenteredGeometry,
@@ -315,7 +322,7 @@ impl<S: Float> CompiledCulling<S> {
     }
 }
 
-/// Returns the region in which camera rays start: a ball around the eye. It contains the lens and
+/// Returns the region in which camera rays start: a sphere around the eye. It contains the lens and
 /// every start point on the near plane.
 fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
     let size = scene.film.size.map(|n| n as usize);
@@ -370,27 +377,13 @@ impl<L: SimdFloat> World<L> {
         let outside_only = outside_only(forms, start, &entered);
         let culling =
             CompiledCulling::new(scene, recentered, &geometry, &camera, &lights, &outside_only);
-        let inventory = Inventory::new(
-            scene,
-            InventorySources {
-                geometry: geometry.to_string(),
-                textures: textures.as_ref().map(SurfaceTextures::features).unwrap_or_default(),
-                bsdfs: &materials.bsdfs,
-                groups: &lights.groups.members,
-                lights: lights.count() + lights.environments.len(),
-                light_choice: lights.choice.is_some(),
-                emissive: lights.emission.counts(),
-                diffuse_limits: materials.diffuse_limits(scene),
-                precision: if L::EPSILON > 1e-10 { "single" } else { "double" },
-            },
-        );
         let smooth =
             geometry.is_smooth() || textures.as_ref().is_some_and(SurfaceTextures::is_bumped);
         let colored =
             geometry.is_colored() || textures.as_ref().is_some_and(SurfaceTextures::is_colored);
         let has_background = scene.background.color.0 != [0.0; 3];
         let background = lights.groups.find(&LightGroupSource::Background);
-        Self {
+        let mut world = Self {
             smooth,
             colored,
             simple: !smooth && !colored && geometry.has_no_tree(),
@@ -420,8 +413,10 @@ impl<L: SimdFloat> World<L> {
             light_buffers: culling.light_buffers,
             camera,
             jitter: scene.film.filter == Filter::Box,
-            inventory,
+            inventory: String::new(),
             truncation_biases: truncation_bias::truncation_bounds(scene),
-        }
+        };
+        world.inventory = inventory(scene, &world);
+        world
     }
 }

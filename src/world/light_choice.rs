@@ -1,16 +1,16 @@
 //! Choice of lights at a surface point, in scenes with many point lights.
 //!
-//! The lights are divided into sets of four to eight lights, and each path asks the lights of one
-//! set at each surface, all sets with the same probability. A set holds at most one light of each
-//! stratum, and the strata are consecutive parts of the lights in the order of a Morton curve, so
-//! that the lights of a set are spread over the scene.
+//! The lights are divided into sets of four to eight lights. At each surface a path chooses one
+//! set, all with the same probability, and traces shadow rays to its lights. A stratum is a group
+//! of lights that are close to each other: consecutive lights in the order of a Morton curve. A set
+//! holds at most one light of each stratum, so that its lights are spread over the scene.
 //!
 //! The number of sets is a power of two. Successive samples of a pixel are stratified over the
-//! sets, as Sobol points are, so that as many samples as there are sets ask every light once. With
-//! another number of sets the noise would be several times as large.
+//! sets, as Sobol points are, so that as many samples as there are sets trace a shadow ray to every
+//! light once. With another number of sets the noise would be several times as large.
 //!
-//! The probabilities depend neither on intensities nor on the place, so that light groups mix
-//! exactly.
+//! The probabilities depend neither on the intensities of the lights nor on the surface point. All
+//! lights are in one light group, see [`LightGroups`](crate::world::LightGroups).
 
 use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
 use crate::light::DeltaLight;
@@ -19,181 +19,216 @@ use crate::world::world::DeltaSource;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Least number of point lights of which some are chosen. In scenes with fewer every light is
-/// asked. `benches/many-lights.sh` measures the cost of both.
-const MIN_LIGHTS: usize = 16;
+/// Smallest number of point lights in a scene whose paths choose a few of them per surface. With
+/// fewer lights, shadow rays go to every light. `benches/many-lights.sh` measures the cost of both.
+pub(super) const MIN_LIGHTS: usize = 16;
 
-/// Least number of lights in a full set.
+/// Smallest number of lights in a set. A set holds the lights to which a path traces shadow rays at
+/// one surface.
 const MIN_SET: usize = 4;
 
-/// Largest number of strata: the largest number of lights in a set.
-const MAX_STRATA: usize = 2 * MIN_SET;
+/// Smallest length of the list in [`Table::BySet`]; shorter lists are padded. With AVX-512, a
+/// lookup in 16 elements is one instruction.
+const MIN_TABLE: usize = 16;
 
-/// Lights that a path asks together, one of each stratum.
-#[derive(Clone, Copy)]
-struct LightSet<S> {
-    /// Positions of the lights; NaN in strata that have no light in this set, so that no surface
-    /// faces it.
-    positions: [[S; 3]; MAX_STRATA],
-    /// Light group of each light, as an index.
-    groups: [u32; MAX_STRATA],
-    /// Emission that the samples of the group contain.
-    emissions: [[S; 3]; MAX_STRATA],
-    /// `true` for each light whose irradiance is the same at every distance.
-    constant: [bool; MAX_STRATA],
+/// Values of one property of the lights of a stratum (a spatial group). The lights of a scene are
+/// divided into sets, which have at most one light of each stratum. A path chooses one set at a
+/// surface and traces shadow rays to its lights.
+enum Table<S> {
+    /// Value that all lights of the stratum (spatial group of lights) have.
+    Common(S),
+    /// Value for each set of lights (those to which one path traces shadow rays). Elements beyond
+    /// the number of sets are never read.
+    BySet(Vec<S>),
 }
 
-/// Properties that the lights of one stratum have in common.
+/// Stratum: a spatial group of lights. A path traces shadow rays to at most one of them at each
+/// surface.
 struct Stratum<S> {
-    /// Sphere around the lights.
+    /// Sphere around the lights of the stratum (spatial group of lights).
     ball: BoundingSphere,
-    /// Light group of all lights; `None` if they have several.
-    group: Option<u32>,
-    /// Emission of all lights; `None` if they have several.
-    emission: Option<[S; 3]>,
+    /// Coordinates x, y and z of the stratum's lights, one light for each set (the lights to which
+    /// one path traces shadow rays at a surface). NaN for a set without a light of the stratum, so
+    /// that the test for a surface that faces the light fails.
+    positions: [Table<S>; 3],
+    /// Irradiance of the stratum's lights (one for each set) at normal incidence, if it is the same
+    /// at every distance. 0 for lights whose irradiance decreases with the square of the distance.
+    constant: Table<S>,
+    /// Red, green and blue of the emission (colour times intensity) by which the lights' samples
+    /// are multiplied in the film.
+    emission: [Table<S>; 3],
 }
 
-/// Point lights of which a few are chosen at each surface.
+/// Point lights of a scene, of which each path chooses a few at each surface.
 pub(super) struct LightChoice<S> {
-    sets: Vec<LightSet<S>>,
+    /// Index of the light group that all lights of this choice share.
+    pub group: usize,
+    /// Number of sets of lights, a power of two. A path traces shadow rays to one set per surface.
+    sets: usize,
     strata: Vec<Stratum<S>>,
-    /// `true` if the irradiance of a light is the same at every distance.
-    any_constant: bool,
 }
 
 /// For each lane of a packet, the set of lights to which it traces shadow rays.
 pub(super) struct ChosenSets<'a, S> {
     choice: &'a LightChoice<S>,
-    /// Set of each lane.
-    sets: [&'a LightSet<S>; MAX_WIDTH],
+    /// Index of the chosen set of lights in each lane.
+    sets: [u32; MAX_WIDTH],
 }
 
 impl<S: Float> LightChoice<S> {
-    /// Takes the lights of which some are chosen out of `sources`: point lights that are not on a
-    /// surface. Returns `None` if they are so few that all of them are asked.
+    /// Removes from `sources` the lights of which paths choose a few: point lights that are not on
+    /// a surface. Returns `None` if they are so few that shadow rays go to all of them.
     pub fn take(sources: &mut Vec<DeltaSource<S>>) -> Option<Self> {
-        let position = |source: &DeltaSource<S>| match source.light.light {
-            DeltaLight::InverseSquare { position } | DeltaLight::Constant { position } => {
-                source.light.on_surface.is_none().then_some(position)
-            }
-            DeltaLight::Directional { .. } | DeltaLight::Spot { .. } => None,
+        let is_point = |source: &DeltaSource<S>| {
+            matches!(source.light.light, DeltaLight::Point { cone: None, .. })
+                && source.light.on_surface.is_none()
         };
-        if sources.iter().filter_map(position).count() < MIN_LIGHTS {
+        if sources.iter().filter(|source| is_point(source)).count() < MIN_LIGHTS {
             return None;
         }
-        let (mut chosen, others): (Vec<_>, Vec<_>) =
-            sources.drain(..).partition(|source| position(source).is_some());
+        let (mut chosen, others): (Vec<_>, Vec<_>) = sources.drain(..).partition(is_point);
         *sources = others;
-        let place = |source: &DeltaSource<S>| source.light.light.position().unwrap_or_default();
         let low = chosen.iter().map(place).reduce(DVec3::min)?;
         let high = chosen.iter().map(place).reduce(DVec3::max)?;
         chosen.sort_by_key(|source| morton(place(source), low, high));
 
-        let count = 1 << (chosen.len() / MIN_SET).ilog2();
-        let strata: Vec<&[DeltaSource<S>]> = chosen.chunks(count).collect();
-        let white = [S::from_f64(1.0); 3];
-        let set = |i: usize| {
-            let light = |k: usize| strata.get(k).and_then(|stratum| stratum.get(i));
-            LightSet {
-                positions: array_from_fn(|k| {
-                    light(k).and_then(position).unwrap_or([S::from_f64(f64::NAN); 3])
-                }),
-                groups: array_from_fn(|k| light(k).map_or(0, |light| light.group as u32)),
-                emissions: array_from_fn(|k| {
-                    light(k).and_then(|light| light.emission).unwrap_or(white)
-                }),
-                constant: array_from_fn(|k| {
-                    light(k).is_some_and(|light| !light.light.light.is_inverse_square())
-                }),
-            }
-        };
-        let sets: Vec<LightSet<S>> = (0..count).map(set).collect();
-        let strata = strata.iter().map(|lights| Stratum {
-            ball: ball(lights.iter().map(place)),
-            group: common(lights.iter().map(|light| light.group)).map(|group| group as u32),
-            emission: common(lights.iter().map(|light| light.emission.unwrap_or(white))),
-        });
-        let strata = strata.collect();
-        let any_constant = sets.iter().any(|set| set.constant.contains(&true));
-        Some(Self { sets, strata, any_constant })
+        let group = chosen[0].group;
+        assert!(chosen.iter().all(|light| light.group == group), "many point lights share a group");
+        let sets = 1 << (chosen.len() / MIN_SET).ilog2();
+        let strata = chosen.chunks(sets).map(|lights| Stratum::new(lights, sets)).collect();
+        Some(Self { group, sets, strata })
     }
 
-    /// Number of strata.
+    /// Returns the number of strata (spatial groups of lights).
     pub fn strata(&self) -> usize {
         self.strata.len()
     }
 
-    /// Number of light sets. As many successive samples of a pixel use each set once, and so trace
-    /// a shadow ray to each light once.
+    /// Returns the light period: the number of successive samples of a pixel that together trace a
+    /// shadow ray to each light once. It is the number of sets of lights, because each of these
+    /// samples uses a different set.
     pub fn period(&self) -> u32 {
-        self.sets.len() as u32
+        self.sets as u32
     }
 
-    /// Returns a sphere around the lights of each stratum.
+    /// Returns a sphere around the lights of each stratum (spatial group of lights).
     pub fn balls(&self) -> impl Iterator<Item = BoundingSphere> {
         self.strata.iter().map(|stratum| stratum.ball)
     }
 
-    /// Chooses a set for each lane. `number` is uniform in [0, 1).
+    /// Chooses a set of lights for each lane. `number` is uniform in [0, 1).
     #[inline(always)]
     pub fn choose<L: SimdFloat<Scalar = S>>(&self, number: L) -> ChosenSets<'_, S> {
         // The product with a power of two is exact.
-        let place = number * L::from_f64(self.sets.len() as f64);
-        let set =
-            |lane: usize| if lane < L::WIDTH { place.lane(lane).to_f64() as usize } else { 0 };
-        ChosenSets { choice: self, sets: array_from_fn(|lane| &self.sets[set(lane)]) }
+        let place = number * L::from_f64(self.sets as f64);
+        let set = |lane: usize| if lane < L::WIDTH { place.lane(lane).to_u32() } else { 0 };
+        ChosenSets { choice: self, sets: array_from_fn(set) }
+    }
+}
+
+impl<S: Float> Table<S> {
+    /// Creates a table of one property of lights, with a value for each of `sets` sets. `values`
+    /// are the values of the lights; `absent` is the value of sets without a light.
+    fn new(values: impl Iterator<Item = S> + Clone, absent: f64, sets: usize) -> Self {
+        let absent = S::from_f64(absent);
+        let is_full = values.clone().count() == sets;
+        match common(values.clone()) {
+            Some(value) if is_full => Self::Common(value),
+            _ => {
+                let padded = values.chain(std::iter::repeat(absent));
+                Self::BySet(padded.take(sets.max(MIN_TABLE)).collect())
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn gather<L: SimdFloat<Scalar = S>>(&self, sets: &[u32; MAX_WIDTH]) -> L {
+        match self {
+            Self::Common(value) => L::splat(*value),
+            Self::BySet(table) => L::gather(table, sets),
+        }
+    }
+}
+
+impl<S: Float> Stratum<S> {
+    /// Creates a stratum (spatial group of lights) from its `lights`. Each of the `sets` sets holds
+    /// at most one light of the stratum. A path chooses one set at a surface and traces shadow rays
+    /// to its lights.
+    fn new(lights: &[DeltaSource<S>], sets: usize) -> Self {
+        let coordinate = |axis: usize| {
+            let coordinate = move |light: &DeltaSource<S>| match light.light.light {
+                DeltaLight::Point { position, .. } => position[axis],
+                DeltaLight::Directional { .. } => S::from_f64(f64::NAN),
+            };
+            Table::new(lights.iter().map(coordinate), f64::NAN, sets)
+        };
+        let constant = |light: &DeltaSource<S>| match light.light.light {
+            DeltaLight::Point { inverse_square: false, .. } => S::from_f64(PI),
+            _ => S::default(),
+        };
+        let emission = |channel: usize| {
+            let emission = move |light: &DeltaSource<S>| {
+                light.emission.map_or(S::from_f64(1.0), |emission| emission[channel])
+            };
+            Table::new(lights.iter().map(emission), 1.0, sets)
+        };
+        Self {
+            ball: ball(lights.iter().map(place)),
+            positions: [0, 1, 2].map(coordinate),
+            constant: Table::new(lights.iter().map(constant), 0.0, sets),
+            emission: [0, 1, 2].map(emission),
+        }
     }
 }
 
 impl<S: Float> ChosenSets<'_, S> {
-    /// Positions of the lights of a stratum.
+    #[inline(always)]
+    fn gather<L: SimdFloat<Scalar = S>>(&self, tables: &[Table<S>; 3]) -> Vec3<L> {
+        let [x, y, z] = tables;
+        Vec3::new(x.gather(&self.sets), y.gather(&self.sets), z.gather(&self.sets))
+    }
+
+    /// Returns the position of each lane's chosen light in the stratum number `stratum` (a spatial
+    /// group of lights).
     #[inline(always)]
     pub fn positions<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
-        Vec3::from_fn(|lane| self.sets[lane].positions[stratum])
+        self.gather(&self.choice.strata[stratum].positions)
     }
 
-    /// Returns the irradiance at normal incidence of lights with unit emission, divided by the
-    /// probability of the choice. `inverse` is the inverse of the distance.
+    /// Returns the irradiance of each lane's chosen light in the stratum number `stratum` (a
+    /// spatial group of lights), divided by the probability of the choice. The irradiance is that
+    /// of a light with unit emission at normal incidence. `inverse` is the reciprocal of the
+    /// distance to the light.
     #[inline(always)]
     pub fn irradiance<L: SimdFloat<Scalar = S>>(&self, stratum: usize, inverse: L) -> L {
-        let count = L::from_f64(self.choice.sets.len() as f64);
+        let count = L::from_f64(self.choice.sets as f64);
         // The irradiance is kept finite, because infinity times black would be NaN.
-        let mut irradiance = (inverse * inverse).min(L::from_f64(L::MAX) / count);
-        if self.choice.any_constant {
-            let constant = L::from_fn(|lane| {
-                S::from_f64(if self.sets[lane].constant[stratum] { PI } else { 0.0 })
-            });
-            irradiance = L::select(constant.gt(L::zero()), constant, irradiance);
-        }
-        irradiance * count
+        let falling = (inverse * inverse).min(L::from_f64(L::MAX) / count);
+        let constant: L = self.choice.strata[stratum].constant.gather(&self.sets);
+        L::select(constant.gt(L::zero()), constant, falling) * count
     }
 
-    /// Emission of the lights of a stratum that the samples of their groups contain.
+    /// Returns the emission (colour times intensity) of each lane's chosen light in the stratum
+    /// number `stratum`; 1 for a light with a light group of its own, whose emission is applied to
+    /// the film's sums.
     #[inline(always)]
     pub fn emission<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
-        match self.choice.strata[stratum].emission {
-            Some(emission) => Vec3::splat(emission),
-            None => Vec3::from_fn(|lane| self.sets[lane].emissions[stratum]),
-        }
-    }
-
-    /// Light groups of the lights of a stratum, as ids.
-    #[inline(always)]
-    pub fn groups<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> L {
-        match self.choice.strata[stratum].group {
-            Some(group) => L::from_id(group),
-            None => L::from_fn(|lane| L::from_id(self.sets[lane].groups[stratum]).lane(0)),
-        }
+        self.gather(&self.choice.strata[stratum].emission)
     }
 }
 
-/// Returns the value that all items have. Returns `None` if they differ.
+/// Returns the position of a light; the origin for a directional light.
+fn place<S: Float>(source: &DeltaSource<S>) -> DVec3 {
+    source.light.light.position().unwrap_or_default()
+}
+
+/// Returns the value that all `items` have. Returns `None` if they differ or if there are none.
 fn common<T: PartialEq>(mut items: impl Iterator<Item = T>) -> Option<T> {
     let first = items.next()?;
     items.all(|item| item == first).then_some(first)
 }
 
-/// Returns a sphere around points.
+/// Returns a sphere that contains `points`, centred on their bounding box.
 fn ball(points: impl Iterator<Item = DVec3> + Clone) -> BoundingSphere {
     let low = points.clone().reduce(DVec3::min).unwrap_or_default();
     let high = points.clone().reduce(DVec3::max).unwrap_or_default();

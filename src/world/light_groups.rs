@@ -1,12 +1,14 @@
-//! Light groups. A light group is the part of the picture that comes from one light, one emissive
-//! material, ambient light or the background, and is linear in its colour and intensity. The film
-//! stores each group separately, so that colour and intensity can change without new samples.
+//! Light groups. A light group is the part of the picture that comes from one source: a light, an
+//! emissive material, ambient light or the background. It is proportional to the colour and
+//! intensity of the source. The film stores each group separately, so that colour and intensity can
+//! change without new samples.
 
 use crate::lanes::Float;
 use crate::light::{DeltaLight, Emitter, EnvironmentLight, Light};
 use crate::material::Material;
 use crate::scene::{Object, Scene};
 use crate::value::Color;
+use crate::world::light_choice::MIN_LIGHTS;
 use crate::world::radiance_range::{RadianceRange, SceneDistances};
 use glam::DVec3;
 
@@ -18,22 +20,24 @@ const MAX_LIGHT_GROUPS: usize = 8;
 /// and one for the background.
 pub const MAX_GROUPS: usize = MAX_LIGHT_GROUPS + 2;
 
-/// Size of the film's sums in bytes up to which every light has a group of its own.
+/// Largest size of the film's integer sums in bytes. Lights get groups of their own up to this
+/// size; further lights share the last group.
 const FILM_BYTES: u64 = 1 << 30;
 
-/// Bytes per pixel and light group: two replicates of three channels.
+/// Bytes per pixel and light group: a sum of eight bytes for each of two replicates (halves of the
+/// samples) and three channels.
 const GROUP_BYTES: u64 = 2 * 3 * 8;
 
 /// Source of the light in one light group.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LightGroupSource {
-    /// Ambient light.
+    /// Ambient light of the scene.
     Ambient,
     /// Background: the radiance of rays that miss all primitives.
     Background,
-    /// One light, by its index in the scene.
+    /// One light; the value is its index in the scene.
     Light(usize),
-    /// Emission of all objects with one material, by its name.
+    /// Emission of all objects with one material; the value is the name of the material.
     Material(String),
     /// Several lights and materials. Their samples already contain the colour and intensity of
     /// each.
@@ -41,7 +45,7 @@ pub enum LightGroupSource {
 }
 
 impl LightGroupSource {
-    /// Returns the lights and materials in the group; empty for ambient light and background.
+    /// Returns the lights and materials in the light group; empty for ambient light and background.
     pub fn emitting(&self) -> &[Self] {
         match self {
             Self::Ambient | Self::Background => &[],
@@ -50,7 +54,8 @@ impl LightGroupSource {
         }
     }
 
-    /// Returns the emission of a light or material in `scene`; black for other sources.
+    /// Returns the emission of this source in `scene` if it is a light or a material; otherwise
+    /// black.
     pub(super) fn emission(&self, scene: &Scene) -> [f64; 3] {
         match self {
             Self::Light(i) => scene.lights.get(*i).map_or([0.0; 3], emission),
@@ -63,17 +68,19 @@ impl LightGroupSource {
 /// Light groups of a scene, except for groups that would be black in every sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightGroups {
-    /// Source of each group, in the order of the film.
+    /// Sources of the light groups, in the order of the film's sums: one source for each group.
     pub members: Vec<LightGroupSource>,
-    /// `true` if some surface reflects direct light.
+    /// `true` if some surface reflects light that arrives directly from lights.
     pub(super) lit: bool,
     /// `true` if some surface reflects ambient light.
     pub(super) ambient: bool,
 }
 
 impl LightGroups {
-    /// Creates the light groups of `scene`. If `merge_lights` is `true`, all lights share one
-    /// group.
+    /// Creates the light groups of `scene`. If `merge_lights` is `true`, all lights and emissive
+    /// materials share one group. Otherwise each has a group of its own, with two exceptions that
+    /// share the last group: the point lights of a scene with `MIN_LIGHTS` or more of them, and
+    /// the lights and materials for which the film has no further group.
     ///
     /// `lit` is `true` if some surface reflects direct light, and `ambient` if some surface
     /// reflects ambient light. A light that no surface reflects has a group only if the camera can
@@ -86,23 +93,28 @@ impl LightGroups {
         if scene.background.color != Color::BLACK {
             members.push(LightGroupSource::Background);
         }
-        let lights = (0..scene.lights.len()).filter(|i| contributes(&scene.lights[*i], lit));
-        let mut emitting: Vec<_> = lights.map(LightGroupSource::Light).collect();
-        emitting.extend(emissive_materials(scene).into_iter().map(LightGroupSource::Material));
+        let mut emitting: Vec<usize> = (0..scene.lights.len()).collect();
+        emitting.retain(|i| contributes(&scene.lights[*i], lit));
+        let is_point = |i: &usize| scene.lights[*i].point.is_some();
+        // Separate sums of seven of many point lights would take a quarter of the time.
+        let is_shared = emitting.iter().filter(|i| is_point(i)).count() >= MIN_LIGHTS;
+        let (shared, separate): (Vec<_>, Vec<_>) =
+            emitting.into_iter().partition(|i| is_shared && is_point(i));
+        let [mut shared, mut separate] = [shared, separate]
+            .map(|lights| lights.into_iter().map(LightGroupSource::Light).collect::<Vec<_>>());
+        separate.extend(emissive_materials(scene).into_iter().map(LightGroupSource::Material));
         let pixels = scene.film.size.iter().map(|n| u64::from(*n)).product::<u64>().max(1);
         let max_groups = (FILM_BYTES / (pixels * GROUP_BYTES)) as usize;
         let max_light_groups = match merge_lights {
             true => 1,
             false => max_groups.saturating_sub(members.len()).clamp(1, MAX_LIGHT_GROUPS),
         };
-        let (single, shared) = emitting.split_at(if emitting.len() <= max_light_groups {
-            emitting.len()
-        } else {
-            max_light_groups - 1
-        });
-        members.extend_from_slice(single);
+        if separate.len() + usize::from(!shared.is_empty()) > max_light_groups {
+            shared.splice(0..0, separate.drain(max_light_groups - 1..));
+        }
+        members.extend(separate);
         if !shared.is_empty() {
-            members.push(LightGroupSource::Shared(shared.to_vec()));
+            members.push(LightGroupSource::Shared(shared));
         }
         if members.is_empty() {
             // The film needs at least one group, even for a black picture.
@@ -111,21 +123,22 @@ impl LightGroups {
         Self { members, lit, ambient }
     }
 
-    /// Returns the number of groups that would remain if all lights and emissive materials shared
-    /// one.
+    /// Returns the number of light groups that would remain if all lights and emissive materials
+    /// shared one.
     pub fn merged_count(&self) -> usize {
         let lights = self.members.iter().filter(|member| !member.emitting().is_empty()).count();
         self.members.len() - lights.saturating_sub(1)
     }
 
-    /// Returns the index of the group whose source is `wanted`. Returns `None` if there is no such
-    /// group.
+    /// Returns the index of the light group whose source is `wanted`. Returns `None` if there is no
+    /// such group.
     pub fn find(&self, wanted: &LightGroupSource) -> Option<usize> {
         self.members.iter().position(|m| m == wanted)
     }
 
-    /// Returns a triple for each light that emits: its index in the scene, its group, and the
-    /// emission that the group's samples contain.
+    /// Returns three values for each light in a light group: its index in the scene, the index of
+    /// the group, and its emission. The film's samples of the light are multiplied by the emission,
+    /// which is 1 for a light with a group of its own.
     pub fn lights(&self, scene: &Scene) -> Vec<(usize, usize, [f64; 3])> {
         let light = |source: &LightGroupSource| match source {
             LightGroupSource::Light(i) => Some(*i),
@@ -134,8 +147,9 @@ impl LightGroups {
         self.emitting(scene, light)
     }
 
-    /// Returns a triple for each emissive material: its name, its group, and the emission that the
-    /// group's samples contain.
+    /// Returns three values for each emissive material: its name, the index of its light group, and
+    /// its emission. The film's samples of the material are multiplied by the emission, which is 1
+    /// for a material with a group of its own.
     pub fn materials(&self, scene: &Scene) -> Vec<(String, usize, [f64; 3])> {
         let material = |source: &LightGroupSource| match source {
             LightGroupSource::Material(name) => Some(name.clone()),
@@ -144,8 +158,9 @@ impl LightGroups {
         self.emitting(scene, material)
     }
 
-    /// Returns a triple for each source that `select` accepts: the value that `select` returns, the
-    /// group, and the emission that the group's samples contain.
+    /// Returns three values for each light or emissive material that `select` accepts: the result
+    /// of `select`, the index of the light group, and the emission. The film's samples are
+    /// multiplied by the emission, which is 1 for a source with a group of its own.
     fn emitting<T>(
         &self,
         scene: &Scene,
@@ -162,9 +177,10 @@ impl LightGroups {
         out
     }
 
-    /// Returns the red, green and blue factor by which the sums of each group are multiplied in the
-    /// picture of `scene`. It may differ from the compiled scene in colours, intensities and on/off
-    /// switches of lights, emission of materials, ambient light and background.
+    /// Returns the red, green and blue factor by which the film's sums of each light group are
+    /// multiplied in the picture of `scene`. `scene` may differ from the compiled scene in colours,
+    /// intensities and on/off switches of lights, emission of materials, ambient light and
+    /// background.
     pub fn mix(&self, scene: &Scene) -> Vec<[f64; 3]> {
         let weight = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => scene.ambient.color.0,
@@ -175,7 +191,7 @@ impl LightGroups {
         self.members.iter().map(weight).collect()
     }
 
-    /// Returns the name of each group, for layers of image files.
+    /// Returns the name of each light group, for layers of image files.
     pub fn names(&self, scene: &Scene) -> Vec<String> {
         let name = |member: &LightGroupSource| match member {
             LightGroupSource::Ambient => "ambient".to_string(),
@@ -190,9 +206,10 @@ impl LightGroups {
         self.members.iter().map(name).collect()
     }
 
-    /// Returns the scale of each group: the number of integer steps per unit of radiance in the
-    /// film, a power of two. It is derived from the group's [`RadianceRange`]. `lift` is the height
-    /// by which emitters are moved off surfaces.
+    /// Returns the scale of each light group: the number of integer steps per unit of radiance in
+    /// the film, a power of two. It is derived from the group's [`RadianceRange`]. `origin` is the
+    /// point in scene coordinates that becomes the origin of the compiled geometry. `lift` is the
+    /// height by which emitters are moved off surfaces.
     pub(super) fn scales<S: Float>(
         &self,
         scene: &Scene,
@@ -409,6 +426,28 @@ mod tests {
         assert_eq!(emission, [("lamp".to_string(), MAX_LIGHT_GROUPS - 1, [4.0; 3])]);
         let change = |s: &mut Scene| s.materials.get_mut("lamp").unwrap().emission = 3.0;
         assert!(!can_reuse(&groups, &scene, change));
+    }
+
+    #[test]
+    fn many_point_lights_share_a_group() {
+        let point = "[[light]]\npoint = { position = [0.0, 3.0, 0.0] }\n";
+        let sphere = "[[light]]\nsphere = { center = [0.0, 3.0, 0.0], radius = 0.1 }\n";
+        let members = |points: usize| {
+            let scene = scene(&(point.repeat(points) + sphere + GLOWING));
+            LightGroups::new(&scene, (true, false), false).members
+        };
+        let lights =
+            |range| -> Vec<_> { std::ops::Range::map(range, LightGroupSource::Light).collect() };
+        let lamp = LightGroupSource::Material("lamp".to_string());
+
+        let single = MAX_LIGHT_GROUPS - 1;
+        let few = members(MIN_LIGHTS - 1);
+        assert_eq!(few[..single], lights(0..single));
+        let rest = [lights(single..MIN_LIGHTS), vec![lamp.clone()]].concat();
+        assert_eq!(few[single..], [LightGroupSource::Shared(rest)]);
+
+        let shared = LightGroupSource::Shared(lights(0..MIN_LIGHTS));
+        assert_eq!(members(MIN_LIGHTS), [LightGroupSource::Light(MIN_LIGHTS), lamp, shared]);
     }
 
     #[test]

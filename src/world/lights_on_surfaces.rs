@@ -1,28 +1,30 @@
 //! End points of shadow rays to point lights that are located on a surface, such as ceiling lights.
 //!
 //! Shadow rays start a small offset above the surface that they leave. Shadow rays to a light on a
-//! surface end the same kind of offset before that surface, on the side from which they arrive. The
-//! result is the limit of the shadows of a light that approaches the surface from that side. With
-//! an end point at the light itself, rounding would decide whether the surface occludes it. With an
-//! end point a fixed length before the light, a ray at a grazing angle would be occluded by the
-//! surface.
+//! surface end at a similar small offset before that surface, on the side from which they arrive.
+//! The result is the limit of the shadows of a light that approaches the surface from that side.
+//! With an end point at the light itself, rounding would decide whether the surface occludes it.
+//! With an end point a fixed length before the light, a ray at a grazing angle would be occluded by
+//! the surface.
 
 use crate::lanes::{Float, SimdFloat, Vec3};
 use crate::primitive::Form;
 use glam::DVec3;
 
-/// Largest distance from a surface at which a light is treated as on the surface, in rounding
-/// errors of the largest coordinate.
+/// Largest distance from a surface at which a point light is treated as on the surface. The unit is
+/// the rounding error of the largest coordinate.
 const ON: f64 = 8.0;
 
-/// Height above the surface at which shadow rays end, in rounding errors of the largest coordinate.
+/// Height above a light's surface at which shadow rays to the light end, in rounding errors of the
+/// largest coordinate.
 const LIFT: f64 = 16.0;
 
-/// Largest distance between light and end point, as a multiple of the height above the surfaces. At
-/// a sharp edge the end point must be farther from the light to clear both sides of the edge.
+/// Largest distance between a light on a surface and the end point of its shadow rays, as a
+/// multiple of the end point's height above the surface. At a sharp edge the end point must be
+/// farther from the light to clear both sides of the edge.
 const SHARPEST: f64 = 4.0;
 
-/// A light and the surfaces that contain its position.
+/// Surfaces on which a point light is located.
 pub(super) struct OnSurface<S> {
     position: [S; 3],
     /// Unit normals of the surfaces at the light, one list for each convex solid, flat shape or
@@ -32,9 +34,9 @@ pub(super) struct OnSurface<S> {
 }
 
 impl<S: Float> OnSurface<S> {
-    /// Creates the record of the light at `position`. `forms` are the shapes of all objects. All
-    /// coordinates are relative to `origin` and rounded to `epsilon`. Returns `None` if the light
-    /// is on no surface.
+    /// Finds the surfaces that contain the position of a light. `forms` are the shapes of all
+    /// objects. All coordinates are relative to `origin`; `epsilon` is their relative rounding
+    /// error. Returns `None` if the light is on no surface.
     pub fn new(forms: &[Form], position: DVec3, origin: DVec3, epsilon: f64) -> Option<Self> {
         let mut solids = Vec::new();
         let mut largest = 0.0f64;
@@ -55,13 +57,15 @@ impl<S: Float> OnSurface<S> {
         (!solids.is_empty()).then_some(Self { position, solids, lift })
     }
 
-    /// Returns the largest distance between the light and an end point of its shadow rays.
+    /// Returns the largest distance between the light and the points, a little above its surface,
+    /// at which shadow rays to it end.
     pub fn farthest(&self) -> f64 {
         SHARPEST * self.lift.to_f64() * self.solids.len() as f64
     }
 
-    /// Returns the unit directions from `start` to the end points of the shadow rays, and the
-    /// distances.
+    /// Returns two values for each lane: the unit direction from `start` to the end point of the
+    /// light's shadow ray, and the distance to it. The end points are a little above the light's
+    /// surface.
     #[inline(never)]
     pub fn end<L: SimdFloat<Scalar = S>>(&self, start: Vec3<L>) -> (Vec3<L>, L) {
         let to = Vec3::splat(self.position) - start;

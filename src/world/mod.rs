@@ -1,18 +1,18 @@
-//! The world: a scene compiled for one lane type, and the integrators that trace paths in it.
+//! World: a scene compiled for one SIMD type, and the integrators that trace paths in it.
 
 mod any_world;
 mod clearance;
 mod compile;
 mod culling;
 mod integrator;
-mod inventory;
 mod light_choice;
 mod light_groups;
 mod lights_on_surfaces;
 mod pixel_block;
 mod precision;
 mod radiance_range;
-mod reuse;
+mod sample_reuse;
+mod scene_inventory;
 mod surface_emission;
 mod tile_tracer;
 mod truncation_bias;
@@ -20,10 +20,8 @@ mod truncation_bias;
 mod world;
 
 pub use any_world::{AnyWorld, Options, Precision};
-pub use culling::tile::TileCandidates;
 pub use integrator::first_hit::FirstHit;
 pub use integrator::path::{Counts, Path, Radiance};
-pub use inventory::Inventory;
 pub use light_groups::{LightGroupSource, LightGroups, MAX_GROUPS};
 pub use pixel_block::MAX_BLOCK_PIXELS;
 pub use tile_tracer::{CameraTracer, TileTracer, TracedPacket};

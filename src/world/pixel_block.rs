@@ -1,21 +1,22 @@
-//! State of pixels that is the same for all their samples, computed once per tile: coordinates,
-//! sampler keys, corner directions.
+//! Block of pixels: values that are the same for all samples of a pixel, computed once per tile.
+//! They are the pixel's coordinates, the key of its random numbers, and the vector from the eye to
+//! its corner.
 
 use crate::camera::PerspectiveCamera;
 use crate::lanes::{Float, SimdFloat, SimdU32, Vec3};
 use crate::sampling::Sampler;
 use std::ops::Range;
 
-/// Largest number of pixels in a block; a multiple of every packet width.
+/// Largest number of pixels in a block that is traced together; a multiple of every packet width.
 pub const MAX_BLOCK_PIXELS: usize = 256;
 
-/// Up to [`MAX_BLOCK_PIXELS`] pixels. Adjacent pixels share a packet; the last packet is filled
-/// with copies of the last pixel.
+/// Block of up to [`MAX_BLOCK_PIXELS`] pixels that are traced together. Adjacent pixels share a
+/// packet; the last packet is filled with copies of the last pixel.
 pub(super) struct PixelBlock<S> {
     count: usize,
-    /// Columns of the raster \[pixels\].
+    /// Column of each pixel of the block in the picture.
     x: [u32; MAX_BLOCK_PIXELS],
-    /// Rows of the raster \[pixels\].
+    /// Row of each pixel of the block in the picture.
     y: [u32; MAX_BLOCK_PIXELS],
     /// Key of each pixel's random numbers, see [`Sampler::key`].
     keys: [u32; MAX_BLOCK_PIXELS],
@@ -25,7 +26,9 @@ pub(super) struct PixelBlock<S> {
 }
 
 impl<S: Float> PixelBlock<S> {
-    /// Creates the block of `pixels` (column, row) in one replicate.
+    /// Creates a block of pixels that are traced together. `replicate` is 0 for replicate A, 1 for
+    /// replicate B; each has half of the samples. `pixels` are the columns and rows of the pixels
+    /// in the picture, at most [`MAX_BLOCK_PIXELS`].
     pub fn new<L: SimdFloat<Scalar = S>>(
         camera: &PerspectiveCamera,
         sampler: &Sampler<L>,
@@ -60,24 +63,26 @@ impl<S: Float> PixelBlock<S> {
         out
     }
 
-    /// Number of pixels in the block.
+    /// Returns the number of pixels in the block.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Column and row of pixel `i`.
+    /// Returns the column and the row of pixel `i` of the block.
     pub fn pixel(&self, i: usize) -> (u32, u32) {
         (self.x[i], self.y[i])
     }
 
-    /// Returns the sampler key of pixel `i`, and its corner direction in all lanes.
+    /// Returns two values for pixel `i`: the key of its random numbers, and the vector from the eye
+    /// to its corner, the same in all lanes.
     #[inline(always)]
     pub fn broadcast<L: SimdFloat<Scalar = S>>(&self, i: usize) -> (u32, Vec3<L>) {
         (self.keys[i], Vec3::splat(self.corner_directions.each_ref().map(|axis| axis[i])))
     }
 
-    /// Returns the sampler keys and corner directions of the `WIDTH / COUNT` pixels from `first`
-    /// on. Each pixel occupies `COUNT` adjacent lanes. `COUNT` is a power of two, `first` a
+    /// Returns two values for each lane: the key of its pixel's random numbers, and the vector from
+    /// the eye to the pixel's corner. The lanes hold the `WIDTH / COUNT` pixels of the block from
+    /// `first` on. Each pixel occupies `COUNT` adjacent lanes. `COUNT` is a power of two, `first` a
     /// multiple of `WIDTH / COUNT`.
     #[inline(always)]
     pub fn gather<L: SimdFloat<Scalar = S>, const COUNT: usize>(
@@ -93,7 +98,8 @@ impl<S: Float> PixelBlock<S> {
         (L::SimdU32::from_fn(|lane| keys[lane / COUNT]), Vec3::new(x, y, z))
     }
 
-    /// Iterates over the pixels in ranges of `packet_pixels` each; the last range may be shorter.
+    /// Iterates over the pixels of the block in ranges of `packet_pixels` each; the last range may
+    /// be shorter.
     pub fn packets(&self, packet_pixels: usize) -> impl Iterator<Item = Range<usize>> + use<S> {
         let count = self.count;
         (0..count).step_by(packet_pixels).map(move |first| first..count.min(first + packet_pixels))

@@ -4,9 +4,9 @@
 //! In single precision a coordinate is exact to about 2^-23 of the scene's extent, and rays that
 //! leave a surface start 2^-20 of the extent above it (the ray offset). Details smaller than a few
 //! ray offsets are lost: thin objects, gaps between objects, the surroundings of a light, and the
-//! part of a close object that one pixel shows. Each kind of detail has a largest ratio of scene
-//! extent to its size below. `tests/extremes/precision.rs` measures the errors of single precision
-//! at each ratio.
+//! part of a close object that one pixel shows. For each kind of detail, a constant below is the
+//! largest permitted ratio of the scene extent to the size of the detail.
+//! `tests/extremes/precision.rs` measures the errors of single precision at each ratio.
 
 use crate::camera::PerspectiveCamera;
 use crate::light::EmitterSurface;
@@ -28,17 +28,18 @@ const MAX_EXTENT_PER_GAP: f64 = 131_072.0;
 /// eye. At this ratio the side is 32 ray offsets.
 const MAX_EXTENT_PER_PIXEL: f64 = 32_768.0;
 
-/// Factor by which the eye may be closer to flat objects than to curved ones. On planes, hit points
-/// are projected back almost exactly and the normal is constant.
+/// Factor by which the eye may be closer to flat objects than to curved ones in single precision.
+/// Flat objects have smaller errors: a hit point is moved back to the plane almost exactly, and the
+/// normal is constant.
 const FLAT: f64 = 8.0;
 
 /// Largest ratio of scene extent to the distance of a light from objects. At this ratio the ray
 /// offset is 1/512 of the distance, and the direction to the light is wrong by 1/512 radians.
 const MAX_EXTENT_PER_LIGHT_DISTANCE: f64 = 2048.0;
 
-/// Smallest angle between the rays of neighbouring pixels \[radians\]: 64 times the rounding error
-/// of a direction. A lens raises this limit by the slope of the ray from its edge to the point in
-/// focus.
+/// Smallest angle between the rays of neighbouring pixels \[radians\] in single precision: 64 times
+/// the rounding error of a direction. A lens with the radius r, focused at the distance d, raises
+/// this limit by the factor 1 + r / d.
 const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 
 /// Smallest width of a gap, as a fraction of the scene extent, at which two surfaces are separate:
@@ -46,15 +47,15 @@ const LEAST_ANGLE: f64 = 1.0 / 131_072.0;
 /// coordinates, are treated as coincident.
 const COINCIDENT_GAP: f64 = 1.0 / 17_592_186_044_416.0;
 
-/// Largest number of pairs of objects that are searched for gaps. The search ends there, to limit
-/// its time, and reports no gap.
+/// Largest number of pairs of objects that are searched for gaps, to limit the time. Further pairs
+/// are treated as pairs without a gap.
 const MOST_PAIRS: usize = 1 << 20;
 
-/// Returns `true` if `scene` renders as accurately in single precision as in double precision.
+/// Returns `true` if the errors of single precision would be invisible in the picture of `scene`.
 /// `forms` are all objects, in coordinates relative to `origin`. `extent` is the largest magnitude
-/// of these coordinates of the objects and the lens.
+/// of a coordinate of the objects and the lens, relative to `origin`.
 pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, extent: f64) -> bool {
-    let thinnest = forms.iter().map(Form::thickness).fold(f64::INFINITY, f64::min);
+    let thinnest = forms.iter().map(|form| form.thickness()).fold(f64::INFINITY, f64::min);
     if extent > MAX_EXTENT_PER_THICKNESS * thinnest {
         return false;
     }
@@ -91,7 +92,8 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     !has_gap(forms, narrow, pixel)
 }
 
-/// Returns `true` if the distance between two bounding boxes is at most `limit` along every axis.
+/// Returns `true` if the distance between the bounding boxes of two objects is at most `limit`
+/// along every axis.
 fn are_near(a: &Proxy, b: &Proxy, limit: f64) -> bool {
     (a.low - b.high).max(b.low - a.high).max_element() <= limit
 }
@@ -99,15 +101,15 @@ fn are_near(a: &Proxy, b: &Proxy, limit: f64) -> bool {
 /// Gap between two faces of different objects, at the point where they are closest.
 struct Clearance {
     width: f64,
-    /// Closest point, and the radius of a sphere above a plane whose gap widens like this one.
-    /// `None` if the faces are parallel planes.
+    /// Two values for a gap that widens around its closest point: this point, and the radius of a
+    /// sphere whose gap to a plane widens in the same way. `None` if the faces are parallel planes.
     round: Option<(DVec3, f64)>,
 }
 
 impl Clearance {
     /// Returns `true` if the width of the gap is within `narrow` and the narrow region is wider
     /// than a pixel. `pixel` returns the side of a pixel's footprint at a point. A sphere on a
-    /// floor or on another sphere is close to it only in a spot that is too small to see.
+    /// floor, for example, is close to the floor only in a spot that is too small to see.
     fn is_seen(&self, narrow: &Range<f64>, pixel: &impl Fn(DVec3) -> f64) -> bool {
         let wide =
             |(place, radius): (DVec3, f64)| (2.0 * radius * narrow.end).sqrt() > 0.5 * pixel(place);
@@ -115,7 +117,9 @@ impl Clearance {
     }
 }
 
-/// Returns the gaps between two faces: one or none if a face is a plane, up to two between spheres.
+/// Returns up to two gaps between two faces of different objects, at the points where the faces are
+/// closest. Two spheres have two gaps: side by side, and one inside of the other. A plane and a
+/// sphere have one. Two planes have one if they are parallel, otherwise none.
 fn gaps(a: &ProxyFace, b: &ProxyFace) -> [Option<Clearance>; 2] {
     match (a, b) {
         (ProxyFace::Flat(a), ProxyFace::Flat(b)) => {
@@ -155,7 +159,7 @@ fn has_gap(forms: &[Form], narrow: Range<f64>, pixel: impl Fn(DVec3) -> f64) -> 
     let seen = |a: &ProxyFace, b: &ProxyFace| {
         gaps(a, b).iter().flatten().any(|gap| gap.is_seen(&narrow, &pixel))
     };
-    let mut proxies: Vec<Proxy> = forms.iter().flat_map(Form::proxies).collect();
+    let mut proxies: Vec<Proxy> = forms.iter().flat_map(|form| form.proxies()).collect();
     proxies.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
     let mut pairs = 0;
     for (i, a) in proxies.iter().enumerate() {

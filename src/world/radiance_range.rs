@@ -10,8 +10,8 @@
 //!   brightest spot is white at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit
 //!   levels.
 //! - *The bright end.* With 2^44 steps for the brightest spot, a pixel that shows only this spot
-//!   holds 2^19 samples of each replicate before its sum saturates: a million per pixel. Five bits
-//!   remain for single samples that are brighter.
+//!   holds 2^19 samples of each replicate (half of the samples) before its sum saturates: a million
+//!   per pixel. Five bits remain for single samples that are brighter.
 //!
 //! The two bounds are 28 bits apart. By default light of typical intensity has 2^28 steps. The
 //! brightest spot may then be 2^16 times as bright, and the brightest spot of the dimmest surface
@@ -25,47 +25,51 @@ use crate::camera::PerspectiveCamera;
 use crate::lanes::Float;
 use crate::light::{DeltaLight, Emitter};
 use crate::material::{Fresnel, Highlight, Material, SMOOTH_ALPHA};
-use crate::primitive::{Form, box_distance};
+use crate::primitive::{Bounds, Form, box_distance};
 use crate::scene::{RayTypes, Scene};
 use crate::world::clearance::clearance;
 use crate::world::compile::RecenteredGeometry;
 use glam::DVec3;
 use std::f64::consts::{FRAC_1_PI, PI};
 
-/// Number of bits of a sample with the typical radiance.
+/// Number of bits of an integer sample whose radiance is typical of the scene.
 const TYPICAL_BITS: f64 = 28.0;
 
-/// Smallest number of bits of a sample at the brightest spot of the dimmest surface.
+/// Smallest number of bits of an integer sample at the brightest spot of the dimmest surface.
 const DIM_BITS: f64 = 16.0;
 
-/// Largest number of bits of a sample with a radiance that can fill a whole pixel.
+/// Largest number of bits of an integer sample at the brightest spot that is at least as large as a
+/// pixel.
 const BRIGHT_BITS: f64 = 44.0;
 
-/// Largest number of bits of a single sample.
+/// Largest number of bits of any integer sample.
 const SAMPLE_BITS: f64 = 49.0;
 
-/// Largest number of bits by which the scale is lowered for spots smaller than a pixel.
+/// Largest number of bits by which the integer scale of samples is lowered for bright spots smaller
+/// than a pixel.
 const SPOT_BITS: f64 = 12.0;
 
-/// Range of the radiance of a light group's samples, by places in the scene.
+/// Estimates of the radiance of a light group's samples at several places of the scene. The integer
+/// scale of the film is chosen for this range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RadianceRange {
-    /// Radiance of a white surface in the middle of the scene.
+    /// Radiance of a white surface in the middle of the scene, lit by the light group.
     pub typical: f64,
-    /// Radiance of the brightest spot on the surface that reflects the least light.
+    /// Radiance of the brightest spot of each surface: the smallest value over all surfaces.
     pub dimmest: f64,
-    /// Radiance of the brightest spot on the surface that reflects the most light. Spots smaller
-    /// than a quarter of a pixel are ignored.
+    /// Radiance of the brightest spot of each surface: the largest value over all surfaces. Spots
+    /// smaller than a quarter of a pixel are ignored.
     pub brightest: f64,
-    /// Radiance of the brightest spot, including the smallest ones.
+    /// Radiance of the brightest spot of the picture outside of highlights, including spots smaller
+    /// than a pixel.
     pub spots: f64,
     /// Largest radiance of highlights, and of light amplified by mirrors.
     pub extreme: f64,
 }
 
 impl RadianceRange {
-    /// Returns the range for light with another emission. `least` and `most` are its factors in the
-    /// darkest and in the brightest channel.
+    /// Returns this range of radiance for the same light with another emission. `least` and `most`
+    /// are the factors of the emission in the darkest and in the brightest channel.
     pub fn times(self, least: f64, most: f64) -> Self {
         Self {
             typical: self.typical * most,
@@ -76,7 +80,8 @@ impl RadianceRange {
         }
     }
 
-    /// Returns the range that covers `self` and `other`, the ranges of two sources in one group.
+    /// Returns the range of radiance that covers `self` and `other`, the ranges of two sources in
+    /// one light group.
     pub fn or(self, other: Self) -> Self {
         Self {
             typical: self.typical.max(other.typical),
@@ -87,7 +92,7 @@ impl RadianceRange {
         }
     }
 
-    /// Returns the base-2 logarithm of the number of steps per unit of radiance.
+    /// Returns the base-2 logarithm of the number of integer steps per unit of radiance.
     pub fn scale_exponent(&self) -> f64 {
         let bits_above_bright_end = |bright: f64| {
             let excess = ceil_log2(bright / self.typical) - (BRIGHT_BITS - TYPICAL_BITS);
@@ -115,19 +120,22 @@ fn ceil_log2(x: f64) -> f64 {
     floor + f64::from(u8::from(bits << 12 != 0))
 }
 
-/// Factors by which the materials of an object reflect light, relative to a white diffuse surface.
+/// Factors by which the materials of an object reflect direct light, relative to a white diffuse
+/// surface.
 #[derive(Clone, Copy, Debug)]
 struct Response {
-    /// Smallest factor over all channels that are not black.
+    /// Smallest factor by which the material reflects light, over all channels that are not black.
     least: f64,
-    /// Largest factor outside of highlights, over all channels.
+    /// Largest factor by which the material reflects light outside of highlights, over all
+    /// channels.
     most: f64,
-    /// Largest factor in highlights.
+    /// Largest factor by which the highlights of a material reflect light.
     peak: f64,
 }
 
 impl Response {
-    /// Creates the response of a material to direct light. Returns `None` if it reflects none.
+    /// Computes the factors by which a material reflects direct light. Returns `None` if it
+    /// reflects none.
     fn new(material: &Material) -> Option<Self> {
         let diffuse = material.color.0.map(|c| c * material.diffuse);
         let specular = material.specular;
@@ -155,18 +163,30 @@ fn least_of(numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
     numbers.into_iter().filter(|x| *x > 0.0).reduce(f64::min)
 }
 
-/// Properties of a scene without its lights that determine the range of radiance.
+/// Returns the distance of a light at `point` from the bounding box `bounds` of an object. For a
+/// light inside of the box, it is half of the box's diagonal.
+fn distance_to_box(bounds: Bounds, point: DVec3) -> f64 {
+    match box_distance(bounds, point) {
+        away if away > 0.0 => away,
+        _ => 0.5 * bounds.0.distance(bounds.1),
+    }
+}
+
+/// Distances and reflection factors of a scene without its lights, from which the
+/// [`RadianceRange`] of each light group is computed.
 pub(super) struct SceneDistances<'a> {
     forms: &'a [Form],
-    /// Response of each object to direct light, over all its parts. `None` if it reflects none.
+    /// Factors by which each object reflects direct light, over all its parts. `None` if it
+    /// reflects none.
     responses: Vec<Option<Response>>,
-    /// Ambient factors of all materials, each channel separately.
+    /// Factors by which the materials reflect ambient light: one for each material and channel.
     ambient: Vec<f64>,
-    /// Smallest factor by which a mirror or glass surface without direct lighting multiplies light.
+    /// Smallest factor by which a mirror or glass surface multiplies light, at most 1. Materials
+    /// that reflect direct light are not included.
     faintest: f64,
-    /// Largest product of the factors of all mirrors on a path; at least 1.
+    /// Largest factor by which all mirrors of a path together multiply light; at least 1.
     gain: f64,
-    /// Radius around the scene's centre at which the irradiance of a light is taken as typical.
+    /// Distance from the scene's centre at which the irradiance of a light is taken as typical.
     radius: f64,
     /// Position of the eye, and the side of a pixel at unit distance from it.
     eye: (DVec3, f64),
@@ -175,8 +195,9 @@ pub(super) struct SceneDistances<'a> {
 }
 
 impl<'a> SceneDistances<'a> {
-    /// Computes the properties of `scene`. `materials_of` returns the materials of the parts of an
-    /// object. `epsilon` is the rounding error of the world's precision.
+    /// Computes the properties of `scene` that determine the ranges of radiance of its light
+    /// groups. `materials_of` returns the materials of the parts of an object. `epsilon` is the
+    /// rounding error of the world's precision.
     pub fn new(
         scene: &Scene,
         geometry: &'a RecenteredGeometry,
@@ -221,25 +242,30 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Range of ambient light with intensity 1.
+    /// Returns the smallest and the largest factors by which objects of the scene reflect direct
+    /// light; all are 1 if no object reflects any.
+    fn response(&self) -> Response {
+        let all = self.responses.iter().flatten().copied().reduce(Response::or);
+        all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 })
+    }
+
+    /// Returns the range of the radiance that ambient light of intensity 1 causes.
     pub fn ambient(&self) -> RadianceRange {
         let least = least_of(self.ambient.iter().copied()).unwrap_or(1.0);
         let most = self.ambient.iter().copied().fold(0.0, f64::max);
         self.range_of(1.0, (least, most, most))
     }
 
-    /// Range of a background with intensity 1.
+    /// Returns the range of the radiance of a background with intensity 1.
     pub fn background(&self) -> RadianceRange {
         self.range_of(1.0, (1.0, 1.0, 1.0))
     }
 
-    /// Range of a light without a size, with intensity 1.
+    /// Returns the range of the radiance that a light without a size causes at intensity 1.
     pub fn light<S: Float>(&self, light: &DeltaLight<S>) -> RadianceRange {
         let typical = light.typical_irradiance(self.radius) * FRAC_1_PI;
         let Some(position) = light.position().filter(|_| light.is_inverse_square()) else {
-            let all = self.responses.iter().flatten().copied().reduce(Response::or);
-            let Response { least, most, peak } =
-                all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 });
+            let Response { least, most, peak } = self.response();
             return self.range_of(typical, (least, most, peak));
         };
         let radiance_at = |distance: f64| (distance * distance * PI).recip();
@@ -259,14 +285,10 @@ impl<'a> SceneDistances<'a> {
                 out.spots = out.spots.max(radiance_at(distance) * response.most);
                 out.extreme = out.extreme.max(radiance * response.peak * self.gain);
             }
-            // For a light inside of the bounding box, half of the box's diagonal is the distance.
-            let far = match form.bounds() {
-                Some(bounds) => match box_distance(bounds, position) {
-                    away if away > 0.0 => away,
-                    _ => 0.5 * bounds.0.distance(bounds.1),
-                },
-                None => form.clearance(position).unwrap_or(0.0),
-            };
+            let far = form.bounds().map_or_else(
+                || form.clearance(position).unwrap_or(0.0),
+                |bounds| distance_to_box(bounds, position),
+            );
             let radiance = radiance_at(far.max(min_distance));
             out.dimmest = out.dimmest.min(radiance * response.least * self.faintest);
         }
@@ -279,15 +301,15 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Range of a light with a size, with intensity 1. `visible` is `true` if the camera and
-    /// mirrors see it.
+    /// Returns the range of the radiance that a light with a size causes at intensity 1. `visible`
+    /// is `true` if the camera and mirrors see it.
     pub fn emitter<S: Float>(&self, emitter: &Emitter<S>, visible: bool) -> RadianceRange {
         let ball = (emitter.center(), emitter.radius());
-        self.emitting_surface(ball, emitter.area(), emitter.radiance().to_f64(), visible)
+        self.emitting_surface(ball, emitter.area(), emitter.radiance.to_f64(), visible)
     }
 
-    /// Range of the light that object `index` emits with radiance 1. The area of the object is
-    /// replaced by the area of its bounding sphere.
+    /// Returns the range of the radiance that object `index` causes if it emits radiance 1. The
+    /// estimate uses the area of the bounding sphere in place of the object's area.
     pub fn object(&self, index: usize) -> RadianceRange {
         match self.forms[index].bounds() {
             Some((low, high)) => {
@@ -296,16 +318,17 @@ impl<'a> SceneDistances<'a> {
             }
             // The light of an infinite plane is the same everywhere.
             None => {
-                let all = self.responses.iter().flatten().copied().reduce(Response::or);
-                let Response { least, most, peak } =
-                    all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 });
+                let Response { least, most, peak } = self.response();
                 self.range_of(1.0, (least, most.max(1.0), peak.max(1.0)))
             }
         }
     }
 
-    /// Range of the light of a surface inside of the given ball. `area` is the area of the surface,
-    /// and `emitted` is its radiance. `visible` is `true` if the camera and mirrors see it.
+    /// Returns the range of the radiance that an emissive surface causes: the radiance that the
+    /// surfaces of the scene reflect towards the camera, from the dimmest to the brightest place.
+    /// The emissive surface is inside of the sphere with `center` and `radius`. `area` is the area
+    /// of the surface, and `emitted` is its radiance. If the camera and mirrors see the surface
+    /// itself (`visible`), the range also includes `emitted`.
     fn emitting_surface(
         &self,
         (center, radius): (DVec3, f64),
@@ -322,13 +345,7 @@ impl<'a> SceneDistances<'a> {
         for (form, response) in self.forms.iter().zip(&self.responses) {
             let Some(response) = response else { continue };
             let near = form.clearance(center).unwrap_or(0.0) - radius;
-            let far = match form.bounds() {
-                Some(bounds) => match box_distance(bounds, center) {
-                    away if away > 0.0 => away,
-                    _ => 0.5 * bounds.0.distance(bounds.1),
-                },
-                None => near,
-            };
+            let far = form.bounds().map_or(near, |bounds| distance_to_box(bounds, center));
             let nearest = radiance_at(near.max(0.0));
             brightest = brightest.max(nearest * response.most);
             extreme = extreme.max(nearest * response.peak * self.gain);
@@ -354,14 +371,12 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Range of an environment with intensity 1. `visible` is `true` if the camera and mirrors see
-    /// it.
+    /// Returns the range of the radiance that an environment causes at intensity 1. `visible` is
+    /// `true` if the camera and mirrors see it.
     pub fn environment(&self, map: &RadianceMap, visible: bool) -> RadianceRange {
         let mean = map.mean().into_iter().fold(0.0, f64::max);
         let typical = if mean > 0.0 { mean } else { 1.0 };
-        let all = self.responses.iter().flatten().copied().reduce(Response::or);
-        let Response { least, most, peak } =
-            all.unwrap_or(Response { least: 1.0, most: 1.0, peak: 1.0 });
+        let Response { least, most, peak } = self.response();
         let range = self.range_of(typical, (least, most, peak));
         if !visible {
             return range;
@@ -377,8 +392,9 @@ impl<'a> SceneDistances<'a> {
         }
     }
 
-    /// Returns the range of light with the typical radiance `light`. Surfaces multiply it by
-    /// factors from `least` to `most`, and by `peak` in highlights.
+    /// Returns the range of the radiance that surfaces reflect. `light` is the radiance of a white
+    /// surface. Surfaces multiply it by factors from `least` to `most`, and by `peak` in
+    /// highlights.
     fn range_of(&self, light: f64, (least, most, peak): (f64, f64, f64)) -> RadianceRange {
         RadianceRange {
             typical: light,

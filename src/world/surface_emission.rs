@@ -6,9 +6,10 @@
 //!
 //! Sampled points are lifted off their surface. Where the object touches another one, a lifted
 //! point is beyond the other's surface: below the floor that a box stands on, or inside of the
-//! glass that stands on a shining floor. Shadow rays from there would reach it. Compilation lists
-//! the objects that touch an emissive one and behind whose surfaces rays can start; shadow rays are
-//! tested against them a second time, up to the surface from which the point was lifted.
+//! glass that stands on a shining floor. Shadow rays from there would reach it. Compilation
+//! therefore lists the objects that touch an emissive one, if rays can start behind their surfaces.
+//! Shadow rays are tested against these objects a second time, up to the surface from which the
+//! point was lifted.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, next_distinct};
@@ -28,25 +29,28 @@ use std::collections::{HashMap, HashSet};
 /// single precision.
 const MAX_TRIANGLES: usize = 1 << 16;
 
-/// Largest distance between a lifted point and the surface of a touching object, in lifts.
+/// Largest distance between a point sampled on an emissive object and the surface of a touching
+/// object, as a multiple of the point's height above its own surface.
 const CONTACT_LIFTS: f64 = 4.0;
 
 /// Emission of an object, with its light group. The emitter is `None` if points of the object
-/// cannot be sampled.
+/// cannot be sampled, so that only rays find the emission.
 pub(super) type EmissiveSource<S> = LightSource<Option<ObjectEmitter<S>>, S>;
 
-/// Emission of all objects of a world. Empty if no object emits light.
+/// Emission of all objects of a scene, compiled. Empty if no object emits light.
+#[derive(Default)]
 pub(super) struct SurfaceEmission<S> {
     /// Emissive objects; those whose points are sampled come first.
     sources: Vec<EmissiveSource<S>>,
     /// Number of objects from whose surfaces points are sampled. They come first in `sources`.
     sampled: usize,
-    /// Index into `sources`, for each primitive; `None` for primitives that emit nothing.
+    /// For each primitive, the index of its emission in `sources`; `None` for primitives that emit
+    /// nothing.
     source_of: Vec<Option<u32>>,
-    /// Objects that touch the sampled objects, one list for each: the first primitive of each, and
-    /// `true` if it is flat.
+    /// For each sampled object, the objects that touch it. An entry has two values: the id of the
+    /// touching object's first primitive, and `true` if that object is flat.
     touching: Vec<Vec<(u32, bool)>>,
-    /// Height of sampled points above their surface.
+    /// Height of points that are sampled on an emissive object above its surface.
     lift: S,
 }
 
@@ -64,13 +68,7 @@ impl<S: Float> SurfaceEmission<S> {
     ) -> Self {
         let emitting = groups.materials(scene);
         if emitting.is_empty() {
-            return Self {
-                sources: Vec::new(),
-                sampled: 0,
-                source_of: Vec::new(),
-                touching: Vec::new(),
-                lift: S::default(),
-            };
+            return Self::default();
         }
         // The group of each primitive, by object.
         let entry_of = |id: &PrimitiveId| {
@@ -106,8 +104,8 @@ impl<S: Float> SurfaceEmission<S> {
     }
 
     /// Returns the lanes of `lanes` whose sampled points on emitter number `index` are behind the
-    /// surface of an object that touches the emitter. `ray` are the shadow rays to the points, at
-    /// the distance `distance`.
+    /// surface of an object that touches the emitter. `ray` are the shadow rays to the points, and
+    /// `distance` is the distance of the points along them.
     #[inline(always)]
     pub fn covered<L: SimdFloat<Scalar = S>>(
         &self,
@@ -157,35 +155,38 @@ impl<S: Float> SurfaceEmission<S> {
         self.sources.is_empty()
     }
 
-    /// Number of emissive objects from which light is sampled, and number of other emissive
-    /// objects.
+    /// Returns the number of emissive objects from which light is sampled, and the number of other
+    /// emissive objects.
     pub fn counts(&self) -> [usize; 2] {
         [self.sampled, self.sources.len() - self.sampled]
     }
 
-    /// Emission of primitive `item`. `None` if it emits nothing.
+    /// Returns the emission of primitive `item`. Returns `None` if it emits nothing.
     #[inline(always)]
     pub fn of_item(&self, item: u32) -> Option<&EmissiveSource<S>> {
         let source = *self.source_of.get(item as usize)?;
         Some(&self.sources[source? as usize])
     }
 
-    /// Returns emitter number `index` among those from which light is sampled, and its source
-    /// (light group and emission).
+    /// Returns two values for the emissive object number `index` from which light is sampled: the
+    /// object as an emitter, and its light group and emission. Returns `None` if there is no such
+    /// object.
     #[inline(always)]
     pub fn sampled(&self, index: usize) -> Option<(&ObjectEmitter<S>, &EmissiveSource<S>)> {
         let source = self.sources[..self.sampled].get(index)?;
         Some((source.light.as_ref()?, source))
     }
 
-    /// Emitters from which light is sampled.
+    /// Returns the emissive objects from which light is sampled.
     pub fn emitters(&self) -> impl Iterator<Item = &ObjectEmitter<S>> {
         self.sources.iter().filter_map(|source| source.light.as_ref())
     }
 }
 
-/// Returns, for each of the emissive `objects`, the objects that touch it and behind whose surfaces
-/// rays can start: the number of the first primitive, and `true` if it is flat.
+/// Returns one list for each of the emissive `objects`: the objects that touch it and behind whose
+/// surfaces rays can start. An entry has two values: the id of the touching object's first
+/// primitive, and `true` if that object is flat. `is_entered` returns `true` for an object that
+/// rays can be inside of.
 fn touching_objects(
     objects: &[(usize, usize, [f64; 3])],
     forms: &[Form],
@@ -223,12 +224,13 @@ fn touching_objects(
     objects.iter().map(|(form, ..)| touching.get(form).cloned().unwrap_or_default()).collect()
 }
 
-/// Returns the material of an object that is not a compound.
+/// Returns the material of the object with the number `object`, which is no compound. Returns
+/// `None` if the scene does not define the material.
 fn material_of(scene: &Scene, object: usize) -> Option<&Material> {
     scene.materials.get(&scene.objects[object].material)
 }
 
-/// Returns `true` if points of `form` can be sampled.
+/// Returns `true` if light can be sampled from points on an object of this shape.
 pub(super) fn is_sampled(form: &Form) -> bool {
     match form {
         Form::Sphere(_) | Form::Parallelogram(_) | Form::ConvexPolyhedron(_) => true,
@@ -241,7 +243,8 @@ pub(super) fn is_sampled(form: &Form) -> bool {
     }
 }
 
-/// Returns the surface of `form`, or `None` if its points cannot be sampled.
+/// Returns the surface of an object from which light is sampled, or `None` if its points cannot be
+/// sampled.
 fn surface_of(form: &Form) -> Option<ObjectSurface> {
     if !is_sampled(form) {
         return None;
@@ -277,7 +280,7 @@ fn surface_of_parallelogram(form: &ParallelogramForm) -> ObjectSurface {
     }
 }
 
-/// Returns the triangles of all faces, counter-clockwise as seen from outside.
+/// Returns the faces of a polyhedron as triangles, counter-clockwise as seen from outside.
 fn triangles_of_polyhedron(form: &ConvexPolyhedronForm) -> Vec<[DVec3; 3]> {
     let slack = 1e-6 * form.thickness();
     let mut triangles = Vec::new();

@@ -1,4 +1,5 @@
-//! Tracing of camera samples for the pixels of a tile. The renderer gets radiance only from here.
+//! Tracing of camera samples for the pixels of a tile. The renderer gets radiance only by these
+//! functions.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
@@ -11,7 +12,7 @@ use crate::world::pixel_block::PixelBlock;
 use crate::world::world::World;
 use std::ops::Range;
 
-/// A world and the sample sequence of a picture, from which [`TileTracer`]s are created.
+/// Compiled scene and sample sequence of a picture, from which [`TileTracer`]s are created.
 pub struct CameraTracer<'a, L: SimdFloat> {
     world: &'a World<L>,
     sampler: Sampler<L>,
@@ -22,10 +23,12 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
         Self { world, sampler: Sampler::new(*sampling, world.camera_dimensions()) }
     }
 
-    /// Creates the tracer of `pixels`, at most [`MAX_BLOCK_PIXELS`](crate::world::MAX_BLOCK_PIXELS)
-    /// columns and rows. All pixels must be in the rectangle of the raster with corner `origin` and
-    /// size `extent`, because culling uses this rectangle. Returns `None` if every camera ray of
-    /// the rectangle misses and the background is black.
+    /// Creates the tracer of `pixels`. `replicate` is 0 for replicate A, 1 for replicate B; each
+    /// has half of the samples. `pixels` has at most
+    /// [`MAX_BLOCK_PIXELS`](crate::world::MAX_BLOCK_PIXELS) pairs of column and row. All pixels
+    /// must be in the rectangle of the raster with corner `origin` and size `extent`, because
+    /// culling uses this rectangle. Returns `None` if all samples in the rectangle are black: no
+    /// camera ray can hit a primitive or a visible light, and the background is black.
     pub fn tile(
         &self,
         replicate: usize,
@@ -39,7 +42,8 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
         Some(TileTracer { candidates, ..self.scattered(replicate, pixels) })
     }
 
-    /// Creates the tracer of `pixels` at any positions in the raster, without culling.
+    /// Creates the tracer of `pixels` at any positions in the picture, without culling. `replicate`
+    /// is 0 for replicate A, 1 for replicate B; each has half of the samples.
     pub fn scattered(
         &self,
         replicate: usize,
@@ -57,7 +61,7 @@ impl<'a, L: SimdFloat> CameraTracer<'a, L> {
 }
 
 /// Tracer of the samples of up to [`MAX_BLOCK_PIXELS`](crate::world::MAX_BLOCK_PIXELS) pixels in
-/// one replicate. It tests rays against the candidate primitives of the tile.
+/// one replicate (half of the samples). It tests rays against the candidate primitives of the tile.
 pub struct TileTracer<'a, L: SimdFloat> {
     world: &'a World<L>,
     sampler: &'a Sampler<L>,
@@ -111,7 +115,8 @@ impl<L: SimdFloat> TileTracer<'_, L> {
         }
     }
 
-    /// Returns the number of rays traced so far, and if choices were random.
+    /// Returns two values: the number of rays traced so far, and a flag that is `true` if a path
+    /// has made a random choice (see [`Counts`]).
     pub fn counts(&self) -> Counts {
         self.counts
     }
@@ -145,14 +150,14 @@ impl<L: SimdFloat> TileTracer<'_, L> {
 /// Pixels and sample indices in the lanes of a traced packet.
 pub struct TracedPacket<'a, S> {
     block: &'a PixelBlock<S>,
-    /// Pixels of the packet, as indices into the pixels of the tracer.
+    /// Pixels of the packet, as indices into the list of pixels of the tracer.
     pub pixels: Range<usize>,
     first: u32,
     samples_per_pixel: usize,
 }
 
 impl<S: Float> TracedPacket<'_, S> {
-    /// Returns the pixel (column and row) and the sample index of a lane.
+    /// Returns the pixel (column and row) and the sample index that were traced in a lane.
     pub fn sample(&self, lane: usize) -> ((u32, u32), u32) {
         let pixel = self.pixels.start + lane / self.samples_per_pixel;
         (self.block.pixel(pixel), self.first + (lane % self.samples_per_pixel) as u32)

@@ -7,7 +7,7 @@ use crate::world::surface_emission::is_sampled;
 use glam::DVec3;
 
 /// Returns the largest fraction of light that a material reflects and transmits together, over all
-/// channels and angles.
+/// channels and angles. `flat` is `true` for flat objects.
 fn max_albedo(material: &Material, flat: bool) -> f64 {
     let (k_r, k_t) = (material.reflection, material.transmission);
     let f = match material.fresnel_mode() {
@@ -38,7 +38,7 @@ fn max_diffuse_albedo(material: &Material, object: &Object) -> f64 {
     if albedo > 0.0 { albedo * factor } else { 0.0 }
 }
 
-/// Geometric properties of an object that determine the bound of the bias.
+/// Geometric properties of an object that determine how much light truncated paths lose.
 struct ObjectTraits {
     flat: bool,
     /// `true` if a ray that leaves the object outwards may hit it again.
@@ -70,10 +70,10 @@ impl ObjectTraits {
     }
 
     /// Returns `true` if a path may hit the object at two consecutive vertices. A ray that leaves a
-    /// convex form outwards cannot hit it again. Rays inside of the form can, but paths are inside
-    /// only if they start there or are transmitted. Bump maps make no difference: a reflected
-    /// direction that would point into the surface is mirrored out of it, and a transmitted
-    /// direction that would point out is mirrored into it.
+    /// convex object outwards cannot hit it again. Rays inside of the object can, but paths are
+    /// inside only if they start there or are transmitted. Bump maps make no difference: a
+    /// reflected direction that would point into the surface is mirrored out of it, and a
+    /// transmitted direction that would point out is mirrored into it.
     fn sees_itself(&self, material: &Material) -> bool {
         let let_in = !self.flat && material.transmission > 0.0;
         self.concave || let_in || self.contains_eye && material.two_sided
@@ -84,17 +84,18 @@ impl ObjectTraits {
 /// radiance that truncation loses.
 #[derive(Clone, Copy)]
 struct Reach {
-    /// Largest factor of one surface.
+    /// Largest factor by which a single surface multiplies the throughput of a path.
     first: f64,
-    /// Largest product of the factors of two surfaces that a path can hit one after the other.
+    /// Largest product of the throughput factors of two surfaces that a path can hit one after the
+    /// other.
     round_trip_albedo: f64,
     /// `true` if some surface transmits light. Paths may then split at surfaces.
     through: bool,
 }
 
 impl Reach {
-    /// Computes the factors of mirrors and glass. If `diffuse` is `true`, they include the diffuse
-    /// albedo of matt surfaces.
+    /// Computes the throughput factors of mirrors and glass. If `diffuse` is `true`, they include
+    /// the diffuse albedo of matt surfaces.
     fn new(scene: &Scene, diffuse: bool) -> Self {
         let default = Material::default();
         let (mut first, mut second, mut round_trip_albedo) = (0.0f64, 0.0f64, 0.0f64);
@@ -125,14 +126,15 @@ impl Reach {
         Self { first, round_trip_albedo, through }
     }
 
-    /// Returns the largest possible sum of the throughputs of the paths that have hit `n` surfaces.
+    /// Returns w(n) of [`truncation_bounds`]: the largest possible sum of the throughputs of all
+    /// branches of a path after `n` surfaces.
     fn weight(&self, n: u32) -> f64 {
         let pairs = self.round_trip_albedo.powi(i32::try_from(n / 2).unwrap_or(i32::MAX));
         if n.is_multiple_of(2) { pairs } else { pairs * self.first }
     }
 
-    /// Returns the largest possible sum of the throughputs of the paths that have hit at least `n`
-    /// surfaces; infinite if there is no bound.
+    /// Returns the sum of [`Self::weight`] over `n` and all larger numbers of surfaces; infinite if
+    /// the sum may have no bound.
     fn from(&self, n: u32) -> f64 {
         let sum = self.weight(n) + self.weight(n.saturating_add(1));
         if self.round_trip_albedo < 1.0 {
@@ -170,16 +172,16 @@ impl Reach {
 /// sum up to at most w(n) = r^(n/2) for even n, and w(n) = r^((n-1)/2) f for odd n. The sum over n
 /// and all larger numbers is at most (w(n) + w(n + 1)) / (1 - r). The lost radiance is at most this
 /// sum times the radiance of the brightest surface, light with a size, or background. Nothing is
-/// truncated only if no surface reflects or transmits, or if the only one that does is flat or
-/// convex, which a path hits once.
+/// truncated in two cases: no surface reflects or transmits, or the only object that does is flat
+/// or convex, so that a path hits it once.
 ///
 /// The emission of some objects is found only by rays that hit them. Without diffuse bounces,
-/// diffuse surfaces lack their light.
+/// diffuse surfaces lack the light of these objects.
 ///
-/// With diffuse bounces the factor of a surface includes its diffuse albedo. `max_depth` ends a
-/// path after at least as many surfaces, `max_diffuse_depth` after one surface more than bounces,
-/// and `caustics = false` after two surfaces. Without diffuse bounces, ambient light stands for all
-/// indirect light; that is no truncation.
+/// With diffuse bounces the factor of a surface includes its diffuse albedo. The lost paths have
+/// hit at least `max_depth + 1` surfaces, `max_diffuse_depth + 1` surfaces, or two surfaces if
+/// `caustics` is `false`. Without diffuse bounces, ambient light stands for all indirect light;
+/// that is no truncation.
 ///
 /// Total internal reflection in a transparent ball is included in the bound, although light that
 /// can enter a ball can also leave it, because the angle of incidence is the same at every hit. At
@@ -253,7 +255,7 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
     out
 }
 
-/// Formats `x` with three digits, rounded up.
+/// Formats `x` with three significant digits, rounded up.
 fn rounded_up(x: f64) -> String {
     let text = format!("{x:.2e}");
     // A difference in the last digits of a double is a rounding error, not a reason to round up.

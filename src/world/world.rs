@@ -1,4 +1,4 @@
-//! `World`: the scene as the integrators read it.
+//! `World`: a compiled scene, as the integrators read it.
 
 use crate::camera::PerspectiveCamera;
 use crate::lanes::{Double, Float, SimdFloat, Single, Vec3};
@@ -15,19 +15,20 @@ use crate::world::integrator::opaque::trace_opaque;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::integrator::surface_textures::SurfaceTextures;
 use crate::world::integrator::transmission::{Branch, TransmissionIntegrator};
-use crate::world::inventory::Inventory;
 use crate::world::light_choice::LightChoice;
 use crate::world::light_groups::LightGroups;
 use crate::world::lights_on_surfaces::OnSurface;
 use crate::world::surface_emission::SurfaceEmission;
 use crate::world::tile_tracer::CameraTracer;
 
-/// A compiled light of type `T`, with its light group. `S` is the scalar type.
+/// Compiled light of type `T`, with its light group. `S` is the scalar type.
 pub(super) struct LightSource<T, S> {
     pub light: T,
-    /// Index of the light group.
+    /// Index of the light group (part of the picture that the film stores separately) that the
+    /// light belongs to.
     pub group: usize,
-    /// Emission that the samples of the group contain. `None` means 1 in every channel.
+    /// Emission (colour times intensity) by which the light's samples are multiplied in the film,
+    /// for a light that shares its light group. `None` for a light with a group of its own.
     pub emission: Option<[S; 3]>,
     /// `true` if the camera and reflected rays see the light. Lights without a size are never
     /// visible; the field has no effect on them.
@@ -35,7 +36,8 @@ pub(super) struct LightSource<T, S> {
 }
 
 impl<T, S: Float> LightSource<T, S> {
-    /// Returns `value` times the emission that the group's samples contain.
+    /// Returns `value` times the light's emission (colour times intensity) if the light shares its
+    /// light group, otherwise `value`.
     #[inline(always)]
     pub fn emitted<L: SimdFloat<Scalar = S>>(&self, value: Vec3<L>) -> Vec3<L> {
         match self.emission {
@@ -44,7 +46,7 @@ impl<T, S: Float> LightSource<T, S> {
         }
     }
 
-    /// Returns the same source with its light replaced by `light`.
+    /// Returns the same light group and emission with the light replaced by `light`.
     #[inline(always)]
     pub fn with_light<U>(&self, light: U) -> LightSource<U, S> {
         let Self { group, emission, visible, .. } = *self;
@@ -52,10 +54,11 @@ impl<T, S: Float> LightSource<T, S> {
     }
 }
 
-/// A light without a size, and the end points of shadow rays to it.
+/// Light without a size, and the end points of shadow rays to it.
 pub(super) struct ShadowRayTarget<S> {
     pub light: DeltaLight<S>,
-    /// End points of shadow rays. `None` for a light that is not on a surface.
+    /// End points of shadow rays to a light on a surface. `None` for other lights, at which the
+    /// rays end.
     pub on_surface: Option<OnSurface<S>>,
 }
 
@@ -68,79 +71,82 @@ pub(super) type EmitterSource<S> = LightSource<Emitter<S>, S>;
 /// An environment light, with its light group.
 pub(super) type EnvironmentSource<S> = LightSource<EnvironmentLight, S>;
 
-/// A scene compiled for the lane type `L`. Fields of features that the scene does not use are empty
+/// Scene compiled for the SIMD type `L`. Fields of features that the scene does not use are empty
 /// or `None`.
 pub struct World<L: SimdFloat> {
-    /// All primitives, in coordinates relative to the scene's centre.
+    /// All primitives of the scene, in coordinates relative to the scene's centre.
     pub(super) geometry: Aggregate<L>,
     /// `true` for each primitive that rays hit only from outside: a convex solid that contains
     /// neither the eye nor a transmitted ray.
     pub(super) outside_only: Vec<bool>,
-    /// BSDF of each primitive, as an index into `bsdfs`.
+    /// Index of the BSDF of each primitive in `bsdfs`, the world's list of BSDFs.
     pub(super) bsdf_of: Vec<u32>,
     pub(super) bsdfs: Vec<Bsdf<L::Scalar>>,
     pub(super) sources: Vec<DeltaSource<L::Scalar>>,
-    /// Point lights of which a few are asked at each hit; `sources` holds the others. `None` if all
-    /// are asked.
+    /// Point lights of which paths choose a few at each hit; `sources` holds the others. `None` if
+    /// shadow rays go to all lights.
     pub(super) light_choice: Option<LightChoice<L::Scalar>>,
-    /// Lights with a size.
+    /// Lights with a size, and their light groups.
     pub(super) emitters: Vec<EmitterSource<L::Scalar>>,
-    /// Environment lights.
+    /// Environment lights, and their light groups.
     pub(super) environments: Vec<EnvironmentSource<L::Scalar>>,
     /// Emission of objects with an emissive material.
     pub(super) emission: SurfaceEmission<L::Scalar>,
-    /// Light group of ambient light. `None` if no surface reflects ambient light.
+    /// Index of the light group of ambient light. `None` if no surface reflects ambient light.
     pub(super) ambient: Option<usize>,
-    /// Light group of the background. `None` if the background is black.
+    /// Index of the light group of the background. `None` if the background is black.
     pub(super) background: Option<usize>,
-    /// `true` if shadow rays are traced.
+    /// `true` if shadow rays are traced: the scene has objects, and its ray types include shadow
+    /// rays.
     pub(super) shadows: bool,
-    /// `true` if shading normals differ from geometric normals somewhere.
+    /// `true` if shading normals differ from geometric normals on some surface.
     pub(super) smooth: bool,
-    /// `true` if vertex colours or textures multiply the albedo somewhere.
+    /// `true` if vertex colours or textures multiply the albedo of some surface.
     pub(super) colored: bool,
     /// `true` if the world is neither `smooth` nor `colored` and all its primitives are in linear
     /// lists, without BVH and bounding boxes. Kernels have a faster instance for such worlds.
     pub(super) simple: bool,
-    /// Textures and bump maps. `None` if the scene has neither.
+    /// Textures and bump maps of primitives. `None` if the scene has neither.
     pub(super) surface_textures: Option<SurfaceTextures<L>>,
-    /// Transmissive surfaces. `None` if the scene has none.
+    /// Transmissive surfaces and the media between them. `None` if the scene has none.
     pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,
     /// Largest number of surfaces on a path after the first; 0 if no surface reflects or transmits.
     pub(super) depth: u32,
     /// Limits of diffuse bounces. `None` if the scene has no indirect diffuse light.
     pub(super) diffuse_limits: Option<DiffuseLimits>,
-    /// Throughput below which a path is cut off.
+    /// Smallest throughput with which a path continues. The throughput is that of its largest
+    /// channel.
     pub(super) min_weight: f64,
     /// `true` if sampled directions that point into the surface are mirrored at its tangent plane.
     pub(super) fold: bool,
     pub(super) camera: PerspectiveCamera,
-    /// Candidates of rays for which no culling is possible.
+    /// Candidate primitives of all rays of the picture together, for rays that belong to no tile.
     pub(super) all_candidates: TileCandidates,
-    /// Light buffer of each light: its possible occluders by direction. Shadow rays to a light
-    /// without a buffer traverse the BVH.
+    /// Light buffer of each light without a size: its possible occluders by direction. Shadow rays
+    /// to a light without a buffer traverse the BVH.
     pub(super) light_buffers: Vec<Option<LightBuffer<L::Scalar>>>,
     pub(super) culling: CullingMode,
     pub(super) groups: LightGroups,
-    /// Name of each light group.
+    /// Name of each light group of the scene.
     pub(super) group_names: Vec<String>,
     /// Scale of each light group: the number of integer steps per unit of radiance in the film.
     pub(super) scales: Vec<f64>,
     /// `true` if samples are distributed over the area of their pixel instead of its centre.
     pub(super) jitter: bool,
-    pub(super) inventory: Inventory,
+    pub(super) inventory: String,
     /// One sentence for each limit of the scene that ends paths early, with a bound of the lost
     /// light.
     pub(super) truncation_biases: Vec<String>,
 }
 
 impl<L: SimdFloat> World<L> {
-    /// Number of light groups.
+    /// Returns the number of light groups.
     pub fn groups(&self) -> usize {
         self.scales.len()
     }
 
-    /// Scale of each light group: the number of integer steps per unit of radiance in the film.
+    /// Returns the scale of each light group: the number of integer steps per unit of radiance in
+    /// the film.
     pub fn scales(&self) -> &[f64] {
         &self.scales
     }
@@ -151,35 +157,42 @@ impl<L: SimdFloat> World<L> {
         self.jitter
     }
 
-    /// Sample dimensions that camera rays use.
+    /// Returns two flags: camera rays use random numbers for a position in the pixel, and for a
+    /// position on the lens.
     pub fn camera_dimensions(&self) -> CameraDimensions {
         CameraDimensions { pixel: self.jitter, lens: self.camera.lens().is_some() }
     }
 
-    /// The camera, in coordinates relative to the scene's centre.
+    /// Returns the camera, in coordinates relative to the scene's centre.
     pub fn camera(&self) -> &PerspectiveCamera {
         &self.camera
     }
 
-    /// Creates the tracer of camera samples with the given seed and sample sequence.
+    /// Creates the tracer of camera samples. `sampling` has the seed and the sample sequence.
     pub fn camera_tracer(&self, sampling: &SampleSettings) -> CameraTracer<'_, L> {
         CameraTracer::new(self, sampling)
     }
 
-    /// Returns the candidates of the camera rays through a rectangle of the raster, and of the
-    /// shadow rays from their hit points. The rectangle has the corner `origin` and the size
-    /// `extent` \[pixels\]. Returns `None` if no primitive can be excluded.
+    /// Returns the primitives that the camera rays through a rectangle of the picture can hit, and
+    /// those that can occlude the shadow rays from their hit points. The rectangle has the corner
+    /// `origin` and the size `extent` \[pixels\]. Returns `None` if rays must be tested against all
+    /// primitives.
     pub(super) fn candidates(
         &self,
         origin: [usize; 2],
         extent: [usize; 2],
     ) -> Option<TileCandidates> {
-        let strata = self.light_choice.as_ref().map_or(0, LightChoice::strata);
-        let lights = self.first_stratum() + strata;
-        self.culling.candidates(&self.geometry, lights, &self.camera, (origin, extent))
+        self.culling.candidates(&self.geometry, self.light_lists(), &self.camera, (origin, extent))
     }
 
-    /// Index of the first stratum of chosen lights in the lists of occluders.
+    /// Returns the number of lists of possible occluders: one for each light, and one for each
+    /// stratum (spatial group) of the lights among which paths choose.
+    pub(super) fn light_lists(&self) -> usize {
+        self.all_candidates.occluders.len()
+    }
+
+    /// Returns the position, in the lists of possible occluders, of the first stratum (spatial
+    /// group) of the lights among which paths choose.
     #[inline(always)]
     pub(super) fn first_stratum(&self) -> usize {
         self.sources.len() + self.emitters.len() + self.emission.counts()[0]
@@ -191,8 +204,8 @@ impl<L: SimdFloat> World<L> {
         !self.emitters.is_empty() || !self.environments.is_empty() || !self.emission.is_empty()
     }
 
-    /// Returns `true` if all samples of a tile with these candidates are black: its camera rays
-    /// have no candidate primitive, the background is black, and no emitter is visible.
+    /// Returns `true` if all samples of a tile with these candidate primitives are black: its
+    /// camera rays have no candidate, the background is black, and no emitter is visible.
     pub(super) fn is_black(&self, candidates: &TileCandidates) -> bool {
         self.background.is_none()
             && candidates.primary.is_empty()
@@ -201,8 +214,8 @@ impl<L: SimdFloat> World<L> {
     }
 
     /// Traces one packet of paths from the camera, and overwrites them. Lanes outside of `active`
-    /// stay black. `candidates` are the candidates of the camera rays and of the shadow rays from
-    /// their hit points; `None` if they are unknown.
+    /// stay black. `candidates` are the primitives that the camera rays and the shadow rays from
+    /// their hit points are tested against; `None` means all primitives.
     #[inline(always)]
     pub fn trace(
         &self,
@@ -235,13 +248,14 @@ impl<L: SimdFloat> World<L> {
     }
 
     /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the
-    /// same length. A point is a column and a row of the raster in pixels, with fractions.
+    /// same length. A point is a position in the picture: a column and a row in pixels, with
+    /// fractions.
     pub fn first_hit(&self, points: &[[f64; 2]], hits: &mut [FirstHit]) {
         first_hit::trace_first_hits(self, points, hits);
     }
 }
 
-/// Type of [`World::trace`] for the lane type `L`.
+/// Type of [`World::trace`] for the SIMD type `L`.
 type Trace<L> = fn(
     &World<L>,
     &mut Path<L>,
@@ -251,8 +265,8 @@ type Trace<L> = fn(
     &mut Radiance<L>,
 ) -> Counts;
 
-/// [`World::trace`] in both precisions. The library needs no table of these functions: naming them
-/// makes the compiler generate their machine code in this crate. Other crates then call it instead
-/// of generating their own.
+/// [`World::trace`] in both precisions. No code reads this static: it makes the compiler generate
+/// the machine code of the kernels in this crate, so that other crates call it instead of
+/// generating their own.
 #[doc(hidden)]
 pub static KERNELS: (Trace<Single>, Trace<Double>) = (World::trace, World::trace);

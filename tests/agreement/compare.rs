@@ -1,4 +1,5 @@
-//! Statistical comparison of two programs' pictures of a scene.
+//! Statistical comparison of two pictures of a scene: one by the program, one by the reference
+//! tracer.
 
 use crate::agreement::tracer::{Estimate, Mutation, Tracer};
 use crate::common::Numbers;
@@ -15,9 +16,9 @@ use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Size of the pictures.
+/// Width and height of the compared pictures.
 pub const SIZE: [u32; 2] = [32, 24];
-/// Side of the pixel blocks whose means are compared.
+/// Side in pixels of the blocks whose means are compared.
 const BLOCK: usize = 4;
 /// Probability of a false alarm in all comparisons of one scene: 1 / 1000 for a hundred scenes.
 const LEVEL: f64 = 1e-3 / 100.0;
@@ -25,10 +26,11 @@ const LEVEL: f64 = 1e-3 / 100.0;
 /// Deviation of two pictures, and the largest deviation that chance explains.
 #[derive(Debug)]
 pub struct Verdict {
-    /// Largest deviation of a block \[standard errors\].
+    /// Largest deviation of a block's mean, in standard errors.
     pub worst_z: f64,
     pub allowed_z: f64,
-    /// Sum of the squared deviations of all blocks' brightness.
+    /// Sum of the squared deviations of all blocks' brightness, each in standard errors
+    /// (chi-square).
     pub chi2: f64,
     pub allowed_chi2: f64,
     pub picture: Vec<DVec3>,
@@ -48,10 +50,10 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// Results by their inputs. Tests that compare the same pictures share them.
+/// Cache of results by their inputs. Tests that compare the same pictures share it.
 pub struct Memo<K, V>(Mutex<Vec<(K, Slot<V>)>>);
 
-/// A result that is computed when a test first asks for it.
+/// Cached result, which is computed when a test first asks for it.
 type Slot<V> = Arc<OnceLock<V>>;
 
 impl<K: PartialEq, V: Clone> Memo<K, V> {
@@ -59,7 +61,7 @@ impl<K: PartialEq, V: Clone> Memo<K, V> {
         Self(Mutex::new(Vec::new()))
     }
 
-    /// Returns the result of `compute` for `key`, which it must depend on alone.
+    /// Returns the result of `compute` for `key`. The result must depend on the key alone.
     pub fn get(&self, key: K, compute: impl FnOnce() -> V) -> V {
         let slot = {
             // A failed test leaves the table valid.
@@ -76,19 +78,21 @@ impl<K: PartialEq, V: Clone> Memo<K, V> {
     }
 }
 
-/// Picture by the program, with estimates of its noise.
+/// Picture rendered by the program, with estimates of its noise.
 pub struct Picture {
     size: [u32; 2],
     mean: Vec<DVec3>,
-    /// Half the difference of the replicates: the noise of `mean`.
+    /// Half the difference of the two replicates (halves of the samples) of each pixel: the noise
+    /// of `mean`.
     half: Vec<DVec3>,
-    /// Half the difference of the replicates of a picture with independent random numbers.
+    /// Half the difference of the two replicates of each pixel, in a picture with independent
+    /// random numbers.
     random: Vec<DVec3>,
     samples: u32,
 }
 
 impl Picture {
-    /// Renders with `samples` samples per pixel and replicate.
+    /// Renders `scene` with `samples` samples per pixel in each replicate (half of the samples).
     pub fn new(scene: &Scene, samples: u32) -> Arc<Self> {
         static PICTURES: Memo<(Scene, u32), Arc<Picture>> = Memo::new();
         PICTURES.get((scene.clone(), samples), || {
@@ -98,9 +102,10 @@ impl Picture {
         })
     }
 
-    /// Compares block means with a reference of `samples` samples per pixel, which is far noisier.
-    /// The variance of single samples is the larger one of those of the reference and of this
-    /// program's random samples, because few samples underestimate the variance of rare events.
+    /// Compares block means with a `reference` of `samples` samples per pixel, which is far
+    /// noisier. The variance of single samples is estimated from the reference and from this
+    /// program's random samples. The larger one is used, because few samples underestimate the
+    /// variance of rare events.
     pub fn beside(&self, reference: &[Estimate], samples: u32) -> Verdict {
         let (mut worst_z, mut chi2, mut count) = (0f64, 0.0, 0.0);
         let per_reference = 2.0 * f64::from(self.samples) / f64::from(samples);
@@ -136,13 +141,13 @@ impl Picture {
     }
 }
 
-/// Quantile of the chi-square distribution with `n` degrees of freedom at the level of the normal
-/// quantile `z` (Wilson and Hilferty 1931).
+/// Returns a quantile of the chi-square distribution with `n` degrees of freedom. `z` is the normal
+/// quantile of the same probability (Wilson and Hilferty 1931).
 fn chi2_quantile(n: f64, z: f64) -> f64 {
     n * (1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt()).powi(3)
 }
 
-/// Returns the scene with the picture size of the comparison.
+/// Returns the scene with the picture size of the comparison, [`SIZE`].
 pub fn small(scene: Scene) -> Scene {
     sized(scene, SIZE)
 }
@@ -156,10 +161,10 @@ pub fn zoomed(scene: &Scene, point: [f64; 3], degrees: f64) -> Scene {
     scene
 }
 
-/// Picture by the reference tracer.
+/// Picture by the reference tracer, or the name of a feature that it does not support.
 pub type Reference = Result<Arc<Vec<Estimate>>, String>;
 
-/// Estimates every pixel with the reference tracer.
+/// Renders `scene` with the reference tracer. `mutation` is a deliberate error of the tracer.
 ///
 /// # Errors
 ///
@@ -181,7 +186,8 @@ fn traced(scene: &Scene, samples: u32, mutation: Mutation) -> Result<Vec<Estimat
     Ok(rows.concat())
 }
 
-/// Renders with the program. Returns the picture and half the difference of its replicates.
+/// Renders `scene` with the program. Returns the picture, and half the difference of its two
+/// replicates (halves of the samples).
 pub fn rendered(scene: &Scene, samples: u32, kind: SamplerKind) -> (Vec<DVec3>, Vec<DVec3>) {
     let mut rendering = begin_with(scene, SampleSettings { seed: 1, kind }, Precision::Double);
     uniform(&mut rendering, 0, samples, &pool(2));
@@ -191,7 +197,7 @@ pub fn rendered(scene: &Scene, samples: u32, kind: SamplerKind) -> (Vec<DVec3>, 
     (mean, a.iter().zip(&b).map(|(a, b)| 0.5 * (*a - *b)).collect())
 }
 
-/// Pixel indices of each block.
+/// Returns the pixel indices of each block whose mean is compared.
 fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
     let [width, height] = [width as usize, height as usize];
     let block = |x0: usize, y0: usize| {
@@ -202,8 +208,8 @@ fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
     corners.flat_map(|y| (0..width).step_by(BLOCK).map(move |x| block(x, y))).collect()
 }
 
-/// Difference of the variances of single samples, pooled over the picture \[standard errors\]. The
-/// standard error is estimated from the spread of the blocks.
+/// Returns the difference between the variances of the two programs' single samples, pooled over
+/// the picture, in standard errors. The standard error is estimated from the spread of the blocks.
 pub fn variances_differ_by(
     reference: &[Estimate],
     reference_samples: u32,
@@ -228,7 +234,7 @@ pub fn variances_differ_by(
     mean.abs() / (spread / n).sqrt()
 }
 
-/// Writes picture, reference and difference to files, and returns their folder.
+/// Writes picture, reference and their difference to files. Returns the folder of the files.
 pub fn keep(name: &str, verdict: &Verdict) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("agreement");
     std::fs::create_dir_all(&folder).unwrap();

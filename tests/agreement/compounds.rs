@@ -8,23 +8,25 @@ use glam::{DAffine3, DMat3, DVec3};
 use zerkalo::scene::Object;
 use zerkalo::shape::{CsgOperand, Shape};
 
-/// Simple shape: its pieces or triangles, and the transforms between its coordinates and the
-/// scene's.
+/// Simple shape: its pieces or triangles, and the transforms between its own coordinates and those
+/// of the scene.
 pub struct Leaf {
     pub pieces: Vec<Piece>,
     pub mesh: Option<Triangles>,
     pub canvas: Canvas,
-    /// Centre and radius of a ball around all pieces; `None` for an infinite shape or a mesh.
+    /// Centre and radius of a ball around all pieces of the shape; `None` for an infinite shape or
+    /// a mesh.
     ball: Option<(DVec3, f64)>,
     own_from_scene: DAffine3,
-    /// Inverse transpose, which maps normals.
+    /// Matrix that maps normals from the shape's own coordinates to those of the scene: the inverse
+    /// transpose of the transform.
     scene_from_own_normals: DMat3,
     own_from_scene_normals: DMat3,
-    /// Name of the material.
+    /// Name of the shape's material.
     pub material: String,
 }
 
-/// CSG tree over leaves.
+/// Tree of set operations (CSG) over the simple shapes of a compound.
 enum Tree {
     Leaf(usize),
     Union(Vec<Tree>),
@@ -32,20 +34,23 @@ enum Tree {
     Difference(Vec<Tree>),
 }
 
-/// Object: its leaves and their CSG tree.
+/// Object of the scene: its simple shapes, and the tree of set operations that combines them.
 pub struct Body {
     pub leaves: Vec<Leaf>,
     tree: Tree,
 }
 
-/// Distance of the tested points from a crossing, in lengths of the direction.
+/// Distance from a crossing to the two tested points before and behind it, as a multiple of the
+/// length of the ray's direction.
 const ASIDE: f64 = 1e-7;
 
-/// Distance, normal, leaf and triangle.
+/// Hit of a ray on an object: distance, normal, index of the simple shape, and index of the
+/// triangle.
 type Meeting = (f64, DVec3, usize, usize);
 
 impl Leaf {
-    /// Distances, normals in the coordinates of the description, and triangle indices of all crossings.
+    /// Returns all crossings of a line with the surface: distance, normal in the shape's own
+    /// coordinates, and index of the triangle.
     fn crossings(
         &self,
         origin: DVec3,
@@ -65,35 +70,34 @@ impl Leaf {
         hits.chain(mesh_hits)
     }
 
-    /// Interpolated normal of triangle `i` at `point`; `None` for flat shading.
+    /// Returns the interpolated normal of triangle `i` at `point`. Returns `None` for flat shading.
     pub fn smooth(&self, i: usize, point: DVec3) -> Option<DVec3> {
         let own = self.mesh.as_ref()?.smooth(i, self.own_from_scene.transform_point3(point))?;
         Some(self.scene_from_own_normals * own)
     }
 
-    /// Colour of triangle `i` in its file.
+    /// Returns the colour of triangle `i` in its file.
     pub fn color(&self, i: usize) -> DVec3 {
         self.mesh.as_ref().map_or(DVec3::ONE, |mesh| mesh.color(i))
     }
 
-    /// Converts a point of the scene and its outward normal to the coordinates of the leaf's
-    /// description.
+    /// Converts a point of the scene and its outward normal to the shape's own coordinates.
     pub fn spot(&self, facet: usize, point: DVec3, outer: DVec3) -> Spot<'_> {
         let point = self.own_from_scene.transform_point3(point);
         Spot { leaf: self, facet, point, normal: self.own_normal(outer) }
     }
 
-    /// Transform from the coordinates of the leaf's description to the scene's.
+    /// Returns the transform from the shape's own coordinates to those of the scene.
     pub fn scene_from_own(&self) -> DAffine3 {
         self.own_from_scene.inverse()
     }
 
-    /// Converts a normal of the scene to the coordinates of the leaf's description.
+    /// Converts a normal of the scene to the shape's own coordinates.
     pub fn own_normal(&self, normal: DVec3) -> DVec3 {
         (self.own_from_scene_normals * normal).normalize()
     }
 
-    /// Converts a normal of the leaf's description to scene coordinates.
+    /// Converts a normal in the shape's own coordinates to those of the scene.
     pub fn scene_normal(&self, own: DVec3) -> DVec3 {
         (self.scene_from_own_normals * own).normalize()
     }
@@ -105,9 +109,11 @@ impl Leaf {
 }
 
 impl Body {
+    /// Creates the body of `object`.
+    ///
     /// # Errors
     ///
-    /// Names a shape that this tracer does not support.
+    /// Names a shape that the reference tracer does not support.
     pub fn new(object: &Object) -> Result<Self, String> {
         let place = object.transform.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all);
         let mut leaves = Vec::new();
@@ -115,8 +121,9 @@ impl Body {
         Ok(Self { leaves, tree })
     }
 
-    /// Closest hit beyond the distance `from` (in lengths of `direction`): distance, outward or
-    /// front unit normal, leaf and triangle.
+    /// Returns the closest hit of a ray beyond the distance `from`: distance, outward or front unit
+    /// normal, index of the simple shape, and index of the triangle. Distances are in lengths of
+    /// `direction`.
     pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<Meeting> {
         let mut nearest: Option<Meeting> = None;
         for (i, leaf) in self.leaves.iter().enumerate() {
@@ -140,30 +147,31 @@ impl Body {
         nearest
     }
 
-    /// The leaf of a body that is no compound.
+    /// Returns the only simple shape of an object that is no compound. Returns `None` for a
+    /// compound.
     pub fn simple(&self) -> Option<&Leaf> {
         matches!(self.tree, Tree::Leaf(_)).then(|| &self.leaves[0])
     }
 
-    /// Returns `true` for a mesh, which has no defined inside.
+    /// Returns `true` if the object is a mesh, which has no defined inside.
     pub fn is_mesh(&self) -> bool {
         self.leaves[0].mesh.is_some()
     }
 
-    /// Returns `true` if a leaf is a torus.
+    /// Returns `true` if one of the object's simple shapes is a torus.
     pub fn has_torus(&self) -> bool {
         let mut pieces = self.leaves.iter().flat_map(|leaf| &leaf.pieces);
         pieces.any(|piece| matches!(piece, Piece::Torus(..)))
     }
 
-    /// Returns `true` if the body is flat.
+    /// Returns `true` if the object is flat, so that it has no inside.
     pub fn is_open(&self) -> bool {
         let pieces = &self.leaves[0].pieces;
         matches!(self.tree, Tree::Leaf(_))
             && matches!(pieces[..], [Piece::Polygon(..)] | [Piece::Plane(..)])
     }
 
-    /// Returns `true` if `point` is inside.
+    /// Returns `true` if `point` is inside of the object.
     pub fn holds(&self, point: DVec3) -> bool {
         self.contains(&self.tree, point)
     }
@@ -179,7 +187,8 @@ impl Body {
     }
 }
 
-/// Centre and radius of a ball around all `pieces`; `None` without pieces or with an infinite one.
+/// Returns centre and radius of a ball around all `pieces`. Returns `None` if there are no pieces,
+/// or an infinite one.
 fn ball(pieces: &[Piece]) -> Option<(DVec3, f64)> {
     let balls = pieces.iter().map(Piece::ball).collect::<Option<Vec<_>>>()?;
     let center = balls.iter().map(|ball| ball.0).sum::<DVec3>() / balls.len() as f64;

@@ -1,5 +1,6 @@
-//! Emissive objects in the reference tracer: points uniform over the area of a sphere, polygons or
-//! triangles for direct light; rays that hit the object for the rest. There is no importance sampling.
+//! Emissive objects in the reference tracer. For direct light, points are sampled uniformly over
+//! the area of a sphere, polygons or triangles. Other emission is found by rays that hit the
+//! object. There is no importance sampling.
 
 use crate::agreement::compounds::Body;
 use crate::agreement::surfaces::Piece;
@@ -7,15 +8,17 @@ use crate::common::Numbers;
 use glam::{DAffine3, DVec3};
 use std::f64::consts::PI;
 
-/// Surface of an object from which the program samples points.
+/// Surface of an emissive object from which points are sampled.
 pub enum Shine {
     Sphere(DVec3, f64),
-    /// Corners, counter-clockwise as seen from the front, and the sum of all areas up to each.
+    /// Triangles: corners, counter-clockwise as seen from the front, and the sum of the areas of
+    /// the triangles up to this one.
     Triangles(Vec<([DVec3; 3], f64)>),
 }
 
 impl Shine {
-    /// Returns `None` for a body whose emission is found by rays alone.
+    /// Returns the surface of an emissive object from which points are sampled. Returns `None` if
+    /// only rays find the object's emission.
     pub fn new(body: &Body) -> Option<Self> {
         let leaf = body.simple()?;
         let place = leaf.scene_from_own();
@@ -50,7 +53,8 @@ impl Shine {
         (!corners.is_empty()).then_some(Self::Triangles(corners))
     }
 
-    /// Uniform point, the normal of the front there, and the area.
+    /// Returns a uniform random point of the surface, the normal of the front there, and the area
+    /// of the surface.
     pub fn point(&self, numbers: &mut Numbers) -> (DVec3, DVec3, f64) {
         match self {
             Self::Sphere(center, radius) => {
@@ -73,7 +77,7 @@ impl Shine {
     }
 }
 
-/// Scale of a map that keeps spheres spheres.
+/// Returns the scale of a map that keeps spheres spheres. Returns `None` for other maps.
 fn similarity(map: &DAffine3) -> Option<f64> {
     let m = map.matrix3;
     let scale = m.x_axis.length();

@@ -1,5 +1,6 @@
-//! Lights with a size in the reference tracer: points of the light uniform over its area for direct
-//! light, and rays that hit it for the camera and for mirrors. There is no importance sampling.
+//! Lights with a size (lamps) in the reference tracer. For direct light, points are sampled
+//! uniformly over the lamp's area. Camera and mirror rays find the lamps that they hit. There is no
+//! importance sampling.
 
 use crate::agreement::tracer::Mutation;
 use crate::common::Numbers;
@@ -7,18 +8,19 @@ use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::light::{Light, LightUnit};
 
-/// A light with a size.
+/// Lamp: a light with a size.
 pub enum Lamp {
     Sphere { center: DVec3, radius: f64 },
     Rectangle { center: DVec3, across: DVec3, up: DVec3, normal: DVec3 },
     Disk { center: DVec3, radius: f64, normal: DVec3 },
 }
 
-/// Light from a point of a lamp: direction, distance and irradiance of a surface that faces it.
+/// Light that arrives from a point of a lamp: direction to the point, distance, and irradiance of a
+/// surface that faces it.
 pub type Arrival = (DVec3, f64, f64);
 
 impl Lamp {
-    /// Returns `None` if the light has no size.
+    /// Creates the lamp of a light with a size. Returns `None` for a light without a size.
     pub fn new(light: &Light) -> Option<Self> {
         if let Some(sphere) = &light.sphere {
             return Some(Self::Sphere { center: sphere.center.into(), radius: sphere.radius });
@@ -50,7 +52,7 @@ impl Lamp {
         }
     }
 
-    /// Radiance of the lamp, white and of intensity 1.
+    /// Returns the radiance of the lamp if it is white and has intensity 1.
     pub fn radiance(&self, unit: LightUnit) -> f64 {
         match unit {
             LightUnit::Radiance => 1.0,
@@ -58,7 +60,8 @@ impl Lamp {
         }
     }
 
-    /// Distance at which a ray sees the lamp.
+    /// Returns the distance at which a ray hits the visible side of the lamp. Returns `None` for a
+    /// miss.
     pub fn meet(&self, origin: DVec3, direction: DVec3) -> Option<f64> {
         let plane = |center: DVec3, normal: DVec3| {
             let t = (center - origin).dot(normal) / direction.dot(normal);
@@ -83,8 +86,8 @@ impl Lamp {
         }
     }
 
-    /// Light of unit radiance at `from` from a uniform point of the lamp; `None` from a point that
-    /// does not face `from`.
+    /// Samples a uniform random point of the lamp, of unit radiance, and returns its light at
+    /// `from`. Returns `None` if the point does not face `from`.
     pub fn sample(
         &self,
         from: DVec3,

@@ -5,23 +5,25 @@ use std::collections::HashMap;
 use zerkalo::primitive::{Form, MeshForm};
 use zerkalo::shape::{MeshDesc, ShapeDesc};
 
-/// Smallest cosine between the shading normal and the direction to the viewer.
+/// Smallest cosine between the shading normal and the direction to the viewer. Normals at a smaller
+/// cosine are bent towards the viewer.
 const MIN_COSINE: f64 = 0.02;
 
-/// Triangles in the coordinates of their file.
+/// Triangles of a mesh, in the coordinates of their file.
 pub struct Triangles {
     corners: Vec<[DVec3; 3]>,
-    /// Normals of the corners; empty for flat shading.
+    /// Normals of the corners of each triangle; empty for flat shading.
     normals: Vec<[DVec3; 3]>,
     /// Colours of the triangles; empty if the file has none.
     colors: Vec<DVec3>,
-    /// Texture coordinates of the corners; empty if the file has none.
+    /// Texture coordinates of the corners of each triangle; empty if the file has none.
     uvs: Vec<[DVec2; 3]>,
     low: DVec3,
     high: DVec3,
 }
 
-/// Corner normals: angle-weighted means of the unit normals of adjacent triangles, normalised.
+/// Returns the normals of the triangles' corners: means of the unit normals of adjacent triangles,
+/// weighted by angle and normalised.
 fn around(corners: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
     let key = |p: DVec3| p.to_array().map(|x| (x + 0.0).to_bits());
     let mut sums: HashMap<[u64; 3], DVec3> = HashMap::new();
@@ -36,7 +38,7 @@ fn around(corners: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
 }
 
 impl Triangles {
-    /// Loads the triangles of a file.
+    /// Loads the triangles of a mesh file.
     pub fn new(file: &MeshDesc) -> Self {
         let Form::Mesh(MeshForm { mesh, scene_from_mesh, smooth }) = file.form() else {
             unreachable!("a mesh description has a mesh form")
@@ -68,7 +70,7 @@ impl Triangles {
         }
     }
 
-    /// Returns distance, normal and index of every triangle on the line.
+    /// Returns distance, normal and index of every triangle that a line crosses.
     pub fn meet(&self, origin: DVec3, direction: DVec3) -> Vec<(f64, DVec3, usize)> {
         let (a, b) = ((self.low - origin) / direction, (self.high - origin) / direction);
         // NaN for a line in a side of the box is ignored.
@@ -88,14 +90,14 @@ impl Triangles {
         each.collect()
     }
 
-    /// Interpolated normal at a point of triangle `i`; `None` for flat shading.
+    /// Returns the interpolated normal at a point of triangle `i`. Returns `None` for flat shading.
     pub fn smooth(&self, i: usize, point: DVec3) -> Option<DVec3> {
         let normals = self.normals.get(i)?;
         let shares = self.shares(i, point);
         Some((0..3).map(|k| normals[k] * shares[k]).sum())
     }
 
-    /// Barycentric coordinates of a point in the plane of triangle `i`.
+    /// Returns the barycentric coordinates of a point in the plane of triangle `i`.
     fn shares(&self, i: usize, point: DVec3) -> [f64; 3] {
         let [a, b, c] = self.corners[i];
         let normal = (b - a).cross(c - a);
@@ -103,7 +105,7 @@ impl Triangles {
         [(b, c), (c, a), (a, b)].map(|(a, b)| area(a, b) / normal.length_squared())
     }
 
-    /// Corners of all triangles.
+    /// Iterates over the triangles: the three corners of each.
     pub fn corners(&self) -> impl Iterator<Item = [DVec3; 3]> {
         self.corners.iter().copied()
     }
@@ -113,26 +115,27 @@ impl Triangles {
         !self.uvs.is_empty()
     }
 
-    /// Texture coordinates at a point in the plane of triangle `i`; `None` if the file has none.
+    /// Returns the texture coordinates at a point in the plane of triangle `i`. Returns `None` if
+    /// the file has none.
     pub fn uv(&self, i: usize, point: DVec3) -> Option<DVec2> {
         let uvs = self.uvs.get(i)?;
         let shares = self.shares(i, point);
         Some((0..3).map(|k| uvs[k] * shares[k]).sum())
     }
 
-    /// Corners of all triangles.
+    /// Iterates over the corners of all triangles, one by one.
     pub fn points(&self) -> impl Iterator<Item = DVec3> {
         self.corners.iter().flatten().copied()
     }
 
-    /// Colour of triangle `i` in the file.
+    /// Returns the colour of triangle `i` in the mesh file.
     pub fn color(&self, i: usize) -> DVec3 {
         self.colors.get(i).copied().unwrap_or(DVec3::ONE)
     }
 }
 
-/// Shading normal: `smooth` on the side of the geometric normal `own`, bent towards a viewer who
-/// looks along `direction`.
+/// Returns the shading normal: `smooth`, turned to the side of the geometric normal `own`, and bent
+/// towards a viewer who looks along `direction`.
 pub fn seen(smooth: DVec3, own: DVec3, direction: DVec3) -> DVec3 {
     let smooth = smooth.normalize() * smooth.dot(own).signum();
     let short = (MIN_COSINE + smooth.dot(direction)).max(0.0);

@@ -2,16 +2,16 @@
 //! the scene description only. The pictures agree within noise, and deliberate errors of the
 //! reference are detected.
 
-pub(crate) mod answers;
 pub(crate) mod compare;
 pub(crate) mod compounds;
 pub(crate) mod emission;
 pub(crate) mod lamps;
 pub(crate) mod meshes;
 pub(crate) mod paint;
+pub(crate) mod reflection;
 pub(crate) mod surfaces;
-pub(crate) mod through;
 pub(crate) mod tracer;
+pub(crate) mod transmission;
 
 use crate::support;
 use compare::{Picture, keep, reference, rendered, small, variances_differ_by};
@@ -25,17 +25,18 @@ use zerkalo::scene::{BelowHorizon, Scale, Scene, TransformOp};
 
 /// Samples per pixel of the reference tracer.
 const REFERENCE_SAMPLES: u32 = 96;
-/// Samples per pixel and replicate of the program.
+/// Samples per pixel that the program traces in each replicate (half of the samples).
 pub(crate) const SAMPLES: u32 = 512;
 
-/// Samples per pixel and replicate for a picture without rare events, of which more samples would find some.
+/// Smaller number of samples per pixel and replicate, for pictures in which more samples would find
+/// rare events.
 const FEW_SAMPLES: u32 = 128;
 
-/// Scenes whose pictures take seconds with [`SAMPLES`].
+/// Files of scenes whose pictures take seconds with [`SAMPLES`] samples.
 const SLOW_SCENES: [&str; 4] =
     ["torus.toml", "emissive-objects.toml", "gallery-triptych.toml", "water-glass.toml"];
 
-/// Scenes that must be compared.
+/// Files of scenes that must be among the compared ones.
 const GALLERY: [&str; 18] = [
     "mirror-room.toml",
     "gallery-triptych.toml",
@@ -92,7 +93,8 @@ fn shipped_scenes_agree_with_reference_tracer() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Checks that `samples` samples per pixel of `scene` agree with a picture of the reference tracer.
+/// Checks that a picture of `scene` with `samples` samples per pixel agrees with one by the
+/// reference tracer with `reference_samples` samples per pixel.
 fn check_agreement(name: &str, scene: &Scene, samples: u32, reference_samples: u32) {
     let reference = reference(scene, reference_samples, Mutation::None).unwrap();
     let verdict = Picture::new(scene, samples).beside(&reference, reference_samples);
@@ -100,8 +102,8 @@ fn check_agreement(name: &str, scene: &Scene, samples: u32, reference_samples: u
     assert!(verdict.agree(), "{name}: {verdict}");
 }
 
-/// Checks that each of several deliberate errors is detected, and that the same samples agree
-/// without it.
+/// Checks that each deliberate error of the reference tracer in `mutations` is detected, and that
+/// the picture without errors agrees at the same number of samples.
 fn check_detection(mutations: &[Mutation], name: &str, scene: &Scene, samples: u32) {
     let picture = Picture::new(scene, FEW_SAMPLES.max(samples / 6));
     let beside = |m| picture.beside(&reference(scene, samples, m).unwrap(), samples);
@@ -114,7 +116,7 @@ fn check_detection(mutations: &[Mutation], name: &str, scene: &Scene, samples: u
     }
 }
 
-/// Scales eye, lights without falloff and objects by 1/1000.
+/// Returns the scene with eye, lights and objects scaled by 1/1000.
 fn shrunk(mut scene: Scene) -> Scene {
     const FACTOR: f64 = 1e-3;
     let shrink = |v: &mut [f64; 3]| *v = v.map(|x| x * FACTOR);
@@ -172,7 +174,8 @@ fn deliberate_errors_are_detected() {
     }
 }
 
-/// A box that is open towards the eye, with a rough ball and a glass ball, in a gradient.
+/// Scene of a box that is open towards the eye, with a rough ball and a glass ball in it. An
+/// environment with a gradient lights the box.
 const OPEN_BOX: &str = "
     camera = { eye = [0.2, 1.2, 5.0], target = [0.0, 0.9, 0.0] }
     [[light]]
@@ -212,7 +215,8 @@ const OPEN_BOX: &str = "
     material = \"glass\"
     shape.sphere = { center = [0.45, 0.4, 0.3], radius = 0.35 }";
 
-/// Diffuse bounces among mirrors, glass, textures, bumps and smooth meshes, with and without caustics.
+/// Checks diffuse bounces among mirrors, glass, textures, bumps and smooth meshes, with and without
+/// caustics.
 #[test]
 fn diffuse_bounces_agree_with_reference_tracer() {
     for (name, bounces, depth, caustics) in [
@@ -244,12 +248,12 @@ fn diffuse_bounces_agree_with_reference_tracer() {
         scene.trace.max_diffuse_depth = bounces;
         (scene.trace.max_depth, scene.trace.caustics) = (depth, caustics);
         let name = format!("{name}, {bounces} bounces, depth {depth}, caustics {caustics}");
-        check_agreement(&name, &scene, SAMPLES / 2, REFERENCE_SAMPLES);
+        check_agreement(&name, &scene, SAMPLES / 2, REFERENCE_SAMPLES / 2);
     }
 }
 
-/// Apertures by radius and by f-number, from tiny to larger than the room, focused by distance, by
-/// point and on the target, with and without near plane.
+/// Checks apertures by radius and by f-number, from tiny to larger than the room. They are focused
+/// by distance, by point and on the target, with and without near plane.
 #[test]
 fn lenses_agree_with_reference_tracer() {
     let number = Aperture::FNumber;
@@ -273,8 +277,8 @@ fn lenses_agree_with_reference_tracer() {
     }
 }
 
-/// Returns a scene with rough absorbing glass of every lobe and masking, as solid and as pane, that
-/// contains air and touches other glass. `keys` are further keys of the glass.
+/// Returns a scene with rough absorbing glass, as solid and as pane. The glass contains air and
+/// touches other glass. `keys` are further keys of its material.
 fn rough_glass(keys: &str) -> Scene {
     let text = format!(
         "[camera]
@@ -318,8 +322,8 @@ fn rough_glass(keys: &str) -> Scene {
     small(parsed(&text))
 }
 
-/// Every lobe of rough glass agrees, with Fresnel's equations and with constant coefficients. The box touches
-/// the floor.
+/// Checks every lobe of rough glass, with Fresnel's equations and with constant coefficients. A
+/// glass box touches the floor.
 #[test]
 fn rough_and_absorbing_glass_agrees_with_reference_tracer() {
     for lobe in [
@@ -343,8 +347,8 @@ fn rough_and_absorbing_glass_agrees_with_reference_tracer() {
     }
 }
 
-/// With independent random numbers the variance of single samples is equal in both programs, where
-/// both sample their lobes with equal densities.
+/// Checks that the variance of single samples is equal in both programs with independent random
+/// numbers, in scenes where both sample their lobes with equal densities.
 #[test]
 fn variances_agree_under_independent_random_numbers() {
     for name in ["lobe-cone.toml", "lobe-square.toml", "mirror-room.toml"] {
@@ -357,7 +361,8 @@ fn variances_agree_under_independent_random_numbers() {
     }
 }
 
-/// One-sided panes and solids with every Fresnel mode, from both sides. Their backs transmit only.
+/// Checks one-sided panes and solids with every Fresnel mode, seen from both sides. Their backs
+/// transmit only.
 #[test]
 fn one_sided_transparent_objects_reflect_on_their_front_only() {
     for law in ["constant", "schlick\"\nreflectance = \"#806040", "dielectric"] {
@@ -396,8 +401,8 @@ fn one_sided_transparent_objects_reflect_on_their_front_only() {
     }
 }
 
-/// A one-sided pane between a bright and a dark wall. Its back shows k_t of the dark wall and no
-/// reflection.
+/// Checks the back of a one-sided pane between a bright and a dark wall. It shows the dark wall,
+/// multiplied by k_t, and no reflection.
 #[test]
 fn back_of_one_sided_pane_does_not_reflect() {
     for (two_sided, expected) in [(true, 0.75), (false, 0.0)] {

@@ -13,22 +13,23 @@ use zerkalo::material::{
 };
 use zerkalo::shape::Shape;
 
-/// Step of finite differences in scene units.
+/// Step of finite differences for derivatives of texture coordinates, in scene units.
 const ASIDE: f64 = 1e-6;
 
-/// Distance from a cylinder's rims, in heights, of the texture shown on its ends.
+/// Distance from the rims of a cylinder, as a share of its height, at which the texture on its ends
+/// is looked up.
 const RIM: f64 = 1e-6;
 
-/// Image of `scenes`; the lowest row is the first.
+/// Image file of the folder `scenes`. The lowest row is the first.
 pub struct Pixels {
-    /// Columns and rows.
+    /// Number of columns and of rows.
     pub size: DVec2,
-    /// Encoded values of the file, from 0 to 1.
+    /// Encoded colour values of the pixels as in the file, from 0 to 1.
     codes: Vec<DVec3>,
 }
 
 impl Pixels {
-    /// Opens a file by its name in a shipped scene.
+    /// Opens an image by the name that a shipped scene uses.
     pub fn open(file: &str) -> Result<Self, String> {
         let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(file);
         let image = image::open(&path).map_err(|e| format!("{}: {e}", path.display()))?;
@@ -40,7 +41,7 @@ impl Pixels {
         Ok(Self { size, codes: rows.map(code).collect() })
     }
 
-    /// Pixel in a column and row that may be beyond the edges.
+    /// Returns the pixel at a column and a row, which may be beyond the edges of the image.
     fn pixel(&self, position: DVec2, wrap: Wrap) -> DVec3 {
         let inside = match wrap {
             Wrap::Repeat => position.rem_euclid(self.size),
@@ -49,7 +50,7 @@ impl Pixels {
         self.codes[(inside.y * self.size.x + inside.x) as usize]
     }
 
-    /// Bilinear interpolation of `value` of the four pixels around a point.
+    /// Returns `value` of the four pixels around a point, interpolated bilinearly.
     fn bilinear(&self, uv: DVec2, wrap: Wrap, value: impl Fn(DVec3) -> DVec3) -> DVec3 {
         let position = uv * self.size - 0.5;
         let (first, part) = (position.floor(), position - position.floor());
@@ -58,7 +59,8 @@ impl Pixels {
         low.lerp(pixel(0.0, 1.0).lerp(pixel(1.0, 1.0), part.x), part.y)
     }
 
-    /// Linear colour at a point, in repeats from the lower left corner.
+    /// Returns the linear colour at a point `uv`, in repeats of the image from its lower left
+    /// corner.
     pub fn color(&self, uv: DVec2, wrap: Wrap, filter: Filter) -> DVec3 {
         let linear =
             |c: f64| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
@@ -69,12 +71,12 @@ impl Pixels {
         }
     }
 
-    /// Height at a point: grey value from 0 to 1.
+    /// Returns the height of the bump map at a point: its grey value from 0 to 1.
     pub fn height(&self, uv: DVec2, wrap: Wrap) -> f64 {
         self.bilinear(uv, wrap, |code| code).element_sum() / 3.0
     }
 
-    /// Slopes of the height along u and v, by central differences of pixels.
+    /// Returns the slopes of the bump map's height along u and v, by central differences of pixels.
     fn slope(&self, uv: DVec2, wrap: Wrap) -> DVec2 {
         let along = |way: DVec2| {
             let step = way / self.size;
@@ -85,23 +87,24 @@ impl Pixels {
     }
 }
 
-/// Texture frame of a simple shape, in the coordinates of its description.
+/// Texture frame of a simple shape, in the shape's own coordinates.
 pub struct Canvas {
-    /// Right, up (or along the axis), and front (or along the normal).
+    /// Three columns: the directions right, up (or along the axis), and front (or along the
+    /// normal).
     frame: DMat3,
-    /// Default mapping.
+    /// Texture mapping that the scene value `auto` selects for the shape.
     default_mapping: Mapping,
 }
 
-/// Frame around an axis; its right vector is perpendicular to z.
+/// Returns the texture frame around an axis. Its right vector is perpendicular to z.
 fn around(axis: DVec3) -> DMat3 {
     let up = axis.normalize();
     let right = up.cross(DVec3::Z).try_normalize().unwrap_or(DVec3::X);
     DMat3::from_cols(right, up, right.cross(up))
 }
 
-/// Frame of a flat shape. Its up vector is the projection of y; on horizontal shapes it points away
-/// from the viewer.
+/// Returns the texture frame of a flat shape with the given normal. Its up vector is the projection
+/// of y; on horizontal shapes it points away from the viewer.
 fn flat(normal: DVec3) -> DMat3 {
     let front = normal.normalize();
     let up = if front.y.abs() > 0.999 { DVec3::NEG_Z * front.y.signum() } else { DVec3::Y };
@@ -136,7 +139,7 @@ impl Canvas {
         Self { frame, default_mapping: usual }
     }
 
-    /// Mapping of a placement, with its right, up and front vectors.
+    /// Returns the mapping of a texture placement, with its right, up and front vectors.
     fn view(&self, placement: &Placement) -> (Mapping, DMat3) {
         let mapping = match placement.mapping {
             Mapping::Auto => self.default_mapping,
@@ -156,7 +159,8 @@ impl Canvas {
     }
 }
 
-/// Smallest and largest coordinate of all pieces and triangles along a direction.
+/// Returns the smallest and the largest coordinate of a simple shape's pieces and triangles along a
+/// direction.
 fn ends(leaf: &Leaf, along: DVec3) -> (f64, f64) {
     let corners = leaf.mesh.iter().flat_map(Triangles::points).map(|p| (p.dot(along), 0.0));
     let pieces = leaf.pieces.iter().flat_map(|piece| match piece {
@@ -177,17 +181,18 @@ fn ends(leaf: &Leaf, along: DVec3) -> (f64, f64) {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (x, r)| (l.min(x - r), h.max(x + r)))
 }
 
-/// Point on a leaf, in the coordinates of its description.
+/// Point on a simple shape, in the shape's own coordinates.
 pub struct Spot<'a> {
     pub leaf: &'a Leaf,
     pub facet: usize,
     pub point: DVec3,
-    /// Outward normal.
+    /// Outward normal at the point.
     pub normal: DVec3,
 }
 
 impl Spot<'_> {
-    /// Texture coordinates of `point`, which is on the same side of the same leaf, in repeats.
+    /// Returns the texture coordinates of `point`, in repeats of the image. `point` is on the same
+    /// side of the same shape as the spot `self`.
     fn uv(&self, placement: &Placement, point: DVec3) -> DVec2 {
         let (scale, offset) = (DVec2::from(placement.scale), DVec2::from(placement.offset));
         let (mapping, view) = self.leaf.canvas.view(placement);
@@ -235,7 +240,7 @@ impl Spot<'_> {
 }
 
 impl Tracer<'_> {
-    /// Opens the images that a material names.
+    /// Opens the images that `material` names.
     pub fn open_images(&mut self, material: &Material) -> Result<(), String> {
         for file in material.files() {
             if !self.images.contains_key(file) {
@@ -245,7 +250,7 @@ impl Tracer<'_> {
         Ok(())
     }
 
-    /// Albedo factor of the material's texture.
+    /// Returns the factor by which the material's texture multiplies the albedo at a point.
     pub fn painted(&self, material: &Material, spot: &Spot) -> DVec3 {
         let Some(texture) = &material.texture else { return DVec3::ONE };
         let mut uv = spot.uv(&texture.placement(), spot.point);
@@ -265,7 +270,7 @@ impl Tracer<'_> {
         }
     }
 
-    /// Outward normal `normal`, perturbed by the material's bump map.
+    /// Returns the outward normal `normal`, perturbed by the material's bump map at a point.
     pub fn raised(&self, material: &Material, spot: &Spot, normal: DVec3) -> DVec3 {
         let Some(Bump::Image(image)) = &material.bump else { return normal };
         let Some(pixels) = self.images.get(&image.file) else { return normal };

@@ -6,23 +6,25 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use zerkalo::scene::TransformOp;
 use zerkalo::shape::Shape;
 
-/// Simple surface, before the object's transform.
+/// Simple surface, in the coordinates of the shape's description, before the object's transform.
 pub enum Piece {
-    /// Centre, radius.
+    /// Sphere: centre, radius.
     Sphere(DVec3, f64),
-    /// Corners in order, and front normal.
+    /// Polygon: corners in order, and front normal.
     Polygon(Vec<DVec3>, DVec3),
-    /// Point and front normal.
+    /// Infinite plane: point and front normal.
     Plane(DVec3, DVec3),
-    /// Centre, normal, radius.
+    /// Disc: centre, normal, radius.
     Disc(DVec3, DVec3, f64),
     /// Side of a cone: start of the axis, its direction, its length, and the radii at both ends.
     Side(DVec3, DVec3, f64, [f64; 2]),
-    /// Half of the crossings of a torus, the first two or the last two: centre, axis, radii of ring and tube.
+    /// One half of a torus's crossings with a line: the first two or the last two. The values are
+    /// centre, axis, radii of ring and tube, and index of the first crossing.
     Torus(DVec3, DVec3, [f64; 2], usize),
 }
 
-/// Distance in lengths of the direction, and normal. Hits behind the origin are optional.
+/// Crossing of a line with a piece: distance in lengths of the direction, and normal. `None` for a
+/// miss. Crossings behind the origin may be left out.
 type Meeting = Option<(f64, DVec3)>;
 
 impl Piece {
@@ -93,7 +95,8 @@ impl Piece {
 }
 
 impl Piece {
-    /// Centre and radius of a ball that contains the piece; `None` for an infinite piece.
+    /// Returns centre and radius of a ball that contains the piece. Returns `None` for an infinite
+    /// piece.
     pub fn ball(&self) -> Option<(DVec3, f64)> {
         match self {
             Self::Plane(..) => None,
@@ -112,7 +115,7 @@ impl Piece {
         }
     }
 
-    /// Returns `true` if a point is on the inner side of this piece of a convex solid.
+    /// Returns `true` if a point is on the inner side of this piece of a convex solid's surface.
     pub fn is_behind(&self, point: DVec3) -> bool {
         match self {
             Self::Sphere(center, radius) => point.distance(*center) <= *radius,
@@ -129,14 +132,15 @@ impl Piece {
     }
 }
 
-/// Distance from the tube of a torus about the origin, negative inside.
+/// Returns the distance of the point `p` from the tube of a torus about the origin; negative inside
+/// of the tube.
 fn above_torus(p: DVec3, axis: DVec3, [ring, tube]: [f64; 2]) -> f64 {
     let along = p.dot(axis);
     ((p - axis * along).length() - ring).hypot(along) - tube
 }
 
-/// Distances at which a line crosses a torus: changes of sign between small steps through the ball around it,
-/// made exact by bisection.
+/// Returns the distances at which a line crosses a torus. They are changes of sign of `height`
+/// between small steps through a ball around the torus, refined by bisection.
 fn torus_crossings(
     from_center: DVec3,
     direction: DVec3,
@@ -182,7 +186,7 @@ fn flat(point: DVec3, normal: DVec3, origin: DVec3, direction: DVec3) -> Meeting
     (speed != 0.0).then(|| (normal.dot(point - origin) / speed, normal))
 }
 
-/// Affine map of a transform step.
+/// Returns the affine map of a step of an object's transform.
 pub fn map(step: &TransformOp) -> DAffine3 {
     let rotation = |axis: DVec3, degrees: f64| {
         DAffine3::from_axis_angle(axis.normalize(), degrees.to_radians())
@@ -257,7 +261,7 @@ pub fn pieces(shape: &Shape) -> Result<Vec<Piece>, String> {
     })
 }
 
-/// Ends and side of a solid of revolution.
+/// Returns the two ends and the side of a solid of revolution.
 fn round(base: DVec3, top: DVec3, radii: [f64; 2]) -> Vec<Piece> {
     let axis = (top - base).normalize();
     vec![
@@ -267,9 +271,9 @@ fn round(base: DVec3, top: DVec3, radii: [f64; 2]) -> Vec<Piece> {
     ]
 }
 
-/// Base, top and sides of an upright solid. `base` has the corners as x and z relative to `corner`;
-/// the top is `top` times as large. The base is rotated about its centroid, counter-clockwise as
-/// seen from above.
+/// Returns base, top and sides of an upright solid. `base` has the corners as x and z relative to
+/// `corner`; the top is `top` times as large as the base. The base is rotated about its centroid,
+/// counter-clockwise as seen from above.
 fn frustum(corner: DVec3, base: &[[f64; 2]], height: f64, top: f64, degrees: f64) -> Vec<Piece> {
     let base: Vec<DVec2> = base.iter().map(|b| DVec2::from(*b)).collect();
     let middle = base.iter().sum::<DVec2>() / base.len() as f64;

@@ -1,12 +1,13 @@
-//! Reference path tracer in double precision, one sample at a time, optimised for readability.
+//! Reference path tracer in double precision. It traces one sample at a time and is optimised for
+//! readability.
 
-use crate::agreement::answers::{highlight, reflect, wide_lobe};
 use crate::agreement::compounds::Body;
 use crate::agreement::emission::Shine;
 use crate::agreement::lamps::Lamp;
 use crate::agreement::meshes;
 use crate::agreement::paint::Pixels;
-use crate::agreement::through::{Way, medium};
+use crate::agreement::reflection::{highlight, reflect, wide_lobe};
+use crate::agreement::transmission::{Way, medium};
 use crate::common::Numbers;
 use glam::DVec3;
 use std::collections::HashMap;
@@ -16,71 +17,73 @@ use zerkalo::light::{Falloff, Light, Spot};
 use zerkalo::material::Material;
 use zerkalo::scene::{Filter, RayTypes, Scene};
 
-/// Deliberate error that the comparison has to detect.
+/// Deliberate error of the reference tracer that the comparison has to detect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mutation {
-    /// No error.
+    /// No deliberate error.
     None,
-    /// Lobes are 5 % wider.
+    /// Deliberate error: lobes are 5 % wider.
     WiderLobe,
-    /// Lobe densities are overestimated by 5 %.
+    /// Deliberate error: the densities of lobes are overestimated by 5 %.
     LobeDensity,
-    /// Shadow rays start 1e-3 scene units too far towards the light.
+    /// Deliberate error: shadow rays start 1e-3 scene units too far towards the light.
     ShadowOffset,
-    /// Lobe directions below the horizon are absorbed.
+    /// Deliberate error: lobe directions below the horizon are absorbed.
     Absorb,
-    /// The cosine of the first light is omitted.
+    /// Deliberate error: the cosine of the first light is omitted.
     NoCosine,
-    /// Spot lights decrease linearly between the inner and the outer cone.
+    /// Deliberate error: spot lights decrease linearly between the inner and the outer cone.
     LinearCone,
-    /// Light that enters a solid is not refracted.
+    /// Deliberate error: light that enters a solid is not refracted.
     NoBending,
-    /// Texture coordinates u and v are exchanged.
+    /// Deliberate error: texture coordinates u and v are exchanged.
     SidewaysTexture,
-    /// Bump heights are negated.
+    /// Deliberate error: bump heights are negated.
     SunkenBumps,
-    /// Diffuse bounces are distributed uniformly over the hemisphere.
+    /// Deliberate error: diffuse bounces are distributed uniformly over the hemisphere.
     UniformBounce,
-    /// Ambient light is added at diffuse bounces, too.
+    /// Deliberate error: ambient light is also added at diffuse bounces.
     AmbientTwice,
-    /// Points of the lens are distributed over the square around it.
+    /// Deliberate error: points of the lens are distributed over the square around it.
     SquareLens,
-    /// Rays through the lens keep the direction of the ray through its centre.
+    /// Deliberate error: rays through the lens keep the direction of the ray through its centre.
     UnfocusedLens,
-    /// The density of refracted rays is that of the microfacet normals.
+    /// Deliberate error: refracted rays have the density of the microfacet normals, without
+    /// Jacobian.
     NoJacobian,
-    /// The Jacobian of the half vector of refraction has the index of the other side.
+    /// Deliberate error: the Jacobian of the half vector of refraction has the index of the other
+    /// side.
     OtherIndex,
-    /// Absorbed light falls off by the square root of the distance's share.
+    /// Deliberate error: light is absorbed as over half of the distance.
     HalfAbsorption,
-    /// The cosine at the surface of a lamp is omitted.
+    /// Deliberate error: the cosine at the surface of a lamp is omitted.
     NoLampCosine,
-    /// The cosine at the surface of an emissive object is omitted.
+    /// Deliberate error: the cosine at the surface of an emissive object is omitted.
     NoEmissionCosine,
-    /// Rays that miss all surfaces do not see environments.
+    /// Deliberate error: rays that miss all surfaces do not see environments.
     NoSky,
-    /// Reflected rays see lamps whose light in the lobe was found at points of the lamp, too, as
-    /// if two techniques were added without weights.
+    /// Deliberate error: reflected rays also see lamps whose light in the lobe was found at points
+    /// of the lamp. Two techniques are thus added without weights.
     LampSeenTwice,
 }
 
-/// A scene to trace.
+/// Reference tracer of a scene.
 pub struct Tracer<'a> {
     pub scene: &'a Scene,
     pub bodies: Vec<Body>,
     /// Lamp of each light of the scene; `None` for a light without a size.
     lamps: Vec<Option<Lamp>>,
-    /// Emissive surface of each body; `None` for a body of which no points are sampled.
+    /// Emissive surface of each body; `None` for a body from which no points are sampled.
     shines: Vec<Option<Shine>>,
     /// Transmitting material of each body; `None` for an opaque body and for a surface without a volume.
     pub media: Vec<Option<&'a Material>>,
-    /// Images by file name.
+    /// Images of textures and bump maps, by file name.
     pub images: HashMap<String, Pixels>,
     plain: Material,
     pub mutation: Mutation,
 }
 
-/// Mean and variance of the mean of one pixel's samples.
+/// Mean of one pixel's samples, and variance of this mean.
 #[derive(Clone, Copy, Default)]
 pub struct Estimate {
     pub mean: DVec3,
@@ -89,22 +92,24 @@ pub struct Estimate {
 
 pub struct Hit<'a> {
     pub point: DVec3,
-    /// Geometric normal on the viewer's side.
+    /// Unit geometric normal on the viewer's side.
     pub normal: DVec3,
-    /// Shading normal: differs on smooth meshes and bump maps.
+    /// Shading normal. It differs from the geometric normal on smooth meshes and with bump maps.
     pub seen: DVec3,
-    /// Vertex colour times texture.
+    /// Factor of the albedo: vertex colour times texture.
     pub tint: DVec3,
     pub material: &'a Material,
-    /// Index of the body.
+    /// Index of the body that is hit.
     pub body: usize,
-    /// `true` on the outside or front.
+    /// `true` if the ray hits the outside of a solid, or the front of a flat surface.
     pub front: bool,
-    /// `true` on the back of a one-sided surface.
+    /// `true` if the ray hits the back of a one-sided surface.
     pub bare: bool,
 }
 
 impl<'a> Tracer<'a> {
+    /// Creates the reference tracer of `scene` with the deliberate error `mutation`.
+    ///
     /// # Errors
     ///
     /// Names a feature of the scene that this tracer does not support.
@@ -134,13 +139,13 @@ impl<'a> Tracer<'a> {
         Ok(tracer)
     }
 
-    /// Returns `true` if the scene has meshes, whose triangles are tested one by one, or tori, whose crossings
-    /// are found by bisection.
+    /// Returns `true` if the scene is slow to trace: it has meshes, whose triangles are tested one
+    /// by one, or tori, whose crossings are found by bisection.
     pub fn is_slow(&self) -> bool {
         self.bodies.iter().any(|body| body.is_mesh() || body.has_torus())
     }
 
-    /// Estimates the pixel `x`, `y` from `samples` samples.
+    /// Estimates the radiance of the pixel in column `x` and row `y` from `samples` samples.
     pub fn pixel(&self, x: u32, y: u32, samples: u32, numbers: &mut Numbers) -> Estimate {
         let (mut sum, mut squares) = (DVec3::ZERO, DVec3::ZERO);
         for _ in 0..samples {
@@ -163,7 +168,7 @@ impl<'a> Tracer<'a> {
         self.radiance(origin, direction, 0, numbers)
     }
 
-    /// Radiance along a ray after `diffuse` diffuse bounces.
+    /// Returns the radiance along a ray that starts after `diffuse` diffuse bounces.
     fn radiance(
         &self,
         mut origin: DVec3,
@@ -247,8 +252,8 @@ impl<'a> Tracer<'a> {
         unreachable!("the depth ends every path");
     }
 
-    /// Ray through the point `x`, `y` of the raster, in pixels from the upper left corner, and through
-    /// a random point of the lens.
+    /// Returns the camera ray through a random point of the lens and the point `x`, `y` of the
+    /// picture, in pixels from its upper left corner.
     fn camera_ray(&self, x: f64, y: f64, numbers: &mut Numbers) -> (DVec3, DVec3) {
         let camera = &self.scene.camera;
         let eye = DVec3::from(camera.eye);
@@ -303,7 +308,8 @@ impl<'a> Tracer<'a> {
         (eye + on_lens + onward * (camera.near / focus), onward.normalize())
     }
 
-    /// Smallest distance of hits from the origin, more than the rounding of its coordinates.
+    /// Returns the smallest distance of hits from the ray origin `origin`. It is larger than the
+    /// rounding error of the origin's coordinates.
     fn clearance(origin: DVec3) -> f64 {
         1e-10 * (1.0 + origin.abs().max_element())
     }
@@ -342,7 +348,7 @@ impl<'a> Tracer<'a> {
         self.scene.materials.get(name).unwrap_or(&self.plain)
     }
 
-    /// Radiance of the visible lamps that a ray reaches before the distance `end`.
+    /// Returns the radiance of the visible lamps that a ray reaches before the distance `end`.
     fn glow(&self, origin: DVec3, direction: DVec3, end: f64) -> DVec3 {
         let lamps = self.scene.lights.iter().zip(&self.lamps).filter(|(l, _)| l.on && l.visible);
         let seen = lamps.filter_map(|(light, lamp)| {
@@ -355,8 +361,8 @@ impl<'a> Tracer<'a> {
         seen.sum()
     }
 
-    /// Light of the visible lamps that a wide lobe reflects, from a point of each lamp. `None` if
-    /// reflected rays find the lamps.
+    /// Returns the light of the visible lamps that a wide lobe reflects, from a sampled point of
+    /// each lamp. Returns `None` if reflected rays find the lamps instead.
     fn lamps_in_lobe(&self, hit: &Hit, view: DVec3, numbers: &mut Numbers) -> Option<DVec3> {
         let (m, horizon) = (hit.material, self.scene.trace.below_horizon);
         if hit.seen != hit.normal {
@@ -382,7 +388,7 @@ impl<'a> Tracer<'a> {
         Some(sum)
     }
 
-    /// Radiance of the visible environments.
+    /// Returns the radiance of the visible environments in a direction.
     fn sky(&self, direction: DVec3) -> DVec3 {
         if self.mutation == Mutation::NoSky {
             return DVec3::ZERO;
@@ -391,7 +397,8 @@ impl<'a> Tracer<'a> {
         visible.map(|light| sky(light, direction)).sum()
     }
 
-    /// Direct light, and the light of a diffuse bounce, after `diffuse` such bounces.
+    /// Returns the reflected direct light, and the light of one further diffuse bounce, after
+    /// `diffuse` such bounces.
     fn lit(&self, hit: &Hit, view: DVec3, diffuse: u32, numbers: &mut Numbers) -> DVec3 {
         let trace = &self.scene.trace;
         let albedo = DVec3::from(hit.material.color.0) * hit.tint * hit.material.diffuse;
@@ -414,7 +421,7 @@ impl<'a> Tracer<'a> {
         sum
     }
 
-    /// Direct light of all lights, with or without ambient light.
+    /// Returns the reflected direct light of all lights, with ambient light if `ambient` is `true`.
     fn shade(&self, hit: &Hit, view: DVec3, ambient: bool, numbers: &mut Numbers) -> DVec3 {
         let m = hit.material;
         let color = DVec3::from(m.color.0) * hit.tint;
@@ -489,7 +496,7 @@ impl<'a> Tracer<'a> {
     }
 }
 
-/// Radiance of an environment; black for other lights.
+/// Returns the radiance of an environment light in a direction; black for other lights.
 fn sky(light: &Light, direction: DVec3) -> DVec3 {
     let Some(environment) = &light.environment else { return DVec3::ZERO };
     let end = if direction.y > 0.0 { environment.zenith } else { environment.nadir };
@@ -498,7 +505,8 @@ fn sky(light: &Light, direction: DVec3) -> DVec3 {
     radiance * DVec3::from(light.color.0) * light.intensity
 }
 
-/// Direction to the light, distance, and irradiance of a surface that faces it.
+/// Returns three values of a light at `point`: direction to the light, distance, and irradiance of
+/// a surface that faces the light.
 fn arrival(light: &Light, point: DVec3, mutation: Mutation) -> (DVec3, f64, DVec3) {
     let strength = DVec3::from(light.color.0) * light.intensity;
     if let Some(directional) = &light.directional {
@@ -520,8 +528,8 @@ fn arrival(light: &Light, point: DVec3, mutation: Mutation) -> (DVec3, f64, DVec
     (towards, distance, irradiance * factor)
 }
 
-/// Share of a spot light's intensity in the unit direction `along`: 1 inside the inner cone, 0 outside
-/// the outer one, between them the smoothstep of the cosine.
+/// Returns the share of a spot light's intensity in the unit direction `along`: 1 inside the inner
+/// cone, 0 outside the outer one. Between the cones it is the smoothstep of the cosine.
 fn spot_factor(spot: &Spot, along: DVec3, mutation: Mutation) -> f64 {
     let cos = DVec3::from(spot.direction).normalize().dot(along);
     let (inner, outer) = (spot.inner_angle.to_radians().cos(), spot.outer_angle.to_radians().cos());
@@ -535,7 +543,7 @@ fn spot_factor(spot: &Spot, along: DVec3, mutation: Mutation) -> f64 {
     if mutation == Mutation::LinearCone { t } else { 3.0 * t.powi(2) - 2.0 * t.powi(3) }
 }
 
-/// Material keys that this tracer supports.
+/// Keys of materials that the reference tracer supports.
 const KNOWN: [&str; 23] = [
     "color",
     "ambient",
@@ -562,7 +570,7 @@ const KNOWN: [&str; 23] = [
     "bump",
 ];
 
-/// Returns an error if the material has a key that this tracer does not support.
+/// Returns an error if the material has a key that the reference tracer does not support.
 fn unknown_keys(material: &Material) -> Result<(), String> {
     let table = |m: &Material| toml::Table::try_from(m).expect("materials are tables");
     let plain = table(&Material::default());

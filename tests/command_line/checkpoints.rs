@@ -4,13 +4,13 @@ use super::*;
 use std::time::Duration;
 use zerkalo::film::file::FilmReader;
 
-/// Number of kills at random moments.
+/// Number of times that the render is killed at a random moment.
 const KILLS: u64 = 20;
 
-/// Stop criterion and scene of the interrupted renders. They take about a second.
+/// Size, stop criterion and threads of the interrupted renders. They take about a second.
 const LONG: [&str; 6] = ["--size", "160x120", "--noise", "0.35", "--threads", "2"];
 
-/// Canonical bytes of the film in a checkpoint.
+/// Returns the bytes of the film in the checkpoint at `path`, in their canonical form.
 fn film_bytes(path: &Path) -> Vec<u8> {
     let read = FilmReader::open(path).and_then(FilmReader::read);
     read.unwrap_or_else(|error| panic!("{error}")).1.bytes()
@@ -20,7 +20,8 @@ fn args<'a>(name: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     [&["render", "scene.toml", "-o", name][..], &LONG, more].concat()
 }
 
-/// A render that is killed at random moments and resumed gives the same film and the same picture.
+/// Checks that a render that is killed at random moments and resumed gives the same film and the
+/// same picture as an uninterrupted one.
 #[test]
 fn killed_and_resumed_render_equals_an_uninterrupted_one() {
     let desk = Desk::new();
@@ -144,7 +145,8 @@ fn checkpoints_of_other_renders_are_refused_with_a_remedy() {
     assert!(relit == fs::read(desk.path("b.png")).unwrap(), "{}", anew.out);
 }
 
-/// The contents of meshes are part of the identity of a scene; its text has only their names.
+/// Checks that the contents of mesh files are part of the identity of a scene, whose text contains
+/// only their names.
 #[test]
 fn changed_mesh_is_another_scene() {
     let desk = Desk::new();

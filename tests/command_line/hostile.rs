@@ -1,9 +1,11 @@
-//! Hostile input: control characters in names and texts, and scenes that name files outside of their folder.
+//! Hostile input: control characters in names and texts, and scenes that refer to files outside of
+//! their folder.
 
 use super::*;
 use std::fmt::Write;
 
-/// Sets the clipboard (OSC 52), colours (C0 and C1), and reorders what follows.
+/// Text with control sequences that set the clipboard (OSC 52) and colours (C0 and C1), and reverse
+/// the text direction.
 const EVIL: &str =
     "\u{1b}]52;c;cm0gLXJm\u{7}\u{1b}[31m\u{9b}32m\u{9d}52;c;AA\u{9c}\u{202e}\r\u{8}\u{200b}";
 
@@ -22,7 +24,7 @@ fn check(what: &str, run: &Run) {
     assert!(!run.err.contains("panicked"), "{what}: {:?}", run.err);
 }
 
-/// `text` as a string of TOML, with escapes.
+/// Returns `text` as a string of TOML, with escapes.
 fn toml(text: &str) -> String {
     let escaped: String = text.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
     format!("\"{escaped}\"")
@@ -149,7 +151,8 @@ fn environment_is_printed_without_control_characters() {
     assert!(run.out.contains("not queried"), "{}", run.out);
 }
 
-/// Devices, pipes and folders are refused as meshes without blocking, whatever their names are.
+/// Checks that devices, pipes and folders are refused as meshes without blocking, whatever their
+/// names are.
 #[test]
 #[cfg(unix)]
 fn scenes_read_regular_files_only() {
@@ -170,7 +173,7 @@ fn scenes_read_regular_files_only() {
     }
 }
 
-/// The rule stands in docs/scene-format.md.
+/// Checks that a scene may name files in any folder, as docs/scene-format.md says.
 #[test]
 #[cfg(unix)]
 fn scenes_name_files_anywhere() {
@@ -189,7 +192,7 @@ fn scenes_name_files_anywhere() {
     }
 }
 
-/// Files that a mesh file names must be in its own folder or below.
+/// Checks that files to which a mesh file refers must be in the mesh file's folder or below it.
 #[test]
 fn files_named_by_meshes_stay_in_their_folder() {
     let desk = Desk::new();
@@ -220,7 +223,7 @@ fn files_named_by_meshes_stay_in_their_folder() {
     }
 }
 
-/// Excessive sizes are refused before memory is allocated.
+/// Checks that excessive sizes are refused before memory is allocated.
 #[test]
 fn sizes_are_checked_before_allocation() {
     let desk = Desk::new();
@@ -246,8 +249,8 @@ fn sizes_are_checked_before_allocation() {
     }
 }
 
-/// A scene or mesh that does not fit into the address space is refused with its sum, at any limit. It
-/// must not end in a failed allocation.
+/// Checks that a scene or mesh that does not fit into the address space is refused, at any limit.
+/// The message states the sum of the needed memory. No allocation may fail.
 #[test]
 #[cfg(target_os = "linux")]
 fn scenes_and_meshes_that_do_not_fit_are_refused() {

@@ -1,16 +1,18 @@
-//! `zerkalo render --memory`: regions that equal the picture as a whole, refusals, signals.
+//! `zerkalo render --memory`: rendering in regions, whose picture equals that of a render as a
+//! whole; refusals; signals.
 
 use super::*;
 
-/// Arguments of a uniform render. Its film has 7 MB for each light group.
+/// Arguments of a uniform render, whose film has 7 MB for each light group.
 const UNIFORM: [&str; 5] = ["--size", "400x375", "--spp", "4", "--uniform"];
 
-/// Renders `scene` to `name` within `memory`.
+/// Renders `scene` to the file `name` with at most the memory `memory`.
 fn within(desk: &Desk, scene: &str, name: &str, memory: &str, more: &[&str]) -> Run {
     desk.run(&[&["render", scene, "-o", name, "--memory", memory], &UNIFORM[..], more].concat())
 }
 
-/// Least memory of a render in megabytes, as its refusal names it.
+/// Returns the smallest amount of memory for a render, in megabytes, as the program's refusal
+/// states it.
 fn least(desk: &Desk, scene: &str, more: &[&str]) -> u64 {
     let run = within(desk, scene, "refused.png", "1KB", more);
     assert_eq!(run.status, 1, "{}", run.err);
@@ -20,7 +22,7 @@ fn least(desk: &Desk, scene: &str, more: &[&str]) -> u64 {
     advice.trim_end().strip_suffix("MB").unwrap().parse().unwrap()
 }
 
-/// Number of regions that the program announces.
+/// Returns the number of regions in which the program has rendered, by its own report.
 fn regions(run: &Run) -> u32 {
     assert_eq!(run.status, 0, "{}", run.err);
     let line = run.err.lines().find(|line| line.starts_with("memory: ")).unwrap();
@@ -63,8 +65,9 @@ fn regions_equal_the_picture_as_a_whole() {
     }
 }
 
-/// Lights share a light group before a picture is divided. The samples of shared lights contain
-/// their colours, so that roundings differ.
+/// Checks that a lack of memory first makes lights share a light group, before the picture is
+/// divided into regions. The samples of lights in one group contain the lights' colours, so that
+/// roundings differ.
 #[test]
 fn lights_are_merged_first() {
     let desk = Desk::new();
@@ -93,7 +96,7 @@ fn lights_are_merged_first() {
     assert!(fs::read(desk.path("999.png")).unwrap() == fs::read(desk.path("whole.png")).unwrap());
 }
 
-/// Each region of an adaptive render reaches the target.
+/// Checks that each region of an adaptive render reaches the noise target.
 #[test]
 fn adaptive_regions_reach_the_noise_target() {
     let desk = Desk::new();
@@ -128,7 +131,8 @@ fn checkpoint_of_a_film_that_does_not_fit_is_refused() {
     assert!(run.status == 2 && run.err.contains("such as 4GB"), "{}", run.err);
 }
 
-/// A signal between two regions leaves the old file as it is, and no other.
+/// Checks that a signal between two regions leaves the old picture file unchanged and no other
+/// file.
 #[test]
 #[cfg(unix)]
 fn signal_leaves_no_part_of_a_picture() {

@@ -1,4 +1,4 @@
-//! The command line as users and scripts use it.
+//! Tests of the command line, used as users and scripts do.
 
 mod checkpoints;
 mod hostile;
@@ -45,7 +45,7 @@ material = "mirror"
 shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0, 0.0, 1.0] }
 "#;
 
-/// Folder that contains `scene.toml`.
+/// Temporary folder with the scene file `scene.toml`, in which commands run.
 struct Desk(TempDir);
 
 impl Desk {
@@ -65,7 +65,7 @@ impl Desk {
     fn run(&self, args: &[&str]) -> Run {
         Run::from(self.command(args).output().unwrap())
     }
-    /// Renders `scene.toml` to `name` in 64x48 pixels.
+    /// Renders `scene.toml` to the file `name` in 64x48 pixels.
     fn render(&self, name: &str, more: &[&str]) -> Run {
         let args = ["render", "scene.toml", "-o", name, "--size", "64x48"];
         self.run(&[&args, more].concat())
@@ -75,7 +75,7 @@ impl Desk {
         assert_eq!(run.status, 0, "{}", run.err);
         serde_json::from_slice(&fs::read(self.path("stats.json")).unwrap()).unwrap()
     }
-    /// Names of the files in the folder, sorted.
+    /// Returns the names of the files in the folder, sorted.
     fn files(&self) -> Vec<String> {
         let entries = fs::read_dir(self.0.path()).unwrap();
         let mut names: Vec<_> =
@@ -164,7 +164,8 @@ fn files_hold_provenance_metadata() {
     assert!(text.contains("exposure -0.5 EV"));
 }
 
-/// Mirrors that amplify light at every bounce until it exceeds the film's range.
+/// Checks that samples beyond the film's range are reported. Mirrors that amplify light at every
+/// bounce produce them.
 #[test]
 fn saturated_samples_are_reported_everywhere() {
     let desk = Desk::new();

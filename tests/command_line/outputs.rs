@@ -1,4 +1,5 @@
-//! Files of results: replaced in one step, errors reported, devices and pipes written directly.
+//! Result files of commands: replaced in one step, errors reported, devices and pipes written
+//! directly.
 
 use super::*;
 use std::os::unix::fs::{PermissionsExt, lchown, symlink};
@@ -6,8 +7,8 @@ use std::os::unix::fs::{PermissionsExt, lchown, symlink};
 const QUICK: [&str; 8] =
     ["--seconds", "0.1", "--repetitions", "1", "--size", "16x12", "--noise", "8"];
 
-/// A hard link to the old file keeps the old content if the file is replaced, and gets the new one
-/// if the file is overwritten.
+/// Checks that result files are replaced, not overwritten. A hard link to the old file keeps the
+/// old content only if the file is replaced.
 #[test]
 fn results_are_replaced_in_one_step() {
     let desk = Desk::new();
@@ -28,7 +29,8 @@ fn results_are_replaced_in_one_step() {
     assert!(desk.files().iter().all(|name| !name.ends_with(".tmp")));
 }
 
-/// A file size limit of zero ends the program at its first write.
+/// Checks that an interrupted `zerkalo new` leaves no incomplete scene. A file size limit of zero
+/// ends the program at its first write.
 #[test]
 fn interrupted_new_leaves_no_incomplete_scene() {
     let desk = Desk::new();
@@ -58,7 +60,8 @@ fn full_stdout_is_a_failure_and_a_closed_pipe_is_none() {
     assert_eq!(run.err.trim(), "0");
 }
 
-/// Results that cannot be written are refused before the work; a device that is full after it.
+/// Checks that results that cannot be written are refused before the work begins, and those on a
+/// full device after it.
 #[test]
 fn unwritable_results_are_failures() {
     let desk = Desk::new();
@@ -98,7 +101,9 @@ fn stdout_is_a_target_of_results() {
     assert!(run.status == 0 && desk.path("-").exists(), "{}", run.err);
 }
 
-/// Only the superuser can give a link to another user; `disk` tests the rule itself.
+/// Checks that results are not written through links of other users in shared folders. Runs only as
+/// superuser, because only the superuser can give a link to another user. Tests of `disk` check the
+/// rule itself.
 #[test]
 fn results_do_not_follow_links_of_other_users_in_shared_folders() {
     let desk = Desk::new();

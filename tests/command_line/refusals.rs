@@ -79,7 +79,7 @@ fn every_bad_scene_has_status_1_and_names_its_file() {
     assert_eq!(fs::read_to_string(desk.path("old.png")).unwrap(), "precious");
 }
 
-/// Start on an emulated processor that lacks features of the build.
+/// Checks the message of the program on an emulated processor that lacks features of the build.
 #[cfg(target_arch = "x86_64")]
 #[test]
 #[ignore = "needs qemu-x86_64 (Debian: qemu-user); promised only with RUSTFLAGS=\"-C target-cpu=x86-64-v3\""]
@@ -94,7 +94,8 @@ fn old_processor_gets_a_message() {
     }
 }
 
-/// The film of the picture needs 3.2 GB, and the limit is 1.5 GB of address space.
+/// Checks the refusal of a film of 3.2 GB under a limit of 1.5 GB of address space. The message
+/// contains the sums and a remedy.
 #[test]
 #[cfg(target_os = "linux")]
 fn film_that_does_not_fit_is_refused_with_sums_and_remedy() {

@@ -1,9 +1,9 @@
-//! Large scenes: memory by the peak of a child process, time by ratios within one run.
+//! Large scenes: memory is measured as the peak of a child process, time as ratios within one run.
 
 use super::*;
 use std::fmt::Write;
 
-/// Scene of `count` spheres on a grid, 55 bytes of text each.
+/// Returns the text of a scene of `count` spheres on a grid, 55 bytes for each.
 fn spheres(count: usize) -> String {
     let side = (count as f64).cbrt().ceil() as usize;
     let mut text = format!(
@@ -20,19 +20,19 @@ fn spheres(count: usize) -> String {
     text
 }
 
-/// Scene of `count` equal spheres.
+/// Returns the text of a scene of `count` equal spheres at the same place.
 fn coincident(count: usize) -> String {
     let sphere = "[[object]]\nshape.sphere = { center = [0, 0, 0], radius = 1 }\n";
     "ambient.color = [1, 1, 1]\n".to_string() + &sphere.repeat(count)
 }
 
-/// OBJ file of `count` equal triangles.
+/// Returns name and contents of an OBJ file of `count` equal triangles.
 fn obj(count: usize) -> (&'static str, Vec<u8>) {
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_string() + &"f 1 2 3\n".repeat(count);
     ("copies.obj", text.into_bytes())
 }
 
-/// Binary STL file of `count` equal triangles.
+/// Returns name and contents of a binary STL file of `count` equal triangles.
 fn stl(count: usize) -> (&'static str, Vec<u8>) {
     let numbers = [0.0_f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let mut facet: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
@@ -43,7 +43,8 @@ fn stl(count: usize) -> (&'static str, Vec<u8>) {
     ("copies.stl", bytes)
 }
 
-/// glTF file with `count` nodes that place one triangle at the same point.
+/// Returns name and contents of a glTF file with `count` nodes that place one triangle at the same
+/// point.
 fn gltf(count: usize) -> (&'static str, Vec<u8>) {
     let nodes = vec![r#"{"mesh":0}"#; count].join(",");
     let roots: Vec<_> = (0..count).map(|i| i.to_string()).collect();
@@ -59,13 +60,13 @@ fn gltf(count: usize) -> (&'static str, Vec<u8>) {
     ("copies.gltf", text.into_bytes())
 }
 
-/// Writes a mesh file. Returns a scene that shows it.
+/// Writes a mesh file. Returns the text of a scene that shows the mesh.
 fn mesh_scene(desk: &Desk, (name, mesh): (&str, Vec<u8>)) -> String {
     fs::write(desk.path(name), mesh).unwrap();
     format!("ambient.color = [1, 1, 1]\n[[object]]\nshape.mesh.file = \"{name}\"\n")
 }
 
-/// Seconds of processor time of all ended child processes.
+/// Returns the processor time in seconds of all child processes that have ended.
 fn child_seconds() -> f64 {
     let text = fs::read_to_string("/proc/self/stat").unwrap();
     // Fields 16 and 17 of proc(5) in hundredths of a second; the name before may contain spaces.
@@ -73,8 +74,8 @@ fn child_seconds() -> f64 {
     fields.map(|field| field.parse::<f64>().unwrap() / 100.0).sum()
 }
 
-/// Seconds, seconds of processor time and peak memory in bytes of reading, compiling and tracing
-/// `scene` by two threads.
+/// Reads, compiles and traces `scene` by two threads. Returns the seconds, the seconds of processor
+/// time, and the peak memory in bytes.
 fn cost(desk: &Desk, scene: &str) -> [f64; 3] {
     fs::write(desk.path("scene.toml"), scene).unwrap();
     let before = child_seconds();
@@ -83,7 +84,8 @@ fn cost(desk: &Desk, scene: &str) -> [f64; 3] {
     [number("total_seconds"), child_seconds() - before, number("peak_rss_bytes")]
 }
 
-/// With the parsed form of the whole file in memory an object took 7 kB.
+/// Checks that an object of a scene takes at most a kilobyte besides its text. If the parsed form
+/// of the whole file were in memory, it would take 7 kB.
 #[test]
 #[cfg(target_os = "linux")]
 fn object_takes_at_most_a_kilobyte_beyond_its_text() {
@@ -95,13 +97,14 @@ fn object_takes_at_most_a_kilobyte_beyond_its_text() {
     assert!(each < 1024.0, "{each} bytes for each object");
 }
 
-/// Name of scenes, function that makes one of a size, and most seconds of processor time for a million.
+/// Family of scenes: name, function that writes a scene of a given size, and largest allowed
+/// processor time in seconds for a million objects or triangles.
 type Family = (&'static str, fn(&Desk, usize) -> String, f64);
 
-/// A million objects and a million copies of a triangle in all mesh formats, by ratios: twice the
+/// Checks a million objects, and a million copies of a triangle in all mesh formats: twice the
 /// input takes at most 2.3 times the processor time.
 ///
-///     cargo test --release --test program command_line:: -- --ignored --nocapture million
+/// cargo test --release --test program command_line:: -- --ignored --nocapture million
 #[test]
 #[ignore = "takes minutes, and needs an optimised build and an idle machine"]
 #[cfg(target_os = "linux")]

@@ -1,31 +1,32 @@
-//! Plans, shards and merging.
+//! Division of a render among processes: plans, shards, merging.
 
 use crate::command_line::Desk;
 use std::fs;
 use zerkalo::film::file::FilmReader;
 
-/// Runs `args` and returns what the command printed on stdout.
+/// Runs the program with `args`, which succeeds. Returns its output on stdout.
 pub fn done(desk: &Desk, args: &[&str]) -> String {
     let run = desk.run(args);
     assert_eq!(run.status, 0, "{args:?}: {}", run.err);
     run.out
 }
 
-/// Runs `args`, which fail with exit status 1, and returns the message.
+/// Runs the program with `args`, which fails with exit status 1. Returns its message.
 fn refused(desk: &Desk, args: &[&str]) -> String {
     let run = desk.run(args);
     assert_eq!(run.status, 1, "{args:?}: {}{}", run.out, run.err);
     run.err
 }
 
-/// Plans `shards` shards of the scene in 64x48 pixels as `NAME.plan`, with the base `NAME-0.zk`.
+/// Plans a render of the scene in 64x48 pixels by `shards` processes. The files are `NAME.plan`,
+/// and `NAME-0.zk` with the samples of the pilot.
 pub fn plan(desk: &Desk, name: &str, shards: usize) {
     let (output, shards) = (format!("{name}.plan"), shards.to_string());
     let args = ["plan", "scene.toml", "-o", &output, "--size", "64x48"];
     done(desk, &[&args[..], &["--noise", "0.5", "--pilot", "2", "--shards", &shards]].concat());
 }
 
-/// Traces shard `number` of `NAME.plan` to `NAME-number.zk`, which is returned.
+/// Traces shard `number` of the plan `NAME.plan`. Returns the name of its file, `NAME-number.zk`.
 pub fn trace(desk: &Desk, name: &str, number: usize) -> String {
     let (plan, part, number) =
         (format!("{name}.plan"), format!("{name}-{number}.zk"), number.to_string());
@@ -33,7 +34,7 @@ pub fn trace(desk: &Desk, name: &str, number: usize) -> String {
     part
 }
 
-/// Plans and traces all shards. Returns the files of base and shards.
+/// Plans a render and traces all its shards. Returns the files of the pilot and of the shards.
 pub fn traced(desk: &Desk, name: &str, shards: usize) -> Vec<String> {
     plan(desk, name, shards);
     let parts = (1..=shards).map(|number| trace(desk, name, number));

@@ -1,4 +1,4 @@
-//! SIGINT and SIGTERM, sent by `kill`.
+//! Reactions of commands to SIGINT and SIGTERM, which tests send by `kill`.
 
 use super::*;
 use std::process::Child;
@@ -9,11 +9,11 @@ pub fn signal(name: &str, id: u32) {
     assert!(sent.unwrap().success());
 }
 
-/// Longest wait; reached only on failure.
+/// Longest time that a test waits. Only a failing test reaches it.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Waits until `condition` holds for the set of signals `set` of the process, a line of Linux's
-/// `/proc/PID/status`. Elsewhere it waits for a second.
+/// Waits until `condition` is `true` for the signal set `set` of a process: a line of Linux's
+/// `/proc/PID/status`. On other systems, waits for a second.
 fn wait_for_signals(id: u32, set: &str, condition: impl Fn(u64) -> bool) {
     if cfg!(not(target_os = "linux")) {
         return std::thread::sleep(Duration::from_secs(1));
@@ -30,8 +30,7 @@ fn wait_for_signals(id: u32, set: &str, condition: impl Fn(u64) -> bool) {
     }
 }
 
-/// Starts the program and waits until it handles SIGTERM, and SIGINT, whose handlers are installed
-/// before.
+/// Starts the program and waits until it handles SIGTERM and SIGINT.
 pub fn spawn(desk: &Desk, args: &[&str]) -> Child {
     let mut command = desk.command(args);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -55,7 +54,8 @@ fn signal_saves_the_picture_so_far() {
     }
 }
 
-/// The first signal alone would write the picture when the wave ends, after minutes.
+/// Checks that a second signal ends the program at once. After the first one alone it would write
+/// the picture at the end of the wave, minutes later.
 #[test]
 fn second_signal_ends_a_long_wave_at_once() {
     let desk = Desk::new();

@@ -26,7 +26,7 @@ fn states(films: &WatchedFilms) -> Vec<(String, WatchedState)> {
     rows(films).into_iter().map(|row| (row.shards, row.state)).collect()
 }
 
-/// Replaces a file in one step, as all writers of film files do.
+/// Replaces the file `name` in one step, as all writers of film files do.
 fn replace(desk: &Desk, name: &str, bytes: &[u8]) {
     fs::write(desk.path("new"), bytes).unwrap();
     fs::rename(desk.path("new"), desk.path(name)).unwrap();
@@ -191,7 +191,8 @@ fn next_round_is_watched_with_the_merged_film_of_the_first() {
     assert!(alone.film().unwrap().bytes() == film(&desk, "next-1.zk").bytes());
 }
 
-/// Whatever a watched file contains, nothing panics, and the film is the sum of whole files.
+/// Checks that damaged files are left out. Whatever a watched file contains, nothing panics, and
+/// the displayed film is the sum of the undamaged files.
 #[test]
 fn damaged_files_are_left_out() {
     let desk = Desk::new();

@@ -8,19 +8,19 @@ pub mod tables;
 
 use glam::DVec3;
 
-/// Name of scenes that are no files. Files that they name are relative to the workspace.
+/// Name of scenes that come from no file. Paths in them are relative to the workspace.
 pub const NAME: &str = concat!(env!("ZERKALO_ROOT"), "test");
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
+/// Random number generator SplitMix64 (Steele, Lea, Flood 2014).
 pub struct Numbers(u64);
 
 impl Numbers {
-    /// Creates the sequence of `seed`.
+    /// Creates the generator with the seed `seed`.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// 64 random bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = self.0;
@@ -29,22 +29,22 @@ impl Numbers {
         z ^ (z >> 31)
     }
 
-    /// Uniform number in [0, 1).
+    /// Returns a uniform number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Uniform number between `low` and `high`.
+    /// Returns a uniform number between `low` and `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Log-uniform number between `low` and `high`.
+    /// Returns a log-uniform number between `low` and `high`.
     pub fn log_uniform(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
     }
 
-    /// Uniform integer below `n`.
+    /// Returns a uniform integer below `n`.
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }
@@ -56,7 +56,7 @@ impl Numbers {
         }
     }
 
-    /// Direction, uniform over the unit sphere.
+    /// Returns a random direction, uniform over the unit sphere.
     pub fn direction(&mut self) -> DVec3 {
         let z = self.between(-1.0, 1.0);
         let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
@@ -64,7 +64,7 @@ impl Numbers {
         DVec3::new(r * cos, r * sin, z).normalize()
     }
 
-    /// Point, uniform in the cube from -half to half.
+    /// Returns a random point, uniform in the cube from -`half` to `half`.
     pub fn in_cube(&mut self, half: f64) -> DVec3 {
         DVec3::new(self.between(-half, half), self.between(-half, half), self.between(-half, half))
     }

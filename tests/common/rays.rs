@@ -12,21 +12,21 @@ use zerkalo::scene::Scene;
 use zerkalo::shape::EXAMPLES;
 use zerkalo::world::{AnyWorld, MAX_GROUPS, Options, Path, Precision, Radiance, World};
 
-/// A single ray in double precision: origin and unit direction.
+/// Single ray in double precision: origin and unit direction.
 pub type Line = (DVec3, DVec3);
 
-/// The nearest surface that a ray hits.
+/// Nearest surface that a ray hits.
 #[derive(Clone, Copy, Debug)]
 pub struct LineHit {
     pub t: f64,
-    /// Index of the form in the list from which the aggregate was built.
+    /// Index of the primitive's form in the list from which the aggregate was built.
     pub form: usize,
     pub point: DVec3,
     pub normal: DVec3,
 }
 
-/// Packets of `lines` with the number of rays in each. The last packet repeats its last ray to fill all
-/// lanes.
+/// Returns the rays `lines` in packets, each with the number of its rays. The last packet repeats
+/// its last ray to fill all lanes.
 pub fn packets<L: SimdFloat>(lines: &[Line]) -> impl Iterator<Item = (Ray<L>, usize)> + '_ {
     lines.chunks(L::WIDTH).map(|lines| {
         let line_of_lane = |i: usize| lines[i.min(lines.len() - 1)];
@@ -41,7 +41,7 @@ pub fn to_dvec3<L: SimdFloat>(v: Vec3<L>, lane: usize) -> DVec3 {
     DVec3::from(v.lane(lane).map(Float::to_f64))
 }
 
-/// Surface points of all lanes, gathered item by item.
+/// Returns the surface points of all lanes, gathered primitive by primitive.
 pub fn surface<L: SimdFloat>(
     geometry: &Aggregate<L>,
     ray: &Ray<L>,
@@ -62,7 +62,7 @@ pub fn surface<L: SimdFloat>(
     all
 }
 
-/// The nearest hit of each ray; `None` for a miss.
+/// Returns the nearest hit of each ray; `None` for a miss.
 pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Option<LineHit>> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
@@ -81,7 +81,7 @@ pub fn closest<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Opt
     out
 }
 
-/// Occlusion of each ray: `true` if an occluder lies nearer than `limit`.
+/// Returns one value for each ray: `true` if an occluder is nearer than `limit`.
 pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64) -> Vec<bool> {
     let mut out = Vec::with_capacity(lines.len());
     for (ray, count) in packets::<L>(lines) {
@@ -91,28 +91,29 @@ pub fn blocked<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line], limit: f64
     out
 }
 
-/// One form of every registered kind, taken from its example.
+/// Returns one form of every registered kind of shape, taken from the kind's documented example.
 pub fn every_kind() -> Vec<(&'static str, Form)> {
     let form = |text: &str| scene(&format!("[[object]]\n{text}")).objects[0].shape.form();
     EXAMPLES.iter().map(|(key, example)| (*key, form(example))).collect()
 }
 
-/// The scene in `text`; panics if it has faults.
+/// Returns the scene in `text`. Panics if it has errors.
 pub fn scene(text: &str) -> Scene {
     Scene::parse(text, super::NAME).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Centre and radius of the sphere around the bounding box of `form`; `None` for an unbounded form.
+/// Returns centre and radius of the sphere around the bounding box of `form`. Returns `None` for an
+/// unbounded form.
 pub fn bounding_sphere(form: &Form) -> Option<(DVec3, f64)> {
     form.bounds().map(|(low, high)| (0.5 * (low + high), 0.5 * (high - low).length()))
 }
 
-/// A compiled scene whose radiance can be evaluated along single rays.
+/// Compiled scene whose radiance can be evaluated along single rays.
 pub struct Traced {
     world: AnyWorld,
-    /// Weight of each light group.
+    /// Weight (red, green, blue) of each light group.
     weights: Vec<[f64; 3]>,
-    /// Centre of the scene, which compilation subtracts from every coordinate.
+    /// Centre of the scene, which compilation subtracts from all coordinates.
     origin: DVec3,
 }
 
@@ -127,13 +128,13 @@ impl Traced {
         Self { world, weights, origin: DVec3::from(scene.camera.eye) - eye }
     }
 
-    /// Radiance along `lines`, given in scene coordinates.
+    /// Returns the radiance along `lines`, which are in scene coordinates.
     pub fn radiance(&self, lines: &[Line]) -> Vec<[f64; 3]> {
         let lines: Vec<Line> = lines.iter().map(|(o, d)| (*o - self.origin, *d)).collect();
         self.centered(&lines)
     }
 
-    /// Radiance along `lines`, given relative to the scene's centre.
+    /// Returns the radiance along `lines`, which are relative to the scene's centre.
     pub fn centered(&self, lines: &[Line]) -> Vec<[f64; 3]> {
         match &self.world {
             AnyWorld::Single(w) => self.radiance_in(w, lines),
@@ -141,7 +142,7 @@ impl Traced {
         }
     }
 
-    /// Centre of the scene in scene coordinates.
+    /// Returns the centre of the scene in scene coordinates.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
@@ -167,8 +168,14 @@ impl Traced {
     }
 }
 
-/// A random ray around `form`, of one of six kinds: through it, beside it, from inside, along an axis,
-/// from a corner, face or edge centre of its box, with zeros of both signs.
+/// Returns a random ray around `form`, of one of six kinds:
+///
+/// - through the form
+/// - beside it
+/// - from inside
+/// - along an axis
+/// - from a corner, or the centre of a face or edge, of its bounding box
+/// - with zeros of both signs in its direction
 pub fn any_line(numbers: &mut Numbers, form: &Form) -> Line {
     let (center, radius) = bounding_sphere(form).unwrap_or((DVec3::ZERO, 2.0));
     let axis = |numbers: &mut Numbers| {
@@ -214,8 +221,8 @@ pub fn any_line(numbers: &mut Numbers, form: &Form) -> Line {
     }
 }
 
-/// One form of every kind in three versions: unchanged, rotated, and scaled non-uniformly (spheres become
-/// ellipsoids).
+/// Returns the forms of every kind of shape in three versions each: unchanged, rotated, and scaled
+/// non-uniformly (spheres become ellipsoids).
 pub fn forms() -> Vec<(String, Form)> {
     let mut out = Vec::new();
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);

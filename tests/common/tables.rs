@@ -6,21 +6,22 @@ use toml::{Table, Value};
 use zerkalo::scene::{AssetResolver, FIELDS, Scene};
 use zerkalo::value::{Field, ValueType};
 
-/// A key of a scene file.
+/// Key that a scene file may have.
 #[derive(Clone, Debug)]
 pub struct Key {
-    /// Keys from the root; an index in a list is written as a number.
+    /// Path from the root to the key: names of tables and lists. An index in a list is written as a
+    /// number.
     pub path: Vec<String>,
-    /// Type of its value.
+    /// Type of the key's value.
     pub takes: ValueType,
 }
 
-/// `scene` as a TOML table.
+/// Returns `scene` as a TOML table.
 pub fn table(scene: &Scene) -> Table {
     Table::try_from(scene).expect("scenes are tables")
 }
 
-/// The scene in `table`, with the files of `resolver`; `None` if it has errors.
+/// Returns the scene in `table`, with the files of `resolver`. Returns `None` if it has errors.
 pub fn scene(table: &Table, resolver: &AssetResolver) -> Option<Scene> {
     let mut scene: Scene = table.clone().try_into().ok()?;
     scene.resolver = resolver.clone();
@@ -28,9 +29,9 @@ pub fn scene(table: &Table, resolver: &AssetResolver) -> Option<Scene> {
     scene.faults().is_empty().then_some(scene)
 }
 
-/// Every key that the field tables define for the tables that `scene` contains, whether given or left
-/// out. Keys of a table in a list or under a name appear once for each such table. Tables and lists are
-/// included as well as their members.
+/// Returns every key that the field tables define for the tables that `scene` contains, whether the
+/// scene sets it or not. A table in a list or under a name has its own keys. Tables and lists are
+/// included, and so are their members.
 pub fn keys(scene: &Table) -> Vec<Key> {
     let mut out = Vec::new();
     walk(FIELDS, scene, &[], &mut out);
@@ -80,7 +81,7 @@ fn walk(fields: &[Field], table: &Table, path: &[String], out: &mut Vec<Key>) {
     }
 }
 
-/// The value at `path`.
+/// Returns the value at `path` in `table`.
 pub fn value_at<'a>(table: &'a mut Table, path: &[String]) -> Option<&'a mut Value> {
     let (first, deeper_keys) = path.split_first()?;
     let mut value = table.get_mut(first)?;
@@ -94,7 +95,8 @@ pub fn value_at<'a>(table: &'a mut Table, path: &[String]) -> Option<&'a mut Val
     Some(value)
 }
 
-/// Sets the value at `path`; `None` removes it. Does nothing if the parent table is missing.
+/// Sets the value at `path` in `table`; `None` removes it. Does nothing if the parent table is
+/// missing.
 pub fn put(table: &mut Table, path: &[String], value: Option<Value>) {
     let (last, parent_path) = path.split_last().expect("a key");
     let parent = if parent_path.is_empty() {

@@ -1,13 +1,13 @@
-//! Closed forms of irradiance.
+//! Closed forms of the irradiance by spheres, polygons and disks.
 
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Irradiance of a sphere of unit radiance at the origin, on a surface with the given normal. The
-/// surface is outside of the sphere.
+/// Returns the irradiance by a sphere of unit radiance on a surface at the origin with the given
+/// normal. The surface is outside of the sphere.
 ///
 /// Lagarde and de Rousiers 2014, *Moving Frostbite to Physically Based Rendering*, equations 25 and
-/// 26: the second one holds where the horizon of the surface cuts the sphere.
+/// 26. The second one holds where the horizon of the surface cuts the sphere.
 pub fn sphere(center: DVec3, radius: f64, normal: DVec3) -> f64 {
     let distance = center.length();
     let cos = normal.dot(center) / distance;
@@ -22,8 +22,8 @@ pub fn sphere(center: DVec3, radius: f64, normal: DVec3) -> f64 {
     sin2 * (cos * y.acos() - x * root) + (root / x).atan()
 }
 
-/// Irradiance of a polygon of unit radiance on a surface at the origin with the given normal:
-/// Lambert's formula for the part of the polygon above the horizon.
+/// Returns the irradiance by a polygon of unit radiance on a surface at the origin with the given
+/// normal, by Lambert's formula for the part of the polygon above the horizon.
 pub fn polygon(corners: &[DVec3], normal: DVec3) -> f64 {
     let above = clipped(corners, normal);
     let side = |i: usize| {
@@ -35,7 +35,8 @@ pub fn polygon(corners: &[DVec3], normal: DVec3) -> f64 {
     (0.5 * (0..above.len()).map(side).sum::<f64>()).abs()
 }
 
-/// Part of a polygon on the side of a plane through the origin to which `normal` points.
+/// Returns the part of a polygon on the side of a plane through the origin to which `normal`
+/// points.
 pub fn clipped(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
     let mut out = Vec::new();
     for (i, a) in corners.iter().enumerate() {
@@ -51,8 +52,8 @@ pub fn clipped(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
     out
 }
 
-/// Irradiance of a disk of unit radiance on a parallel surface at distance `height` from its plane
-/// and `aside` from its axis.
+/// Returns the irradiance by a disk of unit radiance on a parallel surface. The surface is at
+/// distance `height` from the disk's plane and `aside` from its axis.
 ///
 /// Howell, Mengüç, Siegel, *Thermal Radiation Heat Transfer*, configuration B-15.
 pub fn parallel_disk(radius: f64, height: f64, aside: f64) -> f64 {

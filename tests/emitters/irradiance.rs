@@ -1,4 +1,4 @@
-//! Irradiance of spheres, rectangles and disks on matt surfaces, with and without an occluder.
+//! Irradiance by spheres, rectangles and disks on matt surfaces, with and without an occluder.
 
 use crate::emitters::forms;
 use crate::emitters::setup::{array, check, scene};
@@ -6,7 +6,8 @@ use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::scene::Scene;
 
-/// Rounding errors that the comparison allows: the surface is lifted, and rays start above theirs.
+/// Relative rounding errors that the comparison allows, in single and double precision. Lights are
+/// lifted off surfaces, and rays start above surfaces.
 const ROUNDING: [f64; 2] = [1e-4, 1e-9];
 
 /// Creates the scene of a camera that looks at a white matt receiver at the origin, lit by a light
@@ -27,7 +28,7 @@ fn receiver(normal: DVec3, light: &str, rest: &str) -> Scene {
     ))
 }
 
-/// Expected radiance of the receiver: irradiance / pi.
+/// Returns name, scene, and expected radiance of the receiver: irradiance / pi.
 fn case(name: String, scene: Scene, irradiance: f64) -> (String, Scene, f64) {
     (name, scene, irradiance / PI)
 }
@@ -63,7 +64,7 @@ fn receiver_inside_a_sphere_light_is_lit_from_all_sides() {
     check(&cases, 1 << 15, ROUNDING);
 }
 
-/// Corners of the rectangle in the light description that this returns.
+/// Returns the description of a rectangular light, and its corners.
 fn rectangle(center: DVec3, size: [f64; 2], normal: DVec3) -> (String, Vec<DVec3>) {
     let up = normal.any_orthonormal_vector();
     let across = up.cross(normal);
@@ -142,8 +143,9 @@ fn flat_lights_shine_from_one_side_only() {
     }
 }
 
-/// A black half-plane at height 1 covers the part of the light beyond its straight edge. The
-/// visible part is the polygon on one side of the plane through the receiver and the edge.
+/// Checks the penumbra of a black half-plane at height 1, which covers the part of the light beyond
+/// its straight edge. The visible part is the polygon on one side of the plane through the receiver
+/// and the edge.
 #[test]
 fn penumbra_of_a_straight_edge_is_the_visible_part_of_the_light() {
     let (light, corners) = rectangle(DVec3::Y * 2.0, [1.0, 0.7], -DVec3::Y);
@@ -163,8 +165,9 @@ fn penumbra_of_a_straight_edge_is_the_visible_part_of_the_light() {
     check(&cases, 1 << 15, ROUNDING);
 }
 
-/// Power of 1 W gives the irradiance of a point light of 1 / (4 pi) W/sr on a faraway sphere, and
-/// of 1 / pi W/sr along the normal of a flat light.
+/// Checks that the light of a power of 1 W does not depend on the light's size. On a faraway sphere
+/// it has the irradiance of a point light of 1 / (4 pi) W/sr, and along the normal of a flat light
+/// that of 1 / pi W/sr.
 #[test]
 fn power_is_independent_of_the_size() {
     let mut cases = Vec::new();
@@ -182,7 +185,8 @@ fn power_is_independent_of_the_size() {
     check(&cases, 1 << 10, [1e-4, 1e-5]);
 }
 
-/// Lights that touch the receiver's surface, or are far larger or smaller than the scene.
+/// Checks lights that touch the receiver's surface, and lights far larger or smaller than the
+/// scene.
 #[test]
 fn tiny_and_huge_lights_keep_their_irradiance() {
     let mut cases = Vec::new();
@@ -211,7 +215,8 @@ fn tiny_and_huge_lights_keep_their_irradiance() {
     check(&cases, 1 << 15, [1e-3, 1e-6]);
 }
 
-/// A light that lies in the surface of an object shines, and the surface beside it stays dark.
+/// Checks that a light that lies in the surface of an object shines, and that the surface beside it
+/// stays dark.
 #[test]
 fn light_in_a_ceiling_shines_into_the_room() {
     let (light, corners) = rectangle(DVec3::Y * 2.0, [1.0, 0.7], -DVec3::Y);

@@ -1,4 +1,4 @@
-//! Many point lights, of which each path asks a few, against the sum over all of them.
+//! Many point lights, of which each path samples a few, against the sum over all of them.
 
 use crate::common::Numbers;
 use crate::common::normal::two_sided_z;
@@ -8,10 +8,11 @@ use std::f64::consts::PI;
 use zerkalo::lanes::{Double, Single};
 use zerkalo::scene::Scene;
 
-/// Least number of point lights of which a few are chosen.
+/// Smallest number of point lights of which each path samples only a few.
 const CHOSEN: usize = 16;
 
-/// Positions of `count` lights around the origin, a quarter of them below the plane y = 0, and some at the same place.
+/// Returns positions of `count` lights around the origin. A quarter of them are below the plane y =
+/// 0, and some are at the same place.
 fn positions(count: usize, numbers: &mut Numbers) -> Vec<DVec3> {
     let position = |i: usize| match i % 9 {
         8 => DVec3::new(0.5, 0.75, 0.25),
@@ -23,6 +24,10 @@ fn positions(count: usize, numbers: &mut Numbers) -> Vec<DVec3> {
 /// Creates the scene of a white matt receiver at the origin that faces up, under lights of unit intensity. Every
 /// third light has no falloff.
 fn receiver(lights: &[DVec3]) -> Scene {
+    scene(&receiver_text(lights))
+}
+
+fn receiver_text(lights: &[DVec3]) -> String {
     let mut text = "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
          [camera]\neye = [0.0, 0.01, 0.0]\ndirection = [0.0, -1.0, 0.0]\nup = [0.0, 0.0, -1.0]\n\
          view_angle.vertical = 0.1\n\
@@ -37,10 +42,10 @@ fn receiver(lights: &[DVec3]) -> Scene {
             array(*position)
         );
     }
-    scene(&text)
+    text
 }
 
-/// Radiance of the receiver by light `i` at `position`.
+/// Returns the radiance of the receiver that light `i` at `position` causes.
 fn expected(i: usize, position: DVec3) -> f64 {
     let irradiance = if i.is_multiple_of(3) { PI } else { 1.0 / position.length_squared() };
     irradiance * (position.y / position.length()).max(0.0) / PI
@@ -58,11 +63,14 @@ fn irradiance_of_chosen_lights_is_the_sum_over_all_lights() {
     check(&cases, 1 << 15, [1e-4, 1e-9]);
 }
 
-/// Every light group has the right mean by itself, so that groups can be mixed afterwards.
+/// Checks that the lights of which paths sample a few share one light group with the right mean. A
+/// spot light beside them has a group of its own.
 #[test]
-fn each_group_of_chosen_lights_has_its_own_mean() {
+fn chosen_lights_have_one_light_group() {
     let lights = positions(40, &mut Numbers::new(7));
-    let scene = receiver(&lights);
+    let spot = "[[light]]\nspot = { position = [0.0, 2.0, 0.0], direction = [0.0, -1.0, 0.0], \
+                inner_angle = 20.0, outer_angle = 30.0 }\nfalloff = \"inverse-square\"\n";
+    let scene = scene(&(receiver_text(&lights) + spot));
     let count = 1 << 16;
     let mut sums: Vec<(f64, f64)> = Vec::new();
     samples::<Single>(&scene, count, 5, |groups| {
@@ -72,18 +80,18 @@ fn each_group_of_chosen_lights_has_its_own_mean() {
             *squares += sample * sample;
         }
     });
-    assert_eq!(sums.len(), 8, "seven lights of their own, and a group of the others");
+    let of_points = lights.iter().enumerate().map(|(i, position)| expected(i, *position)).sum();
+    let expected = [0.25 / PI, of_points];
+    assert_eq!(sums.len(), expected.len());
     let limit = two_sided_z(1e-3 / sums.len() as f64);
-    for (group, (sum, squares)) in sums.into_iter().enumerate() {
-        let own = |i: &usize| if group < 7 { *i == group } else { *i >= 7 };
-        let expected: f64 = (0..lights.len()).filter(own).map(|i| expected(i, lights[i])).sum();
+    for ((sum, squares), expected) in sums.into_iter().zip(expected) {
         let (mean, error) = mean_and_error(sum, squares, count);
         let off = (mean - expected).abs() - 1e-4 * expected;
-        assert!(off <= limit * error, "group {group}: {mean} ± {error}, expected {expected}");
+        assert!(off <= limit * error, "{mean} ± {error}, expected {expected}");
     }
 }
 
-/// Below the least number of lights all of them are asked, without noise.
+/// Checks that each path samples all lights, without noise, if there are fewer than [`CHOSEN`].
 #[test]
 fn few_lights_are_all_asked() {
     let lights = positions(CHOSEN, &mut Numbers::new(3));
@@ -93,7 +101,7 @@ fn few_lights_are_all_asked() {
     assert!(error > 1e-3, "{error}");
 }
 
-/// Lights at one place, on surfaces, far away and very near give finite samples.
+/// Checks that lights at one place, on surfaces, far away and very near give finite samples.
 #[test]
 fn a_thousand_lights_at_extreme_places_have_finite_samples() {
     let mut lights = positions(1000, &mut Numbers::new(11));

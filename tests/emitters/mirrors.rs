@@ -23,7 +23,7 @@ fn sphere(radius: f64) -> String {
     format!("sphere = {{ center = [0.0, 1.0, 0.0], radius = {radius:?} }}")
 }
 
-/// Solid angle of a sphere at unit distance.
+/// Returns the solid angle of a sphere whose centre is at unit distance.
 fn solid_angle(radius: f64) -> f64 {
     TAU * (1.0 - (1.0 - radius * radius).sqrt())
 }
@@ -42,9 +42,9 @@ fn camera_and_mirror_see_visible_lights_only() {
     assert!((mean - 1.0).abs() < 1e-8 && error < 1e-8, "{mean} ± {error}");
 }
 
-/// A rough pane with a cone lobe transmits and reflects the fraction of its solid angle that the
-/// light covers. Points of the light are sampled: rays alone would find the smallest lights in a few
-/// of a million samples.
+/// Checks that a rough pane with a cone lobe transmits and reflects the fraction of the lobe's
+/// solid angle that the light covers. Points of the light are sampled: rays alone would find the
+/// smallest lights in a few of a million samples.
 #[test]
 fn rough_panes_find_small_lights_on_both_sides() {
     let mut cases = Vec::new();
@@ -72,7 +72,7 @@ fn rough_panes_find_small_lights_on_both_sides() {
     check(&cases, 1 << 14, [2e-3, 1e-6]);
 }
 
-/// A cone lobe reflects the fraction of its solid angle that the light covers.
+/// Checks that a cone lobe reflects the fraction of its solid angle that the light covers.
 #[test]
 fn cone_lobe_reflects_the_covered_fraction_of_its_solid_angle() {
     let mut cases = Vec::new();
@@ -88,7 +88,7 @@ fn cone_lobe_reflects_the_covered_fraction_of_its_solid_angle() {
     check(&cases, 1 << 15, [2e-3, 1e-6]);
 }
 
-/// A lobe without loss reflects the radiance of a light that fills all directions.
+/// Checks that a lobe without loss reflects the radiance of a light that fills all directions.
 #[test]
 fn lobes_inside_a_sphere_light_reflect_all_light() {
     let mut cases = Vec::new();

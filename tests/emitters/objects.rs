@@ -1,4 +1,4 @@
-//! Light of emissive objects: closed forms, agreement with lights of the same size, furnaces.
+//! Light of emissive objects: closed forms, agreement with lights of the same size, white furnaces.
 
 use crate::common::normal::two_sided_z;
 use crate::emitters::forms;
@@ -9,12 +9,12 @@ use std::fs;
 use zerkalo::lanes::{Double, Single};
 use zerkalo::scene::Scene;
 
-/// Rounding errors that the comparison allows: sampled points are lifted off the surface, and rays
-/// start above theirs.
+/// Relative rounding errors that the comparison allows, in single and double precision. Sampled
+/// points are lifted off their surface, and rays start above theirs.
 const ROUNDING: [f64; 2] = [1e-4, 1e-9];
 
-/// Scene of a camera that looks at a receiver at the origin, with the material `white`, a black
-/// emissive material `lamp`, and a black material `black`.
+/// Returns the scene of a camera that looks at a receiver at the origin. It has the materials
+/// `white`, `lamp` (black and emissive) and `black`.
 fn receiver(normal: DVec3, white: &str, rest: &str) -> Scene {
     scene(&format!(
         "[film]\nsize = [1, 1]\nfilter = \"point\"\n\
@@ -38,7 +38,8 @@ fn object(material: &str, shape: &str) -> String {
     format!("[[object]]\nmaterial = \"{material}\"\n{shape}\n")
 }
 
-/// A rectangle across `x` and `z` at `center`, facing down: as a shape or light, and its corners.
+/// Returns a rectangle across `x` and `z` at `center` that faces down: its description as a shape
+/// or light, and its corners.
 fn rectangle(center: DVec3, [width, depth]: [f64; 2]) -> (String, Vec<DVec3>) {
     let corner = |x: f64, z: f64| center + DVec3::new(x * width, 0.0, z * depth);
     let text = format!(
@@ -49,7 +50,8 @@ fn rectangle(center: DVec3, [width, depth]: [f64; 2]) -> (String, Vec<DVec3>) {
     (text, [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, z)| corner(x, z)).into())
 }
 
-/// Pieces of a rectangle with the given corners, 6 x 6 of them: 72 triangles.
+/// Returns the 6 x 6 equal pieces of the rectangle with the given corners. As triangles they are
+/// 72.
 fn pieces(corners: &[DVec3]) -> Vec<Vec<DVec3>> {
     let (u, v) = ((corners[1] - corners[0]) / 6.0, (corners[3] - corners[0]) / 6.0);
     let corner = |i: u32, j: u32| corners[0] + u * f64::from(i) + v * f64::from(j);
@@ -59,7 +61,7 @@ fn pieces(corners: &[DVec3]) -> Vec<Vec<DVec3>> {
     squares.map(piece).collect()
 }
 
-/// Writes the polygons to an OBJ file; returns the shape that names it.
+/// Writes `polygons` to an OBJ file. Returns the description of the shape that uses the file.
 fn mesh(name: &str, polygons: &[Vec<DVec3>]) -> String {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("emissive-objects");
     fs::create_dir_all(&folder).unwrap();
@@ -160,7 +162,8 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     check(&cases, 1 << 15, ROUNDING);
 }
 
-/// The face of an emissive box that stands on a surface lights nothing behind that surface.
+/// Checks that the face of an emissive box that stands on a surface lights nothing behind that
+/// surface.
 #[test]
 fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     let turned = "transform = [{ rotate_y = 30.0 }]\n";
@@ -208,7 +211,8 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     agree("box beside a square", &alone, &with_square, 4096);
 }
 
-/// A flat object with a two-sided material lights both sides, one with a one-sided material its front.
+/// Checks that a flat emissive object with a two-sided material lights both sides, and one with a
+/// one-sided material its front.
 #[test]
 fn back_of_a_flat_emissive_object_follows_two_sided() {
     let (text, corners) = rectangle(DVec3::Y, [1.0, 0.7]);
@@ -223,7 +227,7 @@ fn back_of_a_flat_emissive_object_follows_two_sided() {
     check(&cases, 1 << 14, ROUNDING);
 }
 
-/// Asserts that the means of `a` and `b` differ by no more than chance explains.
+/// Checks that the mean radiances of the scenes `a` and `b` differ by no more than chance explains.
 fn agree(name: &str, a: &Scene, b: &Scene, count: u32) {
     for (precision, rounding) in ["single", "double"].into_iter().zip(ROUNDING) {
         let mean = |scene: &Scene, seed| match precision {
@@ -240,8 +244,8 @@ fn agree(name: &str, a: &Scene, b: &Scene, count: u32) {
     }
 }
 
-/// Rough mirrors combine sampled points with reflected rays: for each lobe the light of an emissive
-/// object is that of a light of its size.
+/// Checks rough mirrors, which combine sampled points with reflected rays. For each lobe, the
+/// reflected light of an emissive object equals that of a light of the same size.
 #[test]
 fn reflection_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     let center = DVec3::new(0.15, 0.7, 0.0);
@@ -265,8 +269,9 @@ fn reflection_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     }
 }
 
-/// Inside of a closed surface that emits a radiance of 1 everything white shows 1: by sampled points, by
-/// rays, and by both. Surfaces of which no points are sampled need a diffuse bounce.
+/// Checks that white objects inside of a closed surface that emits a radiance of 1 have the
+/// radiance 1: by sampled points, by rays, and by both. Surfaces from which no points are sampled
+/// need a diffuse bounce.
 #[test]
 fn furnace_of_emissive_walls_shows_white() {
     let walls = [
@@ -305,7 +310,8 @@ fn furnace_of_emissive_walls_shows_white() {
     check(&cases, 1 << 14, [1e-4, 1e-6]);
 }
 
-/// An emissive sphere with an object inside: the back of the wall lights it, but not through it.
+/// Checks shadows inside of an emissive sphere. A black platform hides a part of the wall from the
+/// receiver.
 #[test]
 fn inside_of_an_emissive_sphere_has_shadows() {
     // A black disk-like box between the receiver and half of the wall.

@@ -7,7 +7,7 @@ use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::scene::Scene;
 use zerkalo::world::{MAX_GROUPS, Path, Radiance, World};
 
-/// Writes three numbers as a TOML array.
+/// Returns three numbers as a TOML array.
 pub fn array(v: glam::DVec3) -> String {
     format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
 }
@@ -42,14 +42,16 @@ pub fn samples<L: SimdFloat>(scene: &Scene, count: u32, seed: u64, mut visit: im
     }
 }
 
-/// Mean and its standard error of a quantity with the given sum and sum of squares over `count` samples.
+/// Returns the mean of a quantity and the mean's standard error, from its sum and its sum of
+/// squares over `count` samples.
 pub fn mean_and_error(sum: f64, squares: f64, count: u32) -> (f64, f64) {
     let n = f64::from(count);
     let mean = sum / n;
     (mean, ((squares / n - mean * mean).max(0.0) / (n - 1.0)).sqrt())
 }
 
-/// Mean and its standard error of the red radiance of the pixel (0, 0), all light groups together; see [`samples`].
+/// Returns the mean and its standard error of the red radiance of pixel (0, 0), over all light
+/// groups together; see [`samples`].
 pub fn radiance<L: SimdFloat>(scene: &Scene, count: u32, seed: u64) -> (f64, f64) {
     let (mut sum, mut squares) = (0.0, 0.0);
     samples::<L>(scene, count, seed, |groups| {
@@ -60,9 +62,9 @@ pub fn radiance<L: SimdFloat>(scene: &Scene, count: u32, seed: u64) -> (f64, f64
     mean_and_error(sum, squares, count)
 }
 
-/// Checks the mean radiance of each scene against its expected value by z-test in both precisions.
-/// `level` is the probability that any correct case fails. Rounding errors of the relative size
-/// `rounding` (single, double) are allowed.
+/// Checks the mean radiance of each scene against its expected value, by z-tests in both
+/// precisions. Each test takes `count` samples. `rounding` has the allowed relative rounding errors
+/// in single and double precision.
 pub fn check(cases: &[(String, Scene, f64)], count: u32, rounding: [f64; 2]) {
     let level = 1e-3;
     let limit = two_sided_z(level / (2.0 * cases.len() as f64));

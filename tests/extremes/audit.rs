@@ -1,11 +1,12 @@
-//! Audit of the thirty numbered tests: each exists once, in the file that the table names.
+//! Audit of the thirty numbered tests of extremes: each exists once, in the file that the table
+//! names.
 
 use crate::common::report::report;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Subject, criterion, test name without its prefix, and file of each number. Further tests may
-/// share a number.
+/// Table of the thirty numbered extremes: subject, criterion, name of the test without its prefix,
+/// and file. Further tests may have the same number.
 const EXTREMES: [(&str, &str, &str, &str); 30] = [
     (
         "a unit sphere from 1e2 .. 1e9 away",
@@ -167,7 +168,7 @@ const EXTREMES: [(&str, &str, &str, &str); 30] = [
         "the shift by a slab at 0 .. 89.9 degrees",
         "within 1e-10 t (single: 1.5e-3 t)",
         "slab_displacement",
-        "tests/lobes/through.rs",
+        "tests/lobes/transmission.rs",
     ),
     (
         "1e9 samples in the film",
@@ -184,8 +185,8 @@ const EXTREMES: [(&str, &str, &str, &str); 30] = [
     (
         "the estimated error is the true error",
         "true / estimated 0.9 .. 1.1; at most 1.1 times the target",
-        "estimator_honesty",
-        "tests/honesty/mod.rs",
+        "estimated_error_is_the_true_error",
+        "tests/error_estimates/mod.rs",
     ),
 ];
 

@@ -1,4 +1,4 @@
-//! Extremes of brightness: samples within the range of the film, and samples beyond it.
+//! Extremes of brightness: samples inside and outside of the range of the film.
 
 use crate::common::report::report;
 use crate::support::{begin, parsed, picture, pool, rendered, uniform};
@@ -10,18 +10,18 @@ use zerkalo::world::Precision;
 
 const PRECISIONS: [Precision; 2] = [Precision::Auto, Precision::Double];
 
-/// Checks that no sample is bad and none is saturated.
+/// Checks that no sample of the film is invalid and none is saturated.
 fn assert_no_sample_lost(rendering: &RenderState, name: &str) {
     let film = &rendering.film;
     let bad = film.bad_samples();
     assert_eq!(
-        (bad.count, film.saturated_samples(), film.saturated()),
+        (bad.count, film.saturated_samples(), film.saturated_pixels()),
         (0, 0, 0),
         "{name}: {bad:?}"
     );
 }
 
-/// Returns the mean of all pixels in green.
+/// Returns the mean of the green channel over all pixels.
 fn mean(rendering: &RenderState) -> f64 {
     let pixels = picture(rendering, Replicates::Both);
     pixels.iter().map(|p| p[1]).sum::<f64>() / pixels.len() as f64
@@ -50,8 +50,8 @@ fn to_toml(height: f64, [x, y, z]: [f64; 3], object: &str) -> String {
     )
 }
 
-/// Cases: the earth with a lamp 6 above the ground, and lamps close to walls inside the scene's
-/// bounding box.
+/// Checks the earth with a lamp 6 units above the ground, and lamps close to walls inside the
+/// scene's bounding box.
 #[test]
 fn surface_near_lamp_is_lit_at_every_scene_extent() {
     let cases = [
@@ -103,7 +103,7 @@ fn surface_near_lamp_is_lit_at_every_scene_extent() {
     report(30, "both", &format!("close lamps in large scenes: {worst:.0e} off"));
 }
 
-/// A room with walls of triangles.
+/// Checks a lamp close to a wall in a room whose walls are triangles.
 #[test]
 fn mesh_wall_near_lamp_is_lit() {
     let folder = tempfile::tempdir().unwrap();
@@ -129,7 +129,7 @@ fn mesh_wall_near_lamp_is_lit() {
     assert!((mean(&rendering) - 1.0).abs() < 2e-3, "{}", mean(&rendering));
 }
 
-/// Returns a floor of the material `material` in directional light of `intensity`.
+/// Returns the scene of a floor of the material `material` in directional light of `intensity`.
 fn floor(material: &str, intensity: f64) -> Scene {
     parsed(&format!(
         "film = {{ size = [8, 8] }}\n\
@@ -141,7 +141,7 @@ fn floor(material: &str, intensity: f64) -> Scene {
     ))
 }
 
-/// A colour and the light's reciprocal intensity give white.
+/// Checks that a dark colour in light of the reciprocal intensity is white.
 #[test]
 fn dim_colour_in_bright_light_is_white() {
     for colour in [1e-15, 1e-9, 1e-6, 0.002, 1.0, 50.0, 1e6] {
@@ -155,7 +155,8 @@ fn dim_colour_in_bright_light_is_white() {
     }
 }
 
-/// A colour of 1e6 does not saturate the film after a million samples in two pixels.
+/// Checks that a colour of 1e6 does not saturate the film after a million samples in each of two
+/// pixels.
 #[test]
 fn bright_colour_does_not_saturate_film() {
     let mut scene = floor("color = [1e6, 1e6, 1e6]", 1e-6);
@@ -166,7 +167,8 @@ fn bright_colour_does_not_saturate_film() {
     assert!((mean(&rendering) - 1.0).abs() < 1e-6, "{}", mean(&rendering));
 }
 
-/// Two facing mirrors that amplify in front of a white background show white, and finite radiance.
+/// Checks two facing mirrors that amplify light in front of a white background. They show white,
+/// and finite radiance.
 #[test]
 fn amplifying_mirrors_give_finite_white() {
     let text = |k: f64, depth: u32| {
@@ -202,7 +204,7 @@ fn amplifying_mirrors_give_finite_white() {
     }
 }
 
-/// An object far from the lamp leaves the picture near the lamp unchanged.
+/// Checks that an object far from the lamp leaves the picture near the lamp unchanged.
 #[test]
 fn distant_object_leaves_surface_near_lamp_unchanged() {
     let ball = "shape.sphere = { center = [0.0, -1.0, 0.0], radius = 1.0 }";
@@ -213,8 +215,8 @@ fn distant_object_leaves_surface_near_lamp_unchanged() {
     assert!((alone - both).abs() < 1e-4 && (alone - 1.0).abs() < 0.01, "{alone} {both}");
 }
 
-/// Lights 2^40 times as strong or as weak give the same picture up to that factor, also in a film
-/// whose scale is not the default.
+/// Checks that lights 2^40 times as strong or as weak give the same picture, multiplied by that
+/// factor. One of the films has a scale other than the default.
 #[test]
 fn light_intensity_in_powers_of_two_scales_picture_exactly() {
     let scenes = [

@@ -58,7 +58,7 @@ fn extreme_17_odd_cameras() {
     report(17, "both", "rays finite");
 }
 
-/// The angle between the outermost rays equals the view angle.
+/// Checks that the angle between the outermost camera rays equals the view angle.
 #[test]
 fn extreme_17_narrow_and_wide_angles_are_right() {
     let mut worst = 0f64;

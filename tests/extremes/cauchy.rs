@@ -1,6 +1,6 @@
-//! Isotropic uniform lines: a convex body with surface S and volume V, inside a convex body with
-//! surface S', is hit by the share S / S' of the lines that hit the outer body, and its mean chord
-//! is 4 V / S (Cauchy, Crofton). Every registered kind is tested.
+//! Chords of isotropic uniform lines, for every registered kind of shape. Of the lines that hit a
+//! convex body with surface S', the share S / S' hits a convex body inside it with surface S and
+//! volume V. The mean chord is 4 V / S (Cauchy, Crofton).
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, bounding_sphere, closest, every_kind};
@@ -14,7 +14,8 @@ use zerkalo::primitive::{
 };
 use zerkalo::shape::{Cuboid, Prism, Pyramid, ShapeDesc};
 
-/// Returns the area of one face from the corners on it, sorted around their middle.
+/// Returns the area of one face of a polyhedron, from the corners on it, sorted around their
+/// middle.
 fn face_area(face: &HalfSpace, corners: &[DVec3], size: f64) -> f64 {
     let near = |c: &&DVec3| (face.normal.dot(**c) - face.offset).abs() < 1e-12 * size;
     let mut on: Vec<DVec3> = corners.iter().filter(near).copied().collect();
@@ -27,8 +28,8 @@ fn face_area(face: &HalfSpace, corners: &[DVec3], size: f64) -> f64 {
     0.5 * wedges.sum::<DVec3>().length()
 }
 
-/// Returns the surface area of the image of the unit sphere: the integral of |cofactor(M) n| over
-/// all n.
+/// Returns the surface area of the image of the unit sphere under `m`: the integral of |cofactor(m)
+/// n| over all directions n.
 fn ellipsoid_surface(m: DMat3) -> f64 {
     let cofactor = m.inverse().transpose() * m.determinant().abs();
     let (rows, columns) = (2000, 400);
@@ -44,7 +45,7 @@ fn ellipsoid_surface(m: DMat3) -> f64 {
     sum * 4.0 * PI / f64::from(rows * columns)
 }
 
-/// Returns surface area and volume of the image of the canonical tapered cylinder.
+/// Returns surface area and volume of the image of the canonical tapered cylinder under `m`.
 fn tapered(m: DMat3, top: f64) -> (f64, f64) {
     let volume = m.determinant().abs() * PI * (1.0 + top + top * top) / 3.0;
     let disc = PI * m.x_axis.cross(m.y_axis).length();
@@ -102,20 +103,20 @@ fn surface_and_volume(form: &Form) -> Option<(f64, f64)> {
     }
 }
 
-/// Hits and chords of lines.
+/// Counts and sums of lines, of their hits and of their chords.
 #[derive(Default)]
 struct Tally {
     lines: f64,
     hits: f64,
     chord: f64,
     chord2: f64,
-    /// Lines whose hits from both ends contradict each other.
+    /// Number of lines whose hits from both ends contradict each other.
     inconsistent: usize,
 }
 
 impl Tally {
-    /// Adds each line `(middle, direction)`, traced from both of its ends at distance `far` from
-    /// the middle.
+    /// Adds lines, each given by its middle and direction. Each is traced from both of its ends, at
+    /// distance `far` from the middle.
     fn add<L: SimdFloat>(&mut self, geometry: &Aggregate<L>, lines: &[Line], far: f64, flat: bool) {
         let ends = |sign: f64| -> Vec<Line> {
             lines.iter().map(|(p, d)| (*p - *d * (sign * far), *d * sign)).collect()
@@ -140,7 +141,8 @@ impl Tally {
         }
     }
 
-    /// Checks share and mean chord; returns the larger deviation in standard deviations.
+    /// Checks the share of hits and the mean chord. Returns the larger deviation in standard
+    /// deviations.
     fn check(&self, name: &str, share: f64, mean_chord: f64) -> f64 {
         let found = self.hits / self.lines;
         let sigma = (share * (1.0 - share) / self.lines).sqrt();
@@ -155,8 +157,8 @@ impl Tally {
     }
 }
 
-/// Returns a line through a ball with a uniform direction and a uniform point of the disc across
-/// it.
+/// Returns a random line through a ball, with a uniform direction and a uniform point of the disc
+/// perpendicular to it.
 fn through_ball(numbers: &mut Numbers, center: DVec3, radius: f64) -> Line {
     let d = numbers.direction();
     let (u, v) = d.any_orthonormal_pair();
@@ -164,7 +166,8 @@ fn through_ball(numbers: &mut Numbers, center: DVec3, radius: f64) -> Line {
     (center + (u * cos + v * sin) * (radius * numbers.unit().sqrt()), d)
 }
 
-/// Returns a line through a box from a uniform point of its surface, inward by the cosine law.
+/// Returns a random line through a box, from a uniform point of its surface, inwards with a cosine
+/// distribution.
 fn through_box(numbers: &mut Numbers, center: DVec3, half: DVec3) -> Line {
     let areas = [half.y * half.z, half.z * half.x, half.x * half.y];
     let mut pick = numbers.unit() * areas.iter().sum::<f64>();
@@ -189,8 +192,9 @@ fn through_box(numbers: &mut Numbers, center: DVec3, half: DVec3) -> Line {
     (center + p * half, d.normalize())
 }
 
-const LINES: usize = 1_000_000;
-const BLOCK: usize = 1 << 14;
+const LINES: usize = 62 << 14;
+/// Number of lines traced together: few, because the allocator returns large blocks to the system.
+const BLOCK: usize = 1 << 9;
 
 fn tally<L: SimdFloat>(
     form: &Form,
@@ -210,7 +214,7 @@ fn tally<L: SimdFloat>(
     tally
 }
 
-/// Closed form 8: Cauchy's laws.
+/// Checks Cauchy's laws on all kinds of shapes (closed form 8).
 #[test]
 fn extreme_07_cauchy() {
     let mut worst = [0f64; 2];
@@ -299,7 +303,7 @@ fn infinite_plane_is_hit_by_one_half_of_every_line() {
     assert_eq!(bounded + planes, every_kind().len(), "every kind has a law");
 }
 
-/// Returns boxes, prisms and pyramids with sides one millionth of each other.
+/// Returns boxes, prisms and pyramids, some of whose sides are a millionth of the others.
 fn slivers() -> Vec<(&'static str, Form)> {
     let thin = 1e-6;
     let corner = [-0.5, -0.5, 0.5];

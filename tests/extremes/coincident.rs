@@ -9,13 +9,13 @@ use std::f64::consts::PI;
 use zerkalo::lanes::{Double, SimdFloat, Single};
 use zerkalo::world::Precision;
 
-/// Returns `x` moved by `units` ulps of the precision's numbers near 1.
+/// Returns `x` moved by `units` spacings between the precision's numbers near 1.
 fn nudged(x: f64, units: i32, epsilon: f64) -> f64 {
     x * (1.0 + f64::from(units) * epsilon)
 }
 
-/// Checks a box with a hole from its top, where the cutter's top is `units` ulps from the box's. No
-/// ray from above hits a surface in the opening.
+/// Checks a box with a hole from its top. The top of the shape that cuts the hole is `units`
+/// roundings from the top of the box. No ray from above hits a surface in the opening.
 fn check_flush<L: SimdFloat>(units: i32, rays: usize) {
     let top = nudged(1.0, units, L::EPSILON);
     let cutter = block([0.0, (top + 0.3) / 2.0, 0.0], [1.0, top - 0.3, 1.0]);
@@ -118,7 +118,8 @@ fn extreme_10_touching_parts_have_no_crack() {
     report(10, "both", "0 cracks");
 }
 
-/// Coincident faces of two materials show the part listed first, not a mixture by rounding.
+/// Checks that coincident faces of two materials show the part listed first, not a mixture by
+/// rounding.
 #[test]
 fn coincident_faces_show_the_first_part() {
     let parts =
@@ -136,7 +137,8 @@ fn coincident_faces_show_the_first_part() {
     }
 }
 
-/// A lamp in a hollow ball lights the inside; light leaves only through a window.
+/// Checks that a lamp in a hollow ball lights the inside, and that light leaves only through a
+/// window.
 #[test]
 fn lamp_in_hollow_ball_lights_only_its_inside() {
     let room = |window: &str| {

@@ -1,4 +1,4 @@
-//! Compound solids: volumes, parity, algebra.
+//! Compound solids: volumes, parity of surfaces along a line, laws of set operations.
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, LineHit, blocked, closest};
@@ -19,7 +19,7 @@ pub fn block(center: [f64; 3], size: [f64; 3]) -> Form {
     Cuboid { center, size }.form()
 }
 
-/// Returns a compound of all parts, combined by `join`.
+/// Returns a compound of all `parts`, combined by `join`.
 fn joined(join: fn(Vec<Tree>) -> Tree, parts: Vec<Form>) -> Form {
     let tree = join((0..parts.len()).map(Tree::Part).collect());
     Form::Csg(CsgSolid { parts, tree })
@@ -52,7 +52,7 @@ pub fn lines(seed: u64, count: usize) -> Vec<Line> {
     (0..count).map(|_| line(&mut numbers)).collect()
 }
 
-/// Returns every hit along each line, tracing from one to the next.
+/// Returns all hits along each line. Each ray is traced from one hit to the next.
 fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<LineHit>> {
     let mut out = vec![Vec::new(); lines.len()];
     let mut open: Vec<(usize, f64)> = (0..lines.len()).map(|i| (i, 0.0)).collect();
@@ -74,7 +74,7 @@ fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<Li
     out
 }
 
-/// Returns the length of a line inside the solid, and checks that its hits enter and leave
+/// Returns the length of a line inside of the solid. Checks that its hits enter and leave
 /// alternately.
 fn chord(name: &str, line: &Line, hits: &[LineHit]) -> f64 {
     let context = || format!("{name}: {line:?} {hits:?}");
@@ -86,7 +86,7 @@ fn chord(name: &str, line: &Line, hits: &[LineHit]) -> f64 {
     hits.chunks(2).map(|pair| pair[1].t - pair[0].t).sum()
 }
 
-/// Returns the lengths of lines inside `form`.
+/// Returns the length of each line inside of `form`.
 pub fn chords<L: SimdFloat>(name: &str, form: &Form, lines: &[Line]) -> Vec<f64> {
     let all = surfaces(&geometry::<L>(form), lines);
     lines.iter().zip(all).map(|(line, hits)| chord(name, line, &hits)).collect()
@@ -107,7 +107,8 @@ fn random_solid(numbers: &mut Numbers) -> Form {
     form.transformed(&DAffine3::from_scale_rotation_translation(scale, turn, place))
 }
 
-/// Returns a random tree of at most `depth` levels; some parts occur twice, so that faces coincide.
+/// Returns a random tree of set operations with at most `depth` levels. Some parts occur twice, so
+/// that faces coincide.
 fn random_tree(numbers: &mut Numbers, depth: usize, parts: &mut Vec<Form>) -> Tree {
     if depth == 0 || numbers.below(6) == 0 {
         let part = match numbers.below(4) {
@@ -154,8 +155,9 @@ fn tree_contains(tree: &Tree, parts: &[Form], p: DVec3) -> bool {
     }
 }
 
-/// Random trees of depth 8 have alternating surfaces, and the points between them agree with the
-/// parts. Half a million rays are traced in each precision.
+/// Checks random trees of set operations of depth 8. Their surfaces are entered and left
+/// alternately, and the points between surfaces agree with the parts. Half a million rays are
+/// traced in each precision.
 #[test]
 fn extreme_08_parity() {
     let (mut seen, mut odd, mut line_count) = (0, 0, 0);
@@ -214,14 +216,14 @@ fn extreme_08_parity() {
     report(8, "single", &format!("{odd} of {line_count} lines out of turn"));
 }
 
-/// Returns `true` if surfaces are entered and left alternately.
+/// Returns `true` if the ray enters and leaves the solid alternately.
 fn alternates(line: &Line, hits: &[LineHit]) -> bool {
     let right_side = |(i, m): (usize, &LineHit)| (m.normal.dot(line.1) < 0.0) == (i % 2 == 0);
     hits.len().is_multiple_of(2) && hits.iter().enumerate().all(right_side)
 }
 
-/// Returns the number of lines whose surfaces differ in single precision: in number, or by more
-/// than 1e-5 of the distance over the cosine.
+/// Returns the number of lines on which the surfaces of two forms differ in single precision: in
+/// number, or in distance by more than 1e-5 of the distance divided by the cosine.
 fn differing(a: &Form, b: &Form, lines: &[Line]) -> usize {
     let (a, b) = (geometry::<Single>(a), geometry::<Single>(b));
     let apart = |line: &Line, a: &LineHit, b: &LineHit| {
@@ -234,8 +236,8 @@ fn differing(a: &Form, b: &Form, lines: &[Line]) -> usize {
     lines.iter().zip(both).filter(differs).count()
 }
 
-/// Checks that both have the same surfaces to 1e-12 of the distance. Lines with a grazing hit are
-/// skipped: the tie tolerance is wide there.
+/// Checks that two forms have the same surfaces along all lines, to 1e-12 of the distance. Lines
+/// with a grazing hit are left out, because the tie tolerance is wide there.
 fn same_surfaces(name: &str, a: &Form, b: &Form, lines: &[Line]) {
     let (a, b) = (geometry::<Double>(a), geometry::<Double>(b));
     for ((line, a), b) in lines.iter().zip(surfaces(&a, lines)).zip(surfaces(&b, lines)) {

@@ -11,10 +11,10 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Width of the gap that contact is compared with.
+/// Width of the gap with which objects in contact are compared.
 const GAP: f64 = 1e-4;
 
-/// Shapes on the plane y = 0 that reach up to y = 1, or lie in it.
+/// Shapes on the plane y = 0 that reach up to y = 1 or are in that plane.
 const UPPER: [&str; 7] = [
     "box = { center = [0, 0.5, 0], size = [2, 1, 2] }",
     "mesh = { file = \"upper.obj\", normals = \"flat\" }",
@@ -37,7 +37,7 @@ const LOWER: [&str; 6] = [
     "cylinder = { base = [0, -1, 0], top = [0, 0, 0], radius = 3 }",
 ];
 
-/// Materials of the upper and the lower shape.
+/// Pairs of materials: those of the upper and of the lower shape.
 const MATERIALS: [(&str, &str); 8] = [
     ("glass", "matte"),
     ("glass", "mirror"),
@@ -60,7 +60,7 @@ fn slab(low: DVec3, high: DVec3) -> String {
     out + "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n"
 }
 
-/// A folder with the two mesh files.
+/// Returns a folder with the two mesh files.
 fn meshes() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let write_file = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
@@ -77,12 +77,12 @@ struct Setting<'a> {
     folder: &'a Path,
 }
 
-/// Box whose lower face lies in that of a smaller box inside it.
+/// Text of a box whose lower face is in the plane of the lower face of a smaller box inside it.
 const OUTER: &str = "box = { center = [0, 0.5, 0], size = [3, 1, 3] }";
 const INNER: &str = "box = { center = [0, 0.25, 0], size = [1.4, 0.5, 1.4] }";
 
 impl Setting<'_> {
-    /// Compiles the scene with the upper shape lifted by `gap`.
+    /// Compiles the scene, with the upper shape lifted by `gap`.
     fn traced(&self, gap: f64, precision: Precision) -> Traced {
         let (scale, turn, offset) = self.place.to_scale_rotation_translation();
         let (axis, angle) = turn.to_axis_angle();
@@ -126,7 +126,7 @@ impl Setting<'_> {
         Traced::new(&scene.unwrap_or_else(|e| panic!("{e}\n{text}")), precision)
     }
 
-    /// Returns lines through the middle of the contact, from above or from below.
+    /// Returns lines through the middle of the contact area, from above or from below.
     fn lines(&self, above: bool, count: usize) -> Vec<Line> {
         let mut numbers = Numbers::new(5);
         let line = |_| {
@@ -143,7 +143,7 @@ impl Setting<'_> {
         (0..count).map(line).collect()
     }
 
-    /// Checks contact from both sides.
+    /// Checks the contact of both shapes by rays from above and from below.
     fn check(&self, precision: Precision, count: usize) {
         let both_flat = !is_solid(self.upper) && !is_solid(self.lower);
         // In front is the transparent one of two flat shapes in one plane, or the one listed last.
@@ -154,7 +154,7 @@ impl Setting<'_> {
         }
     }
 
-    /// Compares contact with the upper shape lifted by `gap`.
+    /// Compares the scene with one whose upper shape is lifted by `gap`.
     fn compare(&self, gap: f64, above: bool, precision: Precision, count: usize) {
         let lines = self.lines(above, count);
         let touching = self.traced(0.0, precision).radiance(&lines);
@@ -183,7 +183,7 @@ fn is_solid(shape: &str) -> bool {
     !shape.starts_with("pla")
 }
 
-/// Covers every pair of shapes with every pair of materials, in both precisions.
+/// Checks every pair of shapes with every pair of materials, in both precisions.
 #[test]
 fn contact_is_the_limit_of_a_gap() {
     let folder = meshes();
@@ -203,7 +203,7 @@ fn contact_is_the_limit_of_a_gap() {
     }
 }
 
-/// Contact tilted, far from the origin, small and large.
+/// Checks shapes in contact that are tilted, far from the origin, small, or large.
 #[test]
 fn transformed_contact_is_the_limit_of_a_gap() {
     let folder = meshes();
@@ -236,8 +236,8 @@ fn transformed_contact_is_the_limit_of_a_gap() {
     }
 }
 
-/// Solids on the same side of a common face have an order: a transparent one lies outside of an
-/// opaque one, and the last one listed outside of other transparent ones.
+/// Checks solids on the same side of a common face. A transparent solid is outside of an opaque
+/// one, and the last one listed is outside of other transparent ones.
 #[test]
 fn common_faces_of_nested_solids_have_an_order() {
     let folder = meshes();
@@ -257,8 +257,8 @@ fn common_faces_of_nested_solids_have_an_order() {
     }
 }
 
-/// Light that bounces from the floor below a glass box meets the box's lower face, in contact as with
-/// a gap.
+/// Checks that light that bounces from the floor below a glass box hits the box's lower face, both
+/// in contact and with a gap.
 #[test]
 fn diffuse_bounces_in_contact_are_the_limit_of_a_gap() {
     for floor in ["matte", "glass"] {

@@ -1,4 +1,4 @@
-//! Indirect diffuse light in closed forms: a furnace, and the inside of a sphere.
+//! Indirect diffuse light against closed forms: a white furnace, and the inside of a sphere.
 
 use crate::support::{picture, rendered};
 use std::f64::consts::PI;
@@ -14,7 +14,7 @@ fn scene(text: &str, bounces: u32) -> Scene {
     scene
 }
 
-/// Mean, largest deviation from it, and standard error of the red channel.
+/// Returns the mean of the red channel, the largest deviation from it, and its standard error.
 fn moments(scene: &Scene, precision: Precision) -> [f64; 3] {
     let rendering = rendered(scene, 11, precision, SAMPLES);
     assert_eq!(rendering.film.bad_samples().count, 0);
@@ -26,8 +26,8 @@ fn moments(scene: &Scene, precision: Precision) -> [f64; 3] {
     [mean, deviation, (variance / n).sqrt()]
 }
 
-/// White surfaces in a white furnace are white, after every number of bounces, in mirrors and behind
-/// glass as well. Ambient light of the same radiance stands for further bounces.
+/// Checks that white surfaces in a white furnace are white after every number of bounces, also in
+/// mirrors and behind glass. Ambient light of the same radiance stands for further bounces.
 #[test]
 fn furnace_is_white_at_every_diffuse_depth() {
     let text = "film.size = [24, 18]
@@ -78,8 +78,8 @@ fn furnace_is_white_at_every_diffuse_depth() {
     }
 }
 
-/// A sphere of albedo rho around a light of intensity I, seen from inside: every bounce adds rho times
-/// the radiance of the one before, which is rho I / (pi R^2).
+/// Checks the inside of a sphere of albedo rho and radius R around a light of intensity I. Every
+/// bounce adds rho times the radiance of the one before. The first radiance is rho I / (pi R^2).
 #[test]
 fn sphere_from_inside_is_a_geometric_series() {
     let (rho, radius, intensity) = (0.6, 2.0, 3.0);
@@ -115,8 +115,9 @@ fn sphere_from_inside_is_a_geometric_series() {
     }
 }
 
-/// A floor beside a wall that is lit alone: the form factor between a point of the floor and the wall is
-/// known. The wall is 1 high and infinitely wide, with the radiosity of a directional light.
+/// Checks a floor beside a wall; only the wall is lit. The form factor between a point of the floor
+/// and the wall is known. The wall is 1 high and infinitely wide, with the radiosity of a
+/// directional light.
 #[test]
 fn light_of_a_wall_falls_on_the_floor_by_its_form_factor() {
     let rho = 0.5;

@@ -1,4 +1,4 @@
-//! Directions of every length that a file can hold render the same picture.
+//! Lengths of directions: a direction of any length that a file can contain gives the same picture.
 
 use crate::common::tables::{keys, scene, table, value_at};
 use crate::support::{parsed, rendered};
@@ -8,7 +8,7 @@ use zerkalo::scene::{FIELDS, Scene};
 use zerkalo::value::{Field, ValueType};
 use zerkalo::world::Precision;
 
-/// Scene with a value for every key that takes a direction.
+/// Scene that sets every key whose value is a direction.
 const TEXT: &str = "
     film.size = [24, 18]
     [camera]
@@ -35,8 +35,8 @@ const TEXT: &str = "
     transform = [{ rotate = { axis = [0.5, 1.0, 0.25], degrees = 30.0 } }]
 ";
 
-/// Collects the names of all keys that take a direction. Compound shapes hold shapes again: two
-/// levels are enough.
+/// Collects the names of all keys whose value is a direction. Compounds contain shapes again; two
+/// levels are searched.
 fn directions(fields: &[Field], depth: usize, out: &mut BTreeSet<&'static str>) {
     for field in fields.iter().filter(|_| depth < 8) {
         match field.takes {
@@ -53,7 +53,7 @@ fn directions(fields: &[Field], depth: usize, out: &mut BTreeSet<&'static str>) 
     }
 }
 
-/// Returns the scene with each of its directions `factor` times as long.
+/// Returns the scene with each of its directions multiplied by `factor`.
 fn stretched(base: &Scene, factor: f64) -> Scene {
     let mut changed = table(base);
     let mut stretched_keys = BTreeSet::new();

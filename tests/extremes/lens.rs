@@ -1,5 +1,5 @@
-//! Thin lens: circles of confusion against their closed form, lenses of no size and of the size of
-//! the room.
+//! Thin lens: circles of confusion against their closed form, and lenses of zero size and of the
+//! size of the room.
 
 use crate::support::{begin_with, picture, pool, rendered, shipped, sized, uniform};
 use std::f64::consts::PI;
@@ -9,14 +9,15 @@ use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::Precision;
 
-/// Two-sided z of the closed forms: a false alarm in 1 of 1,000 runs of all comparisons below, some
-/// 4,000 pixels.
+/// Largest deviation from a closed form, in standard errors. All comparisons below, some 4,000
+/// pixels, give a false alarm in 1 of 1,000 runs.
 const MAX_Z: f64 = 5.3;
 
-/// Picture of the edge of a white half-plane.
+/// Width and height of the picture of the edge of a white half-plane, in pixels.
 const EDGE: [u32; 2] = [96, 4];
 
-/// A white half-plane x < 0 at `depth` before a black background. The focus is at `focus`.
+/// Returns the scene of a white half-plane x < 0 at `depth` in front of a black background. The
+/// lens has the radius `radius` and is focused at the distance `focus`.
 fn edge(depth: f64, radius: f64, focus: f64) -> Scene {
     Scene::parse(
         &format!(
@@ -36,14 +37,14 @@ fn edge(depth: f64, radius: f64, focus: f64) -> Scene {
     .unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Share of a unit disk on the side x < t of a line.
+/// Returns the share of a unit disk on the side x < `t` of a line.
 fn disk_share(t: f64) -> f64 {
     let t = t.clamp(-1.0, 1.0);
     0.5 + (t * (1.0 - t * t).sqrt() + t.asin()) / PI
 }
 
-/// Expected radiance of each column: the share of the circle of confusion that is on the half-plane.
-/// The circle has the radius r |1 - z / f| at the depth z.
+/// Returns the expected radiance of each column: the share of the circle of confusion that is on
+/// the half-plane. At the depth z the circle has the radius r |1 - z / f|.
 fn profile(depth: f64, radius: f64, focus: f64) -> Vec<f64> {
     let confusion = radius * (1.0 - depth / focus).abs();
     let pixel = 2.0 * 20f64.to_radians().tan() / f64::from(EDGE[0]);
@@ -55,8 +56,9 @@ fn profile(depth: f64, radius: f64, focus: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Returns the largest z of a pixel with independent random numbers, and the root mean squares of
-/// the errors with these and with Sobol points. `expected` is the radiance of each column.
+/// Compares a picture with `expected`, the radiance of each column. Returns the largest deviation
+/// of a pixel with independent random numbers, in standard errors, and two root mean square errors:
+/// with these numbers and with Sobol points.
 fn compare(scene: &Scene, expected: &[f64], precision: Precision) -> (f64, [f64; 2]) {
     const SAMPLES: u32 = 1024;
     let mut worst = 0.0f64;
@@ -103,7 +105,7 @@ fn circle_of_confusion_matches_its_closed_form() {
     }
 }
 
-/// A scene without random numbers, apart from the lens.
+/// Returns the scene without random numbers other than those of the lens.
 fn sharp(mut scene: Scene) -> Scene {
     scene.film.filter = Filter::Point;
     for material in scene.materials.values_mut() {
@@ -150,8 +152,8 @@ fn pixels_bytes(scene: &Scene) -> Vec<u8> {
     rendered(scene, 1, Precision::Auto, 2).film.bytes()
 }
 
-/// Lenses as large as the room and larger, focused anywhere: every sample is finite, and what the
-/// lens sees is no brighter than the brightest object.
+/// Checks lenses as large as the room and larger, focused anywhere. Every sample is finite, and no
+/// brighter than the brightest object.
 #[test]
 fn huge_aperture_gives_finite_samples() {
     for name in ["mirror-room.toml", "mirror-room-physical.toml", "glass.toml", "torus.toml"] {

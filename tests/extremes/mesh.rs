@@ -14,9 +14,9 @@ use zerkalo::primitive::{Aggregate, Form, MeshForm};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options};
 
-/// Returns an icosahedron around the origin with each triangle cut in four `times` times, its
-/// corners on the ellipsoid with the half-axes `axes`; and `true` if `auto` traces a scene of it in
-/// double precision.
+/// Returns an icosahedron around the origin, each triangle of which is divided into four, `times`
+/// times. The corners are on the ellipsoid with the half-axes `axes`. The second value is `true` if
+/// `auto` traces a scene of the mesh in double precision.
 fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
     let golden = 0.5 * (1.0 + 5f64.sqrt());
     let mut corners = Vec::new();
@@ -76,8 +76,8 @@ fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
     (Assets::default().mesh(&path).unwrap(), double)
 }
 
-/// Returns the number of `rays` rays that miss the mesh, counted by closest hits and by occlusion.
-/// Rays start inside the mesh and point to its corners, its edges and into its triangles.
+/// Returns the number of rays that miss the mesh, by closest hit or by occlusion. `rays` rays start
+/// inside of the mesh and point to its corners, its edges and into its triangles.
 fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: usize) -> usize {
     const BLOCK: usize = 1 << 14;
     let form = Form::Mesh(MeshForm { mesh: mesh.clone(), scene_from_mesh: place, smooth: false });
@@ -113,9 +113,9 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
     (0..rays.div_ceil(BLOCK)).into_par_iter().map(block).sum()
 }
 
-/// Checks fine and coarse meshes, one turned and far from the origin for its size, a needle of 1e-6
-/// and a sheet of 1e-6, whose triangles are slivers. Single precision resolves the inside of a
-/// sliver to a tenth of its thickness and loses one ray in a million there; `auto` takes double.
+/// Checks fine and coarse meshes: one far from the origin for its size, a needle and a sheet of
+/// 1e-6, whose triangles are slivers. Single precision resolves the inside of a sliver to a tenth
+/// of its thickness and loses one ray in a million there; `auto` selects double.
 fn check(rays: usize) {
     let turned = DAffine3::from_scale_rotation_translation(
         DVec3::splat(3.7),
@@ -150,7 +150,7 @@ fn check(rays: usize) {
     );
 }
 
-/// Two million rays, each traced by closest hit and by occlusion. The ignored test below traces ten
+/// Checks two million rays, each by closest hit and by occlusion. The ignored test below checks ten
 /// times as many.
 #[test]
 fn extreme_14_mesh_watertight() {

@@ -8,8 +8,8 @@ use std::path::Path;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Surface on which the lamp at (0, 3, 0) lies, and the distance from the axis beyond which the
-/// lamp lights points at y = 4.
+/// Surfaces on which the lamp at (0, 3, 0) lies. The second value is the distance from the axis
+/// beyond which the lamp lights points at y = 4.
 const CEILINGS: [(&str, f64); 9] = [
     ("platform = { center = [0, 3, 0], size = [4, 4] }", 0.0),
     ("plane = { point = [0, 3, 0], normal = [0, -1, 0] }", 0.0),
@@ -26,12 +26,12 @@ const CEILINGS: [(&str, f64); 9] = [
     ),
 ];
 
-/// OBJ text of a box from -3 to 3, and from 3 to 3.2 upwards.
+/// OBJ text of a box that extends from -3 to 3 in x and z, and from 3 to 3.2 in y.
 const SLAB: &str = "v -3 3 -3\nv 3 3 -3\nv 3 3.2 -3\nv -3 3.2 -3\nv -3 3 3\nv 3 3 3\nv 3 3.2 3\nv -3 3.2 3\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
 
-/// Returns points and normals of a room's floor and of a wall that reaches up to the ceiling, and
-/// of a board above.
+/// Returns two lists of points and normals that receive light. The first is on a room's floor and a
+/// wall that reaches up to the ceiling, the second on a board above the ceiling.
 fn receivers(numbers: &mut Numbers, count: usize) -> [Vec<(DVec3, DVec3)>; 2] {
     let mut below = Vec::new();
     let mut above = Vec::new();
@@ -112,7 +112,8 @@ fn check(ceiling: &str, open: f64, place: &DAffine3, folder: &Path, precision: P
     }
 }
 
-/// Exactly those receivers are lit that a lamp slightly off the surface would light.
+/// Checks that a lamp on a surface lights exactly those points that a lamp slightly off the surface
+/// would light.
 #[test]
 fn lamp_on_surface_lights_like_lamp_just_off_it() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,6 +1,6 @@
 //! Choice of precision by `auto`: double where errors of single precision would be visible, single
-//! elsewhere. In each family of scenes one proportion shrinks; the error of single precision is
-//! measured as the RMSE against double precision with the same samples, in 8-bit levels.
+//! elsewhere. In each family of scenes one proportion shrinks. The error of single precision is the
+//! RMSE against double precision with the same samples, in 8-bit levels.
 
 use crate::common::report::report;
 use crate::support::{all_shipped, parsed, picture, rendered, shipped, sized};
@@ -9,21 +9,21 @@ use zerkalo::film::{Display, Replicates};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
-const SIZE: [u32; 2] = [48, 36];
-/// Samples enough that paths diverted by rounding, equally often to either side, add no visible
-/// noise.
+const SIZE: [u32; 2] = [32, 24];
+/// Samples per pixel in each replicate (half of the samples). Rounding diverts some paths, equally
+/// often to either side; with this number of samples they add no visible noise.
 const SAMPLES: u32 = 128;
 
-/// Largest error of single precision where `auto` takes it: a quarter of the noise at which
-/// pictures count as converged by default.
+/// Largest error of single precision in scenes for which `auto` selects it, in 8-bit levels: a
+/// quarter of the noise at which pictures by default count as converged.
 const INVISIBLE: f64 = 0.125;
 
 fn takes_single(scene: &Scene) -> bool {
     matches!(AnyWorld::compile(scene, &Options::default()), AnyWorld::Single(_))
 }
 
-/// Returns the RMSE of single precision against double precision [8-bit levels]. Each replicate has
-/// `samples` samples per pixel.
+/// Returns the RMSE of single precision against double precision in 8-bit levels. Each replicate
+/// (half of the samples) has `samples` samples per pixel.
 fn error(scene: &Scene, samples: u32) -> f64 {
     let display = Display::default();
     let levels_of_picture = |precision| -> Vec<f64> {
@@ -37,14 +37,14 @@ fn error(scene: &Scene, samples: u32) -> f64 {
     (sum / single.len() as f64).sqrt()
 }
 
-/// Family of scenes over one proportion.
+/// Family of scenes that differ in one proportion.
 struct Family {
     name: &'static str,
-    /// Returns the scene text for a proportion, from 1/4 down.
+    /// Function that returns the scene text for a proportion, which is at most 1/4.
     text: fn(f64) -> String,
-    /// Smallest proportion tested.
+    /// Smallest tested proportion of the family.
     least: f64,
-    /// Least error of single precision at that proportion [8-bit levels].
+    /// Smallest error of single precision at the smallest proportion, in 8-bit levels.
     visible: f64,
 }
 
@@ -62,7 +62,7 @@ const FLOOR: &str = "[materials.floor]\ncolor = [0.6, 0.55, 0.5]\n[[object]]\n\
 const RED: &str = "[materials.red]\ncolor = [0.8, 0.2, 0.1]\n\
     specular = 0.5\nexponent = 80.0\nreflection = 0.3\n";
 
-/// Returns a ball of radius `r` on a large floor, seen from close.
+/// Returns the scene of a ball of radius `r` on a large floor, seen from close.
 fn small_ball(r: f64) -> String {
     camera([2.0 * r, 2.5 * r, 5.0 * r], [0.0, r, 0.0], 40.0)
         + SUN
@@ -74,7 +74,7 @@ fn small_ball(r: f64) -> String {
         )
 }
 
-/// Returns a sheet of thickness `t` lying on the floor, seen from close to its edge.
+/// Returns the scene of a sheet of thickness `t` on the floor, seen from close to its edge.
 fn thin_slab(t: f64) -> String {
     camera([-4.0 * t, 3.0 * t, 6.0 * t], [0.0, 0.5 * t, 0.0], 40.0)
         + SUN
@@ -87,7 +87,7 @@ fn thin_slab(t: f64) -> String {
         )
 }
 
-/// Returns a pane of glass at the height `g` above the floor.
+/// Returns the scene of a pane of glass at the height `g` above the floor.
 fn narrow_gap(g: f64) -> String {
     camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0)
         + SUN
@@ -100,7 +100,7 @@ fn narrow_gap(g: f64) -> String {
         )
 }
 
-/// Returns a hollow ball with a wall of thickness `t` and a lamp inside.
+/// Returns the scene of a hollow ball with a wall of thickness `t` and a lamp inside.
 fn thin_shell(t: f64) -> String {
     camera([1.0, 2.5, 4.0], [0.0, 0.6, 0.0], 40.0)
         + "[[light]]\npoint = { position = [0.1, 1.1, 0.1] }\n"
@@ -113,7 +113,8 @@ fn thin_shell(t: f64) -> String {
         )
 }
 
-/// Returns a lamp at the height `h` above the floor, bright enough for the floor to be visible.
+/// Returns the scene of a lamp at the height `h` above the floor, bright enough for the floor to be
+/// visible.
 fn low_lamp(h: f64) -> String {
     camera([0.6, 2.0, 4.0], [0.0, 0.0, 0.0], 40.0)
         + FLOOR
@@ -123,7 +124,7 @@ fn low_lamp(h: f64) -> String {
         )
 }
 
-/// Returns a narrow view, 40 degrees times `a`, of the edges of objects.
+/// Returns a scene with a narrow view, 40 degrees times `a`, of the edges of objects.
 fn narrow_view(a: f64) -> String {
     camera([0.6, 1.4, 4.5], [0.4, 0.8, 0.1], 40.0 * a)
         + SUN
@@ -132,7 +133,8 @@ fn narrow_view(a: f64) -> String {
         + "[[object]]\nmaterial = \"red\"\nshape.cube = { corner = [-0.4, 0.0, 0.1], edge = 0.8 }\n"
 }
 
-/// Returns an eye at the height `h` above the floor, in front of the shadow of a far pole.
+/// Returns the scene of an eye at the height `h` above the floor, in front of the shadow of a far
+/// pole.
 fn low_eye(h: f64) -> String {
     camera([0.3, h, 0.2], [0.3 - 4.0 * h, 0.0, 0.2 - 3.0 * h], 40.0)
         + &format!("[[light]]\npoint = {{ position = [3.0, 4.0, {:?}] }}\n", 0.2 - 3.0 * h)
@@ -143,7 +145,7 @@ fn low_eye(h: f64) -> String {
         )
 }
 
-/// Returns a ball on a ground ball of radius 1 / `p`.
+/// Returns the scene of a ball on a ground ball of radius 1 / `p`.
 fn round_ground(p: f64) -> String {
     let r = 1.0 / p;
     camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0)
@@ -157,7 +159,7 @@ fn round_ground(p: f64) -> String {
         )
 }
 
-/// Returns a bare ground ball of radius 1 / `p`, seen from eye height.
+/// Returns the scene of a bare ground ball of radius 1 / `p`, seen from eye height.
 fn bare_round_ground(p: f64) -> String {
     let r = 1.0 / p;
     camera([0.0, 1.7, 0.0], [0.0, 1.2, -5.0], 40.0)
@@ -168,7 +170,7 @@ fn bare_round_ground(p: f64) -> String {
         )
 }
 
-/// Returns two balls at the distance 1 / `p`, seen from near one of them.
+/// Returns the scene of two balls at the distance 1 / `p`, seen from near one of them.
 fn far_apart(p: f64) -> String {
     camera([0.6, 1.4, 4.5], [0.0, 0.3, -0.5], 40.0)
         + SUN
@@ -196,8 +198,9 @@ const FAMILIES: [Family; 10] = [
     Family { name: "two balls far apart", text: far_apart, least: 1e-7, visible: 1.0 },
 ];
 
-/// Along each family `auto` takes single precision first, then double. Where it takes single the
-/// error is invisible; at the smallest proportion it would be visible.
+/// Checks that `auto` selects single precision first, then double, as the proportion of a family
+/// shrinks. Where it selects single, the error is invisible. At the smallest proportion the error
+/// of single precision would be visible.
 #[test]
 fn auto_takes_double_where_single_would_show() {
     let mut wrong = Vec::new();
@@ -235,7 +238,8 @@ fn auto_takes_double_where_single_would_show() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Size and place of the whole scene do not matter: only proportions count.
+/// Checks that size and place of the whole scene have no effect on the choice of precision, only
+/// proportions.
 #[test]
 fn auto_takes_single_where_proportions_are_harmless() {
     let scene_text = |place: f64, size: f64| {
@@ -272,8 +276,9 @@ fn auto_takes_single_where_proportions_are_harmless() {
     assert!(takes_single(&two_balls(40.0)) && !takes_single(&two_balls(0.4)));
 }
 
-/// Scenes with the numbered extremes. `auto` takes double precision for those beyond single
-/// precision and single for the others. One shipped scene represents many.
+/// Checks the choice of precision for scenes with the numbered extremes. `auto` selects double
+/// precision for those beyond single precision, single for the others. One shipped scene represents
+/// many.
 #[test]
 fn auto_takes_double_for_the_extremes_beyond_single() {
     let scene_from = |eye: [f64; 3], degrees: f64, shape: &str| {
@@ -349,8 +354,9 @@ fn auto_takes_double_for_the_extremes_beyond_single() {
     }
 }
 
-/// The box around a cylinder, a cone, an ellipsoid or a mesh holds points close to its surface and
-/// points far from it.
+/// Checks eyes inside of the bounding box of a cylinder, a cone, an ellipsoid or a mesh. The box
+/// contains points close to the surface and points far from it, with different choices of
+/// precision.
 #[test]
 fn eye_inside_a_box_of_a_round_solid_decides_by_its_distance_from_the_surface() {
     let scene = |shape: &str, eye: [f64; 3]| {
@@ -375,7 +381,7 @@ fn eye_inside_a_box_of_a_round_solid_decides_by_its_distance_from_the_surface() 
     }
 }
 
-/// Shipped scenes are traced in single precision, without visible error.
+/// Checks that shipped scenes are traced in single precision, without visible error.
 #[test]
 fn shipped_scenes_stay_in_single_precision() {
     // Rounding makes some paths in glass and between mirrors end elsewhere. That is noise, not

@@ -1,5 +1,5 @@
-//! Scenes scaled by a millionth or a million, or moved by ten million units, render the same
-//! picture.
+//! Scenes that are scaled by a millionth or a million, or moved by ten million units, against the
+//! original scene: the pictures are equal.
 
 use crate::support::{picture, rendered, shipped, sized};
 use glam::DVec3;
@@ -11,8 +11,8 @@ use zerkalo::world::Precision;
 const SIZE: [u32; 2] = [64, 48];
 const SAMPLES: u32 = 16;
 
-/// One scene of each family: cone lobes, Beckmann lobes with light that falls off, glass,
-/// compounds, meshes.
+/// Files of scenes, one of each family: cone lobes, Beckmann lobes with light that falls off,
+/// glass, compounds, meshes.
 const SCENES: [&str; 5] = [
     "mirror-room.toml",
     "mirror-room-physical.toml",
@@ -48,8 +48,8 @@ fn changed(mut scene: Scene, s: f64, by: DVec3) -> Scene {
     scene
 }
 
-/// Returns the root mean square difference of two pictures with equal samples, in 8-bit levels,
-/// without the `left_out` pixels that differ most.
+/// Returns the root mean square difference of two scenes' pictures with equal samples, in 8-bit
+/// levels. The `left_out` pixels that differ most are left out.
 fn rms_difference(a: &Scene, b: &Scene, precision: Precision, left_out: usize) -> f64 {
     let display = Display::default();
     let levels_of_picture = |scene: &Scene| -> Vec<[f64; 3]> {
@@ -69,8 +69,9 @@ fn rms_difference(a: &Scene, b: &Scene, precision: Precision, left_out: usize) -
     (most.iter().sum::<f64>() / (3 * a.len()) as f64).sqrt()
 }
 
-/// Checks all scenes under one change. `limits` are 8-bit levels in double precision and with
-/// `auto`; `flipped` is the number of pixels in which a path with `auto` may differ.
+/// Checks all scenes, scaled by `s` and moved by `by`. `limits` are the largest differences in
+/// 8-bit levels, in double precision and with `auto`. `flipped` is the number of pixels in which a
+/// path with `auto` may differ.
 fn check(name: &str, s: f64, by: DVec3, limits: [f64; 2], flipped: usize) {
     for file in SCENES {
         let scene = sized(shipped(file), SIZE);
@@ -84,7 +85,8 @@ fn check(name: &str, s: f64, by: DVec3, limits: [f64; 2], flipped: usize) {
     }
 }
 
-/// Scaling by a power of two changes no bit; scaling by a power of ten changes roundings.
+/// Checks scenes of other sizes. Scaling by a power of two changes no bit; scaling by a power of
+/// ten changes roundings.
 #[test]
 fn scaled_scenes_give_the_same_picture() {
     for exponent in [-6, -3, 3, 6] {
@@ -94,14 +96,16 @@ fn scaled_scenes_give_the_same_picture() {
     check("scaled by 2^20", 1_048_576.0, DVec3::ZERO, [0.0; 2], 0);
 }
 
-/// Pixels of 3,072 in which a path in single precision may pass the other side of an edge.
+/// Number of pixels, of 3,072, in which a path in single precision may pass the other side of an
+/// edge.
 const FLIPPED: usize = 2;
 
-/// Largest RMSE from rounding with equal samples, in 8-bit levels, in double precision and with
+/// Largest RMSE by rounding with equal samples, in 8-bit levels: in double precision and with
 /// `auto`. Measured are 3e-7, and 5e-5 in single precision.
 const DOUBLE_AUTO: [f64; 2] = [1e-6, 2e-4];
 
-/// Numbers in a scene file shifted by ten million units are rounded to 2e-9.
+/// Checks moved scenes. Numbers in a scene file that are moved by ten million units are rounded to
+/// 2e-9.
 #[test]
 fn shifted_scenes_give_the_same_picture() {
     let aside = DVec3::new(1.0, -0.7, 0.3);

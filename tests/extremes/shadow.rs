@@ -115,7 +115,8 @@ impl ConvexShape {
     }
 }
 
-/// Counts points of a convex shape that its own surface hides from the light.
+/// Returns the number of points of a convex shape that its own surface hides from the light by
+/// error.
 fn falsely_dark(
     shape: ConvexShape,
     scale: f64,
@@ -193,7 +194,7 @@ fn check_self_shadow(precision: Precision, place: DVec3, scales: &[f64], points:
     }
 }
 
-/// Traces 392 settings of 8000 points.
+/// Checks self-shadowing in 392 settings of 8000 points each.
 #[test]
 fn extreme_15_self_shadow() {
     check_self_shadow(Precision::Double, DVec3::ZERO, &SCALES, 8000);
@@ -202,8 +203,9 @@ fn extreme_15_self_shadow() {
     report(15, "both", &format!("0 falsely dark of {point_count} points"));
 }
 
-/// Numbers in a scene file a million units from the origin are rounded to 1e-10: shapes are as
-/// small as 1e-4. Recentring keeps single precision as good there as at the origin.
+/// Checks self-shadowing a million units from the origin. Numbers in the scene file are rounded to
+/// 1e-10 there, and shapes are as small as 1e-4. Compilation moves the scene to the origin, so that
+/// single precision is as good as there.
 #[test]
 fn extreme_15_self_shadow_far_from_the_origin() {
     let place = DVec3::new(1e6, -1e6, 1e6);
@@ -213,8 +215,8 @@ fn extreme_15_self_shadow_far_from_the_origin() {
     report(15, "both", &format!("a million units off 0 of {point_count}"));
 }
 
-/// Checks a box that hovers a millionth of its size above the ground: the ground under it is dark
-/// except for the strip that slanting light reaches, as wide as the gap.
+/// Checks the shadow of a box that hovers a millionth of its size above the ground. The ground
+/// under it is dark, except for the strip that slanting light reaches, as wide as the gap.
 fn check_gap(scale: f64, precision: Precision) {
     let gap = 1e-6 * scale;
     let scene = scene(&format!(

@@ -1,4 +1,5 @@
-//! Convergence rate: the slope of the error against the number of samples, in scenes made for it.
+//! Convergence rate: the slope of the error against the number of samples, both logarithmic, in
+//! scenes made for this test.
 
 use crate::support::{begin_with, pool, shipped, sized, uniform};
 use zerkalo::camera::Aperture;
@@ -9,10 +10,11 @@ use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
 const SIZE: [u32; 2] = [24, 16];
-/// Samples per pixel, both replicates together.
+/// Samples per pixel of the first point, over both replicates (halves of the samples).
 const FIRST: u32 = 64;
 const LAST: u32 = 2048;
-/// Samples of the reference over those of the last point.
+/// Number of samples of the reference picture, divided by that of the picture with the most
+/// samples.
 const REFERENCE: u32 = 64;
 
 /// Returns the slope of log RMSE against log samples, over several pictures with different seeds.
@@ -41,7 +43,7 @@ fn slope(scene: &Scene, kind: SamplerKind, reference: &Reference) -> Slope {
     slope
 }
 
-/// Returns the slopes with Sobol points and with random numbers.
+/// Returns the slopes of the error of `scene` with Sobol points and with random numbers.
 fn slopes(name: &str, scene: &Scene) -> [Slope; 2] {
     let settings = SampleSettings { seed: 77, kind: SamplerKind::Sobol };
     let mut best = begin_with(scene, settings, Precision::Auto);
@@ -63,13 +65,14 @@ fn check_scene(name: &str, scene: &Scene, at_most: f64) {
     assert!((random.value + 0.5).abs() <= error, "{name}, random: {random:?}");
 }
 
-/// Samples have two dimensions: the direction in the lobe.
+/// Checks the convergence of samples with two dimensions: the direction in the lobe.
 #[test]
 fn lobe_error_converges_like_two_dimensions() {
     check("slope-lobe.toml", -0.70);
 }
 
-/// Samples have four dimensions: the positions in the pixel and on the lens.
+/// Checks the convergence of samples with four dimensions: the positions in the pixel and on the
+/// lens.
 #[test]
 fn lens_error_converges_like_four_dimensions() {
     let mut scene = sized(shipped("slope-aa.toml"), SIZE);
@@ -78,10 +81,10 @@ fn lens_error_converges_like_four_dimensions() {
     check_scene("slope-aa.toml through a lens", &scene, -0.58);
 }
 
-/// Samples have six dimensions: the position in the pixel, the direction in the lobe, and the point
-/// of the light. The error falls in steps, because the points fill these dimensions at some powers of
-/// two and not at others. With 24 seeds in place of 6 the slope is -0.733 +- 0.045: the standard error
-/// is that of the steps, so that the slope alone is compared.
+/// Checks the convergence of samples with six dimensions: the position in the pixel, the direction
+/// in the lobe, and the point of the light. The error falls in steps, because the points fill these
+/// dimensions at some powers of two and not at others. With 24 seeds in place of 6 the slope is
+/// -0.733 +- 0.045. The standard error is that of the steps; the slope alone is therefore compared.
 #[test]
 fn light_error_through_a_rough_mirror_converges_like_smooth_dimensions() {
     let [sobol, random] = slopes("slope-light.toml", &sized(shipped("slope-light.toml"), SIZE));
@@ -89,7 +92,8 @@ fn light_error_through_a_rough_mirror_converges_like_smooth_dimensions() {
     assert!((random.value + 0.5).abs() <= 3.0 * random.standard_error, "{random:?}");
 }
 
-/// Samples have four dimensions: the position in the pixel and the direction in the lobe.
+/// Checks the convergence of samples with four dimensions: the position in the pixel and the
+/// direction in the lobe.
 #[test]
 fn lobe_error_with_anti_aliasing_converges_like_four_dimensions() {
     check("slope-aa.toml", -0.58);

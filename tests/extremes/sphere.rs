@@ -10,7 +10,7 @@ use zerkalo::lanes::{Double, SimdFloat, Single, Vec3};
 use zerkalo::primitive::{Aggregate, Form, SphereForm};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
-/// An unevaluated sum of two doubles: about 106 bits (Dekker 1971, Knuth).
+/// Unevaluated sum of two doubles, with about 106 bits (Dekker 1971, Knuth).
 #[derive(Clone, Copy)]
 struct Dd(f64, f64);
 
@@ -46,8 +46,9 @@ fn dot(a: [Dd; 3], b: [Dd; 3]) -> Dd {
     a[0].times(b[0]).plus(a[1].times(b[1])).plus(a[2].times(b[2]))
 }
 
-/// Returns the signed distance of the line beyond the sphere's limb, and the nearer hit point
-/// relative to the centre (not finite for a miss), computed exactly for these numbers.
+/// Returns two values, computed exactly for the given numbers: the signed distance of the line
+/// beyond the sphere's limb, and the nearer hit point relative to the centre. The hit point is not
+/// finite for a miss.
 fn exact((origin, d): Line, center: DVec3, radius: f64) -> (f64, DVec3) {
     let f: [Dd; 3] = std::array::from_fn(|i| Dd::sum(origin[i], -center[i]));
     let d: [Dd; 3] = std::array::from_fn(|i| Dd(d[i], 0.0));
@@ -184,10 +185,10 @@ fn extreme_02_sphere_as_ground() {
     report(2, "single", LEFT_TO_DOUBLE);
 }
 
-/// Checks the share of rays that hit the sphere, among rays through points of the square around the
-/// image of `center` on z = -1, against pi r^2 sqrt(D^2 - r^2) / (c_z^2 - r^2)^(3/2); and each ray
-/// against the exact mask (v.c)^2 >= (c^2 - r^2) v^2. Returns the measured share over the expected
-/// one.
+/// Checks rays through points of the square around the image of `center` on z = -1. The share that
+/// hits the sphere is pi r^2 sqrt(D^2 - r^2) / (c_z^2 - r^2)^(3/2) over the area. Each ray agrees
+/// with the exact mask (v.c)^2 >= (c^2 - r^2) v^2. Returns the measured share, divided by the
+/// expected one.
 fn check_silhouette(center: DVec3, radius: f64, rays: usize, seed: u64) -> f64 {
     let geometry = Aggregate::<Double>::new(&[Form::Sphere(SphereForm { center, radius })]);
     let distance = center.length();
@@ -245,7 +246,8 @@ fn closed_form_10_silhouettes() {
     }
 }
 
-/// The mask of a whole picture through the compiled camera is exact.
+/// Checks the mask of a sphere's whole picture, through the compiled camera, against the exact
+/// mask.
 #[test]
 fn closed_form_10_every_pixel_of_a_sphere() {
     let camera = Camera {
@@ -283,13 +285,13 @@ fn closed_form_10_every_pixel_of_a_sphere() {
     assert!((5_000..30_000).contains(&covered), "{covered} pixels covered");
 }
 
-/// Returns the longest chord of a tangent. A line 8 away is rounded to 4 x 8 roundings across; a
-/// line as much below the surface has this chord.
+/// Returns the longest chord that rounding can give a tangent. A line at distance 8 is rounded to 4
+/// x 8 roundings across its direction. A line as much below the surface has this chord.
 fn longest_touch<L: SimdFloat>() -> f64 {
     2.0 * (2.0 * 32.0 * L::EPSILON).sqrt()
 }
 
-/// Checks tangents: each misses or has a chord no longer than rounding makes it.
+/// Checks tangents: each misses, or has a chord no longer than rounding explains.
 fn check_tangents<L: SimdFloat>() {
     let mut numbers = Numbers::new(5);
     let (limit, mut longest) = (longest_touch::<L>(), 0f64);

@@ -16,7 +16,8 @@ fn closest_hits<L: SimdFloat>(form: &Form, lines: &[Line]) -> Vec<Option<LineHit
     closest(&Aggregate::<L>::new(std::slice::from_ref(form)), lines)
 }
 
-/// Returns the distances of entry and exit, from a ray from each side.
+/// Returns the distances at which a line enters and leaves a solid, found by a ray from each of its
+/// ends.
 fn ends(form: &Form, (p, d): Line, far: f64) -> Option<(f64, f64)> {
     let hits = closest_hits::<Double>(form, &[(p - d * far, d), (p + d * far, -d)]);
     Some((hits[0]?.t - far, far - hits[1]?.t))
@@ -38,8 +39,8 @@ fn lines(seed: u64, count: usize) -> Vec<Line> {
         .collect()
 }
 
-/// Returns the span of a line in the canonical solid by the plain quadratic formula; `None` if the
-/// line misses or grazes too closely for the formula.
+/// Returns the span of a line inside of the canonical solid, by the plain quadratic formula.
+/// Returns `None` if the line misses, or is too close to a tangent for the formula.
 fn quadratic_span(s: f64, (o, d): Line) -> Option<(f64, f64)> {
     let k = s - 1.0;
     let r = 1.0 + k * o.z;
@@ -79,7 +80,8 @@ fn frustum_spans_match_the_quadratic_formula() {
     }
 }
 
-/// The transition from cylinder to cone has no step where the quadratic changes its degree.
+/// Checks that the transition from cylinder to cone has no step where the quadratic changes its
+/// degree.
 #[test]
 fn extreme_11_tapered_cylinders() {
     let mut worst = 0f64;
@@ -107,7 +109,8 @@ fn extreme_11_tapered_cylinders() {
     report(11, "single", LEFT_TO_DOUBLE);
 }
 
-/// A tapered cylinder of equal radii is bit-equal to the cylinder, and one of radius 0 to the cone.
+/// Checks that a tapered cylinder of equal radii is bit-equal to the cylinder, and one of radius 0
+/// to the cone.
 #[test]
 fn extreme_11_untapered_solid_is_bit_equal_to_cylinder() {
     let (base, end) = ([0.1, -0.2, 0.3], [0.5, 0.9, -0.4]);
@@ -208,7 +211,7 @@ fn extreme_12_along_a_generator() {
     report(12, "single", "finite");
 }
 
-/// Checks tangents: hits are finite, and at most `limit` of a line is inside.
+/// Checks tangents: hits are finite, and at most the length `limit` of a line is inside.
 fn check_tangents<L: SimdFloat>(limit: f64) {
     let mut longest = 0.0f64;
     let mut numbers = Numbers::new(15);

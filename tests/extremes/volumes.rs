@@ -10,8 +10,8 @@ use zerkalo::lanes::Double;
 use zerkalo::primitive::{Form, PlaneForm};
 use zerkalo::shape::{Cylinder, ShapeDesc};
 
-/// Returns the volume of `form` in the cube from -`half` to `half`, and its standard error: from
-/// the chords of parallel lines, one in each cell of a lattice.
+/// Returns the volume of `form` in the cube from -`half` to `half`, and its standard error. They
+/// are computed from the chords of parallel lines, one in each cell of a lattice.
 fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
     let mut numbers = Numbers::new(seed);
     let side = 400;
@@ -38,7 +38,7 @@ fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
     (sum * area, squares.sqrt() * area)
 }
 
-/// Closed form 9: volumes of compounds.
+/// Checks the volumes of compounds (closed form 9).
 #[test]
 fn extreme_09_volumes() {
     let mut worst = 0f64;
@@ -124,7 +124,7 @@ fn extreme_09_volumes() {
     report(9, "double", &format!("volumes {worst:.1} sigma off at most"));
 }
 
-/// Inclusion and exclusion on every line: V(A or B) + V(A and B) = V(A) + V(B).
+/// Checks the inclusion-exclusion principle on every line: V(A or B) + V(A and B) = V(A) + V(B).
 #[test]
 fn extreme_09_inclusion_and_exclusion() {
     let solids = [

@@ -1,5 +1,5 @@
-//! Analytic shapes, independent of the program. Solids are implicit functions, negative inside; rectangles and
-//! triangles are intersected directly.
+//! Analytic shapes, independent of the program. Solids are implicit functions, negative inside.
+//! Rectangles and triangles are intersected directly.
 
 use crate::agreement::surfaces::map;
 use glam::{DAffine3, DVec3};
@@ -8,12 +8,12 @@ use zerkalo::shape::{CsgOperand, Shape};
 
 /// Implicit function: negative inside, zero on the surface, positive outside.
 pub type Inside = Box<dyn Fn(DVec3) -> f64 + Sync>;
-/// Distances of all hits of the ray with the given origin and direction.
+/// Function that returns the distances of all hits of the ray with the given origin and direction.
 pub type Crossings = Box<dyn Fn(DVec3, DVec3) -> Vec<f64> + Sync>;
 
 /// Analytic form of an object.
 pub enum AnalyticShape {
-    /// Implicit function, and its largest slope: infinity if that is unknown.
+    /// Solid: implicit function, and its largest slope; infinity if the slope is unknown.
     Solid(Inside, f64),
     Thin(Crossings),
 }
@@ -47,7 +47,8 @@ impl AnalyticShape {
     }
 }
 
-/// The rectangle of the points `center` + a `u` + b `v` with |a| <= 1, |b| <= 1; `u` and `v` are perpendicular.
+/// Returns the crossings of a rectangle: the points `center` + a `u` + b `v` with |a| <= 1, |b| <=
+/// 1; `u` and `v` are perpendicular.
 fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Crossings {
     let normal = u.cross(v);
     Box::new(move |origin, direction| {
@@ -58,7 +59,7 @@ fn rectangle(center: DVec3, u: DVec3, v: DVec3) -> Crossings {
     })
 }
 
-/// Triangles, intersected by solving origin + t direction = a + x (b - a) + y (c - a).
+/// Returns the crossings of triangles, by solving origin + t direction = a + x (b - a) + y (c - a).
 pub fn triangles(list: Vec<[DVec3; 3]>, scene_from_mesh: DAffine3) -> Crossings {
     let placed = move |t: &[DVec3; 3]| t.map(|corner| scene_from_mesh.transform_point3(corner));
     let list: Vec<[DVec3; 3]> = list.iter().map(placed).collect();
@@ -85,7 +86,7 @@ fn placed(inside: Inside, steps: &[TransformOp]) -> Inside {
     Box::new(move |p| inside(object_from_scene.transform_point3(p)))
 }
 
-/// The affine map of transform `steps`, applied in order.
+/// Returns the affine map of the transform steps `steps`, applied in order.
 pub fn placement(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |all, step| map(step) * all)
 }
@@ -158,7 +159,8 @@ fn parts(operands: &[CsgOperand]) -> Vec<Inside> {
     operands.iter().map(|part| placed(inside(&part.shape), &part.transform)).collect()
 }
 
-/// Inverse of a rotation about the vertical by `degrees`, counter-clockwise seen from above.
+/// Returns `p`, rotated back: the inverse of a rotation about the vertical by `degrees`,
+/// counter-clockwise as seen from above.
 fn unturned(p: DVec3, degrees: f64) -> DVec3 {
     let (sin, cos) = degrees.to_radians().sin_cos();
     // Seen from above x points right and z down.

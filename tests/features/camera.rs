@@ -1,4 +1,4 @@
-//! The camera's frame and navigation.
+//! Tests of the camera's frame and of navigation.
 
 use crate::agreement::compare::zoomed;
 use crate::features::first_hits::hits_agree;
@@ -13,16 +13,17 @@ fn target(camera: &Camera) -> DVec3 {
     DVec3::from(camera.target.expect("the camera has a target"))
 }
 
-/// Length of the chord that spans `degrees` of a circle.
+/// Returns the length of the chord that spans `degrees` of a circle.
 fn chord(radius: f64, degrees: f64) -> f64 {
     2.0 * radius * (degrees.to_radians() / 2.0).sin()
 }
 
-/// The camera after the named motion.
+/// Function that returns the camera after the motion with the given name.
 type Motion<'a> = &'a dyn Fn(&Camera, &str) -> Camera;
 
-/// Each motion has the right length and direction and keeps its invariants, and the picture shows the
-/// room from the new viewpoint. `moved` returns the camera after a named motion.
+/// Checks that each motion of the camera has the right length and direction and keeps its
+/// invariants, and that the picture shows the room from the new viewpoint. `moved` returns the
+/// camera after a named motion.
 fn moves_correctly(room: &Scene, moved: Motion) -> Verdict {
     // Camera coordinates are rounded new_eye about a millionth of the distance new_eye the target.
     let near = |quantity: &str, a: f64, b: f64| {
@@ -122,7 +123,7 @@ fn b3_camera_frame() {
     );
 }
 
-/// The picture of `tested` shows the discs of the lens and their images like that of `original`: the
+/// Checks that the picture of `tested` shows the circles of confusion like that of `original`: the
 /// bright bead on the right, and the ball in front of it.
 fn discs_agree(original: &Scene, tested: &Scene) -> Verdict {
     [[0.9, 1.5, -6.5], [0.7, 0.35, 2.3]].into_iter().try_for_each(|point| {

@@ -1,4 +1,4 @@
-//! Lights with a size, and many lights.
+//! Tests of lights with a size, and of many lights.
 
 use crate::emitters::setup::check;
 use crate::features::plain_tracer::agrees;
@@ -7,7 +7,8 @@ use crate::support::{parsed, shipped};
 use zerkalo::light::{Environment, Falloff, Light, LightUnit, Point};
 use zerkalo::scene::{RayTypes, Scene};
 
-/// Asserts that `file` agrees with the plain tracer, and none of its `mutations` does.
+/// Checks that the picture of `file` agrees with the reference tracer, and that the picture of none
+/// of its `mutations` does.
 fn alike(file: &str, mutations: &[(&str, Change)]) {
     let original = shipped(file);
     row(file, |tested| agrees(&original, tested, 128), mutations);

@@ -7,7 +7,7 @@ use zerkalo::primitive::Acceleration;
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
-/// Bytes of the film of `scene` with the given acceleration structure.
+/// Returns the bytes of the film of `scene` with the given acceleration structure.
 fn film(scene: &Scene, acceleration: Acceleration, precision: Precision) -> Vec<u8> {
     let mut scene = sized(scene.clone(), [100, 70]);
     scene.trace.acceleration = acceleration;
@@ -16,8 +16,8 @@ fn film(scene: &Scene, acceleration: Acceleration, precision: Precision) -> Vec<
     rendering.film.bytes()
 }
 
-/// The scene is compiled with object boxes, its objects are where their formulas say, and no acceleration
-/// structure changes a bit of the picture.
+/// Checks that the scene is compiled with bounding boxes of objects, that its objects are where
+/// their formulas say, and that no acceleration structure changes a bit of the picture.
 fn uses_object_boxes(original: &Scene, tested: &Scene) -> Verdict {
     let world = AnyWorld::compile(tested, &Options::default());
     let inventory = world.inventory().to_string();

@@ -9,24 +9,25 @@ use zerkalo::camera::{Camera, ViewAngle};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, FirstHit, Options, Precision};
 
-/// Raster of the comparison.
+/// Width and height in pixels of the compared pictures.
 pub const RASTER: [u32; 2] = [48, 36];
-/// Points at which shapes are evaluated along each ray.
+/// Number of points of each ray at which analytic shapes are evaluated.
 const STEPS: usize = 600;
-/// Relative error of depths, which are in single precision. Coordinates in the scenes are at most some hundred
-/// units.
+/// Largest relative error of depths, which are in single precision. Coordinates in the scenes are
+/// at most some hundred units.
 const TOLERANCE: f64 = 2e-6;
 
-/// A camera ray with unit direction.
+/// Camera ray with unit direction.
 #[derive(Clone, Copy)]
 pub struct PixelRay {
     pub origin: DVec3,
     pub direction: DVec3,
-    /// Cosine of the angle to the view direction.
+    /// Cosine of the angle between the ray and the view direction.
     cos: f64,
 }
 
-/// The camera ray through the point `x`, `y` of the raster, in pixels from its upper left corner.
+/// Returns the camera ray through the point `x`, `y` of the picture, in pixels from its upper left
+/// corner.
 pub fn pixel_ray(camera: &Camera, [width, height]: [u32; 2], [x, y]: [f64; 2]) -> PixelRay {
     let origin = DVec3::from(camera.eye);
     let ahead =
@@ -46,7 +47,7 @@ pub fn pixel_ray(camera: &Camera, [width, height]: [u32; 2], [x, y]: [f64; 2]) -
     PixelRay { origin, direction, cos: direction.dot(ahead) }
 }
 
-/// First hits of the program at the pixel centres, row by row.
+/// Returns the program's first hits at the pixel centres, row by row.
 pub fn first_hits(scene: &Scene) -> Vec<FirstHit> {
     let centers = centers(scene.film.size);
     let mut hits = vec![FirstHit::MISS; centers.len()];
@@ -56,7 +57,7 @@ pub fn first_hits(scene: &Scene) -> Vec<FirstHit> {
     hits
 }
 
-/// Pixel centres, row by row.
+/// Returns the pixel centres, row by row.
 pub fn centers([width, height]: [u32; 2]) -> Vec<[f64; 2]> {
     let row = |y| (0..width).map(move |x| [f64::from(x) + 0.5, f64::from(y) + 0.5]);
     (0..height).flat_map(row).collect()

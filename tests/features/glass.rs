@@ -1,4 +1,4 @@
-//! Rough transmission and absorption.
+//! Tests of rough transmission and absorption.
 
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{material, row};

@@ -1,4 +1,4 @@
-//! Materials, lights and shading formulas.
+//! Tests of materials, lights and shading formulas.
 
 use crate::features::first_hits::{RASTER, centers, first_hits, pixel_ray};
 use crate::features::plain_tracer::{agrees, agrees_exactly, without_chance};
@@ -11,13 +11,14 @@ use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Metal};
 use zerkalo::scene::{RayTypes, Scene};
 use zerkalo::value::Color;
 
-/// Asserts that `file` agrees exactly with the plain tracer, and none of its `mutations` does.
+/// Checks that the picture of `file` agrees exactly with the reference tracer, and that the picture
+/// of none of its `mutations` does.
 fn exact(file: &str, mutations: &[(&str, crate::features::row::Change)]) {
     let original = shipped(file);
     row(file, |tested| agrees_exactly(&original, tested), mutations);
 }
 
-/// `scene` with a camera for which the blurred ball fills the picture.
+/// Returns `scene` with a camera for which the blurred ball fills the picture.
 fn close_up(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.camera.target = Some([1.65, 0.5, 0.3]);
@@ -45,7 +46,8 @@ fn a7_material() {
     );
 }
 
-/// Each visible point of the floor has the sum of colour x intensity x cosine over the lamps that reach it.
+/// Checks that the radiance of each visible point of the floor is the sum of colour x intensity x
+/// cosine over the lamps that reach it.
 fn floor_is_lit(original: &Scene, tested: &Scene) -> Verdict {
     let original = sized(original.clone(), RASTER);
     let pixels = without_chance(tested);
@@ -189,7 +191,8 @@ fn b12_metals() {
     );
 }
 
-/// Radiance is the sum of the Phong part, k_r x reflected and k_t x transmitted radiance.
+/// Checks that radiance is the sum of the Phong part, k_r x reflected radiance, and k_t x
+/// transmitted radiance.
 #[test]
 fn a17_composition() {
     let weighted = |s: &mut Scene| {
@@ -228,7 +231,8 @@ fn a17_composition() {
     );
 }
 
-/// A camera ray that misses shows the background colour; a ball that reflects it shows k_r times that colour.
+/// Checks that a camera ray that misses shows the background colour, and a ball that reflects it
+/// k_r times that colour.
 fn background_is_seen(original: &Scene, tested: &Scene) -> Verdict {
     let original = sized(original.clone(), RASTER);
     let color = DVec3::from(original.background.color.0);
@@ -277,7 +281,7 @@ fn a18_background() {
     );
 }
 
-/// Ambient and directional light, alone and in the scene of the reflecting tracks.
+/// Checks ambient and directional light, alone and in the scene of the reflecting tracks.
 #[test]
 fn c3_what_the_tracks_lacked() {
     exact(
@@ -329,8 +333,8 @@ fn d2_spot_light() {
     );
 }
 
-/// `scene` with a point light in place of the panel, which the plain tracer does not have with diffuse
-/// bounces, and with a side that reflects, so that caustics light much of the room.
+/// Returns `scene` with a point light in place of the panel, which the reference tracer does not
+/// support with diffuse bounces. One side of the room reflects, so that caustics light much of it.
 fn with_point_light(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     material(&mut scene, "green").reflection = 0.8;

@@ -1,4 +1,4 @@
-//! Mirrors and blurred reflection.
+//! Tests of mirrors and blurred reflection.
 
 use crate::features::first_hits::{RASTER, centers, first_hits, pixel_ray};
 use crate::features::plain_tracer::{agrees, without_chance};
@@ -12,7 +12,8 @@ use zerkalo::scene::{Filter, Scale, Scene, TransformOp};
 use zerkalo::shape::Shape;
 use zerkalo::world::Precision;
 
-/// `scene` with the mirror as its only reflecting material, without ambient and diffuse parts.
+/// Returns `scene` with the mirror as its only reflecting material, without ambient and diffuse
+/// parts.
 fn stripped(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     for (name, m) in &mut scene.materials {
@@ -25,7 +26,7 @@ fn stripped(scene: &Scene) -> Scene {
     scene
 }
 
-/// `scene` without the mirror and mirrored at its plane, z = -2.
+/// Returns `scene` without the mirror, mirrored at its plane z = -2.
 fn mirrored_scene(scene: &Scene) -> Scene {
     let mut scene = stripped(scene);
     scene.objects.retain(|o| o.material != "mirror");
@@ -39,7 +40,7 @@ fn mirrored_scene(scene: &Scene) -> Scene {
     scene
 }
 
-/// The mirror's pixels have 0.92 of the radiance of the mirrored scene.
+/// Checks that the mirror's pixels have 0.92 of the radiance of the mirrored scene.
 fn shows_the_mirrored_room(original: &Scene, tested: &Scene) -> Verdict {
     let mirror = number(original, "mirror") as u32;
     let hits = first_hits(&sized(original.clone(), RASTER));
@@ -60,7 +61,7 @@ fn shows_the_mirrored_room(original: &Scene, tested: &Scene) -> Verdict {
     })
 }
 
-/// Standard deviation of the brightness of the mirror's pixels.
+/// Returns the standard deviation of the brightness of the mirror's pixels.
 fn contrast(scene: &Scene) -> f64 {
     let mirror = number(scene, "mirror") as u32;
     let scene = sized(stripped(scene), RASTER);
@@ -112,29 +113,29 @@ fn a6_flat_mirror() {
     assert!(by_roughness[4] < 0.5 * by_roughness[0], "{by_roughness:?}");
 }
 
-/// Raster of the footprint scenes.
+/// Width and height in pixels of the pictures that show the shape of lobes.
 const FINE: [u32; 2] = [96, 64];
 
-/// A ball as seen from a point of the mirror.
+/// Ball as seen from a point of the mirror.
 struct Spot {
-    /// Angle between its centre and the mirrored direction, in radians.
+    /// Angle between the ball's centre and the mirrored view direction, in radians.
     angle: f64,
-    /// Angular radius in radians.
+    /// Angular radius of the ball, in radians.
     half: f64,
     radiance: DVec3,
 }
 
-/// A pixel of the mirror.
+/// Pixel that shows the mirror, with the balls that it may reflect.
 struct Footprint {
-    /// Balls that it may reflect.
+    /// Balls that the pixel's lobe may reflect.
     spots: Vec<Spot>,
-    /// Rendered radiance.
+    /// Rendered radiance of the pixel.
     radiance: DVec3,
     /// Standard error of `radiance`.
     error: DVec3,
 }
 
-/// The pixels of the mirror in the rendering of `tested`, with the balls of `original`.
+/// Returns the pixels of the mirror in the picture of `tested`, with the balls of `original`.
 fn footprints(original: &Scene, tested: &Scene) -> Vec<Footprint> {
     let original = sized(original.clone(), FINE);
     let mut tested = sized(tested.clone(), FINE);
@@ -164,9 +165,9 @@ fn footprints(original: &Scene, tested: &Scene) -> Vec<Footprint> {
     mirrors.map(pixel).collect()
 }
 
-/// Each pixel has the sum of 0.9 x share x radiance over its balls (k_r = 0.9). `share` returns the share of
-/// the lobe that a ball covers; pixels with a ball for which it returns `None` are left out. Pixels whose
-/// sum is 0 must be exactly black.
+/// Checks that each pixel has the sum of 0.9 x share x radiance over its balls (k_r = 0.9). `share`
+/// returns the share of the lobe that a ball covers. Pixels with a ball for which it returns `None`
+/// are left out. Pixels whose sum is 0 must be exactly black.
 fn shows_shares(pixels: &[Footprint], share: impl Fn(&Spot) -> Option<f64>) -> Verdict {
     let (mut sum, mut variance, mut expected_sum) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
     let (mut bright, mut dark) = (0, 0);
@@ -195,21 +196,21 @@ fn shows_shares(pixels: &[Footprint], share: impl Fn(&Spot) -> Option<f64>) -> V
     ensure(z < 4.0, || format!("inside off by {off:.4}, {z:.1} standard errors"))
 }
 
-/// Radius of the cone's base at unit distance.
+/// Radius of the lobe's cone at unit distance.
 const RADIUS: f64 = 0.2;
 
-/// Half the side of the square with the area of the cone's base.
+/// Returns half the side of the square whose area equals that of the cone's base.
 fn half_side() -> f64 {
     0.5 * PI.sqrt() * RADIUS
 }
 
-/// Distance from the axis at which a direction at `angle` to it reaches the plane at unit distance; infinite
-/// if it does not.
+/// Returns the distance from the axis at which a direction at `angle` to it reaches the plane at
+/// unit distance. Infinite if it does not reach the plane.
 fn reach(angle: f64) -> f64 {
     if angle < 0.5 * PI { angle.tan() } else { f64::INFINITY }
 }
 
-/// Directions are uniform in the cone: a ball's share is its solid angle.
+/// Checks that reflected directions are uniform in the cone: a ball's share is its solid angle.
 fn spreads_over_a_cone(original: &Scene, tested: &Scene) -> Verdict {
     let edge = RADIUS.atan();
     shows_shares(&footprints(original, tested), |spot| {
@@ -221,8 +222,9 @@ fn spreads_over_a_cone(original: &Scene, tested: &Scene) -> Verdict {
     })
 }
 
-/// Points are uniform on the square: a ball's share is the area of its ellipse in the plane at unit
-/// distance. The corners of the square extend beyond the cone, its sides lie within.
+/// Checks that reflected directions are uniform on the square: a ball's share is the area of its
+/// ellipse in the plane at unit distance. The corners of the square extend beyond the cone; its
+/// sides are within the cone.
 fn spreads_over_a_square(original: &Scene, tested: &Scene) -> Verdict {
     let half = half_side();
     let pixels = footprints(original, tested);

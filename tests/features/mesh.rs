@@ -1,4 +1,4 @@
-//! Meshes from files, compared with a direct intersection of all triangles.
+//! Tests of meshes from files, compared with a direct intersection of all triangles.
 
 use crate::features::analytic_shapes::{AnalyticShape, placement, triangles};
 use crate::features::first_hits::hits_agree_with;
@@ -8,12 +8,12 @@ use glam::DVec3;
 use std::fs;
 use zerkalo::scene::Scene;
 
-/// Triangles of the fan around the first corner of a polygon.
+/// Returns the triangles of a polygon: a fan around its first corner.
 fn fan(corners: &[DVec3]) -> impl Iterator<Item = [DVec3; 3]> {
     corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]])
 }
 
-/// Triangles of an OBJ file.
+/// Returns the triangles of an OBJ file.
 fn obj_triangles(text: &str) -> Vec<[DVec3; 3]> {
     let statements = |key: &str| {
         let lines = text.lines().filter_map(|line| line.split_once(' '));
@@ -36,8 +36,8 @@ fn obj_triangles(text: &str) -> Vec<[DVec3; 3]> {
         .collect()
 }
 
-/// Triangles of a binary PLY file whose vertices are three `float` and whose faces are lists of `int` after
-/// a `uchar` count.
+/// Returns the triangles of a binary PLY file whose vertices are three `float` and whose faces are
+/// lists of `int` after a `uchar` count.
 fn ply_triangles(bytes: &[u8]) -> Vec<[DVec3; 3]> {
     let end = b"end_header\n";
     let data = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();

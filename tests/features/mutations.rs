@@ -1,24 +1,24 @@
-//! Mutations: changes of the source that make a row's test fail. `mutate.sh` runs them; the test here checks
-//! that they still apply to the source.
+//! Mutations of the source code, which must make the test of a feature fail. `mutate.sh` runs them;
+//! the test here checks that they still apply to the source.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// Replacement of one expression in the source.
+/// Mutation of the source code: replacement of one expression.
 pub struct Mutation {
-    /// Name of the test that must fail.
+    /// Name of the test that must fail with the mutation.
     pub test: String,
-    /// Source file.
+    /// Path of the source file that is changed.
     pub file: String,
-    /// Source text with the expression in guillemets.
+    /// Source text around the expression, which is in guillemets.
     replace: String,
-    /// Replacement, an expression of the same type.
+    /// Expression of the same type that replaces the original one.
     by: String,
 }
 
-/// All mutations by file name. Each file begins with a description after `#` and has one line for each of
-/// `test`, `file`, `replace` and `by`.
+/// Returns all mutations by file name. Each file begins with a description after `#` and has one
+/// line for each of `test`, `file`, `replace` and `by`.
 pub fn all() -> BTreeMap<String, Mutation> {
     let folder = Path::new(env!("ZERKALO_ROOT")).join("tests/features/mutations");
     let read = |path: std::path::PathBuf| {

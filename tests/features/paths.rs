@@ -1,4 +1,4 @@
-//! Path depth, transmission, and faults of earlier ray tracers that this one must not have.
+//! Tests of path depth, of transmission, and of faults of earlier ray tracers.
 
 use crate::features::first_hits::{RASTER, centers, hits_agree, pixel_ray};
 use crate::features::plain_tracer::{agrees, agrees_exactly, without_chance};
@@ -31,19 +31,19 @@ fn b1_tracing_depth() {
     row("level-full.toml", |tested| agrees(&original, tested, 96), &[primary, shadows]);
 }
 
-/// An upright pane of the ray-tree scene.
+/// Upright pane of the scene with the ray tree.
 struct Pane {
     center: DVec3,
-    /// Half width and half height.
+    /// Half the width and half the height of the pane.
     half: [f64; 2],
-    /// Emitted radiance.
+    /// Radiance that the pane emits.
     glow: DVec3,
     reflection: f64,
     transmission: f64,
 }
 
-/// Radiance along a ray by the full tree: reflection and transmission at every pane. `depth` is the number of
-/// surfaces that the ray may still scatter at.
+/// Returns the radiance along a ray by the full ray tree: reflection and transmission at every
+/// pane. `depth` is the number of further surfaces at which the ray may scatter.
 fn tree(panes: &[Pane], background: DVec3, origin: DVec3, direction: DVec3, depth: u32) -> DVec3 {
     let nearest = panes
         .iter()
@@ -65,7 +65,7 @@ fn tree(panes: &[Pane], background: DVec3, origin: DVec3, direction: DVec3, dept
         + pane.transmission * incoming(direction)
 }
 
-/// The mean over each band of six rows is that of the full ray tree.
+/// Checks that the mean over each band of six rows is that of the full ray tree.
 fn traces_the_whole_tree(original: &Scene, tested: &Scene) -> Verdict {
     let pane = |o: &zerkalo::scene::Object| {
         let Shape::Rectangle(r) = &o.shape else { panic!("not a pane") };
@@ -105,8 +105,8 @@ fn traces_the_whole_tree(original: &Scene, tested: &Scene) -> Verdict {
     Ok(())
 }
 
-/// Between two mirrors of 1e4 units that emit radiance 1 every pixel has the sum of `terms`. Each term is
-/// the throughput with which a path reaches its next surface.
+/// Checks two facing mirrors of 1e4 units that emit radiance 1: every pixel has the sum of `terms`.
+/// Each term is the throughput with which a path reaches its next surface.
 fn sums_reflections(
     tested: &Scene,
     mirrors: [&str; 2],
@@ -165,8 +165,8 @@ fn b2_ray_tree() {
     );
 }
 
-/// The large ball reflects all light outside and transmits a fifth at each surface. Before a white
-/// background it shows 1 + 0.2 x 0.2: nothing is reflected inside.
+/// Checks a large ball that reflects all light outside and transmits a fifth at each surface. In
+/// front of a white background its radiance is 1 + 0.2 x 0.2: nothing is reflected inside.
 fn has_no_inner_reflections(tested: &Scene) -> Verdict {
     let mut alone = tested.clone();
     alone.objects.truncate(1);
@@ -205,8 +205,9 @@ fn c2_refraction() {
     row("reflecting-tracks.toml", has_no_inner_reflections, &[("k_t of 0.4", &two_fifths)]);
 }
 
-/// Faults of earlier ray tracers: a round room seen from inside, lossless facing mirrors, a light with a ball
-/// beyond it, radiance above 1 in a mirror, glass away from the origin.
+/// Checks scenes that earlier ray tracers rendered wrongly: a round room seen from inside, lossless
+/// facing mirrors, a light with a ball beyond it, radiance above 1 in a mirror, glass away from the
+/// origin.
 #[test]
 fn c4_old_faults() {
     let original = shipped("round-room.toml");

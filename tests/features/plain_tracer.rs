@@ -1,4 +1,4 @@
-//! Comparison of the program's pictures with those of the plain tracer of tests/agreement.
+//! Comparison of the program's pictures with those of the reference tracer of tests/agreement.
 
 use crate::agreement::SAMPLES;
 use crate::agreement::compare::{Picture, reference, small};
@@ -12,8 +12,8 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::Precision;
 
-/// Statistical comparison of the program's picture of `tested` with the plain tracer's picture of `original`.
-/// The plain tracer takes `samples` samples per pixel.
+/// Compares the program's picture of `tested` statistically with the reference tracer's picture of
+/// `original`. The reference tracer traces `samples` samples per pixel.
 pub fn agrees(original: &Scene, tested: &Scene, samples: u32) -> Verdict {
     let reference = reference(&small(original.clone()), samples, Mutation::None);
     let reference = reference.expect("the plain tracer supports the scene");
@@ -21,7 +21,7 @@ pub fn agrees(original: &Scene, tested: &Scene, samples: u32) -> Verdict {
     if verdict.agree() { Ok(()) } else { Err(verdict.to_string()) }
 }
 
-/// Radiance of every pixel, with one ray through each pixel centre.
+/// Returns the radiance of every pixel, with one ray through each pixel centre.
 pub fn without_chance(scene: &Scene) -> Vec<DVec3> {
     let mut scene = sized(scene.clone(), RASTER);
     scene.film.filter = Filter::Point;
@@ -29,8 +29,8 @@ pub fn without_chance(scene: &Scene) -> Vec<DVec3> {
     picture(&rendering, Replicates::Both).into_iter().map(DVec3::from).collect()
 }
 
-/// Comparison of the program's picture of `tested` with the plain tracer's picture of `original`, pixel by pixel.
-/// The scenes must not depend on random choices.
+/// Compares the program's picture of `tested` with the reference tracer's picture of `original`,
+/// pixel by pixel. The scenes must not depend on random choices.
 pub fn agrees_exactly(original: &Scene, tested: &Scene) -> Verdict {
     let mut original = sized(original.clone(), RASTER);
     original.film.filter = Filter::Point;

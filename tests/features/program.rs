@@ -1,4 +1,5 @@
-//! Features of the program: cap on rays per pixel, threads, edits during rendering, demonstrations.
+//! Tests of features of the program: cap on rays per pixel, threads, edits during rendering,
+//! demonstrations.
 
 use crate::features::first_hits::{RASTER, first_hits, hits_agree};
 use crate::features::plain_tracer::agrees;
@@ -7,6 +8,8 @@ use crate::support::{begin, follow, picture, pool, settings, shipped, sized};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zerkalo::disk::Existing;
+use zerkalo::film::file::FilmReader;
 use zerkalo::film::{Display, Film, Replicates, TILE};
 use zerkalo::material::Material;
 use zerkalo::render::export::Provenance;
@@ -27,7 +30,8 @@ fn options() -> Options {
     }
 }
 
-/// Samples per pixel of each tile; the flag is `true` if the camera sees a reflecting surface in it.
+/// Returns two values for each tile: its samples per pixel, and `true` if the camera sees a
+/// reflecting surface in it.
 fn tiles(film: &Film, scene: &Scene) -> Vec<(u32, bool)> {
     let hits = first_hits(scene);
     let width = film.width();
@@ -42,9 +46,9 @@ fn tiles(film: &Film, scene: &Scene) -> Vec<(u32, bool)> {
         .collect()
 }
 
-/// Renders with the scene's cap on rays per pixel and a target noise of `levels` 8-bit levels. With a `cap` the
-/// render ends by the cap, and reflecting tiles have that many samples; with 0 it ends by the noise, with more
-/// than 16 samples.
+/// Checks a render of `tested` to a noise of `levels` 8-bit levels. If `cap` is not 0, the render
+/// ends by the cap on rays per pixel, and reflecting tiles have `cap` samples. If it is 0, the
+/// render ends by the noise, with more than 16 samples.
 fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
     let scene = sized(tested.clone(), [96, 72]);
     let stop = Stop { noise_codes: Some(levels), ..Stop::default() };
@@ -86,7 +90,8 @@ fn a13_rays_per_pixel() {
     println!("16 for none: {}", caps_rays(&capped, 0, 1.0).unwrap_err());
 }
 
-/// The scene has the objects and materials of the thread experiment, so that times on it are comparable.
+/// Checks that the scene has the objects and materials of the thread experiment, so that times on
+/// it are comparable.
 fn is_the_experiment(scene: &Scene) -> Verdict {
     let materials_of = |key: &str| -> Vec<&Material> {
         let objects = scene.objects.iter().filter(|o| o.shape.key() == key);
@@ -106,7 +111,8 @@ fn is_the_experiment(scene: &Scene) -> Verdict {
     ensure(right, || "not the scene of the thread experiment".into())
 }
 
-/// The film of an adaptive render by `threads` threads, whose tiles get different sample counts.
+/// Returns the film of an adaptive render by `threads` threads, whose tiles get different sample
+/// counts.
 fn film(scene: &Scene, seed: u64, threads: usize) -> Film {
     let mut rendering = begin(&sized(scene.clone(), [100, 70]), seed, Precision::Auto);
     let stop = Stop { spp: Some(96), ..Stop::default() };
@@ -114,7 +120,7 @@ fn film(scene: &Scene, seed: u64, threads: usize) -> Film {
     rendering.film
 }
 
-/// The film has the same bytes for 1, 2 and 7 threads, and every tile has samples.
+/// Checks that the film has the same bytes for 1, 2 and 7 threads, and that every tile has samples.
 fn threads_do_not_matter(scene: &Scene, seed_of: impl Fn(usize) -> u64) -> Verdict {
     is_the_experiment(scene)?;
     let one = film(scene, seed_of(1), 1);
@@ -139,12 +145,12 @@ fn a14_threads() {
     threads_do_not_matter(&other, |_| 3).unwrap_err();
 }
 
-/// Raster of the pictures after edits.
+/// Width and height in pixels of the pictures after edits.
 const SMALL: [u32; 2] = [40, 30];
-/// Stop of the pictures after edits.
+/// Stop criterion of the pictures after edits.
 const SPP: Stop = Stop { spp: Some(8), noise_codes: None, rmse_linear: None, seconds: None };
 
-/// A session that renders scenes as they are edited.
+/// Session that renders scenes as they are edited.
 struct Desk {
     session: Session,
 }
@@ -155,7 +161,7 @@ impl Desk {
         Self { session: Session::new(2, options(), settings).unwrap() }
     }
 
-    /// The session's finished picture of `scene`.
+    /// Returns the session's finished picture of `scene`.
     fn finished_picture(&mut self, scene: &Scene) -> Vec<[f64; 3]> {
         let generation = self.session.set_scene(Arc::new(scene.clone()));
         let end = Instant::now() + Duration::from_secs(60);
@@ -170,7 +176,7 @@ impl Desk {
     }
 }
 
-/// The picture of `scene` after it was saved and read again.
+/// Returns the picture of `scene` after the scene was saved and read again.
 fn saved_and_rendered(scene: &Scene) -> Vec<[f64; 3]> {
     let text = Document::new(scene, "room.toml").text().to_string();
     let read = Scene::parse(&text, "room.toml").unwrap_or_else(|e| panic!("{e}"));
@@ -179,10 +185,11 @@ fn saved_and_rendered(scene: &Scene) -> Vec<[f64; 3]> {
     picture(&rendering, Replicates::Both)
 }
 
-/// A named edit of a scene.
+/// Name of an edit, and the function that applies it to a scene.
 type NamedEdit<'a> = (&'a str, Box<dyn Fn(&Scene) -> Result<Edit, EditError> + 'a>);
 
-/// The edit that sets `key` of the target with `label` in the outline.
+/// Returns the edit that sets the property `key` of the part of the scene with the label `label` in
+/// the outline.
 fn set<'a>(label: &'a str, key: &'a str, text: &'a str) -> NamedEdit<'a> {
     let edit = move |scene: &Scene| {
         let subject = edit::outline(scene).into_iter().map(|(_, s)| s).find(|s| {
@@ -249,7 +256,7 @@ fn a15_user_edits() {
         let settings = settings(false, 0, SPP);
         let mut render = SyncRender::new(scene, &options(), settings, 2).unwrap();
         while render.step().is_none() {}
-        render.samples()
+        render.schedule().samples()
     };
     assert!(sample_count(&capped) < sample_count(history.scene()));
     // Undoing all edits restores the scene and its picture.
@@ -261,7 +268,7 @@ fn a15_user_edits() {
     assert!(desk.finished_picture(&capped) == saved_and_rendered(&first));
 }
 
-/// The two scenes differ, and `equalise` removes their only difference.
+/// Checks that two scenes differ, and that `equalise` removes their only difference.
 fn differ_only(left: &Scene, right: &Scene, equalise: impl Fn(&mut Scene, &Scene)) -> Verdict {
     ensure(left != right, || "the scenes are equal".into())?;
     let mut same = left.clone();
@@ -269,7 +276,7 @@ fn differ_only(left: &Scene, right: &Scene, equalise: impl Fn(&mut Scene, &Scene
     ensure(same == *right, || "the scenes have other differences, too".into())
 }
 
-/// Brightness of the floor left of the ball divided by that right of the ball.
+/// Returns the brightness of the floor left of the ball, divided by that right of the ball.
 fn left_to_right(scene: &Scene) -> f64 {
     let mut scene = sized(scene.clone(), RASTER);
     let ball = scene.objects.iter().find(|o| o.name == "ball").unwrap().shape.clone();
@@ -316,7 +323,7 @@ fn demonstrates_roughness([sharp, blurred]: [&Scene; 2]) -> Verdict {
     agrees(blurred, blurred, 48)
 }
 
-/// Two scenes and the check that they must pass.
+/// Two scenes, and the check that their pictures must pass.
 type Demonstration<'a> = (&'a [Scene; 2], fn([&Scene; 2]) -> Verdict);
 
 #[test]
@@ -340,8 +347,8 @@ fn a16_demonstrations() {
     }
 }
 
-/// Renders the scene until it is finished, with a checkpoint after the first samples if `path` is
-/// given. Returns its film and its number of rays.
+/// Renders the scene of `generation` until it is finished. Writes a checkpoint after the first
+/// samples if `path` is given. Returns the film and the number of rays.
 fn film_of(session: &mut Session, generation: u64, path: Option<&Path>) -> (Vec<u8>, u64) {
     let mut path = path;
     loop {
@@ -359,7 +366,7 @@ fn film_of(session: &mut Session, generation: u64, path: Option<&Path>) -> (Vec<
                 adaptive: true,
             };
             session.checkpoint(provenance, move |checkpoint| sender.send(checkpoint).unwrap());
-            receiver.recv().unwrap().expect("a picture").write(path).unwrap();
+            receiver.recv().unwrap().expect("a picture").write(path, Existing::Replace).unwrap();
         }
         if let State::Finished(_) = report.state {
             let film = session.with(|state, _| state.film.bytes()).expect("a film");
@@ -381,7 +388,7 @@ fn a19_checkpoints() {
     let generation = first.set_scene(Arc::clone(&scene));
     let whole = film_of(&mut first, generation, Some(&path));
     let checkpoint = Checkpoint::read(&path).unwrap();
-    let samples = checkpoint.film().samples();
+    let samples = FilmReader::open(&path).unwrap().read().unwrap().1.samples();
     let mut second = start();
     let generation = second.continue_from(Arc::clone(&scene), checkpoint);
     let (film, rays) = film_of(&mut second, generation, None);

@@ -1,4 +1,4 @@
-//! Feature of big pictures: rendering in regions.
+//! Test of rendering in regions, the feature for big pictures.
 
 use crate::features::row::{Verdict, ensure, material, row};
 use crate::support::{begin, follow, pool, settings, shipped, sized};

@@ -1,18 +1,19 @@
-//! Test of a row: a check that passes for the shipped scene and fails for each mutation of it.
+//! Test of a row of docs/features.md: a check that passes for the shipped scene and fails for each
+//! mutation of it.
 
 use crate::support::{parsed, shipped};
 use zerkalo::material::Material;
 use zerkalo::scene::{Object, Scene};
 use zerkalo::shape::Shape;
 
-/// Result of a check, with a description of the failure.
+/// Result of a check: success, or a description of the failure.
 pub type Verdict = Result<(), String>;
 
-/// Mutation of a scene: replaces a feature by a similar one.
+/// Mutation of a scene, which replaces a feature by a similar one.
 pub type Change<'a> = &'a dyn Fn(&mut Scene);
 
-/// Asserts that `check` passes for the shipped scene `file` and fails for each of `mutations`. `check` renders
-/// the scene it is given and compares with an expectation from an independent source.
+/// Checks that `check` passes for the shipped scene `file` and fails for each of `mutations`.
+/// `check` renders the given scene and compares it with an expectation from an independent source.
 pub fn row(file: &str, check: impl Fn(&Scene) -> Verdict, mutations: &[(&str, Change)]) {
     let original = shipped(file);
     if let Err(error) = check(&original) {
@@ -31,24 +32,24 @@ pub fn row(file: &str, check: impl Fn(&Scene) -> Verdict, mutations: &[(&str, Ch
     }
 }
 
-/// The object `name`.
+/// Returns the object of the scene with the name `name`.
 pub fn object<'a>(scene: &'a mut Scene, name: &str) -> &'a mut Object {
     let found = scene.objects.iter_mut().find(|o| o.name == name);
     found.unwrap_or_else(|| panic!("no object \"{name}\""))
 }
 
-/// Index of the object `name`.
+/// Returns the index of the object with the name `name`.
 pub fn number(scene: &Scene, name: &str) -> usize {
     let found = scene.objects.iter().position(|o| o.name == name);
     found.unwrap_or_else(|| panic!("no object \"{name}\""))
 }
 
-/// The material `name`.
+/// Returns the material of the scene with the name `name`.
 pub fn material<'a>(scene: &'a mut Scene, name: &str) -> &'a mut Material {
     scene.materials.get_mut(name).unwrap_or_else(|| panic!("no material \"{name}\""))
 }
 
-/// The shape with the text `text` after `shape.` in a scene file.
+/// Returns the shape that scene files write as `shape.` followed by `text`.
 pub fn shape(text: &str) -> Shape {
     parsed(&format!("[[object]]\nshape.{text}")).objects.remove(0).shape
 }

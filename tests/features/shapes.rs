@@ -1,4 +1,4 @@
-//! Shapes, transforms and compounds, compared with the formulas of the shapes.
+//! Tests of shapes, transforms and compounds, compared with the formulas of the shapes.
 
 use crate::features::first_hits::hits_agree;
 use crate::features::row::{object, row, shape};
@@ -6,8 +6,8 @@ use crate::support::shipped;
 use zerkalo::scene::Scene;
 use zerkalo::shape::{Difference, Intersection, Shape, Union};
 
-/// Asserts that first hits in `file` agree with the formulas, and not after a mutation: name, object and its
-/// new shape.
+/// Checks that first hits in `file` agree with the formulas, and that they do not after a mutation.
+/// A mutation has a name, the name of an object, and the text of its new shape.
 fn shapes(file: &str, mutations: &[(&str, &str, &str)]) {
     let original = shipped(file);
     let changes: Vec<_> = mutations
@@ -233,7 +233,7 @@ fn as_difference(scene: &mut Scene) {
     replace_operation(scene, |of| Shape::Difference(Difference { of }));
 }
 
-/// Replaces the operation of every compound by that of `combine`.
+/// Replaces the set operation of every compound by that of `combine`.
 fn replace_operation(
     scene: &mut Scene,
     combine: impl Fn(Vec<zerkalo::shape::CsgOperand>) -> Shape,

@@ -1,7 +1,8 @@
-//! Features of renders that are divided among machines.
+//! Tests of renders that are divided among machines.
 
 use crate::features::row::{Verdict, ensure, material, row};
 use crate::support::{begin, begin_with, follow, pool, settings, shipped, sized};
+use zerkalo::disk::Existing;
 use zerkalo::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
 use zerkalo::film::{Display, Film, LightWeights};
 use zerkalo::render::plan::{
@@ -19,14 +20,15 @@ use std::time::SystemTime;
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;
 
-/// Film of an adaptive render by one process, whose tiles get different sample counts.
+/// Returns the film of an adaptive render by one process, whose tiles get different sample counts.
 fn film_of_one(scene: &Scene) -> Film {
     let mut state = begin(&sized(scene.clone(), SIZE), SEED, Precision::Auto);
     follow(&mut state, settings(true, 0, Stop { spp: Some(96), ..Stop::default() }), &pool(2));
     state.film
 }
 
-/// Plan of `shards` shards for the sample counts of `film`, with 4 samples of each tile as the base.
+/// Returns a plan that divides a render with the sample counts of `film` into `shards` shards. The
+/// base (samples that the plan starts from) has 4 samples in each tile.
 fn plan(film: &Film, shards: u32) -> Plan {
     let tile = |i: usize| PlannedTile {
         base: 4,
@@ -54,7 +56,7 @@ fn plan(film: &Film, shards: u32) -> Plan {
     }
 }
 
-/// Films of the base and of all shards.
+/// Returns the films of the plan's base and of all shards.
 fn parts(scene: &Scene, plan: &Plan) -> Result<Vec<Film>, String> {
     let scene = sized(scene.clone(), SIZE);
     let part = |shard: u32| {
@@ -62,12 +64,13 @@ fn parts(scene: &Scene, plan: &Plan) -> Result<Vec<Film>, String> {
         let state = begin_with(&scene, sampling, Precision::Auto);
         let mut render = ShardRender::new(state, &plan.ranges(shard), 0, 2)?;
         while render.step() {}
-        Ok(render.into_state().film)
+        Ok(render.state.film)
     };
     (0..=plan.settings.shards).map(part).collect()
 }
 
-/// The films of `shards` shards add to the film `one`, in ascending and descending order.
+/// Checks that the films of `shards` shards add up to the film `one`, in ascending and descending
+/// order.
 fn shards_add_to(one: &Film, scene: &Scene, shards: u32) -> Verdict {
     let parts = parts(scene, &plan(one, shards))?;
     for descending in [false, true] {
@@ -103,7 +106,7 @@ fn e1_shards() {
     assert!(plan.differing_tile(&left_out, &[0, 1, 2]).is_none());
 }
 
-/// Bytes of the part file of a shard.
+/// Returns the bytes of the film file of shard `number`.
 fn part_file(plan: &Plan, number: u32, complete: bool, film: &Film) -> Vec<u8> {
     let mut header = FilmFileHeader {
         film: film.header().clone(),
@@ -121,14 +124,15 @@ fn part_file(plan: &Plan, number: u32, complete: bool, film: &Film) -> Vec<u8> {
     pieces.concat()
 }
 
-/// Watches the parts of `scene` while they are written, first damaged, then unfinished, then
-/// complete, and compares the sum with the film `one`.
+/// Watches the films of the shards of `scene` while they are written: first damaged, then
+/// unfinished, then complete. Compares the sum with the film `one`.
 fn watched_parts_add_to(one: &Film, scene: &Scene, folder: &Path) -> Verdict {
     let plan = plan(one, 3);
     let parts = parts(scene, &plan)?;
     let path = |number: u32| folder.join(format!("job-{number}.zk"));
     let write = |number: u32, bytes: &[u8]| {
-        write_film_file(&path(number), &[bytes.to_vec()]).map_err(|e| e.to_string())
+        write_film_file(&path(number), &[bytes.to_vec()], Existing::Replace)
+            .map_err(|e| e.to_string())
     };
     fs::write(folder.join("job.plan"), plan.text()).map_err(|e| e.to_string())?;
     (0..4).for_each(|number| drop(fs::remove_file(path(number))));

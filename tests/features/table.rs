@@ -1,11 +1,12 @@
-//! Guard of the table in docs/features.md: it has every row, and all files and tests that it names exist.
+//! Check of the table in docs/features.md: it has every row, and all files and tests that it names
+//! exist.
 
 use crate::features::mutations;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The rows: A1 to A19, B1 to B15, C1 to C4, D1 to D11, E1 to E3.
+/// Returns the names of the rows: A1 to A19, B1 to B15, C1 to C4, D1 to D11, E1 to E3.
 fn expected() -> BTreeSet<String> {
     let rows = |letter: char, last: u32| (1..=last).map(move |n| format!("{letter}{n}"));
     let last_rows = [('A', 19), ('B', 15), ('C', 4), ('D', 11), ('E', 3)];
@@ -16,12 +17,12 @@ fn root() -> PathBuf {
     PathBuf::from(env!("ZERKALO_ROOT"))
 }
 
-/// Texts between backticks.
+/// Returns the texts between backticks in a cell of the table.
 fn quoted(cell: &str) -> Vec<&str> {
     cell.split('`').skip(1).step_by(2).collect()
 }
 
-/// The names of the tests in this folder.
+/// Returns the names of the tests in this folder.
 fn tests() -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     for entry in fs::read_dir(root().join("tests/features")).unwrap() {

@@ -1,4 +1,4 @@
-//! Textures and bumps, compared with image lookups by the formulas of the mappings.
+//! Tests of textures and bumps, compared with image lookups by the formulas of the mappings.
 
 use crate::agreement::paint::Pixels;
 use crate::features::first_hits::{RASTER, centers, first_hits, pixel_ray};
@@ -12,12 +12,12 @@ use zerkalo::scene::edit::{self, Target};
 use zerkalo::scene::{RayTypes, Scene};
 use zerkalo::shape::Shape;
 
-/// The image `name` of `scenes/textures`.
+/// Returns the image `name` of the folder `scenes/textures`.
 fn image(name: &str) -> Pixels {
     Pixels::open(&format!("textures/{name}")).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// `scene` with camera rays only and without highlights.
+/// Returns `scene` with camera rays only and without highlights.
 fn plain(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.trace.ray_types = RayTypes::Primary;
@@ -25,18 +25,19 @@ fn plain(scene: &Scene) -> Scene {
     scene
 }
 
-/// Longitude (from +z towards +x) and latitude of a unit vector.
+/// Returns longitude (from +z towards +x) and latitude of a unit vector, in radians.
 fn angles(n: DVec3) -> [f64; 2] {
     [n.x.atan2(n.z), n.y.asin()]
 }
 
-/// Texture coordinates of the spherical mapping: a full turn and the distance between the poles become `scale`.
+/// Returns the texture coordinates of the spherical mapping. `scale` is the change of u over a full
+/// turn, and of v from pole to pole.
 fn spherical(n: DVec3, scale: [f64; 2]) -> DVec2 {
     let [longitude, latitude] = angles(n);
     DVec2::new(0.5 + longitude / TAU, 0.5 + latitude / PI) * DVec2::from(scale)
 }
 
-/// Index and hit point of each pixel that shows the object `name`.
+/// Returns index and hit point of each pixel that shows the object `name`.
 fn points(scene: &Scene, name: &str) -> Vec<(usize, DVec3)> {
     let object = number(scene, name) as u32;
     let scene = sized(scene.clone(), RASTER);
@@ -56,7 +57,8 @@ fn ball(scene: &Scene, name: &str) -> (DVec3, f64) {
     }
 }
 
-/// The pixels of the picture on the wall and of the ball are their images times the untextured radiance.
+/// Checks that the pixels of the picture on the wall and of the ball are their images times the
+/// untextured radiance.
 fn has_images(original: &Scene, tested: &Scene) -> Verdict {
     let mut bare = plain(original);
     bare.materials.values_mut().for_each(|m| m.texture = None);
@@ -83,7 +85,7 @@ fn has_images(original: &Scene, tested: &Scene) -> Verdict {
     Ok(())
 }
 
-/// Sets `key` of a material to `text`.
+/// Sets the property `key` of a material to the value `text`.
 fn set(scene: &mut Scene, material: &str, key: &str, text: &str) {
     let subject = Target::Material(material.into());
     let edit = edit::set(scene, &subject, key, text);
@@ -112,7 +114,8 @@ fn b13_image_texture() {
     );
 }
 
-/// The ball is shaded with the normals of a surface raised by the image's heights, and keeps its outline.
+/// Checks that the ball is shaded with the normals of a surface raised by the image's heights, and
+/// that it keeps its silhouette.
 fn is_raised(original: &Scene, tested: &Scene) -> Verdict {
     let picture = without_chance(&plain(tested));
     let heights = image("brick-heights.png");

@@ -1,4 +1,4 @@
-//! Small valid files of every format, covering everything that the readers parse.
+//! Small valid files of every format, which together contain everything that the readers parse.
 
 use image::{DynamicImage, ImageFormat};
 use std::io::Cursor;
@@ -7,7 +7,7 @@ use zerkalo::render::plan::{Plan, PlanSettings, PlannedTile};
 use zerkalo::sampling::SamplerKind;
 use zerkalo::value::fnv1a64;
 
-/// Returns a sphere of triangles: corners, and the corners of each triangle.
+/// Returns a sphere of triangles: its corners, and the indices of the corners of each triangle.
 fn ball(rings: usize, sides: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     let mut points = Vec::new();
     for ring in 0..=rings {
@@ -29,7 +29,7 @@ fn ball(rings: usize, sides: usize) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// Materials for [`obj`].
+/// Material file to which the OBJ files of [`obj`] refer.
 pub const MTL: &str = "# colours\nnewmtl red\nKa 0 0 0\nKd 0.8 0.1 0.1\nNs 10\nillum 2\n\
                        map_Kd a.png\nnewmtl grey\nKd 0.5\nd 1.0\n";
 
@@ -111,7 +111,7 @@ pub fn stl() -> Vec<Vec<u8>> {
     vec![text.into(), bytes]
 }
 
-/// Returns the description and the buffer of a glTF file; `uri` is the entry that locates the
+/// Returns the JSON description and the buffer of a glTF file. `uri` is the entry that locates the
 /// buffer.
 fn description(uri: &str) -> (String, Vec<u8>) {
     let (points, triangles) = ball(4, 6);
@@ -201,7 +201,7 @@ pub fn png() -> Vec<Vec<u8>> {
         .into()
 }
 
-/// Corrects the checksum of every chunk that can be found (CRC-32 of type and data).
+/// Corrects the checksum (CRC-32 of type and data) of every PNG chunk that can be found.
 pub fn repair_png(bytes: &mut [u8]) {
     let mut at = 8;
     while let Some(length) = bytes.get(at..at + 4) {
@@ -227,7 +227,7 @@ pub fn jpeg() -> Vec<Vec<u8>> {
     [image.to_luma8().into(), image].map(|i| encoded(i, ImageFormat::Jpeg)).into()
 }
 
-/// Returns the scenes that come with the program.
+/// Returns the scene files that come with the program.
 pub fn toml() -> Vec<Vec<u8>> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes");
     let mut paths: Vec<_> = std::fs::read_dir(folder)
@@ -241,7 +241,7 @@ pub fn toml() -> Vec<Vec<u8>> {
     texts.collect()
 }
 
-/// Returns plans: of a pilot, and of a second round.
+/// Returns plan files: one made from a pilot, and one for a second round.
 pub fn plan() -> Vec<Vec<u8>> {
     let tile = |(base, end, glossy): (u32, u32, bool)| PlannedTile {
         base,
@@ -279,7 +279,7 @@ pub fn plan() -> Vec<Vec<u8>> {
     [plan(None, 8), plan(Some(12), 40)].map(|plan| plan.text().into_bytes()).into()
 }
 
-/// Returns the lines of a plan before its checksum, with a correct checksum.
+/// Returns the lines of a plan file up to its checksum, with a correct checksum.
 pub fn repaired_plan(bytes: &[u8]) -> Vec<u8> {
     let end = bytes.windows(9).rposition(|w| w == b"checksum ").unwrap_or(bytes.len());
     let mut out = bytes[..end].to_vec();
@@ -288,7 +288,7 @@ pub fn repaired_plan(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Returns a film file with the checksums that fit its chunks, as far as it has chunks.
+/// Returns a film file with correct checksums of its chunks, as far as it has chunks.
 pub fn repair_film(bytes: &[u8]) -> Vec<u8> {
     const START: usize = 12;
     let mut out = bytes.to_vec();

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo::asset::Assets;
+use zerkalo::disk::Existing;
 use zerkalo::film::Display;
 use zerkalo::film::file::{FilmFileHeader, FilmReader};
 use zerkalo::render::export::Provenance;
@@ -18,24 +19,24 @@ use zerkalo::render::{Checkpoint, Options, SampleInputs};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 
-/// Mutations of each kind of file.
+/// Number of mutations of the files of each format.
 const CASES: u64 = 5_000;
 
-/// Longest time for one file.
+/// Longest time for reading one file, as the shortest of five attempts.
 const LONGEST: Duration = Duration::from_secs(1);
 
-/// Largest peak memory of the whole test [KiB].
+/// Largest peak memory of the whole test, in KiB.
 const MEMORY_KIB: u64 = 512 << 10;
 
-/// Returns the peak memory of this process [KiB], where the system reports it.
+/// Returns the peak memory of this process in KiB. Returns 0 if the system does not report it.
 fn peak_kib() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
     line.and_then(|l| l.trim().split(' ').next()?.parse().ok()).unwrap_or(0)
 }
 
-/// Reads `CASES` mutations of `seeds`; `read` returns `true` if the file was accepted. Returns the
-/// number of accepted files.
+/// Reads `CASES` mutations of the files `seeds`. `read` returns `true` if it accepts a file.
+/// Returns the number of accepted files.
 fn read_mutations(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> bool) -> u64 {
     for (i, seed) in seeds.iter().enumerate() {
         assert!(read(seed), "seed {i} of {name} is not good");
@@ -52,7 +53,16 @@ fn read_mutations(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> 
         }
         let begin = Instant::now();
         accepted += u64::from(read(&bytes));
-        let spent = begin.elapsed();
+        let mut spent = begin.elapsed();
+        // Other programs may have taken the time.
+        for _ in 0..4 {
+            if spent < LONGEST {
+                break;
+            }
+            let begin = Instant::now();
+            read(&bytes);
+            spent = spent.min(begin.elapsed());
+        }
         assert!(spent < LONGEST, "{name} case {case} took {spent:?}");
     }
     println!("{name}: {accepted} of {CASES} accepted, peak memory {} MiB", peak_kib() >> 10);
@@ -60,21 +70,21 @@ fn read_mutations(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> 
     accepted
 }
 
-/// Asserts that some mutations are accepted and some are not, so that the checks after the first
-/// are reached.
+/// Checks that some mutations are accepted and some are not, so that also the checks after the
+/// first are tested.
 fn assert_mixed(accepted: u64) {
     assert!(accepted > CASES / 50 && accepted < CASES, "{accepted} of {CASES} were accepted");
 }
 
-/// Replaces the file at `path`. A file that is truncated instead is written to the disk by ext4 when it is closed,
-/// which takes longer than the test.
+/// Writes a new file at `path` in place of the old one. If the old one were truncated instead, ext4
+/// would write it to the disk when it is closed, which takes longer than the test.
 fn write(path: &Path, bytes: &[u8]) {
     // Before the first case there is no file.
     let _ = std::fs::remove_file(path);
     std::fs::write(path, bytes).unwrap();
 }
 
-/// Returns `true` if a file with these bytes, written to `path` first, is accepted.
+/// Writes `bytes` to the mesh file `path` and reads it. Returns `true` if the file is accepted.
 fn mesh(path: &Path, bytes: &[u8]) -> bool {
     write(path, bytes);
     match Assets::default().mesh(path) {
@@ -189,7 +199,8 @@ fn plan() {
     }
 }
 
-/// Bytes of two checkpoints of a small render, one of them in the middle of a decision.
+/// Returns the bytes of two checkpoints of a small render, one of them written in the middle of an
+/// allocation round.
 fn checkpoints() -> Vec<Vec<u8>> {
     let scene = Scene::parse(
         "light = [{ point = { position = [2.0, 4.0, 3.0] } }]\n[film]\nsize = [40, 21]\n\
@@ -213,7 +224,7 @@ fn checkpoints() -> Vec<Vec<u8>> {
                 adaptive: true,
             };
             session.checkpoint(provenance, move |checkpoint| sender.send(checkpoint).unwrap());
-            receiver.recv().unwrap().expect("a picture").write(&path).unwrap();
+            receiver.recv().unwrap().expect("a picture").write(&path, Existing::Replace).unwrap();
             std::fs::read(&path).unwrap()
         })
         .to_vec()
@@ -248,7 +259,7 @@ fn film(bytes: &[u8]) -> Option<(FilmFileHeader, Vec<u8>)> {
     Some((header, film.bytes()))
 }
 
-/// A mutated checkpoint is refused unless its contents are those of the original.
+/// Checks that a mutated checkpoint is refused unless its contents are those of the original.
 #[test]
 fn film_files() {
     let seeds = checkpoints();
@@ -262,8 +273,8 @@ fn film_files() {
     });
 }
 
-/// Checkpoints with mutated parts and right checksums cause no panic, neither when they are read nor
-/// when their render continues.
+/// Checks that checkpoints with mutated parts and correct checksums cause no panic, neither when
+/// they are read nor when their render continues.
 #[test]
 fn film_files_with_repaired_checksums() {
     let seeds = checkpoints();
@@ -280,7 +291,7 @@ fn film_files_with_repaired_checksums() {
             && let Ok(scene) = Scene::parse(&inputs.scene, "a.toml")
         {
             continued += 1;
-            // Ends at once, so that a mutated decision does not trace for hours.
+            // Ends at once, so that a mutated allocation round does not trace for hours.
             let mut session = session(2);
             session.continue_from(Arc::new(scene), checkpoint);
             session.with(|_, _| ());

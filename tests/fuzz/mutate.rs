@@ -1,11 +1,11 @@
-//! Mutations of files, as faulty writers, transfers and editors cause them.
+//! Mutations of files, similar to those that faulty writers, transfers and editors cause.
 
 use crate::common::Numbers;
 
-/// Random mutations.
+/// Generator of random mutations.
 pub struct Random(Numbers);
 
-/// Replacements of numbers in a text.
+/// Texts that replace numbers in a file.
 const NUMBERS: &[&str] = &[
     "0",
     "-1",
@@ -34,12 +34,12 @@ impl Random {
         Self(Numbers::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
     }
 
-    /// Returns a number below `n`, which is greater than 0.
+    /// Returns a random number below `n`, which is greater than 0.
     pub fn below(&mut self, n: usize) -> usize {
         self.0.below(n)
     }
 
-    /// Returns `bytes` after one to four mutations, sometimes with pieces of `other`.
+    /// Returns `bytes` after one to four mutations, which may insert pieces of `other`.
     pub fn mutated(&mut self, bytes: &[u8], other: &[u8]) -> Vec<u8> {
         let mut out = bytes.to_vec();
         for _ in 0..=self.below(4) {
@@ -84,7 +84,7 @@ impl Random {
         }
     }
 
-    /// Replaces the first number in a text after `at`.
+    /// Replaces the first number in the text after the position `at`.
     fn number(&mut self, out: &mut Vec<u8>, at: usize) {
         let digit = |b: &u8| b.is_ascii_digit() || matches!(b, b'.' | b'-');
         let Some(begin) = out[at..].iter().position(digit).map(|b| b + at) else { return };

@@ -1,4 +1,4 @@
-//! Packets and the width-1 instances return equal bits.
+//! Comparison of packets with vectors of width 1: their results are equal in every bit.
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, packets, surface};
@@ -24,7 +24,7 @@ fn same3<A: SimdFloat, B: SimdFloat>(a: Vec3<A>, b: Vec3<B>, lane: usize) -> boo
     (0..3).all(|i| same(a[i], b[i]))
 }
 
-/// Compares packets of `L` with rays of its scalar, in ray_hit aggregate of all `forms`.
+/// Compares packets of `L` with rays of its scalar type, in the aggregate of all `forms`.
 fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
     name: &str,
     forms: &[Form],
@@ -77,15 +77,16 @@ fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
 fn packets_and_single_rays_give_the_same_bits() {
     for (i, (name, form)) in forms().into_iter().enumerate() {
         let mut numbers = Numbers::new(100 + i as u64);
-        let lines: Vec<Line> = (0..40_000).map(|_| any_line(&mut numbers, &form)).collect();
+        let lines: Vec<Line> = (0..10_000).map(|_| any_line(&mut numbers, &form)).collect();
         let forms = [form];
         compare::<Single, f32>(&name, &forms, false, &lines);
         compare::<Double, f64>(&name, &forms, false, &lines);
     }
 }
 
-/// All kinds in ray_hit place: lanes of a packet hit different primitives, and coincident surfaces tie.
-/// The winner does not depend on the other lanes.
+/// Compares packets with single rays among forms of all kinds in one place. The lanes of a packet
+/// hit different primitives, and coincident surfaces tie. The winner of a tie must not depend on
+/// the other lanes.
 #[test]
 fn packets_and_single_rays_agree_among_all_kinds() {
     let mut all: Vec<Form> = forms().into_iter().map(|f| f.1).collect();

@@ -1,4 +1,4 @@
-//! Point light over a plane: irradiance, radiance, the edge of a shadow.
+//! Point light over a plane, against closed forms: irradiance, radiance, the edge of a shadow.
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, Traced, scene};
@@ -18,7 +18,7 @@ fn ground(extra: &str, light: DVec3) -> String {
     )
 }
 
-/// Returns a ray from above to a point of the ground, and that point.
+/// Returns a ray from above to a random point of the ground, and this point.
 fn to_ground(numbers: &mut Numbers, half: f64) -> (Line, DVec3) {
     let p = DVec3::new(numbers.between(-half, half), 0.0, numbers.between(-half, half));
     let from = DVec3::new(numbers.between(-5.0, 5.0), 2.0, numbers.between(-5.0, 5.0));
@@ -55,8 +55,8 @@ fn closed_form_01_a_point_light_on_a_plane() {
     }
 }
 
-/// Rectangle with the corners (+-1.5, 1, +-1) turned by 20 degrees: the ground is dark exactly
-/// where the segment to the light crosses it.
+/// Checks the shadow of a rectangle with the corners (+-1.5, 1, +-1), turned by 20 degrees. The
+/// ground is dark exactly where the segment to the light crosses the rectangle.
 #[test]
 fn closed_form_01_the_shadow_has_straight_edges() {
     let light = DVec3::new(0.5, 4.0, -0.7);

@@ -1,4 +1,4 @@
-//! Perfect mirrors show the view of the mirrored camera: the image of P is P - 2 (n.P - d) n.
+//! Perfect mirrors against the view of the mirrored camera: the image of P is P - 2 (n.P - d) n.
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, Traced, closest, scene};

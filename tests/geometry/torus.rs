@@ -1,5 +1,9 @@
-//! Tori: hits against the roots of the quartic's coefficients in double precision, measures against
-//! closed forms, self-shadowing, and compounds.
+//! Tests of tori:
+//!
+//! - hits, against the roots of the quartic in double precision
+//! - volumes and surfaces, against closed forms
+//! - self-shadowing
+//! - tori in compounds
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, blocked, closest};
@@ -10,7 +14,7 @@ use zerkalo::primitive::{
     Aggregate, BoundingVolume, CsgSolid, CsgTree, Form, PlaneForm, SphereForm, TorusForm,
 };
 
-/// Ratios of tube to ring.
+/// Ratios of the tube's radius to the ring's radius.
 const TUBES: [f64; 6] = [1e-3, 1e-2, 0.1, 0.4, 0.9, 1.0];
 
 fn torus(tube: f64) -> Form {
@@ -21,13 +25,13 @@ fn geometry<L: SimdFloat>(form: &Form) -> Aggregate<L> {
     Aggregate::new(std::slice::from_ref(form))
 }
 
-/// Returns the height of a point above the surface.
+/// Returns the height of the point `p` above the surface of the torus.
 fn height(p: DVec3, tube: f64) -> f64 {
     (p.x.hypot(p.z) - 1.0).hypot(p.y) - tube
 }
 
-/// Returns the real roots in ascending order of a polynomial, lowest coefficient first: bisection
-/// between the roots of its derivative.
+/// Returns the real roots of a polynomial in ascending order, by bisection between the roots of its
+/// derivative. Coefficients start with the lowest degree.
 fn roots(coefficients: &[f64]) -> Vec<f64> {
     let value = |x: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c);
     if coefficients.len() == 2 {
@@ -54,8 +58,9 @@ fn roots(coefficients: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Returns the coefficients of (|p|^2 + 1 - tube^2)^2 - 4 (x^2 + z^2) along a line, by the distance
-/// from its point nearest to the origin, and the distance of that point from the line's origin.
+/// Returns the coefficients of (|p|^2 + 1 - tube^2)^2 - 4 (x^2 + z^2) along a line, as a polynomial
+/// in the distance from the line's point nearest to the torus's centre. Also returns the distance
+/// of that point from the line's origin.
 fn quartic((origin, d): Line, tube: f64) -> ([f64; 5], f64) {
     let start = -origin.dot(d);
     let p = origin + d * start;
@@ -66,8 +71,8 @@ fn quartic((origin, d): Line, tube: f64) -> ([f64; 5], f64) {
     ([k * k - 4.0 * c, -8.0 * b, 2.0 * k - 4.0 * a, 0.0, 1.0], start)
 }
 
-/// Returns a line near the torus: through its box, or along a tangent slightly above or below the
-/// surface.
+/// Returns a random line near the torus: through its bounding box, or along a tangent slightly
+/// above or below the surface.
 fn line(numbers: &mut Numbers, tube: f64) -> Line {
     let angles = [numbers.between(0.0, 2.0 * PI), numbers.between(0.0, 2.0 * PI)];
     let outward = DVec3::new(angles[0].cos(), 0.0, angles[0].sin());
@@ -83,7 +88,7 @@ fn line(numbers: &mut Numbers, tube: f64) -> Line {
     (on_surface + normal * above - tangent * far, tangent)
 }
 
-/// Checks that every hit lies on the surface, and is the first root of the quartic except where
+/// Checks that every hit is on the surface, and is the first root of the quartic except where
 /// rounding decides.
 fn hits_are_roots<L: SimdFloat>(tube: f64, count: usize) {
     let geometry = geometry::<L>(&torus(tube));
@@ -140,7 +145,7 @@ fn torus_hits_are_roots_of_the_quartic() {
     }
 }
 
-/// Hits in a lane depend neither on the other lanes of the packet nor on its width.
+/// Checks that hits in a lane depend neither on the other lanes of the packet nor on its width.
 #[test]
 fn torus_hits_do_not_depend_on_other_lanes() {
     let mut numbers = Numbers::new(3);
@@ -155,7 +160,7 @@ fn torus_hits_do_not_depend_on_other_lanes() {
     assert_eq!(double, bits(closest(&geometry::<f64>(&form), &lines)));
 }
 
-/// Returns all hits along a line from outside, in order.
+/// Returns the distances of all hits along each line from outside, in order.
 fn all_hits<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<f64>> {
     let mut out = vec![Vec::new(); lines.len()];
     for (hits, (origin, d)) in out.iter_mut().zip(lines) {
@@ -169,8 +174,8 @@ fn all_hits<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<f6
     out
 }
 
-/// Returns lines along `d` through an even grid of `side` by `side` points of a square of
-/// half-width `half`.
+/// Returns lines along `d` through an even grid of `side` by `side` points. The grid is a square of
+/// half-width `half` around the origin.
 fn grid(d: DVec3, half: f64, side: usize) -> Vec<Line> {
     let (u, v) = d.any_orthonormal_pair();
     let place = |i: usize| half * (2.0 * (i as f64 + 0.5) / side as f64 - 1.0);
@@ -202,7 +207,7 @@ fn torus_volume_and_projected_area_match_closed_forms() {
     }
 }
 
-/// Shadow rays from the inner side of the hole to its other side are blocked.
+/// Checks that shadow rays from the inner side of the hole to its other side are blocked.
 #[test]
 fn torus_casts_shadows_on_itself() {
     let form = torus(0.3);
@@ -214,8 +219,8 @@ fn torus_casts_shadows_on_itself() {
     assert_eq!(blocked(&geometry::<Double>(&form), &rays, 10.0), [true, false, false]);
 }
 
-/// Rays that leave the surface by the offset of their precision hit it again only from inside a
-/// bend.
+/// Checks that rays that leave the surface, offset by the height of their precision, hit it again
+/// only from inside of a bend.
 #[test]
 fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
     fn check<L: SimdFloat>(tube: f64) {
@@ -245,8 +250,8 @@ fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
     }
 }
 
-/// Compounds of a torus with a ball and a half-space: each point between surfaces is on the side
-/// that its parts define.
+/// Checks compounds of a torus with a ball and a half-space. Each point between surfaces is on the
+/// side that its parts define.
 #[test]
 fn torus_in_compounds_has_two_intervals() {
     let contains = |part: usize, p: DVec3| match part {
@@ -298,8 +303,8 @@ fn torus_in_compounds_has_two_intervals() {
     assert!(several > 30, "{several}");
 }
 
-/// Bounds touch the image of the surface under any map, clearance is at most the distance of its
-/// points, and normals exist where rays hit.
+/// Checks a torus under any map. Its bounds touch the image of the surface, its clearance is at
+/// most the distance of its points, and normals exist where rays hit.
 #[test]
 fn torus_bounds_clearance_and_normals_agree_with_its_points() {
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);

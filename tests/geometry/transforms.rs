@@ -1,4 +1,4 @@
-//! Transformed objects against the definition: a point is on the image if its original is on the
+//! Transformed objects against their definition: a point is on the image if its original is on the
 //! object.
 
 use crate::common::Numbers;
@@ -75,9 +75,9 @@ fn transformed_objects_are_hit_at_images_of_original_hits() {
     }
 }
 
-/// Transform steps of a scene file against the equation of an ellipsoid worked out by hand: a unit
-/// sphere at the origin scaled by (2, 0.5, 1), turned 90 degrees about z, moved by (1, 2, 3), is (x
-/// - 1)^2 / 0.25 + (y - 2)^2 / 4 + (z - 3)^2 = 1.
+/// Checks the transform steps of a scene file against the equation of an ellipsoid. A unit sphere
+/// at the origin, scaled by (2, 0.5, 1), turned 90 degrees about z, and moved by (1, 2, 3), is (x -
+/// 1)^2 / 0.25 + (y - 2)^2 / 4 + (z - 3)^2 = 1.
 #[test]
 fn stretched_sphere_satisfies_its_equation() {
     let text = "[[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }\n\

@@ -1,4 +1,4 @@
-//! BVHs, and boxes in object or scene space, return the hits of a linear list.
+//! BVHs, and bounding boxes in object or scene space, against a linear list: their hits are equal.
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, packets};
@@ -7,8 +7,8 @@ use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single};
 use zerkalo::primitive::{Acceleration, Aggregate, Form, SphereForm};
 
-/// Returns a random scene of `count` items of every kind, crowded in the ball of radius 10 or on a
-/// lattice, where many faces lie in common planes.
+/// Returns `count` random forms of every kind. They are crowded in the ball of radius 10, or on a
+/// lattice, where many faces are in common planes.
 fn crowd(numbers: &mut Numbers, count: usize) -> Vec<Form> {
     let kinds = forms();
     let lattice = numbers.below(2) == 0;
@@ -106,7 +106,8 @@ fn trees_boxes_and_lists_give_identical_hits() {
     }
 }
 
-/// Rays past the outermost points of spheres, where the rounding of the sphere test decides.
+/// Compares rays past the outermost points of spheres, where the rounding of the sphere test
+/// decides.
 #[test]
 fn tree_and_list_agree_at_limbs() {
     let mut numbers = Numbers::new(77);

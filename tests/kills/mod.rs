@@ -1,9 +1,10 @@
-//! Crash tests: 200 programs end at random moments while their scene is edited, saved and exported, by
-//! SIGTERM, SIGHUP, SIGKILL, or a closed terminal. No file is damaged, no edit older than a limit is lost,
-//! and the terminal is restored unless SIGKILL prevents it.
+//! Crash tests. 200 programs end at random moments while their scene is edited, saved and exported:
+//! by SIGTERM, SIGHUP, SIGKILL, or a closed terminal. No file is damaged, no edit older than a
+//! limit is lost, and the terminal is restored unless SIGKILL prevents it.
 //!
-//! A failure names its run; `ZERKALO_KILL=17 cargo test --test program kills::` repeats run 17 alone, with the same
-//! keys at the same times as far as the machine permits.
+//! The message of a failure contains the number of its run. `ZERKALO_KILL=17 cargo test --test
+//! program kills::` repeats run 17 alone, with the same keys at the same times as far as the
+//! machine permits.
 #![cfg(unix)]
 
 mod pty;
@@ -22,16 +23,17 @@ use zerkalo::film::read_exr;
 use zerkalo::scene::Recovery;
 use zerkalo::terminal::{ENTER, LEAVE};
 
-/// Number of runs.
+/// Number of programs that are started and ended.
 const RUNS: usize = 200;
-/// Number of concurrent runs per processor. A program with its tracing threads must process keys as
-/// fast as they are typed.
+/// Number of concurrent programs per processor. A program with its tracing threads must process
+/// keys as fast as they are typed.
 const RUNS_PER_PROCESSOR: usize = 4;
-/// Period of runs in which one of each kind of end is followed by a start that recovers the edits.
+/// Period of runs in which one run of each kind of end is followed by a start that recovers the
+/// edits.
 const RECOVERY_PERIOD: usize = 20;
-/// Age of an edit from which it must not be lost by SIGKILL.
+/// Smallest age of an edit that must not be lost by SIGKILL.
 const KEPT_AFTER: Duration = Duration::from_secs(2);
-/// Age of a key press from which its edit must not be lost by other ends.
+/// Smallest age of a key press whose edit must not be lost if the program ends in another way.
 const READ_AFTER: Duration = Duration::from_millis(300);
 
 /// Cause of the program's end.
@@ -46,7 +48,8 @@ enum End {
 const ENDS: [End; 4] = [End::Term, End::Hup, End::Kill, End::Closed];
 
 impl End {
-    /// Returns the exit status, if the program can set it, and the age of edits that must be kept.
+    /// Returns two values: the exit status, if the program can set it, and the smallest age of
+    /// edits that must be kept.
     fn consequences(self) -> (Option<u32>, Duration) {
         match self {
             Self::Term => (Some(143), READ_AFTER),
@@ -56,13 +59,13 @@ impl End {
     }
 }
 
-/// Course of a run, derived from its number.
+/// Course of one run, derived from its number.
 #[derive(Debug)]
 struct Plan {
     end: End,
-    /// Time of the end after the first picture.
+    /// Time from the first picture to the end of the program.
     moment: Duration,
-    /// Times and indices into `KEYS`.
+    /// Keys that are pressed: the time of each, and its index into `KEYS`.
     keys: Vec<(Duration, usize)>,
 }
 
@@ -93,10 +96,10 @@ impl Plan {
     }
 }
 
-/// Stalls of the machine: start of a short sleep and its excess time.
+/// Stalls of the machine: start of a short sleep, and the time by which it took too long.
 static STALLS: Mutex<Vec<(Instant, Duration)>> = Mutex::new(Vec::new());
 
-/// Measures short sleeps until `over` is `true`.
+/// Measures short sleeps until `over` is `true`, and records stalls of the machine.
 fn watch_for_stalls(over: &AtomicBool) {
     let nap = Duration::from_millis(20);
     while !over.load(Ordering::Relaxed) {
@@ -109,7 +112,8 @@ fn watch_for_stalls(over: &AtomicBool) {
     }
 }
 
-/// Returns the additional age of edits permitted by stalls since `start`.
+/// Returns the time by which stalls of the machine since `start` may have delayed the writing of an
+/// edit.
 fn stall_allowance(start: Instant) -> Duration {
     let stalls = STALLS.lock().unwrap();
     let longest = stalls.iter().filter(|(at, _)| *at >= start).map(|(_, excess)| *excess).max();
@@ -117,10 +121,10 @@ fn stall_allowance(start: Instant) -> Duration {
     4 * longest.unwrap_or_default()
 }
 
-/// Executes one run. Returns the age of the oldest lost edit.
+/// Executes the run `number`. Returns the age of the oldest lost edit.
 ///
 /// # Errors
-/// If a file is damaged, an old edit lost, or the terminal not restored.
+/// Fails if a file is damaged, an old edit is lost, or the terminal is not restored.
 fn run(number: usize) -> Result<Duration, String> {
     let plan = Plan::of(number);
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
@@ -180,7 +184,7 @@ fn run(number: usize) -> Result<Duration, String> {
     Ok(sent.get(state).map_or(Duration::ZERO, |(at, _)| ended_at - *at))
 }
 
-/// The terminal is as it was, and nothing steers it afterwards.
+/// Checks that the terminal is in its original state, and that no control sequences follow.
 fn check_terminal(bytes: &[u8], restored: bool) -> Result<(), String> {
     let left = find(bytes, LEAVE.as_bytes()).ok_or("the terminal was not left")?;
     let after = &bytes[left + LEAVE.len()..];
@@ -196,7 +200,7 @@ fn check_terminal(bytes: &[u8], restored: bool) -> Result<(), String> {
     Ok(())
 }
 
-/// Every file is complete and what it may be.
+/// Checks that every file in `folder` is complete and has one of the contents that it may have.
 fn check_files(folder: &Path, states: &[String], keys: &[usize]) -> Result<(), String> {
     let text = fs::read_to_string(folder.join("scene.toml")).map_err(|error| error.to_string())?;
     let saved = |(i, key): (usize, &usize)| (*key == SAVE).then(|| &states[i + 1]);
@@ -230,7 +234,8 @@ fn is_whole_png(bytes: &[u8]) -> bool {
     reader.next_frame(&mut pixels).is_ok() && reader.finish().is_ok()
 }
 
-/// Returns the text that the next start has: the recovered one, or else the file's.
+/// Returns the text of the scene at the next start: that with the recovered edits, or else that of
+/// the file.
 fn effective(scene: &Path) -> Result<String, String> {
     let mut recovery = Recovery::new(Some(scene), "", None).find();
     if recovery.elsewhere || !recovery.unreadable.is_empty() || recovery.orphans.len() > 1 {
@@ -242,7 +247,7 @@ fn effective(scene: &Path) -> Result<String, String> {
     }
 }
 
-/// Starts another program that offers the kept edits, recovers and saves them.
+/// Starts another program, which offers the unsaved edits. Recovers and saves them.
 fn recover(folder: &Path, kept: &str) -> Result<(), String> {
     let scene = folder.join("scene.toml");
     let is_saved = || fs::read_to_string(&scene).is_ok_and(|text| text == kept);
@@ -322,7 +327,8 @@ fn random_ends_damage_no_file_and_lose_no_old_edit() {
     );
 }
 
-/// The result of the export is printed when stdout is gone already.
+/// Checks an export that is still running when the terminal is lost. Its result is printed after
+/// stdout is gone.
 #[test]
 fn lost_terminal_during_an_export_ends_with_status_of_sighup() {
     for _ in 0..4 {

@@ -1,4 +1,4 @@
-//! Pseudo-terminal with a minimum of replies, which can be closed like a lost connection and run
+//! Pseudo-terminal with few replies. It can be closed like a lost connection, and several can run
 //! concurrently.
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
@@ -11,12 +11,12 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Longest wait; reached only on failure.
+/// Longest time that a test waits. Only a failing test reaches it.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 const SIZE: [u16; 2] = [60, 18];
 
-/// Request to which every terminal replies, and a reply.
+/// Request to which every terminal replies, and a reply to it.
 const REQUEST: (&[u8], &[u8]) = (b"\x1b[c", b"\x1b[?62;22c");
 
 type Keyboard = Arc<Mutex<Option<Box<dyn Write + Send>>>>;
@@ -24,7 +24,8 @@ type Keyboard = Arc<Mutex<Option<Box<dyn Write + Send>>>>;
 /// Program in its own pseudo-terminal.
 pub struct Pty {
     master: Option<Box<dyn MasterPty + Send>>,
-    /// Slave end, kept open so that the modes can be read after the program's end.
+    /// Slave end of the pseudo-terminal, kept open so that its modes can be read after the
+    /// program's end.
     slave: Option<Box<dyn SlavePty + Send>>,
     keyboard: Keyboard,
     child: Box<dyn Child + Send + Sync>,
@@ -87,7 +88,7 @@ impl Pty {
         }
     }
 
-    /// Presses keys.
+    /// Sends bytes of keys to the program.
     pub fn send(&mut self, keys: &[u8]) {
         if let Some(keyboard) = &mut *self.keyboard.lock().unwrap() {
             // The program may have ended.
@@ -95,10 +96,10 @@ impl Pty {
         }
     }
 
-    /// Waits until `condition` is `true` for the output.
+    /// Waits until `condition` is `true` for the output of the program.
     ///
     /// # Errors
-    /// If it is not within [`PATIENCE`]; the message names `what`.
+    /// Fails after [`PATIENCE`]; the message contains `what`.
     pub fn wait_for(&self, what: &str, condition: impl Fn(&[u8]) -> bool) -> Result<(), String> {
         let end = Instant::now() + PATIENCE;
         let mut bytes = self.output.0.lock().unwrap();
@@ -117,14 +118,14 @@ impl Pty {
         self.wait_for(&format!("{text:?}"), |bytes| screen(bytes).contents().contains(text))
     }
 
-    /// Sends a signal by `kill`.
+    /// Sends the signal `name` to the program by `kill`.
     pub fn signal(&self, name: &str) {
         let id = self.child.process_id().expect("a process").to_string();
         let sent = Command::new("kill").args([&format!("-{name}"), &id]).status();
         assert!(sent.is_ok_and(|status| status.success()), "no signal {name}");
     }
 
-    /// Closes the terminal like a lost connection: its master end is gone.
+    /// Closes the master end of the terminal, as a lost connection does.
     pub fn hang_up(&mut self) {
         self.closing.store(true, Ordering::Release);
         // The help makes output, which wakes the reader.
@@ -152,7 +153,7 @@ impl Pty {
         }
     }
 
-    /// Returns all output, and `true` if the modes of the terminal are restored.
+    /// Returns all output of the program, and `true` if the modes of the terminal are restored.
     pub fn afterwards(mut self) -> (Vec<u8>, bool) {
         let restored = self.master.as_deref().is_some_and(|master| modes(master) == self.modes);
         // Closing the last slave end closes the terminal and the output.
@@ -165,7 +166,7 @@ impl Pty {
     }
 }
 
-/// Ends the program of a failed test.
+/// Dropping the terminal ends the program of a failed test.
 impl Drop for Pty {
     fn drop(&mut self) {
         let _ = self.child.kill();
@@ -177,7 +178,7 @@ pub fn find(bytes: &[u8], part: &[u8]) -> Option<usize> {
     bytes.windows(part.len()).position(|window| window == part)
 }
 
-/// Returns the screen of a terminal after these bytes.
+/// Returns the screen of a terminal after the output `bytes`.
 pub fn screen(bytes: &[u8]) -> vt100::Screen {
     let [columns, rows] = SIZE.map(|n| NonZeroU16::new(n).expect("a size"));
     let mut parser = vt100::Parser::new(rows, columns, 0);

@@ -1,15 +1,15 @@
-//! Expected states of a scene after keys, computed without the program.
+//! Expected states of a scene after key presses, computed without the program.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message};
-use zerkalo::dashboard::model::{Colors, Model, Start};
-use zerkalo::dashboard::update::{begin, update};
+use zerkalo::dashboard::model::Model;
+use zerkalo::dashboard::update::update;
 use zerkalo::render::schedule::Stop;
 use zerkalo::scene::Document;
 
-/// Scene that renders quickly.
+/// Text of a scene that renders quickly.
 pub const SCENE: &str = r#"# A ball before a mirror.
 [film]
 size = [24, 18]
@@ -41,7 +41,8 @@ material = "mirror"
 shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0, 0.0, 1.0] }
 "#;
 
-/// Keys and the bytes that a keyboard sends. Their edits do not depend on time.
+/// Keys that a test presses: the name of each, and the bytes that a keyboard sends. Their edits do
+/// not depend on time.
 pub const KEYS: [(&str, &[u8]); 10] = [
     ("'", b"'"),
     (";", b";"),
@@ -54,24 +55,16 @@ pub const KEYS: [(&str, &[u8]); 10] = [
     ("p", b"p"),
     ("P", b"P"),
 ];
-/// Index of the key that saves.
+/// Index in `KEYS` of the key that saves the scene.
 pub const SAVE: usize = 7;
 
 /// Returns the text of the saved file after each prefix of `keys`, from none to all.
 pub fn states(keys: &[usize]) -> Vec<String> {
     let path = PathBuf::from("scene.toml");
     let mut document = Document::parse(SCENE.to_string(), "scene.toml").expect("a scene");
-    let mut model = Model::new(Start {
-        path: Some(path.clone()),
-        name: "scene.toml".into(),
-        scene: Ok(Arc::new(document.scene().clone())),
-        screen: [60, 18],
-        colors: Colors::Indexed,
-        stop: Stop::default(),
-        threads: 1,
-        max_threads: 1,
-    });
-    begin(&mut model);
+    let scene = Ok(Arc::new(document.scene().clone()));
+    let mut model = Model::new(Some(path.clone()), "", scene, Stop::default(), 1);
+    update(&mut model, Message::Resize([60, 18]), Duration::ZERO);
     let mut texts = vec![SCENE.to_string()];
     for (i, key) in keys.iter().enumerate() {
         let now = Duration::from_secs(i as u64);

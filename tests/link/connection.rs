@@ -1,4 +1,4 @@
-//! Simulated connection with a rate and a delay, and an emulated terminal that replies.
+//! Simulated connection with a rate and a delay, and a simulated terminal that replies.
 
 use std::collections::VecDeque;
 use std::num::NonZeroU16;
@@ -6,38 +6,39 @@ use std::time::Duration;
 use zerkalo::terminal::diff::{FrameDiff, TargetFrame};
 use zerkalo::terminal::flow::{FRAME_INTERVAL, FlowControl, InitialLink, PacingMode};
 
-/// Connection, terminal, and the program's flow control and frame difference.
+/// Simulated connection and terminal, with the program's flow control and frame difference.
 pub struct Connection {
     pub flow: FlowControl,
     pub diff: FrameDiff,
     pub parser: vt100::Parser,
     pub now: Duration,
-    /// Bytes per second.
+    /// Rate of the connection in bytes per second.
     rate: f64,
     one_way: Duration,
     free_at: Duration,
-    /// Frames in transmission with their times of arrival.
+    /// Frames in transmission to the terminal, with their times of arrival.
     in_transit: VecDeque<(Duration, Vec<u8>)>,
     replies: VecDeque<Duration>,
-    /// `true` if the terminal replies.
+    /// `true` if the terminal replies to requests.
     pub is_replying: bool,
-    /// Frames in the kernel's send queue: start and end of their transmission, and their bytes. They
-    /// leave the queue one round trip later.
+    /// Frames in the kernel's send queue: start and end of their transmission, and number of bytes.
+    /// A frame leaves the queue one round trip after its transmission.
     queue: VecDeque<(Duration, Duration, usize)>,
-    /// `true` if the next frame shows the effect of input.
+    /// `true` if the next frame shows the effect of user input.
     is_answering: bool,
     pub sent: Vec<Sent>,
-    /// `true` if the user is always active.
+    /// `true` if the user presses keys all the time.
     pub is_user_active: bool,
-    /// Time in which visible differences waited, and the part of it in which the connection was busy.
+    /// Two durations: the time during which the terminal differed visibly from the target, and the
+    /// part of it during which the connection was busy.
     pub waited: [Duration; 2],
 }
 
-/// Sent frame.
+/// Sizes of a frame that was sent.
 #[derive(Clone, Copy, Debug)]
 pub struct Sent {
     pub bytes: usize,
-    /// Budget in bytes.
+    /// Largest allowed size of the frame in bytes.
     pub budget: usize,
     pub flushed: usize,
 }
@@ -45,13 +46,14 @@ pub struct Sent {
 const STEP: Duration = Duration::from_millis(1);
 
 impl Connection {
-    /// Creates a connection of `rate` bytes per second. `round_trip` is that of an empty connection.
+    /// Creates a connection of `rate` bytes per second. `round_trip` is its round-trip time without
+    /// traffic.
     pub fn new(size: [u16; 2], rate: f64, round_trip: Duration) -> Self {
         Self::with_mode(size, rate, round_trip, PacingMode::AckClocked(None))
     }
 
-    /// Creates a connection whose frames are paced by `mode`. Without replies the round trip is not
-    /// known.
+    /// Creates a connection whose frames are paced by `mode`. In the mode without replies, the
+    /// program does not know the round trip.
     pub fn with_mode(
         [columns, rows]: [u16; 2],
         rate: f64,
@@ -68,7 +70,7 @@ impl Connection {
         let [columns, rows] = [columns, rows].map(|n| NonZeroU16::new(n).unwrap());
         Self {
             flow: FlowControl::new(start),
-            diff: FrameDiff::new(),
+            diff: FrameDiff::default(),
             parser: vt100::Parser::new(rows, columns, 0),
             now: Duration::ZERO,
             rate,
@@ -85,7 +87,7 @@ impl Connection {
         }
     }
 
-    /// Simulates `time` while `target` is to be shown.
+    /// Simulates the duration `time`, during which `target` is the frame to be shown.
     pub fn pass(&mut self, target: &TargetFrame, time: Duration) {
         let end = self.now + time;
         // Frames are not checked more often than the frame interval.
@@ -99,7 +101,7 @@ impl Connection {
                 self.flow.held_back(self.now, Some(queued));
             }
             if self.is_user_active {
-                self.flow.act(self.now);
+                self.flow.record_input(self.now);
             }
             let allowance = self.flow.allowance(self.now, self.is_answering);
             if let Some(allowance) = allowance.filter(|_| next <= self.now) {
@@ -126,12 +128,12 @@ impl Connection {
         }
     }
 
-    /// Presses a key while `old` is shown. Its effect is `new`. Returns the time until the first
-    /// kilobyte of the first frame of the picture arrives.
+    /// Simulates a key press while the terminal shows `old`; the effect of the key is `new`.
+    /// Returns the time until the first kilobyte of the first frame with the effect arrives.
     pub fn press(&mut self, old: &TargetFrame, new: &TargetFrame) -> Duration {
         let pressed = self.now;
         self.pass(old, self.one_way);
-        self.flow.act(self.now);
+        self.flow.record_input(self.now);
         self.is_answering = true;
         while self.is_answering {
             self.pass(new, STEP);
@@ -154,19 +156,19 @@ impl Connection {
         self.queue.iter().map(in_queue).sum::<f64>().ceil() as usize
     }
 
-    /// Delivers all frames in transmission.
+    /// Delivers all frames in transmission to the terminal.
     pub fn drain(&mut self) {
         for (_, bytes) in self.in_transit.drain(..) {
             self.parser.process(&bytes);
         }
     }
 
-    /// Returns the share of the time with waiting visible differences in which the connection was busy.
+    /// Returns the share of the time with visible differences during which the connection was busy.
     pub fn busy(&self) -> f64 {
         self.waited[1].as_secs_f64() / self.waited[0].as_secs_f64().max(1e-3)
     }
 
-    /// Returns the bytes sent in total.
+    /// Returns the total number of bytes that were sent.
     pub fn total(&self) -> usize {
         self.sent.iter().map(|sent| sent.bytes).sum()
     }

@@ -1,4 +1,4 @@
-//! Bytes and errors of complete convergences.
+//! Bytes on a connection, and errors of the screen, while a picture converges to its end.
 
 use crate::link::connection::Connection;
 use crate::link::picture::{SCREEN, Work};
@@ -7,7 +7,7 @@ use std::time::Duration;
 use zerkalo::scene::Scene;
 use zerkalo::terminal::diff::TargetFrame;
 
-/// Scene seen in a rough mirror, noisy everywhere.
+/// Scene seen in a rough mirror, whose picture is noisy everywhere.
 const NOISY: &str = r#"
 [camera]
 eye = [0.0, 1.0, 0.0]
@@ -43,29 +43,30 @@ shape.sphere = { center = [1.5, 1.4, 1.5], radius = 0.8 }
 "#;
 
 const SPP: u32 = 1024;
-/// 1 Mbit/s, in bytes per second.
+/// Rate of the connection in bytes per second: 1 Mbit/s.
 const RATE: f64 = 125e3;
 const ROUND_TRIP: Duration = Duration::from_millis(100);
 
-/// Measurements of one convergence.
+/// Measurements of one picture's convergence.
 struct Figures {
     frames: usize,
     total: usize,
-    /// Bytes for invisible differences.
+    /// Number of bytes that were sent for invisible differences.
     flushed: usize,
     first_64: usize,
     largest: usize,
-    /// Mean over the waves of the OKLab error at the end of each.
+    /// Mean OKLab error of the screen at the end of each wave.
     mean_error: f64,
-    /// Seconds from the last wave until everything is exact.
+    /// Seconds from the end of the last wave until the screen shows the picture exactly.
     exact_after: f64,
-    /// Seconds in which visible differences waited.
+    /// Seconds during which visible differences waited to be sent.
     waited: f64,
-    /// Share of them in which the connection was busy.
+    /// Share of the time with visible differences during which the connection was busy.
     busy: f64,
 }
 
-/// Renders wave by wave; the next wave starts when no visible difference waits.
+/// Renders a scene wave by wave. The next wave starts as soon as no visible difference waits to be
+/// sent.
 fn converge(scene: &Scene) -> Figures {
     let mut work = Work::new(scene, SPP);
     let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
@@ -142,7 +143,7 @@ fn noisy_scene_stays_within_bytes() {
     assert!(figures.busy >= 0.6, "{}", figures.busy);
 }
 
-/// Frames depend on the shown cells and simulated time only.
+/// Checks that frames depend only on the shown cells and on the simulated time.
 #[test]
 fn frames_are_deterministic() {
     let scene = support::shipped("roughness-0.3.toml");
@@ -160,7 +161,8 @@ fn frames_are_deterministic() {
     assert_eq!(first, second);
 }
 
-/// After an edit the first frame shows the new picture everywhere, as a mosaic if need be.
+/// Checks that the first frame after an edit shows the new picture everywhere, if necessary as a
+/// mosaic.
 #[test]
 fn new_picture_shows_in_its_first_frame() {
     let scene = support::shipped("mirror-room.toml");
@@ -185,7 +187,8 @@ fn new_picture_shows_in_its_first_frame() {
     assert!(first.bytes <= first.budget && after < 0.6 * before, "{before} {after}");
 }
 
-/// The connection is busy while visible differences wait, and input waits for at most one frame.
+/// Checks that the connection is busy while visible differences wait, and that user input waits for
+/// at most one frame.
 #[test]
 fn connection_is_busy_while_differences_wait() {
     let scenes = ["mirror-room.toml", "viewpoint-left.toml"].map(support::shipped);
@@ -208,9 +211,9 @@ fn connection_is_busy_while_differences_wait() {
     }
 }
 
-/// Key presses while the effects of earlier ones are sent. The bound of the median is the round trip,
-/// 0.1 s for the frame before, 0.05 s for the excess of the measured round trip, and the time of a
-/// kilobyte; at 1 Mbit/s it is the goal of 0.25 s.
+/// Checks key presses while the effects of earlier ones are being sent. The median of the latency
+/// has a bound: the round trip, 0.1 s for the frame before, 0.05 s for the excess of the measured
+/// round trip, and the time of a kilobyte. At 1 Mbit/s the bound is the goal of 0.25 s.
 #[test]
 fn keys_wait_for_one_frame_only() {
     use zerkalo::terminal::flow::PacingMode::{AckClocked, SendQueue};

@@ -1,4 +1,4 @@
-//! Bytes that a converging picture takes on a simulated connection, and the error of the shown picture.
+//! Bytes that a converging picture takes on a simulated connection, and the error of the screen.
 //! Time is simulated.
 
 mod connection;

@@ -1,4 +1,4 @@
-//! Screen of 160 x 45 cells: a converging picture and a row of text below.
+//! Screen of 160 x 45 cells: a picture that converges, and a row of text below.
 
 use crate::support;
 use ratatui::buffer::Buffer;
@@ -8,19 +8,20 @@ use zerkalo::film::{Display, Replicates};
 use zerkalo::render::RenderState;
 use zerkalo::render::schedule::{Schedule, Step, Stop};
 use zerkalo::scene::Scene;
-use zerkalo::terminal::cells::{CellColor, Colors, Oklab, PictureCells, Raster};
+use zerkalo::terminal::cells::{Colors, Oklab, PictureCells, Raster};
 use zerkalo::terminal::diff::TargetFrame;
 use zerkalo::world::Precision;
 
 pub const SCREEN: [u16; 2] = [160, 45];
-/// Area of the picture: all but the last row.
+/// Area of the picture on the screen: all rows but the last.
 const PICTURE: Rect = Rect { x: 0, y: 0, width: SCREEN[0], height: SCREEN[1] - 1 };
 
-/// Converging picture with one sample per half cell in the first wave.
+/// Picture that converges. Its first wave has one sample per half cell (upper or lower half of a
+/// terminal cell).
 pub struct Work {
     rendering: RenderState,
     schedule: Schedule,
-    pool: rayon::ThreadPool,
+    pool: support::Pool,
     cells: Buffer,
     uncovered: Vec<bool>,
     subject: u64,
@@ -51,7 +52,7 @@ impl Work {
         }
     }
 
-    /// Traces one wave, or sets `done`.
+    /// Traces one wave (set of concurrent jobs), or sets `done` if the picture is complete.
     pub fn wave(&mut self) {
         match self.schedule.next(0.0) {
             Step::Finished(_) => self.done = true,
@@ -71,23 +72,19 @@ impl Work {
         self.cells.reset();
         let picture = PictureCells::new(&raster, Colors::True, self.done);
         for (cell, at) in picture.cells.iter().zip(PICTURE.positions()) {
-            let [fg, bg] = [cell.fg, cell.bg].map(|color| match color {
-                CellColor::Rgb([r, g, b]) => Color::Rgb(r, g, b),
-                _ => Color::Reset,
-            });
-            self.cells[at].set_char(cell.glyph).set_style(Style::new().fg(fg).bg(bg));
+            self.cells[at].set_char(cell.glyph).set_style(Style::new().fg(cell.fg).bg(cell.bg));
         }
         let text = format!(" {} samples per pixel, wave {}", self.samples, self.version);
         self.cells.set_string(0, PICTURE.height, text, Style::new());
     }
 
-    /// Replaces the scene.
+    /// Replaces the scene, to be rendered up to `spp` samples per pixel.
     pub fn edit(&mut self, scene: &Scene, spp: u32) {
         let Self { subject, version, .. } = *self;
         *self = Self { subject: subject + 1, version, ..Self::new(scene, spp) };
     }
 
-    /// Returns the target frame.
+    /// Returns the frame that the terminal should show.
     pub fn target(&self) -> TargetFrame<'_> {
         TargetFrame {
             cells: &self.cells,
@@ -101,7 +98,8 @@ impl Work {
         }
     }
 
-    /// Returns the mean OKLab distance between shown and target halves of all cells.
+    /// Returns the mean OKLab distance between the shown and the target colours, over the halves of
+    /// all cells.
     pub fn error(&self, screen: &vt100::Screen) -> f64 {
         let distances = PICTURE.positions().map(|at| {
             let target = &self.cells[at];
@@ -114,7 +112,7 @@ impl Work {
         distances.sum::<f64>() / (2.0 * f64::from(PICTURE.area()))
     }
 
-    /// Returns `true` if text and picture are shown exactly.
+    /// Returns `true` if the screen shows text and picture exactly.
     pub fn is_exact(&self, screen: &vt100::Screen) -> bool {
         let row = |y: u16| screen.contents_between(y, 0, y, SCREEN[0]);
         let text: String =

@@ -22,9 +22,9 @@ fn codes(session: &Session) -> (Vec<[f64; 3]>, f64) {
     session.with(move |r, _| (read(r), noise(r))).unwrap()
 }
 
-/// Lights are dimmed and lit during an adaptive render. Over several seeds the estimated error for
-/// the new light weights equals the true one, as it does for a fresh render. The reference is a
-/// fresh render of the new weights with another seed.
+/// Checks the noise estimate after lights are dimmed and brightened during an adaptive render. Over
+/// several seeds the estimated error for the new light weights equals the true one, as it does for
+/// a fresh render. The reference is a fresh render with another seed.
 #[test]
 fn noise_estimate_after_light_change_is_accurate() {
     let mut bright = scene();

@@ -1,4 +1,4 @@
-//! Extreme test 23: albedo of Cook-Torrance in a white furnace.
+//! Albedo of Cook-Torrance in a white furnace (test 23 of extremes).
 
 use crate::common::report::{precision, report};
 use crate::lobes::setup::*;
@@ -7,8 +7,8 @@ use zerkalo::material::{Lobe, Masking};
 
 const DEGREES: [f64; 5] = [0.0, 45.0, 75.0, 85.0, 89.0];
 
-/// Albedo of Beckmann microfacets with F = 1 at these angles, from a quadrature of the closed formula that
-/// is independent of this program.
+/// Known albedos of Beckmann microfacets with F = 1, at five angles, from a quadrature of the
+/// closed formula that is independent of this program.
 const KNOWN: [(Masking, f64, [f64; 5]); 7] = [
     (Masking::VCavity, 0.2, [1.000, 0.992, 0.928, 0.960, 0.991]),
     (Masking::VCavity, 0.4, [0.964, 0.912, 0.932, 0.975, 0.995]),

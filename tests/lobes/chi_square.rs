@@ -1,4 +1,5 @@
-//! Chi-square tests of sampled directions against the integrated density of their lobe (extreme test 22).
+//! Chi-square tests of sampled directions against the integrated density of their lobe (test 22 of
+//! extremes).
 
 use crate::common::report::{precision, report};
 use crate::lobes::setup::*;
@@ -10,24 +11,25 @@ use zerkalo::material::{Bsdf, Lobe, Material, ReflectionLobe};
 const ALPHAS: [f64; 5] = [1e-3, 0.05, 0.3, 1.0, 2.0];
 const DEGREES: [f64; 4] = [0.0, 60.0, 85.0, 89.9];
 const GRID: [usize; 2] = [16, 24];
-/// Points per bin and coordinate of the midpoint rule that integrates densities; eight times as many for
-/// densities with a discontinuity.
-const FINE: usize = 16;
+/// Number of points per bin and coordinate of the midpoint rule that integrates densities.
+/// Densities with a discontinuity take eight times as many.
+const FINE: usize = 8;
 const COUNT: u32 = 100_000;
 
 /// Coordinates in [0, 1]^2 for directions, fitted to a lobe so that its bins are neither empty nor
-/// full; geometry alone, no density.
+/// full. They follow from geometry alone, without the lobe's density.
 struct Chart {
     view: Vector,
     n: Vector,
     spread: ReflectionLobe<f64>,
-    /// Interface of transmitted rays; `None` for reflected rays.
+    /// Interface that the rays are transmitted through; `None` for reflected rays.
     through: Option<Sides>,
 }
 
 impl Chart {
-    /// Direction of the rays at a boundary with the normal `h`, and its solid angle per solid angle of
-    /// `h`. Returns `None` for total internal reflection.
+    /// Returns two values for a surface with the normal `h`: the direction of the reflected or
+    /// transmitted ray, and its solid angle per solid angle of `h`. Returns `None` for total
+    /// internal reflection.
     fn leaving(&self, h: Vector) -> Option<(Vector, f64)> {
         let vh = dot(self.view, h);
         let mirror = combine(&[(2.0 * vh, h), (-1.0, self.view)]);
@@ -46,7 +48,7 @@ impl Chart {
         }
     }
 
-    /// Axis of the lobes `cone` and `square`.
+    /// Returns the axis of the lobes `cone` and `square`.
     fn mirror(&self) -> Vector {
         match self.through {
             Some(Sides { thin: true, .. }) => combine(&[(-1.0, self.view)]),
@@ -54,7 +56,7 @@ impl Chart {
         }
     }
 
-    /// Microfacet normal that sends rays in the direction `d`.
+    /// Returns the microfacet normal that sends rays in the direction `d`.
     fn half(&self, d: Vector) -> Vector {
         let h = match self.through {
             None => combine(&[(1.0, self.view), (1.0, d)]),
@@ -77,7 +79,7 @@ impl Chart {
         dot(crossing.transmitted.0, self.n) < 0.0 && self.leaving(h).is_some()
     }
 
-    /// Frame of the square lobe.
+    /// Returns the frame of the square lobe: its two sides and its axis.
     fn square_frame(&self) -> [Vector; 3] {
         let frame = Frame::around(Vec3::<f64>::of(self.mirror()));
         [vector(frame.t), vector(frame.b), vector(frame.n)]
@@ -111,7 +113,8 @@ impl Chart {
         }
     }
 
-    /// Returns the direction at the coordinates, and the solid angle per area there [sr].
+    /// Returns the direction at the coordinates `p` and `q`, and the solid angle per area there, in
+    /// steradians.
     fn direction(&self, [p, q]: [f64; 2]) -> (Vector, f64) {
         let (sin, cos) = (TAU * q).sin_cos();
         match self.spread {
@@ -148,7 +151,8 @@ impl Chart {
     }
 }
 
-/// Expected fraction of each bin, from the density of `material`, and of directions outside of all bins.
+/// Returns the expected fraction of directions in each bin, from the density of `material`. The
+/// last value is the fraction outside of all bins.
 fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
     let finish = Bsdf::<f64>::new(material, true);
     let (_, spread) = finish.reflection.unwrap();
@@ -196,7 +200,8 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
     shares
 }
 
-/// Returns the chart of a lobe seen at an angle, and the fractions expected from its density.
+/// Returns the coordinates for a lobe seen at an angle, and the expected fraction of directions in
+/// each bin.
 fn expectation(material: &Material, degrees: f64, through: Option<Sides>) -> (Chart, Vec<f64>) {
     let n = tilted_normal();
     let view = at_angle(n, degrees.to_radians(), 0.7);
@@ -206,7 +211,8 @@ fn expectation(material: &Material, degrees: f64, through: Option<Sides>) -> (Ch
     (chart, shares)
 }
 
-/// Returns the p-value of samples of `drawn` against expected fractions.
+/// Returns the p-value of sampled directions of the material `drawn` against the expected fractions
+/// `shares`.
 fn p_value<L: SimdFloat>(drawn: &Material, (chart, shares): &(Chart, Vec<f64>), seed: u64) -> f64 {
     let (view, n) = (chart.view, chart.n);
     let mut counts = vec![0u64; shares.len()];
@@ -235,10 +241,10 @@ fn p_value<L: SimdFloat>(drawn: &Material, (chart, shares): &(Chart, Vec<f64>), 
     chi_square_p(&counts, &expected)
 }
 
-/// Material, angle of the view in degrees, and interface of transmitted rays.
+/// Case of the test: material, angle of the view in degrees, and interface of transmitted rays.
 type Case = (Material, f64, Option<Sides>);
 
-/// Returns every lobe with every masking at every alpha and angle.
+/// Returns the cases of reflection: every lobe with every masking, at every alpha and angle.
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     for (lobe, masking) in every_lobe().into_iter().filter(|(l, _)| *l != Lobe::Mirror) {
@@ -254,7 +260,8 @@ fn cases() -> Vec<Case> {
     cases
 }
 
-/// Returns every lobe with every masking for light that enters and leaves glass and crosses a pane.
+/// Returns the cases of transmission: every lobe with every masking, for light that enters and
+/// leaves glass and crosses a pane.
 fn transmitted_cases() -> Vec<Case> {
     let mut cases = Vec::new();
     let sides = [(1.0, 1.5, false), (1.5, 1.0, false), (1.0, 1.5, true)];
@@ -301,8 +308,9 @@ fn extreme_22_chi_square() {
     check_cases::<f64, Double>(&cases());
 }
 
-/// In single precision a half-vector at 89.9 degrees has an error of 2e-5: a fiftieth of the narrowest
-/// lobe's alpha, and of a bin. The error is negligible from alpha 0.05, and up to 60 degrees.
+/// Checks reflected directions in single precision. At 89.9 degrees a half vector has an error of
+/// 2e-5: a fiftieth of the narrowest lobe's alpha, and of a bin. The error is negligible from alpha
+/// 0.05 on, and up to 60 degrees.
 #[test]
 fn extreme_22_chi_square_in_single_precision() {
     let mut cases = cases();
@@ -315,7 +323,8 @@ fn transmitted_directions_have_the_stated_density() {
     check_cases::<f64, Double>(&transmitted_cases());
 }
 
-/// At alpha 0.001 the errors of half vectors are as large as bins, see above.
+/// Checks transmitted directions in single precision. At alpha 0.001 the errors of half vectors are
+/// as large as bins; such narrow lobes are left out.
 #[test]
 fn transmitted_directions_have_the_stated_density_in_single_precision() {
     let mut cases = transmitted_cases();
@@ -323,7 +332,7 @@ fn transmitted_directions_have_the_stated_density_in_single_precision() {
     check_cases::<f32, Single>(&cases);
 }
 
-/// The test has power: it rejects an alpha that is 5 % too large in every lobe.
+/// Checks the power of the test: it rejects an alpha that is 5 % too large in every lobe.
 #[test]
 fn chi_square_rejects_wrong_alpha() {
     for (material, degrees, through) in cases().into_iter().chain(transmitted_cases()) {

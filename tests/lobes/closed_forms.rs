@@ -1,4 +1,4 @@
-//! Fraction of a lobe inside a half-space: closed forms against sampled lobes.
+//! Fractions of lobes inside of a half-space: closed forms against sampled directions.
 
 use crate::common::report::{precision, report};
 use crate::lobes::setup::*;
@@ -8,11 +8,13 @@ use zerkalo::lanes::{Double, Float, Frame, SimdFloat, Single, Vec3};
 use zerkalo::material::{Bsdf, Lobe, Masking, ReflectionLobe};
 use zerkalo::sampling::warp;
 
-/// Fraction of the uniform cone of half-angle `theta` in a half-space whose boundary contains the apex,
-/// at angle `delta` from the axis; delta > 0: the axis is inside. For |delta| < theta < pi / 2:
-///   f = [pi - acos(sin delta / sin theta) - cos theta acos(-tan delta / tan theta)]
-///       / [pi (1 - cos theta)],
-/// and for cones so narrow that this cancels the fraction of a flat disc, within theta^2 / 20.
+/// Returns the fraction of a uniform cone of half-angle `theta` in a half-space whose boundary
+/// contains the apex. `delta` is the angle of the axis to the boundary; if it is positive, the axis
+/// is inside.
+///
+/// For |delta| < theta < pi / 2 the fraction is [pi - acos(sin delta / sin theta) - cos theta
+/// acos(-tan delta / tan theta)] / [pi (1 - cos theta)]. For cones so narrow that this cancels, it
+/// is the fraction of a flat disc, within theta^2 / 20.
 pub fn cone_share(theta: f64, delta: f64) -> f64 {
     if delta.abs() >= theta {
         return if delta > 0.0 { 1.0 } else { 0.0 };
@@ -25,15 +27,16 @@ pub fn cone_share(theta: f64, delta: f64) -> f64 {
     (PI - a - theta.cos() * b) / (PI * 2.0 * (0.5 * theta).sin().powi(2))
 }
 
-/// Fraction of a disc of radius `r` within a straight edge at distance `d` from its centre; d > 0: the
-/// centre is inside. 1/2 + (d sqrt(r^2 - d^2) + r^2 asin(d / r)) / (pi r^2).
+/// Returns the fraction of a disc of radius `r` within a straight edge at distance `d` from its
+/// centre: 1/2 + (d sqrt(r^2 - d^2) + r^2 asin(d / r)) / (pi r^2). If `d` is positive, the centre
+/// is inside.
 fn disc_share(r: f64, d: f64) -> f64 {
     let d = (d / r).clamp(-1.0, 1.0);
     0.5 + (d * (1.0 - d * d).sqrt() + d.asin()) / PI
 }
 
-/// Fraction of the square of side `side`, at unit distance, within an edge at distance `d` in its plane.
-/// `phi` is the angle between the edge's normal and a side.
+/// Returns the fraction of a square with the side `side`, at unit distance, within an edge at
+/// distance `d` in its plane. `phi` is the angle between the edge's normal and a side.
 pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
     let h = 0.5 * side;
     let (c, s) = (phi.cos().abs(), phi.sin().abs());
@@ -49,7 +52,8 @@ pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
     }
 }
 
-/// A half-space for a lobe about the normal: its inward normal and the fraction of the lobe inside.
+/// Half-space that cuts a lobe about the normal: its inward normal, and the fraction of the lobe
+/// inside.
 struct Edge {
     inward: Vector,
     share: f64,
@@ -67,8 +71,8 @@ fn edge(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, delta: f64, phi: f6
     Edge { inward: combine(&[(delta.sin(), n), (delta.cos(), e)]), share }
 }
 
-/// Returns `count` edges at all angles, by the golden ratio in two dimensions. `reach` is the largest
-/// angle of the lobe [radians].
+/// Returns `count` half-spaces at all angles, chosen by the golden ratio in two dimensions. `reach`
+/// is the largest angle of the lobe in radians.
 fn edges(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, reach: f64, count: u32) -> Vec<Edge> {
     (0..count)
         .map(|i| {
@@ -78,13 +82,13 @@ fn edges(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, reach: f64, count:
         .collect()
 }
 
-/// Returns the half-angles of the tested cones [radians].
+/// Returns the half-angles of the tested cones in radians.
 fn half_angles() -> [f64; 7] {
     [1e-6, 1e-4, 1e-2, 0.1, 0.6, 1.3, FRAC_PI_2 - 1e-6]
 }
 
-/// Returns the largest deviation of counted fractions from closed forms, in standard deviations of the
-/// count.
+/// Returns the largest deviation of counted fractions from the closed forms, in standard deviations
+/// of the count.
 fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
     let count = 40_000;
@@ -103,8 +107,8 @@ fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) 
     edges.iter().zip(&inside).map(z).fold(0.0, f64::max)
 }
 
-/// Returns the root mean square error of fractions estimated with `count` Sobol points, a separate set
-/// for each edge.
+/// Returns the root mean square error of fractions that are estimated with `count` Sobol points, a
+/// separate set for each edge.
 fn rmse(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge], count: u32) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
     let incident = combine(&[(-1.0, n)]);
@@ -134,9 +138,10 @@ fn spread_of(lobe: Lobe, roughness: f64) -> ReflectionLobe<f64> {
     Bsdf::new(&material, true).reflection.unwrap().1
 }
 
-/// Closed form 3 and its limit 4, over all half-angles, in both precisions. Single precision rotates a
-/// direction by half a rounding, 6e-8, which is a fraction of 2e-6 of the cone of 0.01. Narrower cones are
-/// limited by the axis of a rotated frame; only a normal along z is precise enough for them.
+/// Checks the fraction of a cone lobe in a half-space, and its limit for narrow cones, over all
+/// half-angles and in both precisions. Single precision rotates a direction by half a rounding,
+/// 6e-8, which is a fraction of 2e-6 of the cone of 0.01. Narrower cones are limited by the axis of
+/// a rotated frame; only a normal along z is precise enough for them.
 #[test]
 fn extreme_19_cone_in_a_half_space() {
     let mut worst = [0f64; 2];
@@ -174,7 +179,8 @@ fn extreme_19_the_error_falls_faster_than_that_of_random_numbers() {
     report(19, "double", &format!("slope {flattest:.2} or steeper"));
 }
 
-/// Closed form 4: the fraction of the flat disc is the limit of the cone's, within theta^2 / 18.
+/// Checks the limit of the fraction for narrow cones: it is the fraction of the flat disc, within
+/// theta^2 / 18.
 #[test]
 fn closed_form_04_the_narrow_cone_is_a_disc() {
     for theta in [2e-3, 1e-2, 0.1] {
@@ -186,7 +192,7 @@ fn closed_form_04_the_narrow_cone_is_a_disc() {
     }
 }
 
-/// Returns half the diagonal of the square as an angle.
+/// Returns half the diagonal of the square lobe as an angle in radians.
 fn square_reach(roughness: f64) -> f64 {
     (roughness * (0.5 * PI).sqrt()).atan()
 }
@@ -215,7 +221,7 @@ fn extreme_20_square_in_a_half_space() {
     report(20, "single", &format!("{:.1} sigma at most", worst[1]));
 }
 
-/// Closed form 5: 1 / (side^2 cos^3) is the direction density of a uniform point of the square. It
+/// Checks the density of directions to a uniform point of the square, 1 / (side^2 cos^3). It
 /// integrates to 1 and is larger towards the corners.
 #[test]
 fn closed_form_05_density_of_the_square() {
@@ -239,8 +245,8 @@ fn closed_form_05_density_of_the_square() {
     }
 }
 
-/// Returns the largest difference between the edge responses of square and cone at tan theta = 0.2, over all
-/// edges.
+/// Returns the largest difference between the responses of square and cone to an edge at tan theta
+/// = 0.2, over all edges.
 fn largest_difference(side: f64) -> f64 {
     let theta = 0.2f64.atan();
     let mut largest: f64 = 0.0;
@@ -254,8 +260,9 @@ fn largest_difference(side: f64) -> f64 {
     largest
 }
 
-/// Closed form 6: the square of the cone's area is nearer to the cone than other usual choices. The
-/// reference values are rounded ones for a flat disc, from which the cone differs by 0.002 at this angle.
+/// Checks that the square lobe with the area of the cone is nearer to the cone lobe than other
+/// usual choices. The reference values are rounded ones for a flat disc, from which the cone
+/// differs by 0.002 at this angle.
 #[test]
 fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
     let r = 0.2;
@@ -272,7 +279,8 @@ fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
     assert!((side - PI.sqrt() * r).abs() < 1e-15);
 }
 
-/// Closed form 6 with sampled lobes: the responses to one edge, 65 536 Sobol points each.
+/// Compares square and cone by sampled lobes: their responses to one edge, by 65,536 Sobol points
+/// each.
 #[test]
 fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
     let (r, n) = (0.2f64, tilted_normal());
@@ -308,8 +316,9 @@ fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
     assert!((0.020..0.025).contains(&largest), "{largest}");
 }
 
-/// Extreme test 21: a lobe half below the surface, seen at 89.999 degrees. Folded it keeps all light;
-/// absorbed it loses the fraction of the closed forms.
+/// Checks a lobe half below the surface, seen at 89.999 degrees. If directions below the horizon
+/// are mirrored up, it keeps all light. If they are absorbed, it loses the fraction of the closed
+/// forms.
 #[test]
 fn extreme_21_lobe_at_the_horizon() {
     horizon::<f64>(1e-12);

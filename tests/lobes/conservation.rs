@@ -1,4 +1,4 @@
-//! Conservation of energy and reciprocity of the reflection models: every lobe, highlight and
+//! Conservation of energy and reciprocity of the reflection models. Every lobe, highlight and
 //! masking has the properties that [`crate::lobes::properties`] lists.
 
 use crate::lobes::properties::{BsdfProperties, Energy, ReflectionModel, transmission_properties};
@@ -12,8 +12,8 @@ use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::value::{Color, ValueType};
 use zerkalo::world::World;
 
-/// The words of the field table and the lists of variants have the same order, so that these tests cover
-/// every word.
+/// Checks that the words of the field table and the lists of variants have the same order, so that
+/// these tests cover every word.
 #[test]
 fn variants_match_words_of_fields() {
     let words = |key: &str| -> Vec<&str> {
@@ -31,8 +31,8 @@ fn variants_match_words_of_fields() {
     assert_eq!(read("fresnel").iter().map(|m| m.fresnel_mode()).collect::<Vec<_>>(), Fresnel::ALL);
 }
 
-/// Energy and reciprocity of reflection and transmission together, from outside and from inside. A mode
-/// without a property violates it.
+/// Checks energy and reciprocity of reflection and transmission together, from outside and from
+/// inside. A mode that does not claim a property violates it.
 #[test]
 fn transparent_surfaces_have_declared_properties() {
     for mode in Fresnel::ALL {
@@ -65,7 +65,7 @@ fn transparent_surfaces_have_declared_properties() {
     }
 }
 
-/// Returns pairs of directions on the same side of a surface, at many angles.
+/// Returns pairs of directions on the same side of a surface, at many angles to the normal.
 fn pairs() -> Vec<(Vector, Vector)> {
     let n = tilted_normal();
     let angles = [0.01, 0.3, 0.8, 1.2, 1.5, 1.57];
@@ -80,7 +80,7 @@ fn pairs() -> Vec<(Vector, Vector)> {
     pairs
 }
 
-/// Returns f of the highlight for light from `l` seen from `v`.
+/// Returns the value f (BRDF) of a highlight for light from `l` seen from `v`.
 fn highlight_f(material: &Material, v: Vector, l: Vector) -> f64 {
     let n = tilted_normal();
     let finish = Bsdf::<f64>::new(material, true);
@@ -88,7 +88,8 @@ fn highlight_f(material: &Material, v: Vector, l: Vector) -> f64 {
     finish.highlight(Vec3::of(n), Vec3::of(v), Vec3::of(l), nl, nv).x / nl
 }
 
-/// Returns f of the reflected ray: weight x density / cos of the light.
+/// Returns the value f (BRDF) of a reflection lobe for light from `l` seen from `v`: weight x
+/// density / cosine of the light.
 fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
     let n = tilted_normal();
     let finish = Bsdf::<f64>::new(material, true);
@@ -105,7 +106,7 @@ fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
     }
 }
 
-/// Largest relative difference between f(l, v) and f(v, l).
+/// Returns the largest relative difference between f(l, v) and f(v, l).
 fn asymmetry(f: impl Fn(Vector, Vector) -> f64) -> f64 {
     let of = |(v, l): &(Vector, Vector)| {
         let (there, back) = (f(*v, *l), f(*l, *v));
@@ -152,7 +153,7 @@ fn closed_form_13_reciprocity_is_as_claimed() {
     }
 }
 
-/// Checks a mirror, which has no f: the reverse ray has the same path and weight.
+/// Checks a mirror, which has no finite value f: the reverse ray has the same path and weight.
 fn mirror_is_reciprocal(material: &Material) {
     assert!(material.lobe.properties().reciprocal);
     let n = tilted_normal();
@@ -172,7 +173,8 @@ fn mirror_is_reciprocal(material: &Material) {
     }
 }
 
-/// Lambert's law in traced paths: exchanging light and eye changes only the cosine of the light.
+/// Checks Lambert's law in traced paths: exchanging light and eye changes only the cosine of the
+/// light.
 #[test]
 fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
     assert_eq!(
@@ -205,7 +207,7 @@ fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
     }
 }
 
-/// Mean weight of reflections at an angle, by a Sobol set.
+/// Returns the mean weight of reflections at an angle, by a set of Sobol points.
 fn mean_weight(material: &Material, degrees: f64) -> f64 {
     let n = tilted_normal();
     let incident = combine(&[(-1.0, at_angle(n, degrees.to_radians(), 1.0))]);
@@ -235,7 +237,7 @@ fn closed_form_7_energy_is_as_claimed() {
     }
 }
 
-/// Albedo of a highlight for light from all directions, by the midpoint rule.
+/// Returns the albedo of a highlight for light from all directions, by the midpoint rule.
 fn highlight_albedo(material: &Material, degrees: f64) -> f64 {
     let n = tilted_normal();
     let v = at_angle(n, degrees.to_radians(), 0.0);
@@ -271,8 +273,8 @@ fn closed_form_7_energy_of_highlights_is_as_claimed() {
     }
 }
 
-/// weight x density = f cos at every sampled direction: sampled reflection and highlight are the same
-/// model.
+/// Checks weight x density = f cos at every sampled direction: the sampled reflection and the
+/// highlight are the same model.
 #[test]
 fn closed_form_13_weight_times_density_is_the_highlight() {
     let n = tilted_normal();
@@ -316,8 +318,8 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
     assert!(vector(Frame::around(Vec3::<f64>::of(n)).n) == n);
 }
 
-/// Value over density of a lobe in a sampled direction is the weight of the sample, whether
-/// directions below the surface are mirrored up or absorbed.
+/// Checks that the value of a lobe in a sampled direction, divided by its density, is the weight of
+/// the sample. This holds whether directions below the surface are mirrored up or absorbed.
 #[test]
 fn value_over_density_is_the_weight_of_the_sample() {
     let n = tilted_normal();

@@ -1,21 +1,23 @@
-//! Phong highlights, from wide ones to those of a single pixel.
+//! Phong highlights, from wide ones to those as small as a pixel.
 
 use crate::lobes::setup::{across, combine, dot, tilted_normal, unit};
 use zerkalo::lanes::{Double, Float, SimdFloat, Single, Vec3};
 use zerkalo::material::{Bsdf, Material};
 
-/// Material with a highlight only.
+/// Returns a material that has only a Phong highlight.
 fn shiny(exponent: f64) -> Material {
     Material { diffuse: 0.0, specular: 0.7, exponent, ..Material::default() }
 }
 
-/// Returns a unit vector in the precision of the kernel, and the same numbers in double precision.
+/// Returns a unit vector, rounded to the precision of the kernel, and the same numbers in double
+/// precision.
 fn rounded<L: SimdFloat>(v: [f64; 3]) -> (Vec3<L>, [f64; 3]) {
     let v = Vec3::<L>::of(v).normalize();
     (v, v.lane(0).map(Float::to_f64))
 }
 
-/// Returns (R.V)^alpha from the tangent of the angle between R and V, which keeps full precision.
+/// Returns (R.V)^alpha, computed from the tangent of the angle between R and V, which keeps full
+/// precision.
 fn power(n: [f64; 3], view: [f64; 3], light: [f64; 3], alpha: f64) -> f64 {
     let n = unit(n);
     let r = combine(&[(2.0 * dot(light, n), n), (-1.0, light)]);
@@ -29,7 +31,8 @@ fn power(n: [f64; 3], view: [f64; 3], light: [f64; 3], alpha: f64) -> f64 {
     if along > 0.0 { (-0.5 * alpha * tan2.ln_1p()).exp() } else { 0.0 }
 }
 
-/// Checks highlights around their centre for every valid exponent: at most k_s, with the exact value.
+/// Checks highlights around their centre for every valid exponent. They have the exact value, which
+/// is at most k_s.
 fn check<L: SimdFloat>(rounding: f64) {
     let most = L::from_f64(0.7) * L::from_f64(std::f64::consts::FRAC_1_PI);
     let most = most.lane(0).to_f64();

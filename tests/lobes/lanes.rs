@@ -1,20 +1,20 @@
-//! SIMD lane types: guarantees beyond the operations of IEEE 754.
+//! SIMD types: guarantees beyond the operations of IEEE 754.
 
 use zerkalo::lanes::{Double, Float, Frame, MAX_WIDTH, Mask, SimdFloat, SimdU32, Single, Vec3};
 
-/// Pseudo-random 32-bit number `i`.
+/// Returns pseudo-random 32-bit number `i`.
 fn noise(i: u32) -> u32 {
     let x = (i ^ 0x9e37_79b9).wrapping_mul(0x85eb_ca6b);
     let x = (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35);
     (x ^ (x >> 16)).wrapping_mul(0x27d4_eb2f) ^ (x >> 15)
 }
 
-/// Pseudo-random number `i`, uniform in [0, 1).
+/// Returns pseudo-random number `i`, uniform in [0, 1).
 fn uniform(i: u32) -> f64 {
     f64::from(noise(i)) / 4_294_967_296.0
 }
 
-/// Calls `check` for the production vectors and the width-1 instances.
+/// Calls `check` for the SIMD types of the program and for the types of width 1.
 macro_rules! for_every_instance {
     ($check:ident) => {
         $check::<f32>();
@@ -24,8 +24,8 @@ macro_rules! for_every_instance {
     };
 }
 
-/// Returns the largest error of `f` against `exact` over `inputs`, in ulps of the result (of 1, if
-/// `of_one`). `exact` gets the input rounded to this precision.
+/// Returns the largest error of `f` against `exact` over `inputs`. The unit is an ulp of the
+/// result, or of 1 if `of_one` is `true`. `exact` gets the input rounded to this precision.
 fn worst_ulps<L: SimdFloat>(
     inputs: impl Fn(u32) -> f64,
     f: impl Fn(L) -> L,
@@ -45,8 +45,9 @@ fn worst_ulps<L: SimdFloat>(
     worst
 }
 
-/// Sine and cosine of 2 pi u with u in [0, 1), as lobes use them: within 1.5 ulps of 1, which is enough for
-/// a direction (near a multiple of pi / 2 the smaller of the two has no better precision).
+/// Checks sine and cosine of 2 pi u with u in [0, 1), as lobes use them. They are exact within 1.5
+/// ulps of 1, which is enough for a direction. Near a multiple of pi / 2 the smaller of the two has
+/// no better precision.
 fn sine_and_cosine<L: SimdFloat>() {
     let angle = |i: u32| std::f64::consts::TAU * uniform(i);
     let sin = worst_ulps::<L>(angle, |x| x.sin_cos().0, f64::sin, true);
@@ -55,7 +56,8 @@ fn sine_and_cosine<L: SimdFloat>() {
     assert!(sin <= 1.5 && cos <= 1.5, "{}: sin {sin}, cos {cos}", L::NAME);
 }
 
-/// Angles of points in all directions: within 3 ulps of 1, for angles up to pi, without NaN on axes.
+/// Checks the angles of points in all directions. They are exact within 3 ulps of 1, for angles up
+/// to pi, without NaN on axes.
 fn arc_tangent<L: SimdFloat>() {
     let angle = |i: u32| std::f64::consts::PI * (2.0 * uniform(i) - 1.0);
     let rounded = |x: f64| L::from_f64(x).lane(0).to_f64();
@@ -72,8 +74,9 @@ fn arc_tangent<L: SimdFloat>() {
     assert_eq!(L::from_f64(0.0).atan2(L::from_f64(2.0)).lane(0).to_f64(), 0.0);
 }
 
-/// Logarithms of the arguments of Beckmann's lobe (1 - u) and Phong's highlight (a cosine, at least 1e-30),
-/// exponentials of the arguments of both highlights.
+/// Checks logarithms and exponentials of the arguments that occur. Logarithms are those of
+/// Beckmann's lobe (1 - u) and of Phong's highlight (a cosine, at least 1e-30); exponentials are
+/// those of both highlights.
 fn logarithm_and_exponential<L: SimdFloat>() {
     let small = |i: u32| 10f64.powf(-30.0 * uniform(i));
     let share = |i: u32| 1.0 - f64::from(noise(i) >> 8) / 16_777_216.0;
@@ -102,7 +105,7 @@ fn elementary_functions_are_good_to_stated_ulps() {
     for_every_instance!(logarithm_and_exponential);
 }
 
-/// Sums of rounded lanes are exact: they equal scalar sums, rounded to nearest even.
+/// Checks that sums of rounded lanes are exact: they equal scalar sums, rounded to nearest even.
 fn fixed_point<L: SimdFloat>() {
     let halves = [0.5, 1.5, 2.5, -0.5, -1.5, -2.5, 0.0, -0.0];
     for i in 0..20_000u32 {
@@ -132,6 +135,26 @@ fn fixed_point_sums_are_exact() {
     for_every_instance!(fixed_point);
 }
 
+/// Checks lookups in tables of one element, of a register of every width, and of more.
+fn gathers<L: SimdFloat>() {
+    for length in [1, 4, 8, 16, 17, 64] {
+        let value = |i: usize| L::Scalar::from_f64(uniform(i as u32));
+        let table: Vec<L::Scalar> = (0..length).map(value).collect();
+        for i in 0..100 {
+            let indices = std::array::from_fn(|lane| noise(i * 16 + lane as u32) % length as u32);
+            let found = L::gather(&table, &indices);
+            for (lane, index) in indices.into_iter().enumerate().take(L::WIDTH) {
+                assert_eq!(found.lane(lane), table[index as usize], "{} {length}", L::NAME);
+            }
+        }
+    }
+}
+
+#[test]
+fn gather_reads_the_element_of_each_lane() {
+    for_every_instance!(gathers);
+}
+
 fn integers<L: SimdFloat>() {
     for i in 0..10_000 {
         let x = L::SimdU32::from_fn(|lane| noise(i * 16 + lane as u32));
@@ -158,7 +181,7 @@ fn simd_integers_equal_scalar_integers() {
     for_every_instance!(integers);
 }
 
-/// Every pattern of truth values.
+/// Checks masks with every pattern of truth values.
 fn masks<L: SimdFloat>() {
     let lane_of = |bits: u32| L::from_fn(|i| L::Scalar::from_f64(f64::from(bits >> i & 1)));
     for bits in 0..1u32 << L::WIDTH {
@@ -188,7 +211,7 @@ fn masks<L: SimdFloat>() {
     assert!(L::mask(true).all() && L::mask(false).none());
 }
 
-/// Labels pass through `select` unchanged, for any bit pattern.
+/// Checks that ids in lanes pass through `select` unchanged, for any bit pattern.
 fn tags<L: SimdFloat>() {
     let labels = [0, 1, 2, 0x7f80_0000, 0x7fa0_0001, 0x7fc0_0000, 0xff80_0001, u32::MAX];
     for a in labels {
@@ -215,7 +238,7 @@ fn masks_select_lanes_and_keep_labels() {
     for_every_instance!(tags);
 }
 
-/// `min` and `max` drop NaN on the left; comparisons with NaN are false.
+/// Checks that `min` and `max` drop NaN on the left, and that comparisons with NaN are false.
 fn not_a_number<L: SimdFloat>() {
     let nan = L::from_f64(f64::NAN);
     for x in [-1.0, 0.0, 2.5, f64::INFINITY, f64::NEG_INFINITY] {
@@ -247,7 +270,8 @@ fn nan_follows_the_stated_rule() {
     for_every_instance!(not_a_number);
 }
 
-/// The smallest and the largest lane are found at any place, with NaN in any other lanes.
+/// Checks that the smallest and the largest lane are found in any position, with NaN in any other
+/// lanes.
 fn ends_of_lanes<L: SimdFloat>() {
     for i in 0..2000u32 {
         let numbers: Vec<f64> = (0..L::WIDTH as u32)
@@ -268,7 +292,7 @@ fn min_max_ignores_nan_lanes() {
     for_every_instance!(ends_of_lanes);
 }
 
-/// Arithmetic, square root and fused multiply-add give the same bits at every width.
+/// Checks that arithmetic, square root and fused multiply-add give the same bits at every width.
 fn same_bits<One: SimdFloat, Many: SimdFloat<Scalar = One::Scalar>>() {
     let value =
         |i: u32| One::Scalar::from_f64((uniform(i) - 0.5) * (60.0 * uniform(!i) - 30.0).exp2());
@@ -294,7 +318,8 @@ fn ieee_operations_are_the_same_bits_at_every_width() {
     same_bits::<f64, Double>();
 }
 
-/// The axes of an upright mirror's lobes are horizontal and vertical for every orientation.
+/// Checks that the axes of an upright mirror's lobes are horizontal and vertical for every
+/// orientation.
 #[test]
 fn frames_around_horizontal_vectors_are_upright() {
     for i in 0..360 {

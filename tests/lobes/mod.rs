@@ -1,5 +1,5 @@
-//! Lobes, physical properties, samples, lanes and whole paths against closed forms and statistics with
-//! fixed seeds.
+//! Lobes, physical properties, samples, SIMD types and whole paths, against closed forms and by
+//! statistics with fixed seeds.
 
 mod albedo;
 mod chi_square;
@@ -12,5 +12,5 @@ mod rough;
 mod sampler;
 mod setup;
 mod stats;
-mod through;
+mod transmission;
 mod worlds;

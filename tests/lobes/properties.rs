@@ -13,22 +13,22 @@ pub enum Energy {
     Unbounded,
 }
 
-/// Physical properties of a reflection model.
+/// Physical properties of a reflection model that tests check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BsdfProperties {
     /// `true` if f(light, view) = f(view, light).
     pub reciprocal: bool,
-    /// Energy balance.
+    /// Energy balance of the model: whether its albedo is 1, at most 1, or unbounded.
     pub energy: Energy,
 }
 
 impl BsdfProperties {
-    /// Properties of the diffuse model, Lambert's law f = albedo / pi. It is the only model without
-    /// a name in scene files.
+    /// Properties of the diffuse model, Lambert's law f = albedo / pi. It is the only model that
+    /// has no name in scene files.
     pub const LAMBERT: Self = Self { reciprocal: true, energy: Energy::Conserving };
 }
 
-/// A reflection model with known properties.
+/// Reflection model with known physical properties.
 pub trait ReflectionModel {
     /// Returns the properties of reflection by this model.
     fn properties(self) -> BsdfProperties;

@@ -1,4 +1,4 @@
-//! Rough interfaces: energy, Walter's formula, extremes, and worlds with rough and absorbing glass.
+//! Rough interfaces: energy, Walter's formula, extremes, and scenes with rough and absorbing glass.
 
 use crate::lobes::setup::*;
 use std::f64::consts::{PI, TAU};
@@ -9,7 +9,7 @@ fn glossy_lobes() -> impl Iterator<Item = (Lobe, Masking)> {
     every_lobe().into_iter().filter(|(lobe, _)| *lobe != Lobe::Mirror)
 }
 
-/// Fresnel reflectance of unpolarised light at the cosine `c`.
+/// Returns the Fresnel reflectance of unpolarised light at the cosine `c`.
 fn fresnel(c: f64, n_i: f64, n_t: f64) -> f64 {
     let sin_t = n_i / n_t * (1.0 - c * c).max(0.0).sqrt();
     if sin_t >= 1.0 {
@@ -21,7 +21,7 @@ fn fresnel(c: f64, n_i: f64, n_t: f64) -> f64 {
     0.5 * (s * s + p * p)
 }
 
-/// Error function by Simpson's rule.
+/// Returns the error function of `x`, by Simpson's rule.
 fn erf(x: f64) -> f64 {
     let steps = 60;
     let h = x.min(6.0) / f64::from(steps);
@@ -38,7 +38,7 @@ fn erf(x: f64) -> f64 {
     (0..=steps).map(term).sum::<f64>() * h / 3.0 * 2.0 / PI.sqrt()
 }
 
-/// Microfacet distribution of the test, written anew from the papers.
+/// Microfacet distribution of this test, implemented a second time from the papers.
 struct Facets {
     ggx: bool,
     masking: Masking,
@@ -88,8 +88,8 @@ impl Facets {
         }
     }
 
-    /// Albedos of reflection and transmission by single scattering, by quadrature over the
-    /// microfacets' slopes.
+    /// Returns the albedos of reflection and transmission by single scattering, by quadrature over
+    /// the microfacets' slopes.
     fn albedo(&self, degrees: f64, n_i: f64, n_t: f64) -> [f64; 2] {
         let (sin_v, nv) = degrees.to_radians().sin_cos();
         let (rings, turns) = (300, 120);
@@ -134,7 +134,7 @@ impl Facets {
     }
 }
 
-/// Returns the mean weights of reflection and transmission.
+/// Returns the mean weights of sampled reflection and of sampled transmission.
 fn sampled_albedo<L: SimdFloat>(
     (lobe, masking, alpha): (Lobe, Masking, f64),
     degrees: f64,
@@ -155,8 +155,8 @@ fn sampled_albedo<L: SimdFloat>(
     sums
 }
 
-/// Energy of rough glass: the albedos equal those of single scattering by quadrature. A Sobol set of
-/// 16,384 points has an error of a thousandth.
+/// Checks that the albedos of rough glass equal those of single scattering by quadrature. A set of
+/// 16,384 Sobol points has an error of a thousandth.
 #[test]
 fn rough_glass_has_the_albedo_of_single_scattering() {
     let mut worst = 0f64;
@@ -186,8 +186,8 @@ fn rough_glass_has_the_albedo_of_single_scattering() {
     println!("albedo of rough glass: {worst:.1e} off at most");
 }
 
-/// The lobes `cone` and `square` lose nothing, and no lobe gains light, whatever the roughness, the angle
-/// and the index.
+/// Checks that the lobes `cone` and `square` lose nothing, and that no lobe gains light, whatever
+/// the roughness, the angle and the index of refraction.
 #[test]
 fn rough_glass_conserves_energy_at_extremes() {
     for (lobe, masking) in glossy_lobes() {
@@ -218,8 +218,9 @@ fn rough_glass_conserves_energy_at_extremes() {
     }
 }
 
-/// weight x density is the cosine times Walter's f (2007, eq. 21) without the factor eta^2 of radiance, at
-/// every sampled direction. f / n_t^2 is the same after light and viewer change places.
+/// Checks that weight x density is the cosine times Walter's f (2007, eq. 21) without the factor
+/// eta^2 of radiance, at every sampled direction. f / n_t^2 is the same after light and viewer
+/// change places.
 #[test]
 fn closed_form_13_weight_times_density_is_walters_formula() {
     let n = tilted_normal();
@@ -279,7 +280,7 @@ fn closed_form_13_weight_times_density_is_walters_formula() {
     assert!(compared > 20_000, "{compared}");
 }
 
-/// Below alpha 0.001 glass is clear.
+/// Checks that glass with an alpha below 0.001 is clear.
 #[test]
 fn smooth_glass_is_clear() {
     for (lobe, masking) in every_lobe() {

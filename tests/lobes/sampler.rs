@@ -1,4 +1,5 @@
-//! Numbers of the samplers: nets, independence, moments, order of convergence.
+//! Numbers of the samplers: nets (distribution in elementary intervals), independence, moments,
+//! order of convergence.
 
 use crate::lobes::stats::slope;
 use std::f64::consts::PI;
@@ -10,8 +11,8 @@ fn sampler<L: SimdFloat>(kind: SamplerKind, seed: u64, jitter: bool) -> Sampler<
     Sampler::new(SampleSettings { seed, kind }, camera)
 }
 
-/// Returns pairs of numbers of `count` samples of a pixel: those of the film plane for `None`, else those
-/// of a bounce.
+/// Returns pairs of numbers of `count` samples of a pixel: for the film plane if `bounce` is
+/// `None`, otherwise for this bounce.
 fn pairs<L: SimdFloat>(
     sampler: &Sampler<L>,
     (x, y): (u32, u32),
@@ -30,7 +31,8 @@ fn pairs<L: SimdFloat>(
     out
 }
 
-/// Asserts that each elementary interval of area 2^-m, of any shape, has one of the first 2^m points.
+/// Checks that each elementary interval of area 2^-m, of any shape, contains one of the first 2^m
+/// points.
 fn assert_net(points: &[[f64; 2]], name: &str) {
     let m = points.len().ilog2();
     assert_eq!(points.len(), 1 << m);
@@ -46,8 +48,9 @@ fn assert_net(points: &[[f64; 2]], name: &str) {
     }
 }
 
-/// Scrambling keeps the nets of all pairs, in the joint set and in the padded ones, whose indices are also
-/// shuffled.
+/// Checks that scrambling keeps each pair of dimensions a net: every elementary interval holds the
+/// right number of points. This holds in the joint set, and in the padded sets, whose indices are
+/// also shuffled.
 fn nets<L: SimdFloat>() {
     for seed in [0, 1, u64::MAX] {
         for replicate in 0..2 {
@@ -76,7 +79,8 @@ fn scrambled_sets_remain_nets() {
     nets::<Single>();
 }
 
-/// Checks that the numbers have the same bits at every width and with any number of pixels in a packet.
+/// Checks that the numbers have the same bits at every vector width and with any number of pixels
+/// in a packet.
 fn packets_equal_singles<One: SimdFloat, Many: SimdFloat>() {
     let bits = |x: f64| x.to_bits();
     for kind in [SamplerKind::Sobol, SamplerKind::Random] {
@@ -138,9 +142,10 @@ fn numbers(sampler: &Sampler<f64>, pixel: (u32, u32), replicate: usize, index: u
     [place.0, place.1].into_iter().chain(lobes).collect()
 }
 
-/// Over pixels every dimension of every index is uniform in mean and variance, and uncorrelated with other
-/// dimensions, the other replicate, the neighbouring pixel and another seed. The limit is 4.8 sigma: one
-/// false alarm in a thousand runs of these 1300 tests.
+/// Checks the independence of pixels and replicates (halves of the samples). Over pixels, every
+/// dimension of every index is uniform in mean and variance. It is uncorrelated with other
+/// dimensions, the other replicate, the neighbouring pixel and another seed. The limit is 4.8
+/// sigma: one false alarm in a thousand runs of these 1300 tests.
 #[test]
 fn pixels_and_replicates_are_independent() {
     const SIGMAS: f64 = 4.8;
@@ -184,13 +189,13 @@ fn pixels_and_replicates_are_independent() {
     }
 }
 
-/// Integrand over the film plane and the first lobe, with its integral.
+/// Integrand over the film plane and the first lobe, with its exact integral.
 struct Integrand {
     value: fn([f64; 4], f64) -> f64,
     exact: fn(f64) -> f64,
 }
 
-/// A product of four smooth bumps.
+/// Integrand that is the product of four smooth bumps.
 const SMOOTH: Integrand = Integrand {
     value: |x, k| x.iter().map(|x| 1.0 + 0.5 * (PI * x * (1.0 + k)).sin()).product(),
     exact: |k| {
@@ -199,13 +204,13 @@ const SMOOTH: Integrand = Integrand {
     },
 };
 
-/// An edge through the pixel, at slope k.
+/// Integrand with an edge through the pixel, at slope k.
 const EDGE: Integrand = Integrand {
     value: |x, k| f64::from(u8::from(x[1] < 0.25 + 0.5 * k * x[0])),
     exact: |k| 0.25 + 0.25 * k,
 };
 
-/// Returns the errors of the estimates of many pixels of one replicate.
+/// Returns the errors of the estimates of many pixels in one replicate (half of the samples).
 fn errors(kind: SamplerKind, f: &Integrand, replicate: usize, count: u32) -> Vec<f64> {
     let sampler = sampler::<Double>(kind, 4, true);
     (0..400)
@@ -232,7 +237,8 @@ fn rmse_slope(kind: SamplerKind, f: &Integrand) -> f64 {
     slope(&(4..=10).map(point).collect::<Vec<_>>())
 }
 
-/// Smooth in four dimensions: nearly 1 / N; an edge in two: N^-3/4; random numbers: N^-1/2.
+/// Checks the rates at which errors fall with N samples: nearly 1 / N for a smooth integrand in
+/// four dimensions, N^-3/4 for an edge in two dimensions, N^-1/2 for random numbers.
 #[test]
 fn errors_fall_at_the_known_rates() {
     let smooth = rmse_slope(SamplerKind::Sobol, &SMOOTH);
@@ -245,7 +251,8 @@ fn errors_fall_at_the_known_rates() {
     }
 }
 
-/// Errors of the replicates are uncorrelated, as the noise estimate assumes.
+/// Checks that the errors of the two replicates (halves of the samples) are uncorrelated, as the
+/// noise estimate assumes.
 #[test]
 fn errors_of_the_replicates_are_uncorrelated() {
     for integrand in [SMOOTH, EDGE] {

@@ -1,4 +1,4 @@
-//! Shared helpers: materials, vectors, sampled reflections, traced samples.
+//! Shared helpers of tests of lobes: materials, vectors, sampled reflections, traced samples.
 
 use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -13,7 +13,7 @@ pub fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Returns a x + b y + c z.
+/// Returns the sum of vectors, each multiplied by a factor.
 pub fn combine(terms: &[(f64, Vector)]) -> Vector {
     std::array::from_fn(|i| terms.iter().map(|(k, v)| k * v[i]).sum())
 }
@@ -35,7 +35,7 @@ pub fn tilted_normal() -> Vector {
     unit([0.3, -0.5, 0.8])
 }
 
-/// Returns the direction at angle `theta` from `n` [radians], with the azimuth `phi`.
+/// Returns the direction at the angle `theta` from `n`, with the azimuth `phi`, both in radians.
 pub fn at_angle(n: Vector, theta: f64, phi: f64) -> Vector {
     let [t, b] = across(n);
     unit(combine(&[(theta.cos(), n), (theta.sin() * phi.cos(), t), (theta.sin() * phi.sin(), b)]))
@@ -45,7 +45,8 @@ pub fn vector(v: Vec3<f64>) -> Vector {
     [v.x, v.y, v.z]
 }
 
-/// Returns a white material that reflects all light in `lobe`, with a highlight of the same microfacets.
+/// Returns a white material that reflects all light in the lobe `lobe`, with a highlight of the
+/// same microfacets.
 pub fn reflector(lobe: Lobe, masking: Masking, roughness: f64) -> Material {
     Material {
         ambient: 0.0,
@@ -60,7 +61,7 @@ pub fn reflector(lobe: Lobe, masking: Masking, roughness: f64) -> Material {
     }
 }
 
-/// Returns `true` if the lobe is one of microfacets, for which masking matters.
+/// Returns `true` if the lobe is one of microfacets, which have masking.
 pub fn has_facets(lobe: Lobe) -> bool {
     let finish = Bsdf::<f64>::new(&reflector(lobe, Masking::Smith, 1.0), true);
     matches!(finish.reflection, Some((_, ReflectionLobe::MicrofacetDistribution(_))))
@@ -72,7 +73,7 @@ pub fn every_lobe() -> Vec<(Lobe, Masking)> {
     Lobe::ALL.into_iter().flat_map(|l| maskings(l).iter().map(move |m| (l, *m))).collect()
 }
 
-/// Source of the numbers that reflections are sampled with.
+/// Random numbers with which reflections are sampled: kind, seed and pixel.
 #[derive(Clone, Copy)]
 pub struct Numbers {
     pub kind: SamplerKind,
@@ -90,8 +91,8 @@ impl Numbers {
     }
 }
 
-/// Samples `count` reflections like the kernel, in the lane type `L`, and passes each direction and weight
-/// to `take`. `incident` points towards the surface.
+/// Samples `count` reflections like the kernel, in the SIMD type `L`. Passes each direction and
+/// weight to `take`. `incident` points towards the surface.
 pub fn each_reflection<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
@@ -103,7 +104,7 @@ pub fn each_reflection<L: SimdFloat>(
     reflect::<L>(material, (incident, n), fold, numbers, count, &mut take);
 }
 
-/// [`each_reflection`] with one instance per lane type.
+/// Implements [`each_reflection`], compiled once for each SIMD type.
 fn reflect<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
@@ -127,7 +128,8 @@ fn reflect<L: SimdFloat>(
     }
 }
 
-/// Returns a white dielectric with this lobe, whose coefficients are both 1.
+/// Returns a white dielectric with the lobe `lobe`, whose coefficients of reflection and
+/// transmission are 1.
 pub fn rough_glass(lobe: Lobe, masking: Masking, alpha: f64, ior: f64) -> Material {
     Material {
         alpha: Some(alpha),
@@ -138,7 +140,7 @@ pub fn rough_glass(lobe: Lobe, masking: Masking, alpha: f64, ior: f64) -> Materi
     }
 }
 
-/// A smooth or rough interface: the indices on both sides, and `true` for a thin pane.
+/// Smooth or rough interface: the indices of refraction on both sides, and `true` for a thin pane.
 #[derive(Clone, Copy, Debug)]
 pub struct Sides {
     pub n_i: f64,
@@ -157,14 +159,16 @@ impl Sides {
     }
 }
 
-/// Directions and weights of one sample at a rough interface.
+/// Directions and weights of the reflected and the transmitted ray of one sample at a rough
+/// interface.
 #[derive(Clone, Copy, Debug)]
 pub struct Crossing {
     pub reflected: (Vector, Vector),
     pub transmitted: (Vector, f64),
 }
 
-/// Samples `count` pairs of reflected and transmitted rays like the kernel, in the lane type `L`.
+/// Samples `count` pairs of reflected and transmitted rays like the kernel, in the SIMD type `L`.
+/// Passes each pair to `take`.
 pub fn each_crossing<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
@@ -176,7 +180,7 @@ pub fn each_crossing<L: SimdFloat>(
     cross::<L>(material, (incident, n), (sides, fold), numbers, count, &mut take);
 }
 
-/// [`each_crossing`] with one instance per lane type.
+/// Implements [`each_crossing`], compiled once for each SIMD type.
 fn cross<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
@@ -205,7 +209,8 @@ fn cross<L: SimdFloat>(
     }
 }
 
-/// Returns the radiance of the sample `index` of a pixel in every group and channel, WIDTH samples at once.
+/// Returns the radiance of as many samples of a pixel as the SIMD type has lanes, from index
+/// `first` on. The order of values is `[sample][group][channel]`.
 pub fn trace<L: SimdFloat>(
     world: &World<L>,
     sampler: &Sampler<L>,
@@ -235,7 +240,8 @@ pub fn scene(text: &str) -> Scene {
 
 const SETTINGS: SampleSettings = SampleSettings { seed: 3, kind: SamplerKind::Sobol };
 
-/// Returns sums over groups of the samples `0..count` of every pixel, white lights.
+/// Returns the samples `0..count` of every pixel, each summed over the light groups, with white
+/// lights.
 pub fn samples<L: SimdFloat>(scene: &Scene, count: u32) -> Vec<Vector> {
     let world = World::<L>::new(scene);
     let sampler = Sampler::<L>::new(SETTINGS, world.camera_dimensions());

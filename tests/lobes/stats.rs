@@ -1,8 +1,9 @@
-//! Statistics: p-values of chi-square, moments, slopes.
+//! Statistical functions: p-values of chi-square, moments, slopes.
 
 use std::f64::consts::PI;
 
-/// Returns ln Gamma(a) for a > 0: Lanczos 1964 with g = 7 and nine terms, relative error below 1e-13.
+/// Returns the logarithm of Gamma(a) for a > 0 (Lanczos 1964 with g = 7 and nine terms), with a
+/// relative error below 1e-13.
 fn ln_gamma(a: f64) -> f64 {
     const C: [f64; 9] = [
         0.999_999_999_999_809_9,
@@ -21,8 +22,8 @@ fn ln_gamma(a: f64) -> f64 {
     0.5 * (2.0 * PI).ln() + (x + 0.5) * t.ln() - t + sum.ln()
 }
 
-/// Returns the regularised upper incomplete gamma function Q(a, x): by the power series of P below a + 1,
-/// by Lentz's continued fraction above.
+/// Returns the regularised upper incomplete gamma function Q(a, x): below a + 1 by the power series
+/// of P, above by Lentz's continued fraction.
 fn gamma_q(a: f64, x: f64) -> f64 {
     if x <= 0.0 {
         return 1.0;
@@ -54,12 +55,14 @@ fn gamma_q(a: f64, x: f64) -> f64 {
     factor * h
 }
 
-/// Returns the probability that a chi-square of `dof` degrees of freedom is at least `chi2`.
+/// Returns the probability that a chi-square variable of `dof` degrees of freedom is at least
+/// `chi2`.
 pub fn chi_square_tail(chi2: f64, dof: usize) -> f64 {
     gamma_q(0.5 * dof as f64, 0.5 * chi2)
 }
 
-/// Returns the p-value of counts against expected ones; bins with fewer than five expected are pooled.
+/// Returns the p-value of counts against expected ones. Bins with fewer than five expected counts
+/// are pooled.
 pub fn chi_square_p(counts: &[u64], expected: &[f64]) -> f64 {
     let mut order: Vec<usize> = (0..counts.len()).collect();
     order.sort_by(|a, b| expected[*a].total_cmp(&expected[*b]));
@@ -78,7 +81,7 @@ pub fn chi_square_p(counts: &[u64], expected: &[f64]) -> f64 {
     chi_square_tail(chi2, bins - 1)
 }
 
-/// Returns the slope of the least-squares line.
+/// Returns the slope of the least-squares line through `points`.
 pub fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
     let mean = |f: fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>() / n;
@@ -88,7 +91,7 @@ pub fn slope(points: &[(f64, f64)]) -> f64 {
     sxy / sxx
 }
 
-/// 97.5 % points of chi-square from the usual tables, and Q(1, x) = exp(-x).
+/// Checks 97.5 % points of chi-square from the usual tables, and Q(1, x) = exp(-x).
 #[test]
 fn chi_square_tail_matches_tables() {
     for (chi2, dof) in [(5.024, 1), (20.483, 10), (129.561, 100), (1_089.531, 1000)] {

@@ -1,4 +1,4 @@
-//! Whole paths: furnaces, parallel mirrors, scalar samples against packets.
+//! Whole paths: white furnaces, parallel mirrors, single samples against packets.
 
 use crate::common::report::report;
 use crate::lobes::properties::{Energy, ReflectionModel};
@@ -8,8 +8,9 @@ use zerkalo::material::{Lobe, Masking};
 use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
-/// Every sample of a ball in a white furnace is exactly rho, for every energy-conserving lobe; at the
-/// silhouette lobes are partly below the surface and folded up.
+/// Checks that every sample of a ball in a white furnace is exactly rho, for every
+/// energy-conserving lobe. At the silhouette, lobe directions are partly below the surface and
+/// mirrored up.
 fn furnace<L: SimdFloat>() {
     let rho = 0.75;
     let text = "film = { size = [24, 24] }
@@ -41,7 +42,8 @@ fn closed_form_7_a_white_furnace_is_exact() {
     furnace::<f64>();
 }
 
-/// At roughness 0 every lobe equals the mirror in every bit; near 0 the square converges to it.
+/// Checks that at roughness 0 every lobe equals the mirror in every bit, and that the square
+/// converges to it near 0.
 #[test]
 fn extreme_20_without_roughness_every_lobe_is_the_mirror() {
     let mut scene = scene(
@@ -88,9 +90,10 @@ fn parallel_mirrors(depth: u32) -> Scene {
     ))
 }
 
-/// Two parallel emitting mirrors of rho = 0.999: the sum of rho^k over all images is 1000, and the part
-/// beyond the depth limit equals the reported bias. In single precision rho itself is rounded by
-/// up to 3e-8, which 1000 images multiply, and so is each of the 10 000 terms of the sum.
+/// Checks two parallel emissive mirrors of rho = 0.999. The sum of rho^k over all images is 1000,
+/// and the part beyond the depth limit equals the reported bias. In single precision rho is rounded
+/// by up to 3e-8, which 1000 images multiply, and each of the 10,000 terms of the sum is rounded as
+/// well.
 #[test]
 fn extreme_26_parallel_mirrors() {
     let rho: f64 = 0.999;
@@ -125,12 +128,14 @@ fn extreme_26_parallel_mirrors() {
     report(26, "single", &format!("{:.0e} off (relative)", worst[1]));
 }
 
-/// One hundredth of the radiance of a lit wall of the physical room. Differences are relative to at least
-/// this: at grazing light N.L is tiny, and the rounding of a direction is a large fraction of it.
+/// Smallest radiance to which differences are relative: a hundredth of that of a lit wall of the
+/// physical room. At grazing light N.L is tiny, and the rounding of a direction is a large fraction
+/// of it.
 const DIM: f64 = 1e-4;
 
-/// Compares scalar samples with packets. Returns the fractions that differ at all and by more than 1e-3, the
-/// largest difference of the others (both relative), and the relative difference of the means.
+/// Compares samples traced alone with samples in packets. Returns the fraction that differs at all,
+/// the fraction that differs by more than 1e-3, the largest relative difference of the others, and
+/// the relative difference of the means.
 fn compare<One: SimdFloat, Many: SimdFloat>(scene: &Scene) -> [f64; 4] {
     let (one, many) = (samples::<One>(scene, 16), samples::<Many>(scene, 16));
     assert_eq!(one.len(), many.len());
@@ -162,8 +167,8 @@ fn physical() -> Scene {
     scene
 }
 
-/// Only ln, sin and exp of the mirror differ between the widths. Such a rounding may change a path so that
-/// it hits another object's edge or a shadow.
+/// Checks that only ln, sin and exp of the mirror differ between vector widths. Such a rounding may
+/// change a path so that it hits another object's edge or a shadow.
 #[test]
 fn packets_equal_single_samples_but_for_roundings_of_sin_and_ln() {
     for [any, far, near, mean] in
@@ -176,7 +181,7 @@ fn packets_equal_single_samples_but_for_roundings_of_sin_and_ln() {
     assert!(far == 0.0 && near < 1e-9 && mean < 1e-12, "{far} {near} {mean}");
 }
 
-/// Every bit is equal if a path uses only IEEE operations.
+/// Checks that every bit is equal at all vector widths if a path uses only IEEE operations.
 #[test]
 fn packets_equal_single_samples_bit_by_bit_without_a_lobe() {
     let mut lambert = physical();

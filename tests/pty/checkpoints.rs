@@ -1,4 +1,4 @@
-//! Checkpoints of the dashboard: written on request, continued after a kill.
+//! Checkpoints of the dashboard, which are written on request and continued after a kill.
 
 use super::*;
 use std::time::{Duration, Instant};
@@ -9,7 +9,7 @@ fn film(path: PathBuf) -> Film {
     FilmReader::open(&path).and_then(FilmReader::read).unwrap_or_else(|e| panic!("{e}")).1
 }
 
-/// Waits until there is a file. It is complete from then on.
+/// Waits until the file `name` exists. It is complete from then on.
 fn wait_for_file(fixture: &Fixture, name: &str) {
     let end = Instant::now() + Duration::from_secs(60);
     while !fixture.path(name).exists() {
@@ -25,7 +25,8 @@ fn kill(terminal: Terminal) {
     drop(terminal);
 }
 
-/// Checkpoints in the folder with their samples. All of them are complete.
+/// Returns the paths of the checkpoints in the folder, each with its number of samples. All of them
+/// are complete.
 fn checkpoints(fixture: &Fixture) -> Vec<(PathBuf, u64)> {
     let files = fs::read_dir(fixture.0.path()).unwrap().map(|entry| entry.unwrap().path());
     let files = files.filter(|path| {
@@ -35,9 +36,9 @@ fn checkpoints(fixture: &Fixture) -> Vec<(PathBuf, u64)> {
     files.map(|path| (path.clone(), film(path).samples())).collect()
 }
 
-/// Kills a dashboard at `moments` random moments, in each life while it renders and writes
-/// checkpoints, continues from the checkpoint with most samples, and compares the film at the end
-/// with that of an uninterrupted render.
+/// Kills a dashboard at `moments` random moments while it renders and writes checkpoints. Each next
+/// one continues from the checkpoint with most samples. At the end, compares the film with that of
+/// an uninterrupted render.
 fn kill_at_random_moments(moments: u32, text: &str, seed: u64) {
     let fixture = Fixture::new();
     fs::write(fixture.path("room.toml"), text).unwrap();
@@ -87,8 +88,8 @@ fn kill_at_random_moments(moments: u32, text: &str, seed: u64) {
     assert_eq!(terminal.end().0, 0);
 }
 
-/// Requests checkpoints `room-FIRST.zk` and so on until one has the samples of `whole`, whose film
-/// it must be.
+/// Requests checkpoints `room-FIRST.zk` and so on until one has as many samples as `whole`. Its
+/// film must equal `whole`.
 fn await_film(fixture: &Fixture, terminal: &mut Terminal, whole: &Film, first: usize) {
     for number in first.. {
         terminal.send("K");
@@ -110,7 +111,8 @@ fn dashboard_killed_at_random_moments_ends_with_the_same_film() {
     kill_at_random_moments(4, &text, 1);
 }
 
-/// The long form: `cargo test --test program killed_at_twenty -- --ignored --nocapture`.
+/// Checks twenty kills at random moments, the long form of the test: `cargo test --test program
+/// killed_at_twenty -- --ignored --nocapture`.
 #[test]
 #[ignore = "long"]
 fn dashboard_killed_at_twenty_random_moments_ends_with_the_same_film() {
@@ -119,8 +121,8 @@ fn dashboard_killed_at_twenty_random_moments_ends_with_the_same_film() {
     kill_at_random_moments(20, &text, 2);
 }
 
-/// A dashboard that is killed after a checkpoint, and one that continues it, end with the film of
-/// `zerkalo render`.
+/// Checks that a dashboard that is killed after a checkpoint, and one that continues it, end with
+/// the film of `zerkalo render`.
 #[test]
 fn killed_dashboard_continues_from_its_checkpoint() {
     let fixture = Fixture::with_room();
@@ -158,7 +160,7 @@ fn killed_dashboard_continues_from_its_checkpoint() {
     checkpoints.for_each(|name| assert_eq!(film(fixture.0.path().join(name)).width(), 320));
 }
 
-/// Without its scene file, a checkpoint opens the scene that it contains.
+/// Checks that a checkpoint without its scene file opens the scene that it contains.
 #[test]
 fn checkpoint_contains_its_scene() {
     let fixture = Fixture::with_room();

@@ -1,4 +1,4 @@
-//! Editing, saving, and leaving with unsaved edits.
+//! Editing, saving, and quitting with unsaved edits.
 
 use super::*;
 use zerkalo::scene::BUILT_IN;

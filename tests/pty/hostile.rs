@@ -1,9 +1,10 @@
-//! A hostile scene whose names contain control sequences.
+//! Hostile scene, whose names contain control sequences.
 
 use super::*;
 use zerkalo::scene::BUILT_IN;
 
-/// Sequences that set the clipboard (OSC 52) and colours (C0 and C1), and reverse the text direction.
+/// Text with sequences that set the clipboard (OSC 52) and colours (C0 and C1), and reverse the
+/// text direction.
 const EVIL: &str = "\u{1b}]52;c;cm0=\u{7}\u{9b}32m\u{202e}x";
 
 #[test]

@@ -1,4 +1,4 @@
-//! Start and end: the terminal is taken and restored.
+//! Start and end of the program: the state of the terminal is changed and restored.
 
 use super::*;
 use std::io::Write;
@@ -37,7 +37,7 @@ fn signals_restore_the_terminal() {
     }
 }
 
-/// Program of the next test.
+/// Program that panics; the next test runs it.
 #[test]
 #[ignore = "runs in the terminal of another test"]
 fn program_that_panics() {
@@ -131,7 +131,8 @@ fn picture_follows_terminal_size() {
     assert_eq!(terminal.end().0, 0);
 }
 
-/// Opens and closes the help, then quits. This takes no prompt, because no scene was edited.
+/// Opens and closes the help, then quits. No prompt asks about unsaved edits, because no scene was
+/// edited.
 fn open_help_and_quit(mut terminal: Terminal) {
     terminal.send("?");
     terminal.wait_for_text("orbit left");
@@ -150,7 +151,7 @@ fn pasted_text_is_not_keys() {
     open_help_and_quit(terminal);
 }
 
-/// Environment of an SSH connection.
+/// Environment variables of an SSH connection.
 const SSH: &[(&str, &str)] = &[("SSH_CONNECTION", "192.0.2.1 50000 192.0.2.2 22")];
 
 /// Opens the dashboard over SSH, in a terminal that replies to requests or does not.
@@ -178,9 +179,9 @@ fn unrequested_replies_are_not_keys() {
     open_help_and_quit(terminal);
 }
 
-/// The probe waits for replies until a signal arrives.
+/// Checks that the query of the terminal's capabilities waits for replies until a signal arrives.
 #[test]
-fn signal_ends_the_probe() {
+fn signal_ends_the_capability_query() {
     let fixture = Fixture::with_room();
     let env = [("SSH_CONNECTION", "192.0.2.7 5000 192.0.2.1 22")];
     let command = [PROGRAM, "room.toml"];
@@ -191,7 +192,7 @@ fn signal_ends_the_probe() {
         env: &env,
         replies: false,
     };
-    // The probe takes two seconds. If the signal comes later, the screen has been drawn.
+    // The query takes two seconds. If the signal comes later, the screen has been drawn.
     let is_prompt = (0..3).any(|_| {
         let terminal = Terminal::start(&start);
         terminal.wait_for("the screen is taken", |screen| screen.alternate_screen().then_some(()));
@@ -201,5 +202,5 @@ fn signal_ends_the_probe() {
         assert!(bytes.ends_with(LEAVE.as_str()));
         !bytes.contains("room.toml")
     });
-    assert!(is_prompt, "the probe goes on after the signal");
+    assert!(is_prompt, "the query goes on after the signal");
 }

@@ -1,9 +1,9 @@
-//! Limits of memory and of threads.
+//! Limits of the dashboard's memory and number of threads.
 
 use super::*;
 use zerkalo::scene::BUILT_IN;
 
-/// The film of the picture needs 4.4 GB, and the limit is 1.5 GB of address space.
+/// Checks the refusal of a film of 4.4 GB under a limit of 1.5 GB of address space.
 #[test]
 #[cfg(target_os = "linux")]
 fn film_that_does_not_fit_is_refused_in_the_dashboard() {

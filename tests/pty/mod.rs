@@ -20,7 +20,7 @@ use terminal::{Start, Terminal};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 
-/// Temporary folder with scene and exports.
+/// Temporary folder with a scene and its exports, in which the program runs.
 struct Fixture(TempDir);
 
 impl Fixture {
@@ -51,25 +51,25 @@ impl Fixture {
         })
     }
 
-    /// Runs a command that succeeds.
+    /// Runs the program with `args`, which must succeed.
     fn run(&self, args: &[&str]) {
         let run = Command::new(PROGRAM).args(args).current_dir(self.0.path()).output().unwrap();
         assert!(run.status.success(), "{args:?}: {}", String::from_utf8_lossy(&run.stderr));
     }
 
-    /// Runs `zerkalo render`. Returns the file that it writes.
+    /// Runs `zerkalo render` with `args`. Returns the contents of the file `output` that it writes.
     fn rendered(&self, args: &[&str], output: &str) -> Vec<u8> {
         self.run(&[&["render"], args, &["-o", output]].concat());
         fs::read(self.path(output)).unwrap()
     }
 }
 
-/// Waits until some cells show a picture: half blocks in colours of 24 bits.
+/// Waits until some cells of the screen show a picture: half blocks in 24-bit colours.
 fn wait_for_picture(terminal: &Terminal) {
     terminal.wait_for("a picture", |screen| (picture_cells(screen) > 100).then_some(()));
 }
 
-/// Returns the number of cells with 24-bit background.
+/// Returns the number of cells with a 24-bit background colour.
 fn picture_cells(screen: &vt100::Screen) -> usize {
     let (rows, columns) = screen.size();
     let cells = (0..rows.get()).flat_map(|row| (0..columns.get()).map(move |column| (row, column)));

@@ -8,7 +8,7 @@ use zerkalo::terminal::cells::Oklab;
 const SIZE: [u16; 2] = [120, 36];
 const FILM: [u32; 2] = [640, 480];
 
-/// Picture in 8-bit sRGB.
+/// Picture file in 8-bit sRGB.
 pub struct Picture {
     pub size: [usize; 2],
     pub rgb: Vec<u8>,
@@ -24,7 +24,8 @@ impl Picture {
         Self { size: [info.width as usize, info.height as usize], rgb }
     }
 
-    /// Returns the mean in linear light over one of `cells` equal boxes, as 8-bit sRGB.
+    /// Returns the mean, in linear light, over one of `cells` equal boxes of the picture, as 8-bit
+    /// sRGB. `index` selects the box by column and row.
     fn averaged(&self, cells: [usize; 2], index: [usize; 2]) -> [u8; 3] {
         let edge = |i: usize, n: usize| (n * self.size[i]) as f64 / cells[i] as f64;
         let overlap = |i: usize, pixel: usize| {
@@ -71,7 +72,7 @@ fn halves(cell: &vt100::Cell) -> Option<[[u8; 3]; 2]> {
     }
 }
 
-/// Returns the mean OKLab distance between the cells of the picture and a picture file.
+/// Returns the mean OKLab distance between the cells that show the picture and a picture file.
 fn distance(screen: &vt100::Screen, layout: &Layout, picture: &Picture) -> Option<f64> {
     let [columns, rows] = layout.raster;
     let mut sum = 0.0;
@@ -146,7 +147,7 @@ fn pending_export_is_written_before_the_end() {
     Picture::of_png(&fs::read(fixture.path("room-1.png")).unwrap());
 }
 
-/// Restarts the picture and waits until it has `spp` samples per pixel. It may have had more before.
+/// Restarts the render and waits until it has `spp` samples per pixel. It may have had more before.
 fn restart_rendering(terminal: &mut Terminal, spp: u32) {
     let condition = format!("spp {spp}");
     terminal.send("T");

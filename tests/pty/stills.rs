@@ -1,5 +1,5 @@
-//! Exported-image viewer. The emulator skips graphics protocols, so their images are decoded from the
-//! bytes.
+//! Viewer of exported images. The terminal emulator ignores graphics protocols, so that tests
+//! decode the images from the program's output.
 
 use super::life::signal;
 use super::picture::Picture;
@@ -16,10 +16,11 @@ const CELL: RequestReply = (b"\x1b[16t", "\x1b[6;20;10t");
 const KITTY: RequestReply = (b"\x1b_Gi=31,", "\x1b_Gi=31;OK\x1b\\");
 const SIXEL: RequestReply = (b"\x1b[c", "\x1b[?62;4;22c");
 const COLORS: RequestReply = (b"\x1b[?1;1;0S", "\x1b[?1;0;256S");
-/// Bytes that remove kitty's image.
+/// Bytes that remove an image from the screen in kitty's graphics protocol.
 const REMOVAL: &str = "\x1b_Gm=0,q=2;\x1b\\\x1b_Ga=d,d=I,i=163,q=2\x1b\\";
 
-/// Starts the dashboard in a terminal with `replies` and exports a picture. Returns both.
+/// Starts the dashboard in a terminal with `replies` and exports a picture. Returns the terminal
+/// and the picture.
 fn with_picture(fixture: &Fixture, args: &[&str], replies: &[RequestReply]) -> (Terminal, Picture) {
     let command = [&[PROGRAM, "room.toml"], args].concat();
     let start =
@@ -35,7 +36,7 @@ fn with_picture(fixture: &Fixture, args: &[&str], replies: &[RequestReply]) -> (
     (terminal, file)
 }
 
-/// Waits until the output contains `text`. Returns the output from there on.
+/// Waits until the output of the program contains `text`. Returns the output from there on.
 fn wait_for_bytes(terminal: &Terminal, text: &str) -> String {
     let mut all = String::new();
     terminal.wait_for(text, |_| {
@@ -52,7 +53,7 @@ fn wait_for_bytes(terminal: &Terminal, text: &str) -> String {
     panic!("no {text:?} in {} bytes", all.len());
 }
 
-/// Returns the chunks of kitty's images: keys and Base64 data.
+/// Returns the chunks of images in kitty's protocol: keys and Base64 data of each.
 fn chunks(bytes: &str) -> Vec<(&str, &str)> {
     let chunk = |text: &'_ str| -> Option<(usize, usize)> {
         let keys = text.find(';')?;
@@ -111,7 +112,8 @@ fn signal_removes_the_image() {
     );
 }
 
-/// At 30 KB/s the transfer takes seconds; a key ends it at once.
+/// Checks that a key ends the transfer of an image at once. At 30 KB/s the transfer would take
+/// seconds.
 #[test]
 fn key_ends_the_transfer() {
     let fixture = Fixture::with_room();

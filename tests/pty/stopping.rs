@@ -7,14 +7,15 @@ use std::time::Duration;
 use zerkalo::scene::BUILT_IN;
 use zerkalo::terminal::{ENTER, LEAVE};
 
-/// Starts a shell with job control and a plain prompt.
+/// Starts a shell with job control and a plain prompt in the test terminal.
 fn shell(fixture: &Fixture) -> Terminal {
     let env = [("PS1", "shell> "), ("ENV", ""), ("ZERKALO", PROGRAM)];
     let (folder, size) = (fixture.0.path(), [100, 30]);
     Terminal::start(&Start { command: &["/bin/sh", "-i"], folder, size, env: &env, replies: true })
 }
 
-/// Returns `true` if `LEAVE` was sent after the last `ENTER`.
+/// Returns `true` if the program has restored the terminal: it has sent `LEAVE` after the last
+/// `ENTER`.
 fn is_left(terminal: &Terminal) -> bool {
     let bytes = String::from_utf8_lossy(&terminal.bytes()).into_owned();
     bytes.rfind(LEAVE.as_str()) > bytes.rfind(ENTER.as_str())
@@ -190,7 +191,8 @@ fn doctor_reports_after_restoring_the_terminal() {
     }
 }
 
-/// Opening a pipe whose other end is closed blocks without end.
+/// Checks a named pipe in place of the scene file. Opening a pipe whose other end is closed blocks
+/// for ever.
 #[test]
 fn pipe_in_place_of_the_scene_blocks_neither_edits_nor_the_end() {
     let fixture = Fixture::with_room();
@@ -212,7 +214,8 @@ fn pipe_in_place_of_the_scene_blocks_neither_edits_nor_the_end() {
     assert!(fs::metadata(fixture.path(".room.toml.unsaved")).unwrap().len() > 100);
 }
 
-/// An aborted program runs no code of its own, as after a failed allocation; a killed one neither.
+/// Checks that the terminal is restored after an abort, as after a failed allocation, and after a
+/// kill. The program then runs no code of its own.
 #[test]
 fn abort_and_kill_leave_a_restored_terminal() {
     for name in ["ABRT", "KILL"] {

@@ -1,4 +1,4 @@
-//! Test terminal: a pseudo-terminal and an emulator of its screen.
+//! Test terminal: a pseudo-terminal, and an emulator of its screen.
 #![allow(dead_code, reason = "the benches use it, too")]
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
@@ -9,39 +9,40 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Longest wait; reached only on failure.
+/// Longest time that a test waits. Only a failing test reaches it.
 pub const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Output of the program.
+/// Output of the program to its terminal.
 struct Output {
     parser: vt100::Parser,
-    /// Every byte, in order.
+    /// All bytes that the program has sent, in order.
     bytes: Vec<u8>,
     /// `true` if the program has closed the terminal.
     ended: bool,
 }
 
-/// Lock for one program at a time, because each uses all processors.
+/// Lock that lets one program run at a time, because each uses all processors.
 static TURN: Mutex<()> = Mutex::new(());
 
-/// Writer of keys and replies.
+/// Writer of keys and replies to the program.
 type Keyboard = Arc<Mutex<Box<dyn Write + Send>>>;
 
-/// Request and its reply.
+/// Request to the terminal, and the terminal's reply.
 pub type RequestReply = (&'static [u8], &'static str);
 
-/// Requests, and the replies of a terminal with synchronised updates. The empty reply is the cursor
-/// position.
+/// Requests, and the replies of a terminal with synchronised updates. The empty reply stands for
+/// the cursor position.
 const REPLIES: [RequestReply; 3] =
     [(b"\x1b[c", "\x1b[?62;22c"), (b"\x1b[?2026$p", "\x1b[?2026;2$y"), (b"\x1b[6n", "")];
 
-/// Program in its terminal.
+/// Program that runs in a test terminal.
 pub struct Terminal {
     master: Box<dyn MasterPty + Send>,
-    /// Slave end, kept open so that the modes can be read after the program's end.
+    /// Slave end of the pseudo-terminal, kept open so that its modes can be read after the
+    /// program's end.
     slave: Option<Box<dyn SlavePty + Send>>,
     keyboard: Keyboard,
-    /// `true` if the terminal replies.
+    /// `true` if the terminal replies to requests.
     is_replying: Arc<AtomicBool>,
     child: Box<dyn Child + Send + Sync>,
     output: Arc<(Mutex<Output>, Condvar)>,
@@ -49,27 +50,27 @@ pub struct Terminal {
     _turn: MutexGuard<'static, ()>,
 }
 
-/// Parameters of a start.
+/// Parameters with which a program is started in a test terminal.
 pub struct Start<'a> {
-    /// The program and its arguments.
+    /// Program and its arguments.
     pub command: &'a [&'a str],
-    /// Working directory.
+    /// Working directory of the program.
     pub folder: &'a Path,
-    /// Columns and rows.
+    /// Columns and rows of the terminal.
     pub size: [u16; 2],
-    /// Additional environment variables.
+    /// Additional environment variables: name and value of each.
     pub env: &'a [(&'a str, &'a str)],
     /// `true` if the terminal replies to requests.
     pub replies: bool,
 }
 
 impl Terminal {
-    /// Starts a program in a terminal with 24-bit colour.
+    /// Starts a program in a terminal with 24-bit colours.
     pub fn start(start: &Start) -> Self {
         Self::start_with(start, &[])
     }
 
-    /// Starts a program in a terminal with `additional` replies, which override the defaults.
+    /// Starts a program in a terminal with `additional` replies, which override the default ones.
     pub fn start_with(start: &Start, additional: &[RequestReply]) -> Self {
         let defaults = REPLIES
             .iter()
@@ -138,20 +139,20 @@ impl Terminal {
         }
     }
 
-    /// Sends input as the keyboard, the mouse or the clipboard do.
+    /// Sends input to the program, as the keyboard, the mouse or the clipboard do.
     pub fn send(&mut self, keys: &str) {
         let mut keyboard = self.keyboard.lock().unwrap();
         keyboard.write_all(keys.as_bytes()).unwrap();
         keyboard.flush().unwrap();
     }
 
-    /// Enables or disables replies.
+    /// Enables or disables the terminal's replies to requests.
     pub fn set_replying(&self, is_replying: bool) {
         self.is_replying.store(is_replying, Ordering::Relaxed);
     }
 
-    /// Waits until `condition` returns a value for the screen. Panics with `what` and the screen on
-    /// failure.
+    /// Waits until `condition` returns a value for the screen. On failure, panics with `what` and
+    /// the screen.
     pub fn wait_for<R>(&self, what: &str, condition: impl Fn(&vt100::Screen) -> Option<R>) -> R {
         let end = Instant::now() + PATIENCE;
         let (output, changed) = &*self.output;
@@ -185,7 +186,7 @@ impl Terminal {
         });
     }
 
-    /// Returns the result of `look` for the current screen.
+    /// Returns the result of `look` for the current screen of the terminal.
     pub fn screen<R>(&self, look: impl FnOnce(&vt100::Screen) -> R) -> R {
         look(self.output.0.lock().unwrap().parser.screen())
     }
@@ -195,7 +196,7 @@ impl Terminal {
         self.output.0.lock().unwrap().bytes.clone()
     }
 
-    /// Resizes the terminal.
+    /// Resizes the terminal to `size` columns and rows.
     pub fn resize(&self, size: [u16; 2]) {
         let [columns, rows] = size.map(|n| NonZeroU16::new(n).unwrap());
         self.output.0.lock().unwrap().parser.screen_mut().set_size(rows, columns);
@@ -244,8 +245,8 @@ impl Terminal {
     }
 }
 
-/// Returns the replies to requests in `unread` and `bytes`. A possible start of a request is kept in
-/// `unread`.
+/// Returns the terminal's replies to requests in `unread` and `bytes`. An incomplete request at the
+/// end is kept in `unread`.
 fn replies_to(table: &[RequestReply], unread: &mut Vec<u8>, bytes: &[u8]) -> Vec<&'static str> {
     unread.extend_from_slice(bytes);
     let mut replies = Vec::new();
@@ -263,7 +264,7 @@ fn replies_to(table: &[RequestReply], unread: &mut Vec<u8>, bytes: &[u8]) -> Vec
     replies
 }
 
-/// Ends the program of a failed test.
+/// Dropping the terminal ends the program of a failed test.
 impl Drop for Terminal {
     fn drop(&mut self) {
         let _ = self.child.kill();
@@ -274,7 +275,7 @@ fn pty_size([cols, rows]: [u16; 2]) -> PtySize {
     PtySize { rows, cols, pixel_width: 0, pixel_height: 0 }
 }
 
-/// Returns the modes of the terminal as text, for comparison.
+/// Returns the modes of the pseudo-terminal as text, for comparison.
 fn state(master: &dyn MasterPty) -> String {
     format!("{:?}", master.get_termios().expect("the modes of a terminal"))
 }

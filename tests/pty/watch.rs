@@ -1,8 +1,9 @@
-//! `zerkalo watch` on real files that are replaced while it runs.
+//! `zerkalo watch` on film files that are replaced while it runs.
 
 use super::*;
 
-/// Plans three shards of the room in 160x120 pixels as `job.plan`.
+/// Plans a render of the room in 160x120 pixels by three shards (parts, each for one process), as
+/// `job.plan`.
 fn planned(fixture: &Fixture) {
     fixture.run(&[
         "plan",

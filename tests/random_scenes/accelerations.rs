@@ -1,4 +1,4 @@
-//! Acceleration structures render identical films, byte for byte.
+//! Acceleration structures on random scenes, whose films are identical byte for byte.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::support::{accelerated, picture};
@@ -6,7 +6,7 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::{Acceleration, Scene};
 use zerkalo::world::Precision;
 
-/// Samples per pixel and replicate; not a multiple of the packet width.
+/// Samples per pixel and replicate (half of the samples); not a multiple of the packet width.
 const SAMPLES: u32 = 3;
 
 fn same_bytes(scene: &Scene) -> Verdict {

@@ -1,4 +1,5 @@
-//! Test driver: compares scenes, and writes and shrinks those that fail.
+//! Driver of tests on random scenes: compares pictures of each scene, and reduces and writes scenes
+//! that fail.
 
 use crate::random_scenes::scene::{Random, scene};
 use crate::random_scenes::shrink::shrunk;
@@ -10,17 +11,17 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use zerkalo::scene::Scene;
 
-/// Result of a comparison.
+/// Result of the comparison of a scene's pictures.
 pub enum Verdict {
     /// The pictures agree.
     Same,
     /// The scene cannot be compared, for this reason.
     Skipped(&'static str),
-    /// The pictures differ in this respect.
+    /// The pictures differ, as this text describes.
     Different(String),
 }
 
-/// Comparison of a scene's pictures.
+/// Function that compares the pictures of a scene.
 pub type Check = fn(&Scene) -> Verdict;
 
 fn number(name: &str, default: u64) -> u64 {
@@ -29,13 +30,13 @@ fn number(name: &str, default: u64) -> u64 {
     })
 }
 
-/// Seeds requested by `ZERKALO_FIRST` and `ZERKALO_SCENES`.
+/// Returns the seeds that `ZERKALO_FIRST` and `ZERKALO_SCENES` select.
 pub fn many() -> Range<u64> {
     let first = number("ZERKALO_FIRST", 0);
     first..first + number("ZERKALO_SCENES", 200)
 }
 
-/// Runs a check and returns its difference or panic, if any.
+/// Runs a check on the scene in `text`. Returns the difference or the panic, if there is one.
 fn failure(text: &str, check: Check) -> Option<String> {
     match catch_unwind(AssertUnwindSafe(|| check(&parsed(text)))) {
         Ok(Verdict::Different(what)) => Some(what),
@@ -49,7 +50,7 @@ fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<&str>().map(|t| t.to_string())).unwrap_or_default()
 }
 
-/// Compares the scenes of `seeds`. `name` is the name of the test.
+/// Compares the pictures of the scenes with the seeds `seeds`. `name` is the name of the test.
 pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
     let (mut wrong, mut skipped) = (Vec::new(), BTreeMap::<&str, u32>::new());
     let mut count = 0;
@@ -70,8 +71,10 @@ pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
         };
         let seconds = number("ZERKALO_SHRINK", 10);
         let small = shrunk(&text, seconds, &|text| failure(text, check).is_some());
-        let last = failure(&small, check).unwrap_or_default();
-        let path = keep(name, seed, &what, &text, &last, &small);
+        let last = small
+            .as_ref()
+            .map_or_else(|| what.clone(), |small| failure(small, check).unwrap_or_default());
+        let path = keep(name, seed, &what, &text, &last, small.as_ref().unwrap_or(&text));
         let line = format!(
             "seed {seed}, {layout:?}: {what}\n    {}\n    ZERKALO_SEED={seed} cargo test --test \
              engine random_scenes::{name}",
@@ -84,12 +87,12 @@ pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
     assert!(wrong.is_empty(), "{} of {count} scenes differ:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// Compares the scenes of [`many`] seeds.
+/// Compares the pictures of the scenes with the seeds that [`many`] returns.
 pub fn compare_many(name: &str, check: Check) {
     compare(name, many(), check);
 }
 
-/// Writes the scenes to files for inspection.
+/// Writes the random scenes to files for inspection.
 #[test]
 #[ignore = "writes the scenes of the requested seeds to target/tmp/random_scenes"]
 fn write_scenes() {
@@ -116,7 +119,7 @@ fn folder() -> PathBuf {
     folder
 }
 
-/// Writes the scene and its reduced form, and returns the path of the latter.
+/// Writes a failing scene and its reduced form to files. Returns the path of the reduced form.
 fn keep(name: &str, seed: u64, what: &str, text: &str, last: &str, small: &str) -> PathBuf {
     let folder = folder();
     let comment = |what: &str| what.lines().map(|line| format!("# {line}\n")).collect::<String>();

@@ -1,4 +1,4 @@
-//! Objects in exact contact against objects with a gap that is too narrow to be visible.
+//! Objects in exact contact, against the same objects with a gap that is too narrow to be visible.
 
 use crate::common::Numbers;
 use crate::random_scenes::driver::{Verdict, compare, many};
@@ -10,16 +10,16 @@ use glam::DVec3;
 use zerkalo::scene::{Filter, Object, RayTypes, Scale, Scene, TransformOp};
 use zerkalo::world::Precision;
 
-/// Width of the gap, relative to the size of an object.
+/// Width of the gap, as a fraction of the size of an object.
 const GAP: f64 = 1e-5;
-/// Largest gap, relative to the smallest length of any object.
+/// Largest width of the gap, as a fraction of the smallest length of any object.
 const MAX_GAP: f64 = 1e-2;
 const SAMPLES: u32 = 4;
-/// Allowed effect of the gap on the mean of a block \[8-bit levels\].
+/// Allowed effect of the gap on the mean of a block of pixels, in 8-bit levels.
 const FLOOR: f64 = 1.0;
 
-/// Turns off the lights on surfaces. Such a light shines on both sides of its surface; a gap would
-/// leave it outside.
+/// Turns off the lights that are on surfaces. Such a light shines on both sides of its surface;
+/// with a gap it would be outside of the object.
 fn without_lights_on_surfaces(scene: &mut Scene) {
     let forms: Vec<_> = scene.objects.iter().map(|object| object.form()).collect();
     let is_on_surface = |position: DVec3| {
@@ -41,9 +41,9 @@ fn without_lights_on_surfaces(scene: &mut Scene) {
 enum Change {
     /// All objects shrink, by different fractions.
     AllShrink,
-    /// Transparent objects shrink, and opaque ones shrink by less than that.
+    /// Transparent objects shrink. Opaque objects shrink by a smaller fraction.
     OpaqueShrink,
-    /// Transparent objects shrink, and opaque ones grow by less than that.
+    /// Transparent objects shrink. Opaque objects grow by a smaller fraction.
     OpaqueGrow,
 }
 
@@ -56,22 +56,23 @@ fn is_transparent(scene: &Scene, object: &Object) -> bool {
     object.shape.part_materials(&object.material).iter().any(transmits)
 }
 
-/// Lengths of an object's bounding box. Returns `None` for flat and unbounded objects, which keep
-/// their size.
+/// Returns the lengths of an object's bounding box. Returns `None` for flat and unbounded objects,
+/// which keep their size.
 fn lengths(object: &Object) -> Option<DVec3> {
     let (low, high) = object.form().bounds()?;
     let size = high - low;
     (size.min_element() > 1e-9 * size.max_element()).then_some(size)
 }
 
-/// Largest and smallest length of any object.
+/// Returns the largest and the smallest length of any object of the scene.
 fn extreme_lengths(scene: &Scene) -> (f64, f64) {
     let sizes = || scene.objects.iter().filter_map(lengths);
     let longest = sizes().map(|size| size.max_element()).fold(0.0, f64::max);
     (longest, sizes().map(|size| size.min_element()).fold(f64::INFINITY, f64::min))
 }
 
-/// Shrinks or grows every bounded object slightly about its centre.
+/// Returns the scene with every bounded object slightly smaller or larger about its centre, as
+/// `change` says.
 fn changed(mut scene: Scene, numbers: &mut Numbers, change: Change) -> Scene {
     let (_, least) = extreme_lengths(&scene);
     let transparent: Vec<bool> =
@@ -99,8 +100,8 @@ fn changed(mut scene: Scene, numbers: &mut Numbers, change: Change) -> Scene {
     scene
 }
 
-/// Shrinks every bounded object slightly, and moves the eye by the widest gap in the direction
-/// `aside`. Returns `None` if the sizes of the objects differ too much.
+/// Returns the scene with every bounded object slightly smaller, and the eye moved by the widest
+/// gap in the direction `aside`. Returns `None` if the sizes of the objects differ too much.
 fn with_gaps(scene: &Scene, numbers: &mut Numbers, aside: DVec3) -> Option<Scene> {
     let (longest, least) = extreme_lengths(scene);
     let mut scene = changed(scene.clone(), numbers, Change::AllShrink);
@@ -110,8 +111,8 @@ fn with_gaps(scene: &Scene, numbers: &mut Numbers, aside: DVec3) -> Option<Scene
     (widest < MAX_GAP * least && scene.faults().is_empty()).then_some(scene)
 }
 
-/// Returns `true` if one sees two coincident opaque surfaces: the picture depends on whether opaque
-/// objects are slightly smaller or slightly larger.
+/// Returns `true` if two coincident opaque surfaces are visible. The picture then depends on
+/// whether opaque objects are slightly smaller or slightly larger.
 pub fn shows_coincident_opaque(scene: &Scene) -> bool {
     let variants = [Change::OpaqueShrink, Change::OpaqueGrow]
         .map(|change| changed(scene.clone(), &mut Numbers::new(1), change));
@@ -123,7 +124,8 @@ pub fn shows_coincident_opaque(scene: &Scene) -> bool {
     matches!(verdict, Verdict::Different(_))
 }
 
-/// Directions in which the eye moves. They lead to both sides of each surface that it is on.
+/// Returns directions in which the eye is moved. They lead to both sides of each surface that the
+/// eye is on.
 fn asides(scene: &Scene, numbers: &mut Numbers) -> Vec<DVec3> {
     let eye = DVec3::from_array(scene.camera.eye);
     let normals: Vec<DVec3> = scene

@@ -7,7 +7,7 @@ use glam::DVec3;
 use zerkalo::scene::{Object, Scale, TransformOp};
 use zerkalo::shape::Shape;
 
-/// Kind of arrangement.
+/// Kind of arrangement of the objects of a random scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Layout {
     /// Objects in contact: on a floor, side by side, on top of each other.
@@ -16,13 +16,13 @@ pub enum Layout {
     Crowd,
     /// Nested compounds whose parts have different materials.
     Compounds,
-    /// Glass in glass, panes, bubbles.
+    /// Glass in glass, panes and bubbles.
     Glass,
     /// Facing mirrors with objects between them.
     Mirrors,
     /// Mostly empty picture: stars, hairlines, a distant crowd, a distant chessboard.
     Sparse,
-    /// Flat objects in one plane.
+    /// Flat objects and flat faces in one plane.
     Flat,
     /// Positions and sizes from 1e-6 to 1e6.
     Wild,
@@ -40,7 +40,7 @@ impl Layout {
         Self::Wild,
     ];
 
-    /// Kinds of its materials.
+    /// Returns the kinds of materials that the arrangement uses.
     pub fn finishes(self) -> &'static [Finish] {
         use Finish::{Any, Glass, Glowing, Mirror};
         match self {
@@ -53,7 +53,7 @@ impl Layout {
         }
     }
 
-    /// Draws the objects around the origin, most of them within a distance of 4.
+    /// Returns random objects around the origin, most of them within a distance of 4.
     pub fn objects(self, numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
         match self {
             Self::Contact => contact(numbers, stock),
@@ -77,7 +77,7 @@ fn untransformed(mut object: Object) -> Object {
     object
 }
 
-/// Floor at y = 0: plane, platform, box or cylinder.
+/// Returns a random floor at y = 0: plane, platform, box or cylinder.
 fn floor(numbers: &mut Numbers, stock: &Stock) -> Object {
     let (key, base, size) = match numbers.below(4) {
         0 => ("plane", DVec3::ZERO, DVec3::ONE),
@@ -90,7 +90,7 @@ fn floor(numbers: &mut Numbers, stock: &Stock) -> Object {
     object
 }
 
-/// Objects in adjacent cells of edge 1 in two storeys, at most one in a cell.
+/// Returns random objects in adjacent cells of edge 1 on two levels, at most one in a cell.
 fn contact(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let mut all = vec![floor(numbers, stock)];
     let mut cells: Vec<DVec3> = Vec::new();
@@ -137,7 +137,7 @@ fn compounds(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     all
 }
 
-/// Nested solids, and panes.
+/// Returns random nested solids, and panes.
 fn glass(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let mut all = vec![floor(numbers, stock)];
     for _ in 0..1 + numbers.below(3) {
@@ -151,7 +151,7 @@ fn glass(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     all
 }
 
-/// Mirrors on both sides, and objects between them.
+/// Returns mirrors on both sides, and random objects between them.
 fn mirrors(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let mut all = vec![floor(numbers, stock)];
     for side in [-1.0, 1.0] {
@@ -191,7 +191,7 @@ fn sparse(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     (0..if way == 3 { 1 } else { count }).map(random_object).collect()
 }
 
-/// Flat objects and flat faces in the plane y = 0, from both sides.
+/// Returns random flat objects and flat faces in the plane y = 0, seen from both sides.
 fn flat(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let count = 2 + numbers.below(4);
     let random_object = |_| {
@@ -208,7 +208,7 @@ fn flat(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     (0..count).map(random_object).collect()
 }
 
-/// Log-uniform positions and sizes from 1e-6 to 1e6.
+/// Returns random objects with log-uniform positions and sizes from 1e-6 to 1e6.
 fn wild(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let mut all = Vec::new();
     for _ in 0..1 + numbers.below(6) {

@@ -13,7 +13,7 @@ use zerkalo::scene::{AssetResolver, Object, Rotate, Scale, Scene, TransformOp};
 use zerkalo::shape::{CsgOperand, KINDS, Shape};
 use zerkalo::value::{Color, Field, ValueType};
 
-/// Mesh files; the empty name is the built-in icosahedron.
+/// Names of mesh files; the empty name is the built-in icosahedron.
 const MESHES: &[&str] = &[
     "",
     "scenes/meshes/knot.ply",
@@ -31,13 +31,13 @@ const IMAGES: &[&str] = &[
     "scenes/textures/wood.png",
 ];
 
-/// Files that scenes refer to, shared by all scenes.
+/// Returns the files to which scenes refer, shared by all scenes.
 pub fn library() -> AssetResolver {
     static ASSETS: OnceLock<Arc<Assets>> = OnceLock::new();
     AssetResolver::new(Path::new(NAME), ASSETS.get_or_init(Arc::default).clone())
 }
 
-/// Random coefficient: 0, 1, between, and rarely above.
+/// Returns a random coefficient of a material: 0, 1, between, and rarely above.
 fn coefficient(numbers: &mut Numbers) -> f64 {
     match numbers.below(12) {
         0 => 0.0,
@@ -78,17 +78,17 @@ fn material_key(numbers: &mut Numbers, field: &Field) -> Option<Value> {
     })
 }
 
-/// Kind of a material.
+/// Kind of a random material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Finish {
     Any,
     Glass,
     Mirror,
-    /// Bright in ambient light.
+    /// Material that is bright in ambient light.
     Glowing,
 }
 
-/// Random material without validation errors. It emits nothing: see [`emission`].
+/// Returns a random material without validation errors. It emits nothing: see [`emission`].
 pub fn material(numbers: &mut Numbers, finish: Finish) -> Material {
     let emits_nothing = |field: &&Field| !field.name.starts_with("emission");
     let fields: Vec<Field> = material::FIELDS.iter().filter(emits_nothing).copied().collect();
@@ -121,7 +121,7 @@ pub fn material(numbers: &mut Numbers, finish: Finish) -> Material {
     }
 }
 
-/// Random emission: of most materials 0.
+/// Returns a random emission: strength and colour. Most strengths are 0.
 pub fn emission(numbers: &mut Numbers) -> (f64, Color) {
     let color = pick(numbers, &[Color::WHITE, Color([1.0, 0.6, 0.2]), Color([0.0, 0.0, 1.0])]);
     (if chance(numbers, 1, 6) { log(numbers, 0.1, 30.0) } else { 0.0 }, color)
@@ -134,12 +134,13 @@ fn keys_of(kind: &Field) -> &'static [Field] {
     }
 }
 
-/// Returns `true` if a kind is a compound.
+/// Returns `true` if shapes of this kind are compounds.
 fn has_parts(kind: &Field) -> bool {
     keys_of(kind).iter().any(|f| matches!(f.takes, ValueType::Tables(_)))
 }
 
-/// Kinds that can be parts of a compound, and the compounds.
+/// Returns two lists: the kinds of shapes that can be parts of a compound, and the kinds of
+/// compounds.
 fn solids() -> &'static (Vec<&'static Field>, Vec<&'static Field>) {
     static SOLIDS: OnceLock<(Vec<&Field>, Vec<&Field>)> = OnceLock::new();
     SOLIDS.get_or_init(|| {
@@ -154,14 +155,16 @@ fn solids() -> &'static (Vec<&'static Field>, Vec<&'static Field>) {
     })
 }
 
-/// Compound without validation errors.
+/// Returns the compound of `of` by the set operation `key`. Returns `None` if it has validation
+/// errors.
 fn compound(key: &str, of: Vec<CsgOperand>) -> Option<Shape> {
     let parts = Table::from_iter([("of".to_string(), Value::try_from(of).ok()?)]);
     let whole = Table::from_iter([(key.to_string(), Value::Table(parts))]);
     whole.try_into::<Shape>().ok().filter(|shape| shape.faults().is_empty())
 }
 
-/// Shape of a kind with random keys, approximately in a box of the lengths `size` on `base`.
+/// Returns a shape of a kind with random keys, approximately in a box of the lengths `size` on
+/// `base`.
 fn by_keys(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Option<Shape> {
     let key_value = |numbers: &mut Numbers, field: &Field| {
         let least = size.min_element();
@@ -189,7 +192,8 @@ fn by_keys(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Opt
     whole.try_into::<Shape>().ok().filter(|shape| shape.faults().is_empty())
 }
 
-/// Compound in a box of the lengths `size` on `base`; faces of its parts often coincide.
+/// Returns a random compound in a box of the lengths `size` on `base`. Faces of its parts often
+/// coincide.
 pub fn combined(
     numbers: &mut Numbers,
     base: DVec3,
@@ -236,7 +240,8 @@ fn of_kind(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Sha
     drawn.unwrap_or_else(|| Shape::fitted_to(kind.name, base, size).expect("a registered kind"))
 }
 
-/// Transform steps that rotate, stretch, shear or mirror about the fixed point `base`; mostly none.
+/// Returns random transform steps that rotate, stretch, shear or mirror about the fixed point
+/// `base`; mostly none.
 fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<TransformOp> {
     let turn = |numbers: &mut Numbers| {
         let any = 180.0 * numbers.unit();
@@ -266,13 +271,13 @@ fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<TransformOp> {
     std::iter::once(to_origin).chain(inner).chain([back]).collect()
 }
 
-/// Names of materials, and the depth of nested compounds.
+/// Names of materials for random objects, and the depth of nested compounds.
 pub struct Stock<'a> {
     pub materials: &'a [String],
     pub levels: usize,
 }
 
-/// Random object on `base`, about as large as `size`, without validation errors.
+/// Returns a random object on `base`, about as large as `size`, without validation errors.
 pub fn object(numbers: &mut Numbers, stock: &Stock, base: DVec3, size: DVec3) -> Object {
     // Unbounded objects hide all others, so that they are rare.
     let kind = loop {
@@ -286,7 +291,7 @@ pub fn object(numbers: &mut Numbers, stock: &Stock, base: DVec3, size: DVec3) ->
     object_of(numbers, stock, kind, base, size)
 }
 
-/// Random object of the kind with this key.
+/// Returns a random object of the kind that the key `key` names.
 pub fn named(numbers: &mut Numbers, stock: &Stock, key: &str, base: DVec3, size: DVec3) -> Object {
     let kind = KINDS.iter().find(|kind| kind.name == key).expect("a registered kind");
     object_of(numbers, stock, kind, base, size)
@@ -316,7 +321,7 @@ fn object_of(
     object
 }
 
-/// Returns the object with its files loaded.
+/// Returns the object with the files that it refers to loaded.
 pub fn resolved(object: &Object) -> Object {
     let mut scene =
         Scene { objects: vec![object.clone()], resolver: library(), ..Scene::default() };

@@ -1,4 +1,4 @@
-//! Single precision, where `auto` selects it, against double precision.
+//! Single precision in random scenes for which `auto` selects it, against double precision.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::random_scenes::gaps::shows_coincident_opaque;
@@ -9,13 +9,14 @@ use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 const SEEDS: u64 = 8;
-/// Samples per pixel and replicate.
+/// Samples per pixel and replicate (half of the samples).
 const SAMPLES: u32 = 4;
-/// Allowed error of single precision in the mean of a block \[8-bit levels\]. docs/accuracy.md
-/// measures 0.12 over a picture at the worst proportions for which `auto` selects it.
+/// Allowed error of single precision in the mean of a block of pixels, in 8-bit levels.
+/// docs/accuracy.md measures 0.12 over a picture at the worst proportions for which `auto` selects
+/// it.
 const FLOOR: f64 = 0.5;
 
-/// Display values of every pixel, for each seed \[8-bit levels\].
+/// Returns the displayed values of every pixel, in 8-bit levels: one picture for each seed.
 pub fn codes(scene: &Scene, precision: Precision, samples: u32) -> Vec<Vec<[f64; 3]>> {
     let display = Display::default();
     (0..SEEDS)
@@ -29,7 +30,8 @@ pub fn codes(scene: &Scene, precision: Precision, samples: u32) -> Vec<Vec<[f64;
         .collect()
 }
 
-/// Compares block means of two sets of pictures. Pictures of one seed have the same samples.
+/// Compares block means of two sets of pictures. The two pictures of one seed have the same
+/// samples.
 pub fn paired(
     size: [u32; 2],
     names: [&str; 2],

@@ -12,21 +12,20 @@ use zerkalo::camera::{Aperture, Camera, Focus, ViewAngle};
 use zerkalo::light::{Directional, Falloff, Light, Point, Spot};
 use zerkalo::primitive::{ConvexPolyhedronForm, Form, ParallelogramForm, PlaneForm, SphereForm};
 use zerkalo::scene::{
-    Acceleration, Document, FilmSettings, IntegratorSettings, Object, Scale, Scene, TRACE_FIELDS,
-    TransformOp,
+    Acceleration, Document, FilmSettings, IntegratorSettings, Object, Scale, Scene, TransformOp,
 };
-use zerkalo::value::{Color, Field};
+use zerkalo::value::{Color, Description, Field};
 
-/// A random scene.
+/// Random scene, with its text.
 pub struct Random {
     pub layout: Layout,
     /// Text of the scene file.
     pub text: String,
 }
 
-/// Points at which renderers often fail.
+/// Points of a scene at which renderers often fail.
 struct Spots {
-    /// Points on surfaces, exact up to rounding.
+    /// Points on surfaces of objects, exact up to rounding.
     on: Vec<DVec3>,
     /// Points inside of objects.
     inside: Vec<DVec3>,
@@ -38,7 +37,7 @@ impl Spots {
     fn new(numbers: &mut Numbers, objects: &[Object], layout: Layout) -> Self {
         let forms: Vec<Form> = objects.iter().take(12).map(|o| resolved(o).form()).collect();
         let on = forms.iter().map(|form| on_surface(numbers, form)).collect();
-        let boxes: Vec<_> = forms.iter().filter_map(Form::bounds).collect();
+        let boxes: Vec<_> = forms.iter().filter_map(|form| form.bounds()).collect();
         let mut inside: Vec<_> = boxes.iter().map(|(low, high)| 0.5 * (*low + *high)).collect();
         inside.push(DVec3::Y);
         let (middle, radius) = match (layout, boxes.first()) {
@@ -75,7 +74,8 @@ fn on_surface(numbers: &mut Numbers, form: &Form) -> DVec3 {
     }
 }
 
-/// Draws a scene; `None` if it has validation errors, such as objects too small for their position.
+/// Returns a random scene with the objects of `layout`. Returns `None` if it has validation errors,
+/// such as objects too small for their position.
 fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
     let finishes = layout.finishes();
     let materials: BTreeMap<String, _> = (0..2 + numbers.below(4))
@@ -148,7 +148,7 @@ fn trace(numbers: &mut Numbers) -> IntegratorSettings {
         "min_throughput" => Some(Value::Float(pick(numbers, &[0.0, 0.01, 0.1]))),
         _ => None,
     };
-    let keys: Table = table(numbers, TRACE_FIELDS, 0.5, key_value);
+    let keys: Table = table(numbers, IntegratorSettings::FIELDS, 0.5, key_value);
     let mut trace: IntegratorSettings = keys.try_into().expect("keys of the table");
     trace.acceleration = Acceleration::Auto;
     trace
@@ -211,8 +211,8 @@ fn camera(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Camera {
     }
 }
 
-/// Lens of one camera in three. The numbers depend on the eye alone, so that the scene is otherwise
-/// the same without a lens.
+/// Returns aperture and focus of the camera; one camera in three has a lens. The random numbers
+/// depend on the eye alone, so that the scene is otherwise the same without a lens.
 fn lens(eye: DVec3, spots: &Spots) -> (Option<Aperture>, Option<Focus>) {
     let mut numbers =
         Numbers::new(eye.to_array().map(f64::to_bits).into_iter().fold(0, u64::wrapping_add));
@@ -279,7 +279,7 @@ fn spot(numbers: &mut Numbers, position: DVec3, target: DVec3) -> Spot {
     Spot { position: position.to_array(), direction, outer_angle, inner_angle }
 }
 
-/// Scales and translates some scenes as a whole.
+/// Scales and translates some of the scenes as a whole.
 fn displace(numbers: &mut Numbers, scene: &mut Scene) {
     let scale = match numbers.below(3) {
         0 => log(numbers, 1e-4, 1e4),
@@ -311,13 +311,13 @@ fn displace(numbers: &mut Numbers, scene: &mut Scene) {
     }
 }
 
-/// Seeds of the scenes of one layout with the given numbers.
+/// Returns the seeds of the scenes of one layout with the given numbers.
 pub fn seeds_of(layout: Layout, numbers: Range<u64>) -> impl Iterator<Item = u64> {
     let index = Layout::ALL.iter().position(|l| *l == layout).expect("a layout");
     numbers.map(move |i| i * Layout::ALL.len() as u64 + index as u64)
 }
 
-/// Scene of a seed. Consecutive seeds cycle through all layouts.
+/// Returns the random scene of a seed. Consecutive seeds have successive layouts.
 pub fn scene(seed: u64) -> Random {
     let layout = Layout::ALL[seed as usize % Layout::ALL.len()];
     let mut numbers = Numbers::new(seed ^ 0x5ce4_e000_0000_0000);

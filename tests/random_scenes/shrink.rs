@@ -1,12 +1,12 @@
-//! Reduction of failing scenes: removes keys and list entries and rounds numbers in the text, as
-//! long as it is a valid scene that fails.
+//! Reduction of scenes that fail: keys and list entries are removed and numbers are rounded in the
+//! text, as long as it remains a valid scene that fails.
 
 use crate::common::NAME;
 use std::time::{Duration, Instant};
 use toml::{Table, Value};
 use zerkalo::scene::Scene;
 
-/// Step of a path: a key or an index in a list.
+/// Step of a path in a TOML document: a key, or an index in a list.
 #[derive(Clone)]
 enum Step {
     Key(String),
@@ -15,7 +15,7 @@ enum Step {
 
 type Path = Vec<Step>;
 
-/// Change of the value at a path.
+/// Change of the value at a path in a TOML document.
 enum Change {
     Remove,
     /// Replaces a compound by the shape of the part with this index.
@@ -23,10 +23,12 @@ enum Change {
     Set(Value),
 }
 
-/// Returns the smallest failing text found within `seconds`.
-pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> String {
+/// Returns the smallest failing text found within `seconds`; `None` if no smaller one was found.
+pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> Option<String> {
     let end = Instant::now() + Duration::from_secs(seconds);
-    let mut best: Table = text.parse().expect("a scene");
+    let whole: Table = text.parse().expect("a scene");
+    let mut best = whole.clone();
+    let found = |best: &Table| (*best != whole).then(|| written(best));
     let size = Scene::parse(text, NAME).map_or([u32::MAX, 1], |scene| scene.film.size);
     let pixels = size.iter().product::<u32>();
     let mut changed = true;
@@ -40,7 +42,7 @@ pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> String 
         places.sort_by_key(|(path, _)| path.len());
         for (path, change) in places {
             if Instant::now() > end {
-                return written(&best);
+                return found(&best);
             }
             let mut candidate = Value::Table(best.clone());
             if apply(&mut candidate, &path, &change).is_none() {
@@ -57,7 +59,7 @@ pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> String 
             }
         }
     }
-    written(&best)
+    found(&best)
 }
 
 fn written(table: &Table) -> String {
@@ -109,7 +111,7 @@ fn inner<'a>(value: &'a mut Value, step: &Step) -> Option<&'a mut Value> {
     }
 }
 
-/// Applies a change; `None` if the path does not exist any more.
+/// Applies a change to the value at a path. Returns `None` if the path no longer exists.
 fn apply(value: &mut Value, path: &[Step], change: &Change) -> Option<()> {
     let (last, above) = path.split_last()?;
     let holder = above.iter().try_fold(value, inner)?;

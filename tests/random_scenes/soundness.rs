@@ -1,5 +1,5 @@
-//! Soundness: no panic, no invalid sample, finite noise; equal replicates in scenes without random
-//! choices.
+//! Soundness of random scenes: no panic, no invalid sample, finite noise. In scenes without random
+//! choices both replicates (halves of the samples) are equal.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::random_scenes::layouts::Layout;
@@ -61,7 +61,7 @@ fn soundness() {
     compare("soundness", 0..160, sound);
 }
 
-/// Scenes of all proportions.
+/// Checks scenes of all proportions.
 #[test]
 fn wild_soundness() {
     compare("soundness", seeds_of(Layout::Wild, 20..320), sound);
@@ -89,7 +89,7 @@ fn many_replicates() {
     compare_many("replicates", replicates_are_equal);
 }
 
-/// A light a few millionths of the scene above the floor makes bright, valid samples.
+/// Checks that a light a few millionths of the scene above the floor gives bright, valid samples.
 #[test]
 fn light_close_to_floor_has_no_bad_sample() {
     let scene = parsed(

@@ -1,15 +1,15 @@
-//! Comparison of pictures of several seeds by block means. Seeds are independent: the spread of
-//! their means estimates the error of the overall mean, for every sampler.
+//! Comparison of pictures of several seeds by means of blocks of pixels. Seeds are independent. The
+//! spread of their means therefore estimates the error of the overall mean, for every sampler.
 
 use crate::common::normal::{two_sided_z, z_of_t};
 
-/// Probability of a false alarm in the comparison of a scene.
+/// Probability of a false alarm in the comparison of one scene.
 const LEVEL: f64 = 1e-6;
 
 /// Side of a block in pixels; a divisor of the tile size.
 pub const BLOCK: usize = 8;
 
-/// Pixel indices of each block, and last those of the whole picture.
+/// Returns the pixel indices of each block, followed by those of the whole picture.
 pub fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
     let [width, height] = [width as usize, height as usize];
     let block = |x0: usize, y0: usize| {
@@ -23,13 +23,13 @@ pub fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
     all
 }
 
-/// Mean colour over some pixels.
+/// Returns the mean colour over the pixels with the indices `pixels`.
 pub fn mean_of(picture: &[[f64; 3]], pixels: &[usize]) -> [f64; 3] {
     let n = pixels.len() as f64;
     [0, 1, 2].map(|c| pixels.iter().map(|p| picture[*p][c]).sum::<f64>() / n)
 }
 
-/// Mean and standard error of the mean.
+/// Returns the mean of `values` and the standard error of the mean.
 pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -37,7 +37,7 @@ pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (n - 1.0) / n).sqrt())
 }
 
-/// Largest of many deviations.
+/// Largest of many deviations, each relative to its standard error.
 pub struct Worst {
     count: f64,
     freedom: f64,
@@ -63,7 +63,7 @@ impl Worst {
         }
     }
 
-    /// Returns the largest deviation if it is significant (Bonferroni).
+    /// Returns the largest deviation if it is significant among all comparisons (Bonferroni).
     pub fn beyond_chance(self) -> Option<String> {
         let allowed = two_sided_z(LEVEL / self.count);
         let wrong = self.z.is_nan() || self.z > allowed;

@@ -1,4 +1,5 @@
-//! Adaptive renderings with different numbers of threads: equal films and decisions.
+//! Adaptive renders of random scenes with different numbers of threads, whose films and sample
+//! counts are equal.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::support::{begin, pool, settings, trace};
@@ -7,10 +8,10 @@ use zerkalo::render::schedule::{Step, Stop, StoppedBy};
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Mean number of samples per pixel, enough for several decisions.
+/// Mean number of samples per pixel, enough for several allocation rounds.
 const SAMPLES: u32 = 40;
 
-/// Result of a rendering.
+/// Result of one render.
 #[derive(PartialEq)]
 struct Outcome {
     bytes: Vec<u8>,

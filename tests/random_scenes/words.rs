@@ -5,25 +5,26 @@ use glam::DVec3;
 use toml::{Table, Value};
 use zerkalo::value::{DefaultValue, Field, NumberRange, ValueType};
 
-/// Function that returns the value of a key; `None` for any value that the table allows.
+/// Function that returns the value of a key, or `None` for a random value that the format table
+/// allows.
 pub type KeyValue<'a> = &'a dyn Fn(&mut Numbers, &Field) -> Option<Value>;
 
-/// Random element of `from`.
+/// Returns a random element of `from`.
 pub fn pick<T: Copy>(numbers: &mut Numbers, from: &[T]) -> T {
     from[numbers.below(from.len())]
 }
 
-/// Returns `true` with the probability `times / of`.
+/// Returns `true` with the probability `times` / `of`.
 pub fn chance(numbers: &mut Numbers, times: usize, of: usize) -> bool {
     numbers.below(of) < times
 }
 
-/// Log-uniform number between two positive numbers.
+/// Returns a log-uniform number between two positive numbers.
 pub fn log(numbers: &mut Numbers, low: f64, high: f64) -> f64 {
     10f64.powf(numbers.between(low.log10(), high.log10()))
 }
 
-/// Random direction, in one of three cases along an axis.
+/// Returns a random direction, along an axis in one of three cases.
 pub fn direction(numbers: &mut Numbers) -> DVec3 {
     match numbers.below(3) {
         0 => pick(numbers, &[DVec3::X, DVec3::Y, DVec3::Z]) * pick(numbers, &[1.0, -1.0]),
@@ -31,12 +32,12 @@ pub fn direction(numbers: &mut Numbers) -> DVec3 {
     }
 }
 
-/// List of numbers.
+/// Returns the TOML list of `numbers`.
 pub fn list(numbers: impl IntoIterator<Item = f64>) -> Value {
     Value::Array(numbers.into_iter().map(Value::Float).collect())
 }
 
-/// Number in `range`; magnitudes near 1 are the most frequent.
+/// Returns a random number in `range`. Magnitudes near 1 are the most frequent.
 fn number(numbers: &mut Numbers, range: NumberRange) -> f64 {
     let ends: Vec<f64> =
         [range.low, range.high].into_iter().filter(|x| x.abs() <= 1.0 && range.holds(*x)).collect();
@@ -49,7 +50,7 @@ fn number(numbers: &mut Numbers, range: NumberRange) -> f64 {
     if range.holds(x) { x } else { x.clamp(range.low.max(-1e3), range.high.min(1e3)) }
 }
 
-/// Random value of a type.
+/// Returns a random value of the type `takes`.
 fn value(numbers: &mut Numbers, takes: ValueType, odds: f64, key_value: KeyValue) -> Value {
     match takes {
         ValueType::Text => Value::String(String::new()),
@@ -89,7 +90,8 @@ fn one_of(numbers: &mut Numbers, fields: &[Field], odds: f64, key_value: KeyValu
     [(field.name.to_string(), value)].into_iter().collect()
 }
 
-/// Table with all required keys, and each of the others with the probability `odds`.
+/// Returns a random table with all required keys, and each of the others with the probability
+/// `odds`.
 pub fn table(numbers: &mut Numbers, fields: &[Field], odds: f64, key_value: KeyValue) -> Table {
     let mut out = Table::new();
     for field in fields {

@@ -1,9 +1,9 @@
-//! Time in which edits of large scenes are written, by ratios of processor time within one run.
+//! Time to write edits of large scenes, as ratios of processor time within one run.
 
 use super::*;
 use std::fmt::Write;
 
-/// Scene of `count` spheres, each with a comment.
+/// Returns the text of a scene of `count` spheres, each with a comment.
 fn spheres(count: usize, has_names: bool) -> String {
     let mut text = "# Spheres.\nambient.color = [1, 1, 1]\n".to_string();
     for i in 0..count {
@@ -17,13 +17,13 @@ fn spheres(count: usize, has_names: bool) -> String {
     text
 }
 
-/// Seconds of processor time of this thread.
+/// Returns the processor time of this thread in seconds.
 fn cpu_seconds() -> f64 {
     let times = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap();
     times.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-9
 }
 
-/// Seconds in which the text of a scene of `count` objects is changed after `edit`.
+/// Returns the seconds that it takes to change the text of a scene of `count` objects after `edit`.
 fn seconds(count: usize, has_names: bool, edit: fn(&mut Scene)) -> f64 {
     let document = document(&spheres(count, has_names));
     let times = (0..3).map(|_| {
@@ -44,10 +44,10 @@ fn move_object(object: &mut Object) {
     }
 }
 
-/// Name of an edit and its function.
+/// Name of an edit, and the function that applies it.
 type NamedEdit = (&'static str, fn(&mut Scene));
 
-/// Twice the objects take at most `limit` times the time.
+/// Checks that twice as many objects take at most `limit` times the time, from `fewest` objects on.
 fn check_growth(fewest: usize, limit: f64) {
     let edits: [NamedEdit; 3] = [
         ("one moved", |scene| {
@@ -68,14 +68,16 @@ fn check_growth(fewest: usize, limit: f64) {
     }
 }
 
-/// Halfway between linear and quadratic time: few objects fit into the caches.
+/// Checks that the growth of the time is less than halfway between linear and quadratic. It is not
+/// exactly linear, because few objects fit into the caches.
 #[test]
 #[cfg(target_os = "linux")]
 fn edits_of_many_objects_are_written_in_linear_time() {
     check_growth(2_000, 8_f64.sqrt());
 }
 
-///     cargo test --test program scene_editing::large -- --ignored --nocapture
+/// Checks edits of 100,000 objects: cargo test --test program scene_editing::large -- --ignored
+/// --nocapture
 #[test]
 #[ignore = "takes a minute, and needs an idle machine"]
 #[cfg(target_os = "linux")]

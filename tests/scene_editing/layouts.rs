@@ -1,6 +1,6 @@
-//! Scene files in the layouts that TOML allows.
+//! Scene files in the different layouts that TOML allows.
 
-/// One scene in the layouts that TOML allows, with comments in every position.
+/// Texts of one scene in the different layouts that TOML allows, with comments in every position.
 pub const LAYOUTS: &[&str] = &[
     // Headers, dotted keys, inline tables.
     r##"# What this file shows.

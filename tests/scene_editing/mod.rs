@@ -19,7 +19,8 @@ fn document(text: &str) -> Document {
     Document::parse(text.to_string(), "scene.toml").unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Applies `edit` and returns the text, after a check that it reads back as the edited scene.
+/// Applies `edit` to the scene in `text`. Checks that the new text reads back as the edited scene,
+/// and returns it.
 fn edited(text: &str, edit: impl FnOnce(&mut Scene)) -> String {
     let mut document = document(text);
     let mut scene = document.scene().clone();
@@ -30,7 +31,8 @@ fn edited(text: &str, edit: impl FnOnce(&mut Scene)) -> String {
     document.text().to_string()
 }
 
-/// Returns the lines of `b` that are missing in `a` and the lines of `a` that are missing in `b`.
+/// Returns two lists: the lines of `b` that are missing in `a`, and the lines of `a` that are
+/// missing in `b`.
 fn difference<'a>(a: &'a str, b: &'a str) -> (Vec<&'a str>, Vec<&'a str>) {
     let missing = |from: &'a str, other: &str| {
         let mut others: Vec<&str> = other.lines().collect();

@@ -9,7 +9,8 @@ fn aimed() -> Camera {
     Camera { eye: [0.6, 1.4, 4.5], target: Some([0.0, 0.8, -0.5]), ..Camera::default() }
 }
 
-/// Returns the same camera with a direction instead of a target, and the distance of its target.
+/// Returns the camera of the mirror room with a direction instead of a target, and the distance of
+/// the target.
 fn free() -> (Camera, f64) {
     let view = aimed().view().unwrap();
     let direction = Some(view.to_array());
@@ -32,7 +33,7 @@ fn degrees_between(a: &Camera, b: &Camera) -> f64 {
     a.view().unwrap().angle_between(b.view().unwrap()).to_degrees()
 }
 
-/// Returns the elevation of the view direction, in degrees.
+/// Returns the elevation of the camera's view direction, in degrees.
 fn pitch(camera: &Camera) -> f64 {
     camera.view().unwrap().y.asin().to_degrees()
 }

@@ -1,4 +1,4 @@
-//! Random sequences of all edit operations.
+//! Random sequences of all operations that edit a scene.
 
 use super::LAYOUTS;
 use proptest::prelude::*;
@@ -10,7 +10,7 @@ use zerkalo::scene::{BUILT_IN, Document, History, Scene};
 
 const TRANSFORMS: &str = include_str!("../../scenes/transform.toml");
 
-/// Random numbers that select an operation, its target, its parameter and its amount.
+/// Random numbers that select an edit operation, its target, its parameter and its amount.
 type Act = (u8, usize, usize, f64);
 
 fn act() -> impl Strategy<Value = Act> {
@@ -26,7 +26,7 @@ fn pick<T: Clone>(list: &[T], at: usize) -> Option<T> {
     list.get(at.checked_rem(list.len())?).cloned()
 }
 
-/// Performs one operation. Returns its name, for the tally, and its result.
+/// Performs one edit operation. Returns its name for the tally, and its result.
 fn perform(
     scene: &Scene,
     (what, at, other, amount): Act,
@@ -74,12 +74,11 @@ fn perform(
         16 => ("recall camera", edit::recall_view(scene, "left")),
         17 => ("roughen", edit::adjust_roughness(scene, Some(&subject), amount.trunc())),
         18 => ("reflect", edit::reflect(scene, Some(&subject), amount.trunc())),
-        19 => ("next lobe", edit::next_lobe(scene, None, amount > 0.0)),
-        _ => ("add material", edit::add_material(scene)),
+        _ => ("next lobe", edit::next_lobe(scene, None, amount > 0.0)),
     }
 }
 
-/// Number of performed and of refused calls of each operation.
+/// Two numbers for each operation: performed calls, and refused ones.
 type Tally = BTreeMap<&'static str, [u32; 2]>;
 
 fn check_sequence(text: &str, acts: &[Act], tally: &mut Tally) -> Result<(), TestCaseError> {
@@ -142,7 +141,6 @@ fn random_edits_leave_valid_scenes_and_can_be_undone() {
         "toggle",
         "add object",
         "add light",
-        "add material",
         "move",
         "turn",
         "drop",

@@ -43,7 +43,7 @@ fn shape() -> impl Strategy<Value = Shape> {
     prop_oneof![4 => simple(), 1 => compound(2)]
 }
 
-/// Returns compounds of solids, nested at most `levels` deep.
+/// Returns a strategy for random compounds of solids, nested at most `levels` deep.
 fn compound(levels: u32) -> BoxedStrategy<Shape> {
     let solid = || {
         simple().prop_filter("flat", |shape| {
@@ -245,7 +245,7 @@ fn unique<'a>(names: impl Iterator<Item = &'a mut String>) {
     }
 }
 
-/// Makes names unique and assigns materials to the objects.
+/// Returns the scene with unique names and with materials assigned to its objects.
 pub fn tidy(mut scene: Scene) -> Scene {
     unique(scene.objects.iter_mut().map(|o| &mut o.name));
     unique(scene.lights.iter_mut().map(|l| &mut l.name));

@@ -1,6 +1,6 @@
-//! At least one story for every command of the command table.
+//! Stories (scene, keys, expected result) of the command table, at least one for every command.
 
-use crate::stories::desk::{Desk, FILE, ROOM};
+use crate::stories::simulated_dashboard::{Desk, FILE, ROOM};
 use std::collections::HashSet;
 use std::path::Path;
 use zerkalo::camera::{Camera, Focus as LensFocus};
@@ -19,15 +19,15 @@ use zerkalo::shape::Shape;
 const BALL: Target = Target::Object(1);
 const GLASS: Target = Target::Object(2);
 
-/// Condition on the scene before and the desk afterwards.
+/// Condition on the scene before the keys, and on the dashboard afterwards.
 type Expect = dyn Fn(&Scene, &Desk) -> bool;
 
-/// A selection, the keys that are pressed, and the expected result.
+/// Story of a command: the selection, the keys that are pressed, and the expected result.
 struct Story {
-    /// The command under test.
+    /// Label of the command that the story tests.
     label: String,
     select: Target,
-    /// Keys; `:` alone runs the command from the palette.
+    /// Keys that are pressed. `:` alone runs the command from the command palette.
     keys: String,
     expect: Box<Expect>,
 }
@@ -41,7 +41,7 @@ fn story(
     Story { label: label.to_string(), select, keys: keys.to_string(), expect: Box::new(expect) }
 }
 
-/// The room with nine viewpoints, each a unit further to the right.
+/// Returns the text of the room with nine stored cameras, each a unit further to the right.
 fn room_with_views() -> String {
     let view =
         |n: i32| format!("\n[cameras.v{n}]\neye = [{n}.0, 1.0, 5.0]\ntarget = [0.0, 1.0, 0.0]\n");
@@ -339,7 +339,8 @@ fn picture_stories() -> Vec<Story> {
         }),
         story("view before", c(), "V", |_, d| d.model.channel == DisplayChannel::Depth),
         story("probe a pixel", c(), "i", |_, d| {
-            d.asked(|e| *e == Effect::Probe(Some([32, 24]))) && d.model.mode == Mode::Probe
+            d.asked(|e| matches!(e, Effect::View(view) if view.probe == Some([32, 24])))
+                && d.model.mode == Mode::Probe
         }),
         story("probe left", c(), "i Left", move |_, d| probe(d)[0] < 32),
         story("probe right", c(), "i Right", move |_, d| probe(d)[0] > 32),
@@ -385,7 +386,7 @@ fn picture_stories() -> Vec<Story> {
         }),
         story("all keys", c(), "?", |_, d| matches!(d.model.overlay, Some(Overlay::Help { .. }))),
         story("find an action", c(), ":", |_, d| {
-            matches!(d.model.overlay, Some(Overlay::Palette(_)))
+            matches!(d.model.overlay, Some(Overlay::CommandPalette(_)))
         }),
         story("inventory of the scene", c(), ":", |_, d| {
             matches!(d.model.overlay, Some(Overlay::Inventory { .. }))
@@ -435,7 +436,7 @@ fn every_command_does_what_its_story_expects() {
     }
 }
 
-/// A command run from the palette does the same as by its key.
+/// Checks that a command does the same if it is run from the command palette as by its key.
 #[test]
 fn palette_finds_every_command_by_its_label() {
     for command in COMMANDS {

@@ -1,6 +1,6 @@
-//! Stories of typing, forms, gestures and refusals.
+//! Stories of typing, forms, drags and refusals.
 
-use crate::stories::desk::{Desk, ROOM};
+use crate::stories::simulated_dashboard::{Desk, ROOM};
 use std::time::Duration;
 use zerkalo::dashboard::layout::Focus;
 use zerkalo::dashboard::message::{Effect, Message};
@@ -24,7 +24,7 @@ fn radius(desk: &Desk) -> f64 {
     }
 }
 
-/// Opens the inspector of the ball with the cursor on the radius.
+/// Opens the inspector of the ball, with the cursor on the radius.
 fn at_radius() -> Desk {
     let desk = desk(BALL, "Enter Down Down Down Down Down Down");
     let lines = desk.model.field_lines();
@@ -61,7 +61,7 @@ fn invalid_value_is_refused_in_its_field() {
         desk.keys("Backspace");
         assert_eq!(desk.problem(), None);
         desk.keys("Esc");
-        assert!(desk.model.editor().is_none());
+        assert!(desk.editor().is_none());
         assert_eq!((desk.text().as_str(), desk.model.focus), (ROOM, Focus::Inspector));
     }
     let mut desk = at_radius();

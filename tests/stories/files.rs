@@ -1,28 +1,23 @@
 //! Stories of files: saving, changes by other programs, errors in the file, quitting.
 
-use crate::stories::desk::{Desk, FILE, ROOM};
+use crate::stories::simulated_dashboard::{Desk, FILE, ROOM};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
-use zerkalo::dashboard::model::{Colors, Model, Start};
+use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::overlay::Overlay;
-use zerkalo::dashboard::update::{begin, update};
+use zerkalo::dashboard::update::update;
 use zerkalo::render::schedule::Stop;
 use zerkalo::scene::edit::Target;
 use zerkalo::scene::{SaveError, Scene, built_in};
 
 fn start(path: Option<&str>, text: &str) -> Model {
-    Model::new(Start {
-        path: path.map(PathBuf::from),
-        name: "mirror-room.toml".into(),
-        scene: Scene::parse(text, FILE).map(Arc::new),
-        screen: [80, 24],
-        colors: Colors::True,
-        stop: Stop::default(),
-        threads: 1,
-        max_threads: 1,
-    })
+    let scene = Scene::parse(text, FILE).map(Arc::new);
+    let path = path.map(PathBuf::from);
+    let mut model = Model::new(path, "mirror-room.toml", scene, Stop::default(), 1);
+    update(&mut model, Message::Resize([80, 24]), Duration::ZERO);
+    model
 }
 
 fn press(model: &mut Model, keys: &str) -> Vec<Effect> {
@@ -70,7 +65,6 @@ fn save_as_asks_before_overwriting() {
 #[test]
 fn untitled_scene_asks_for_path_before_quitting() {
     let mut model = start(None, ROOM);
-    begin(&mut model);
     press(&mut model, "Left q s");
     assert!(matches!(model.overlay, Some(Overlay::Prompt(_))));
     let effects = press(&mut model, "Enter");
@@ -139,8 +133,6 @@ fn external_change_reloads_unless_edits_would_be_lost() {
 fn unreadable_file_loads_after_it_is_fixed() {
     let broken = ROOM.replace("radius = 0.5", "radius = -1");
     let mut model = start(Some(FILE), &broken);
-    let begun = begin(&mut model);
-    assert!(begun.iter().all(|e| !matches!(e, Effect::Show(_))), "{begun:?}");
     assert!(model.file.unreadable);
     let errors = model.file.broken.as_ref().unwrap().to_string();
     assert!(errors.contains("room.toml:33") && errors.contains("radius is -1"), "{errors}");
@@ -155,7 +147,6 @@ fn unreadable_file_loads_after_it_is_fixed() {
     assert!(!model.file.unreadable && model.file.broken.is_none() && !model.is_unsaved());
     assert!(!press(&mut model, "Left").is_empty());
     let mut model = start(Some(FILE), &broken);
-    begin(&mut model);
     assert_eq!(press(&mut model, "q"), [Effect::Quit]);
 }
 
@@ -178,12 +169,10 @@ fn error_in_changed_file_keeps_scene() {
 fn built_in_scene_opens_without_file() {
     let text = zerkalo::scene::BUILT_IN;
     let mut model = start(None, text);
-    let effects = begin(&mut model);
-    assert!(effects.contains(&Effect::Show(Arc::new(built_in()))));
+    assert_eq!(**model.scene(), built_in());
     let raster = model.layout().unwrap().raster;
-    assert!(effects.contains(&Effect::Raster(raster)), "{effects:?}");
     let effects = update(&mut model, Message::Resize([120, 36]), Duration::ZERO);
-    assert!(matches!(effects[..], [Effect::Raster(new)] if new != raster));
+    assert!(matches!(effects[..], [Effect::View(new)] if new.raster != Some(raster)));
 }
 
 #[test]
@@ -202,7 +191,6 @@ fn edit_during_save_prevents_quit() {
 #[test]
 fn recovered_edits_replace_unreadable_file() {
     let mut model = start(Some(FILE), "[camera");
-    begin(&mut model);
     let scene = Arc::new(Scene::parse(ROOM, FILE).unwrap());
     let left = OrphanedEdits { scene: Arc::clone(&scene), age: Duration::ZERO, changed: true };
     update(&mut model, Message::OrphanedEdits(left), Duration::ZERO);
@@ -230,7 +218,8 @@ fn export_path_with_control_characters_is_not_copied() {
     assert!(desk.effects.is_empty() && desk.notice().contains("not copied"));
 }
 
-/// An image covers the whole screen; the next key only closes it.
+/// Checks the viewer of exported images. An image covers the whole screen; the next key only closes
+/// it.
 #[test]
 fn image_viewer_closes_on_any_key() {
     let mut desk = Desk::new(ROOM);

@@ -2,12 +2,12 @@
 //! renderer or disk.
 
 mod actions;
-mod desk;
 mod editing;
 mod files;
 mod mouse;
 mod random;
 mod recovery;
 mod roughness;
+mod simulated_dashboard;
 mod table;
 mod watch;

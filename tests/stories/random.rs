@@ -1,7 +1,7 @@
-//! Ten thousand random key and mouse events on three scenes: the model stays valid and every edit
+//! Ten thousand random key and mouse events on three scenes. The model stays valid, and every edit
 //! can be undone.
 
-use crate::stories::desk::{Desk, ROOM};
+use crate::stories::simulated_dashboard::{Desk, ROOM};
 use std::collections::HashSet;
 use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message};
@@ -11,10 +11,10 @@ use zerkalo::scene::BUILT_IN;
 use zerkalo::terminal::event::{Button, Code, Key, MouseKind};
 
 const EVENTS: usize = 10_000;
-/// Label of the command that ends the program.
+/// Label of the command that quits the program.
 const QUIT: &str = "quit";
 
-/// xorshift64*.
+/// Random number generator xorshift64*.
 struct Rng(u64);
 
 impl Rng {
@@ -26,7 +26,7 @@ impl Rng {
     }
 }
 
-/// Every key of the table, and keys that type characters.
+/// Returns every key of the command table, and keys that type characters.
 fn keys() -> Vec<Key> {
     let bindings = COMMANDS.iter().flat_map(|command| command.keys);
     let names = bindings.flat_map(|(_, names)| names.split(' '));
@@ -39,7 +39,7 @@ fn keys() -> Vec<Key> {
 
 fn quits(desk: &Desk, key: Key) -> bool {
     let palette = match &desk.model.overlay {
-        Some(Overlay::Palette(palette)) => {
+        Some(Overlay::CommandPalette(palette)) => {
             palette.found.get(palette.cursor).is_some_and(|i| COMMANDS[*i].label == QUIT)
         }
         _ => false,
@@ -58,7 +58,7 @@ fn event(desk: &mut Desk, rng: &mut Rng, keys: &[Key]) {
             }
         }
         // From the palette, which also covers commands without a key.
-        14 if desk.model.overlay.is_none() && desk.model.editor().is_none() => {
+        14 if desk.model.overlay.is_none() && desk.editor().is_none() => {
             let label = COMMANDS[rng.below(COMMANDS.len())].label;
             if label != QUIT {
                 desk.palette(label);
@@ -115,7 +115,7 @@ fn play(name: &str, text: &str, seed: u64, fired: &mut HashSet<&'static str>) {
     assert_eq!(desk.text(), text, "{name}: everything undone");
 }
 
-/// Returns `true` if duplicates have made the scene large; more of them find nothing new.
+/// Returns `true` if duplicates have made the scene large. More of them would test nothing new.
 fn scene_is_large(desk: &Desk) -> bool {
     desk.scene().objects.len() > 60
 }

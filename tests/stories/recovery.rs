@@ -1,13 +1,14 @@
 //! Stories of unsaved edits: autosave, and recovery at the next start.
 
-use crate::stories::desk::{Desk, ROOM};
+use crate::stories::simulated_dashboard::{Desk, ROOM};
 use std::sync::Arc;
 use std::time::Duration;
 use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::scene::Scene;
 
-/// Autosave requests since the last clearing: the scenes, `None` for a removal.
+/// Returns the requests for autosaves since the last call: the scene of each, or `None` for a
+/// removal of the recovery file.
 fn kept(desk: &mut Desk) -> Vec<Option<Arc<Scene>>> {
     let effects = std::mem::take(&mut desk.effects);
     let kept = effects.into_iter().filter_map(|effect| match effect {

@@ -1,6 +1,7 @@
-//! The roughness keys change the mirror's pixels and leave all others equal to the bit.
+//! Keys that change the roughness: they change the mirror's pixels and leave all others equal in
+//! every bit.
 
-use crate::stories::desk::Desk;
+use crate::stories::simulated_dashboard::Desk;
 use crate::support::{pool, rendered, sized};
 use zerkalo::render::{FirstHitBuffer, RenderState};
 use zerkalo::scene::{BUILT_IN, Scene};
@@ -15,15 +16,15 @@ fn picture(scene: &Scene) -> RenderState {
     rendered(&sized(scene.clone(), SIZE), 0, Precision::Auto, SAMPLES)
 }
 
-/// Returns the pixels that differ in any bit.
+/// Returns one value for each pixel: `true` if it differs in any bit.
 fn changed(a: &RenderState, b: &RenderState) -> Vec<bool> {
     let [width, height] = SIZE.map(|n| n as usize);
     let pixel = |r: &RenderState, i: usize| r.film.pixel(i % width, i / width, &r.mix);
     (0..width * height).map(|i| pixel(a, i) != pixel(b, i)).collect()
 }
 
-/// Returns the scene with changed ambient colour of the materials that `of` names, which marks the
-/// paths that hit them.
+/// Renders the scene with another ambient colour of the materials that `of` selects. Pixels whose
+/// paths hit these materials change.
 fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> RenderState {
     let mut scene = scene.clone();
     for (_, material) in scene.materials.iter_mut().filter(|(name, _)| of(name)) {

@@ -2,8 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
-use zerkalo::dashboard::hints::reference;
-use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
+use zerkalo::dashboard::update::commands::{COMMANDS, Chapter, lookup};
 use zerkalo::terminal::event::Key;
 
 #[test]
@@ -32,11 +31,12 @@ fn every_command_has_a_label_of_its_own() {
     }
 }
 
-/// `ZERKALO_BLESS=1 cargo test --test program stories::` rewrites the page.
+/// Compares docs/keys.md with the command table. `ZERKALO_BLESS=1 cargo test --test program
+/// stories::` rewrites the file.
 #[test]
 fn keys_page_matches_command_table() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/keys.md");
-    let page = reference();
+    let page = keys_manual();
     if std::env::var_os("ZERKALO_BLESS").is_some() {
         std::fs::write(&path, &page).unwrap();
     }
@@ -46,3 +46,40 @@ fn keys_page_matches_command_table() {
         "docs/keys.md differs from the command table: ZERKALO_BLESS=1 cargo test --test program stories::"
     );
 }
+
+/// Returns the text of docs/keys.md, which lists the keys of all commands.
+fn keys_manual() -> String {
+    let mut page = "# Keys\n\n\
+        Generated from the command table. Every action is also found by typing a part of its name \
+        after `:`; actions without a key only there.\n"
+        .to_string();
+    // A vertical bar would end a cell of the Markdown table.
+    let quoted = |key: &str| format!("`{}`", key.replace('|', "\\|"));
+    for (chapter, title) in Chapter::ALL {
+        page += &format!("\n## {title}\n\n| keys | action |\n|---|---|\n");
+        for command in chapter.commands() {
+            page += &format!("| {} | {} |\n", command.all_keys(quoted), command.label);
+        }
+    }
+    page += "\n## While watching\n\n`zerkalo watch` edits and renders nothing. It has these keys:\n\n\
+             | keys | action |\n|---|---|\n";
+    for command in COMMANDS.iter().filter(|command| command.while_watching) {
+        page += &format!("| {} | {} |\n", command.watch_keys(quoted), command.label);
+    }
+    page += "\n## Mouse\n\n| mouse | effect |\n|---|---|\n";
+    for (mouse, effect) in MOUSE {
+        page += &format!("| {mouse} | {effect} |\n");
+    }
+    page
+}
+
+/// Mouse gestures and their effects, for docs/keys.md.
+const MOUSE: &[(&str, &str)] = &[
+    ("click in the picture", "selects the visible object; while probing: shows the pixel"),
+    ("drag in the picture", "orbits; while moving: moves the selection in the ground plane"),
+    ("drag with the right button, or with Ctrl or Alt", "pans; while moving: moves it up and down"),
+    ("click with the right button, or with Ctrl or Alt", "focuses the lens on the visible point"),
+    ("wheel over the picture", "dollies"),
+    ("click in a panel or list", "selects; a second time: opens"),
+    ("wheel over the field under the cursor", "steps its value; elsewhere: scrolls"),
+];

@@ -1,6 +1,6 @@
-//! Stories of `zerkalo watch`: reports move the table, and no key edits or renders.
+//! Stories of `zerkalo watch`: reports change the table of files, and no key edits or renders.
 
-use crate::stories::desk::Desk;
+use crate::stories::simulated_dashboard::Desk;
 use std::time::Duration;
 use zerkalo::dashboard::hints::{HelpLine, help};
 use zerkalo::dashboard::key_context::KeyContext;
@@ -42,13 +42,12 @@ fn watching(rows: usize) -> Desk {
     desk
 }
 
-/// Effects that show, export or end; all others would edit or render.
+/// Returns `true` if the effect shows, exports or quits; all others would edit or render.
 fn only_shows(effect: &Effect) -> bool {
     matches!(
         effect,
         Effect::Display(_)
-            | Effect::Raster(_)
-            | Effect::Probe(_)
+            | Effect::View(_)
             | Effect::Pin
             | Effect::Export(_)
             | Effect::ViewImage { .. }

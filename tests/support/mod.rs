@@ -1,9 +1,12 @@
-//! Renderings that tests drive wave by wave, without a clock or channels.
+//! Renders that tests drive wave by wave (sets of concurrent jobs), without a clock or channels.
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 use crate::common::NAME;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::fs;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use zerkalo::film::{Display, Film, Replicates};
 use zerkalo::render::schedule::{Criterion, Settings, Step, Stop, StoppedBy};
@@ -14,13 +17,13 @@ use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::{Acceleration, Filter, Scene};
 use zerkalo::world::{self, Precision};
 
-/// The shipped scene `name` of the folder `scenes`.
+/// Returns the scene `name` of the folder `scenes`.
 pub fn shipped(name: &str) -> Scene {
     let path = Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name);
     Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Every shipped scene of the folder `scenes`, sorted by file name.
+/// Returns every scene of the folder `scenes` with its file name, sorted by name.
 pub fn all_shipped() -> Vec<(String, Scene)> {
     let folder = Path::new(env!("ZERKALO_ROOT")).join("scenes");
     let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
@@ -32,29 +35,29 @@ pub fn all_shipped() -> Vec<(String, Scene)> {
     paths.iter().map(|path| (name(path), shipped(&name(path)))).collect()
 }
 
-/// `scene` with a film of `size` pixels. The view angle stays.
+/// Returns `scene` with a film of `size` pixels. The view angle stays the same.
 pub fn sized(mut scene: Scene, size: [u32; 2]) -> Scene {
     scene.film.size = size;
     scene
 }
 
-/// The scene in `text`; panics if it has faults.
+/// Returns the scene in `text`. Panics if it has errors.
 pub fn parsed(text: &str) -> Scene {
     Scene::parse(text, NAME).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Render state without samples.
+/// Returns the state of a render that has no samples yet.
 pub fn begin(scene: &Scene, seed: u64, precision: Precision) -> RenderState {
     begin_with(scene, SampleSettings { seed, kind: SamplerKind::Sobol }, precision)
 }
 
-/// A rendering without samples, with the given sampler settings.
+/// Returns the state of a render that has no samples yet, with the given seed and sample sequence.
 pub fn begin_with(scene: &Scene, sampling: SampleSettings, precision: Precision) -> RenderState {
     let world = world::Options { precision, ..world::Options::default() };
     RenderState::new(scene, &Options { world, sampling, display: Display::default() }, None)
 }
 
-/// A session that traces with `threads` threads until `stop`.
+/// Creates a session (background renderer) that traces with `threads` threads until `stop`.
 pub fn session(threads: usize, seed: u64, stop: Stop, adaptive: bool) -> Session {
     let options = Options {
         world: world::Options::default(),
@@ -65,39 +68,67 @@ pub fn session(threads: usize, seed: u64, stop: Stop, adaptive: bool) -> Session
     Session::new(threads, options, settings).unwrap()
 }
 
-/// A pool of `threads` threads.
-pub fn pool(threads: usize) -> rayon::ThreadPool {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
+/// Thread pools that no test uses at present.
+static FREE_POOLS: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
+
+/// Thread pool that another test can use after it is dropped. Starting and ending a thread costs
+/// more than tracing a small picture: each end unmaps a stack in all threads of the process.
+pub struct Pool(Option<ThreadPool>);
+
+/// Returns a pool of `threads` threads, a free one if there is one.
+pub fn pool(threads: usize) -> Pool {
+    let mut free = FREE_POOLS.lock().unwrap();
+    let found = free.iter().position(|pool| pool.current_num_threads() == threads);
+    let pool = found.map(|i| free.swap_remove(i));
+    let new = || ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    Pool(Some(pool.unwrap_or_else(new)))
 }
 
-/// A wave of samples `first .. first + count` in every tile, in film order.
+impl Deref for Pool {
+    type Target = ThreadPool;
+
+    fn deref(&self) -> &ThreadPool {
+        self.0.as_ref().unwrap()
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        FREE_POOLS.lock().unwrap().extend(self.0.take());
+    }
+}
+
+/// Returns the wave (set of concurrent jobs) of the samples `first .. first + count` of one
+/// replicate in every tile, in the order of the film.
 pub fn wave(film: &Film, replicate: usize, first: u32, count: u32) -> Wave {
     let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first, count }).collect();
     Wave { replicate, jobs, estimate: false }
 }
 
-/// Traces a whole wave.
-pub fn trace(rendering: &mut RenderState, wave: &Wave, pool: &rayon::ThreadPool) -> WaveReport {
+/// Traces all jobs of a wave.
+pub fn trace(rendering: &mut RenderState, wave: &Wave, pool: &ThreadPool) -> WaveReport {
     rendering.trace_wave(wave, pool, &AtomicBool::new(false))
 }
 
-/// Traces samples `first .. first + count` of both replicates in every pixel.
-pub fn uniform(rendering: &mut RenderState, first: u32, count: u32, pool: &rayon::ThreadPool) {
+/// Traces the samples `first .. first + count` of both replicates (halves of the samples) in every
+/// pixel.
+pub fn uniform(rendering: &mut RenderState, first: u32, count: u32, pool: &ThreadPool) {
     for replicate in [0, 1] {
         let wave = wave(&rendering.film, replicate, first, count);
         trace(rendering, &wave, pool);
     }
 }
 
-/// A rendering of `scene` with `count` samples in each of both replicates, traced by two threads.
+/// Renders `scene` by two threads, with `count` samples in each of both replicates (halves of the
+/// samples).
 pub fn rendered(scene: &Scene, seed: u64, precision: Precision, count: u32) -> RenderState {
     let mut rendering = begin(scene, seed, precision);
     uniform(&mut rendering, 0, count, &pool(2));
     rendering
 }
 
-/// A rendering of `scene` with the given acceleration structure, `count` samples in each of both replicates,
-/// traced by one thread.
+/// Renders `scene` by one thread with the given acceleration structure, with `count` samples in
+/// each of both replicates (halves of the samples).
 pub fn accelerated(
     scene: &Scene,
     acceleration: Acceleration,
@@ -111,9 +142,9 @@ pub fn accelerated(
     rendering
 }
 
-/// Removes all random choices from a scene: anti-aliasing, the lens, blurred lobes, lights with a size,
-/// emission, diffuse bounces, the choice among many point lights, and the choice between reflection and refraction,
-/// which begins behind the second transmitting surface.
+/// Removes all random choices from a scene: anti-aliasing, the lens, blurred lobes, lights with a
+/// size, emission, diffuse bounces, and the choice among many point lights. The choice between
+/// reflection and refraction is also removed; it begins behind the second transmitting surface.
 pub fn without_chance(scene: &mut Scene) {
     scene.film.filter = Filter::Point;
     scene.camera.aperture = None;
@@ -134,12 +165,8 @@ pub fn without_chance(scene: &mut Scene) {
     }
 }
 
-/// Runs a schedule until it stops, with a clock that stands at 0.
-pub fn follow(
-    rendering: &mut RenderState,
-    settings: Settings,
-    pool: &rayon::ThreadPool,
-) -> StoppedBy {
+/// Renders by a schedule until it stops, with a clock that always shows 0.
+pub fn follow(rendering: &mut RenderState, settings: Settings, pool: &ThreadPool) -> StoppedBy {
     let mut schedule = rendering.schedule(settings);
     loop {
         match schedule.next(0.0) {
@@ -152,12 +179,12 @@ pub fn follow(
     }
 }
 
-/// Settings that minimise the error in 8-bit levels.
+/// Returns the settings of a schedule that minimises the error in 8-bit levels.
 pub fn settings(adaptive: bool, rays_per_pixel: u32, stop: Stop) -> Settings {
     Settings { adaptive, criterion: Criterion::Codes, rays_per_pixel, stop }
 }
 
-/// Radiance of every pixel, `[row][column]`.
+/// Returns the radiance of every pixel, row by row.
 pub fn picture(rendering: &RenderState, replicates: Replicates) -> Vec<[f64; 3]> {
     let mut row = Vec::new();
     let mut all = Vec::new();

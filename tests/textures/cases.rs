@@ -1,5 +1,5 @@
-//! Textured objects as scene files and for the direct evaluation; comparison of their pictures; and
-//! variants of each object, whose pictures must differ.
+//! Textured objects, each as scene file and for the direct evaluation. The pictures of both are
+//! compared. The pictures of variants of each object must differ.
 
 use crate::common::Numbers;
 use crate::support::{picture, rendered};
@@ -13,7 +13,7 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Folder of scenes with images of random pixels.
+/// Folder of scenes, with two images of random pixels.
 pub struct Desk {
     pub folder: TempDir,
     colors: RgbImage,
@@ -46,12 +46,12 @@ const EYE: DVec3 = DVec3::new(1.1, 1.3, 3.2);
 pub const EVEN: DVec3 = DVec3::new(0.9, 0.5, 0.1);
 pub const ODD: DVec3 = DVec3::new(0.1, 0.3, 0.8);
 
-/// A textured object for the scene file and for the direct evaluation.
+/// Textured object, for the scene file and for the direct evaluation.
 #[derive(Clone)]
 pub struct Case {
     pub name: &'static str,
     pub solid: Solid,
-    /// Shape in the scene file, if it differs from `solid`.
+    /// Text of the shape in the scene file, if it differs from `solid`.
     pub shape: Option<String>,
     pub transform: &'static str,
     pub scene_from_object: DAffine3,
@@ -101,7 +101,7 @@ impl Case {
         })
     }
 
-    /// Returns the placement keys.
+    /// Returns the text of the keys that place the texture.
     fn lay(&self) -> String {
         let Lay { mapping, axis, scale, offset, .. } = self.lay;
         let axis = axis.map(|a| format!("axis = \"{a}\", ")).unwrap_or_default();
@@ -166,7 +166,8 @@ impl Case {
     }
 }
 
-/// Returns the fraction of the covered pixels in which two pictures differ by more than `tolerance`.
+/// Returns the fraction of the covered pixels whose values in two pictures differ by more than
+/// `tolerance`.
 pub fn differing(shown: &[DVec3], expected: &[DVec3], tolerance: f64) -> f64 {
     assert_eq!(shown.len(), expected.len());
     let pairs = shown.iter().zip(expected).filter(|(_, e)| !e.is_nan());
@@ -176,8 +177,8 @@ pub fn differing(shown: &[DVec3], expected: &[DVec3], tolerance: f64) -> f64 {
     wrong.count() as f64 / seen.len() as f64
 }
 
-/// Returns the differences in double and in single precision, where an edge may be on the other side of a
-/// pixel's centre.
+/// Returns the fraction of pixels that differ in double and in single precision. In single
+/// precision an edge may be on the other side of a pixel's centre.
 pub fn differences(case: &Case, shown: &[Vec<DVec3>; 2], desk: &Desk) -> [f64; 2] {
     let expected = case.expected(desk);
     [differing(&shown[0], &expected, 2e-5), differing(&shown[1], &expected, 4e-3)]
@@ -185,7 +186,8 @@ pub fn differences(case: &Case, shown: &[Vec<DVec3>; 2], desk: &Desk) -> [f64; 2
 
 pub const ALLOWED: [f64; 2] = [0.001, 0.01];
 
-/// Smallest fraction in which a variant must differ: many times the tolerance.
+/// Smallest fraction of pixels in which the picture of a variant must differ: many times the
+/// tolerance.
 pub const TOLD: f64 = 0.08;
 
 pub fn check(case: &Case, desk: &Desk) {
@@ -203,7 +205,7 @@ pub fn check(case: &Case, desk: &Desk) {
     }
 }
 
-/// Returns variants whose pictures must differ.
+/// Returns variants of a textured object whose pictures must differ, each with its name.
 fn variants(case: &Case) -> Vec<(Case, &'static str)> {
     let with = |change: &dyn Fn(&mut Case)| {
         let mut other = case.clone();
@@ -258,7 +260,8 @@ pub fn lay(mapping: &'static str, scale: [f64; 2], offset: [f64; 2]) -> Lay {
     Lay { scale, offset, ..Lay::new(mapping) }
 }
 
-/// Returns the case with a rotation, a scaling and a translation, as steps and as a map.
+/// Returns the object with a rotation, a scaling and a translation, both as transform steps and as
+/// a map.
 pub fn moved(mut case: Case) -> Case {
     case.transform = "{ rotate_y = 35 }, { scale = [1.2, 0.8, 1.0] }, { rotate_x = 20 }, \
                       { translate = [0.05, -0.1, 0.1] }, ";

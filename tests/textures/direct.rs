@@ -1,28 +1,29 @@
-//! Direct evaluation of a textured object in double precision: camera ray, intersection in object space,
-//! mapping formula, texture lookup, Lambert's law. It shares no code with the program.
+//! Direct evaluation of a textured object in double precision: camera ray, intersection in object
+//! space, mapping formula, texture lookup, Lambert's law. It has no code in common with the
+//! program.
 
 use glam::{DAffine3, DVec2, DVec3};
 use image::RgbImage;
 use std::f64::consts::{PI, TAU};
 
-/// Width and height of the pictures.
+/// Width and height of the pictures in pixels.
 pub const SIZE: [u32; 2] = [60, 48];
 
-/// Direction to the light, before it is normalised.
+/// Direction from the object to the light, not normalised.
 pub const TO_LIGHT: DVec3 = DVec3::new(0.5, 0.7, 0.9);
 
 /// Shape of the object, in object space.
 #[derive(Clone, Copy, Debug)]
 pub enum Solid {
-    /// Centre, radius.
+    /// Sphere: centre, radius.
     Sphere(DVec3, f64),
-    /// Centre, lengths.
+    /// Box: centre, lengths of the sides.
     Block(DVec3, DVec3),
-    /// Base, height along y, radius.
+    /// Upright cylinder: base, height along y, radius.
     Pillar(DVec3, f64, f64),
-    /// Centre, width, height of a rectangle that faces +z.
+    /// Rectangle that faces +z: centre, width, height.
     Sheet(DVec3, f64, f64),
-    /// Point of a plane that faces +y.
+    /// Plane that faces +y: a point on it.
     Floor(DVec3),
 }
 
@@ -44,15 +45,15 @@ impl Lay {
     }
 }
 
-/// The textured object.
+/// Object with its texture and bump map, for the direct evaluation.
 #[derive(Clone, Debug)]
 pub struct TexturedObject<'a> {
     pub solid: Solid,
     pub scene_from_object: DAffine3,
     pub lay: Lay,
-    /// Colours; `None` for white.
+    /// Colours of the texture; `None` for white.
     pub colors: Option<Colors<'a>>,
-    /// Height image, and the height of white above black.
+    /// Bump map: image of heights, and the height of white above black.
     pub bump: Option<(&'a RgbImage, f64)>,
 }
 
@@ -63,7 +64,7 @@ pub enum Colors<'a> {
 }
 
 impl Solid {
-    /// Returns the corners of its bounding box.
+    /// Returns the two opposite corners of the object's bounding box.
     fn corners(&self) -> [DVec3; 2] {
         match *self {
             Self::Sphere(c, r) => [c - r, c + r],
@@ -77,7 +78,8 @@ impl Solid {
         }
     }
 
-    /// Returns the distance of the first intersection in front of `o`, and the outer normal there.
+    /// Returns the distance of the first intersection in front of `o`, and the outward normal
+    /// there.
     fn intersect(&self, o: DVec3, d: DVec3) -> Option<(f64, DVec3)> {
         let mut hits: Vec<(f64, DVec3)> = Vec::new();
         match *self {
@@ -138,7 +140,7 @@ impl Solid {
     }
 }
 
-/// Returns the coordinates before scale and offset.
+/// Returns the texture coordinates of a point before scale and offset are applied.
 fn mapped(solid: &Solid, lay: &Lay, p: DVec3, n: DVec3) -> DVec2 {
     let [low, high] = solid.corners();
     let middle = 0.5 * (low + high);
@@ -194,7 +196,7 @@ fn coordinates(object: &TexturedObject, p: DVec3, n: DVec3) -> DVec2 {
     mapped(&object.solid, lay, p, n) * DVec2::from(lay.scale) + DVec2::from(lay.offset)
 }
 
-/// Returns the pixel in column `i` and row `j` from below; both may be out of range.
+/// Returns the pixel in column `i` and row `j`, counted from below. Both may be out of range.
 fn pixel(image: &RgbImage, clamp: bool, i: f64, j: f64) -> DVec3 {
     let (w, h) = (f64::from(image.width()), f64::from(image.height()));
     let wrap = |i: f64, n: f64| if clamp { i.clamp(0.0, n - 1.0) } else { i - n * (i / n).floor() };
@@ -203,7 +205,7 @@ fn pixel(image: &RgbImage, clamp: bool, i: f64, j: f64) -> DVec3 {
     DVec3::from(codes.map(|c| f64::from(c) / 255.0))
 }
 
-/// Interpolates `value` of the four nearest pixels.
+/// Returns `value` of the four nearest pixels, interpolated bilinearly.
 fn bilinear(image: &RgbImage, clamp: bool, uv: DVec2, value: impl Fn(DVec3) -> DVec3) -> DVec3 {
     let (x, y) = (uv.x * f64::from(image.width()) - 0.5, uv.y * f64::from(image.height()) - 0.5);
     let (i, j) = (x.floor(), y.floor());
@@ -237,8 +239,9 @@ fn color(object: &TexturedObject, uv: DVec2) -> DVec3 {
     }
 }
 
-/// Returns the perturbed normal in object space by finite differences: of the coordinates along two
-/// directions on the surface, and of the heights one pixel to both sides.
+/// Returns the normal in object space, perturbed by the bump map. It is computed by finite
+/// differences: of the coordinates along two directions on the surface, and of the heights one
+/// pixel to both sides.
 fn bumped(object: &TexturedObject, p: DVec3, n: DVec3) -> DVec3 {
     let Some((image, height)) = object.bump else { return n };
     let uv = coordinates(object, p, n);
@@ -265,8 +268,8 @@ fn bumped(object: &TexturedObject, p: DVec3, n: DVec3) -> DVec3 {
     out.normalize()
 }
 
-/// Returns the picture from `eye` towards `target`, 40 degrees high, row by row. Pixels seen at such grazing
-/// angles that the program bends normals back to the viewer are NaN.
+/// Returns the picture from `eye` towards `target`, 40 degrees high, row by row. A pixel is NaN if
+/// it is seen at such a grazing angle that the program bends the normal back to the viewer.
 pub fn picture(object: &TexturedObject, eye: DVec3, target: DVec3) -> Vec<DVec3> {
     let view = (target - eye).normalize();
     let right = view.cross(DVec3::Y).normalize();

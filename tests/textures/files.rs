@@ -1,4 +1,4 @@
-//! Images and mesh of the shipped scenes with textures, generated here.
+//! Images and mesh of the shipped scenes with textures. These functions generate them.
 
 use glam::DVec3;
 use image::{GrayImage, ImageFormat, Luma, Rgb, RgbImage};
@@ -16,7 +16,7 @@ fn hashed(x: i64, y: i64) -> f64 {
     f64::from(h ^ (h >> 15)) / f64::from(u32::MAX)
 }
 
-/// Returns smooth noise from 0 to 1 with a period of `period` cells.
+/// Returns smooth noise from 0 to 1 that repeats after `period` cells.
 fn noise(x: f64, y: f64, period: [i64; 2]) -> f64 {
     let at = |i: f64, j: f64| {
         hashed((i as i64).rem_euclid(period[0]), (j as i64).rem_euclid(period[1]) + 1000)
@@ -33,7 +33,7 @@ fn code(x: f64) -> u8 {
     (x.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
-/// Tileable image of four boards with grain along u.
+/// Returns a tileable image of four boards with grain along u.
 fn wood() -> RgbImage {
     const SIDE: u32 = 192;
     RgbImage::from_fn(SIDE, SIDE, |x, y| {
@@ -54,8 +54,9 @@ fn wood() -> RgbImage {
     })
 }
 
-/// Tileable brick wall: eight rows of four bricks, each second row offset by half a brick. Returns the
-/// height of the surface above the mortar, from 0 to 1, and the number of the brick.
+/// Returns two values for a point of a tileable brick wall: the height of the surface above the
+/// mortar, from 0 to 1, and the number of the brick. The wall has eight rows of four bricks; each
+/// second row is offset by half a brick.
 fn brick(u: f64, v: f64) -> (f64, i64) {
     let row = (8.0 * v).floor();
     let shifted = 4.0 * u + 0.5 * row.rem_euclid(2.0);
@@ -91,8 +92,8 @@ fn bricks() -> RgbImage {
     })
 }
 
-/// Test image of 8 by 8 squares that show their position: red grows with u, green with v, and an arrow in
-/// every second square points up.
+/// Returns a test image of 8 by 8 squares that show their position. Red grows with u, green with v,
+/// and an arrow in every second square points up.
 fn sheet() -> RgbImage {
     const SIDE: u32 = 256;
     RgbImage::from_fn(SIDE, SIDE, |x, y| {
@@ -115,8 +116,8 @@ fn sheet() -> RgbImage {
     })
 }
 
-/// Vase of an outline rotated about the y axis, as binary PLY with texture coordinates, u once around and v
-/// along the outline.
+/// Returns a vase as binary PLY: an outline rotated about the y axis. The texture coordinate u runs
+/// once around, v along the outline.
 fn vase() -> Vec<u8> {
     const AROUND: usize = 48;
     const ALONG: usize = 40;
@@ -162,8 +163,9 @@ fn shipped(name: &str) -> PathBuf {
     Path::new(env!("ZERKALO_ROOT")).join("scenes").join(name)
 }
 
-/// Pixels are compared instead of files, because the compression may change. Sines differ between machines
-/// in the last digit, which may change a level by one.
+/// Checks that the shipped texture files have the generated pixels. The bytes of the files are not
+/// compared, because the compression may change. A level may differ by one, because sines differ
+/// between machines in the last digit.
 #[test]
 fn texture_files_match_generators() {
     let bless = std::env::var_os("ZERKALO_BLESS").is_some();

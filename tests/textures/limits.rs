@@ -17,7 +17,8 @@ fn shown(scene: &Scene, precision: Precision) -> Vec<[f64; 3]> {
     picture(&rendered(scene, 1, precision, 4), Replicates::Both)
 }
 
-/// A bump of height 0 or of a uniform image changes no bit; one higher texel does.
+/// Checks that a bump map of height 0 or of a uniform image changes no bit of the picture, and that
+/// one higher pixel does.
 #[test]
 fn bump_without_height_changes_no_bit() {
     let bumpy = sized(shipped("bump.toml"), [64, 48]);
@@ -38,8 +39,8 @@ fn bump_without_height_changes_no_bit() {
     }
 }
 
-/// On a ramp all normals tilt by the angle of its slope: light along the tilted normal has full effect,
-/// light across it none.
+/// Checks that on a ramp all normals tilt by the angle of its slope. Light along the tilted normal
+/// has full effect, light across it none.
 #[test]
 fn ramp_tilts_normals_by_its_slope() {
     let folder = tempfile::tempdir().unwrap();
@@ -194,8 +195,8 @@ fn texture_edits_read_each_file_once() {
     assert!(refused.to_string().contains("a.png"), "{refused}");
 }
 
-/// A flat face in the edge of a checker, or of a texture's pixels, has one colour, the same in both
-/// precisions.
+/// Checks a flat face at the edge of a checker field or of a pixel of the texture. It has one
+/// colour, the same in both precisions.
 #[test]
 fn faces_in_edges_of_a_texture_have_one_color() {
     let checker =
@@ -273,7 +274,8 @@ fn faces_in_edges_of_a_texture_have_one_color() {
     }
 }
 
-/// Pictures with textures are equal for packets of one pixel's samples and of neighbouring pixels.
+/// Checks that pictures with textures are equal, whether a packet holds one pixel's samples or
+/// those of neighbouring pixels.
 #[test]
 fn textures_do_not_depend_on_packets() {
     let mut glass = shipped("bump.toml");

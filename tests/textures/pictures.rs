@@ -60,7 +60,7 @@ fn bumps_on_transformed_and_textured_objects() {
     }
 }
 
-/// Textures at the seam of the angle and at the poles.
+/// Checks textures at the seam of the angle and at the poles.
 #[test]
 fn seams_and_poles() {
     let desk = Desk::new();
@@ -76,7 +76,8 @@ fn seams_and_poles() {
     }
 }
 
-/// Pictures far from the origin equal those at the origin: coordinates have about 1e-10 of a unit left.
+/// Checks that pictures far from the origin equal those at the origin. Coordinates there have a
+/// precision of about 1e-10 units.
 #[test]
 fn textures_are_accurate_far_from_the_origin() {
     let desk = Desk::new();
@@ -85,7 +86,8 @@ fn textures_are_accurate_far_from_the_origin() {
     }
 }
 
-/// A rectangle of two triangles with texture coordinates equals a rectangle with mapping `uv`.
+/// Checks that a rectangle of two triangles with texture coordinates equals a rectangle with the
+/// mapping `uv`.
 #[test]
 fn the_coordinates_of_a_mesh() {
     let desk = Desk::new();
@@ -108,7 +110,8 @@ fn the_coordinates_of_a_mesh() {
     }
 }
 
-/// A triangle mesh of a sphere with texture coordinates converges to a sphere with mapping `spherical`.
+/// Checks that a triangle mesh of a sphere with texture coordinates converges to a sphere with the
+/// mapping `spherical`.
 #[test]
 fn a_mesh_of_a_sphere() {
     let desk = Desk::new();
@@ -151,7 +154,7 @@ fn a_mesh_of_a_sphere() {
     assert!(error[1] < 0.05 && error[1] < 0.3 * error[0], "{error:?}");
 }
 
-/// A part of a compound has its own material, whose texture is placed in the part's space.
+/// Checks a part of a compound with its own material, whose texture is placed in the part's space.
 #[test]
 fn parts_of_compounds() {
     let desk = Desk::new();

@@ -8,26 +8,27 @@ use crate::asset::mesh::{MAX_TRIANGLES, MAX_VERTICES, TriangleMesh};
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// Largest absolute value of a coordinate.
+/// Largest absolute value of a mesh coordinate.
 const MAX_COORDINATE: f64 = 1e9;
 
-/// Smallest extent of a mesh. At this extent, products of three single-precision coordinates are
-/// still normal numbers.
+/// Smallest valid extent of a mesh, the longest side of its bounding box. Products of three
+/// coordinates of this magnitude are not subnormal in single precision.
 const MIN_EXTENT: f64 = 1e-9;
 
-/// Largest absolute value of a coordinate, in multiples of the mesh's extent, for positions
-/// relative to the origin. Positions of meshes farther away are stored relative to the centre of
-/// the mesh.
+/// Limit of the largest absolute coordinate of a mesh, in multiples of the mesh's extent. Up to
+/// this limit, positions are stored relative to the origin; above it, relative to the centre of the
+/// mesh.
 const MAX_OFFSET: f64 = 16.0;
 
-/// A mesh under construction.
+/// Mesh under construction by the reader of a file format.
 pub struct Builder<'a> {
     source: &'a FileContents,
     positions: Vec<[f64; 3]>,
     /// Normals of the vertices, in order. The list may be shorter than `positions`. The zero vector
-    /// means no normal.
+    /// means that the file has no normal for the vertex.
     normals: Vec<[f32; 3]>,
-    /// Texture coordinates of the vertices, in order. The list may be shorter than `positions`.
+    /// Texture coordinates of the vertices, in order. The list may be shorter than `positions`; the
+    /// other vertices have no texture coordinates.
     uvs: Vec<[f32; 2]>,
     triangles: Vec<[u32; 3]>,
     colors: Vec<[f32; 3]>,
@@ -37,7 +38,7 @@ pub struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// Creates an empty mesh.
+    /// Creates an empty mesh that is read from `source`.
     pub fn new(source: &'a FileContents) -> Self {
         Self {
             source,
@@ -52,11 +53,12 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Reserves memory for further vertices and triangles. The caller has checked that the file is
-    /// long enough for them.
+    /// Reserves memory for the given numbers of further vertices and triangles. The caller has
+    /// checked that the file is long enough for them.
     ///
     /// # Errors
-    /// Fails if the mesh would exceed a limit, or there is not enough memory.
+    /// Fails if the mesh would exceed [`MAX_VERTICES`] or [`MAX_TRIANGLES`], or if there is not
+    /// enough memory.
     pub fn reserve(&mut self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         self.check_limits(vertices, triangles)?;
         let reserved = self.positions.try_reserve(vertices);
@@ -66,10 +68,11 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// Checks that this number of further vertices and triangles is within the limits.
+    /// Checks that the mesh stays within its limits if the given numbers of vertices and triangles
+    /// are added.
     ///
     /// # Errors
-    /// Fails if the mesh would exceed a limit.
+    /// Fails if the mesh would exceed [`MAX_VERTICES`] or [`MAX_TRIANGLES`].
     pub fn check_limits(&self, vertices: usize, triangles: usize) -> Result<(), AssetError> {
         let checks = [
             (self.positions.len().saturating_add(vertices), MAX_VERTICES, "vertices"),
@@ -85,14 +88,14 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Records a note for the user about an omission or a replacement.
+    /// Records a note for the user about a part of the file that was omitted or replaced.
     pub fn note(&mut self, note: String) {
         if !self.notes.contains(&note) {
             self.notes.push(note);
         }
     }
 
-    /// Returns the number of vertices so far.
+    /// Returns the number of vertices added so far.
     pub fn vertices(&self) -> usize {
         self.positions.len()
     }
@@ -103,7 +106,7 @@ impl<'a> Builder<'a> {
         self.positions.push(position);
     }
 
-    /// Sets the normal of the last vertex.
+    /// Sets the normal of the vertex added last.
     pub fn normal(&mut self, normal: [f32; 3]) {
         self.normals.resize(self.positions.len(), [0.0; 3]);
         if let Some(last) = self.normals.last_mut() {
@@ -111,7 +114,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Sets the texture coordinates of the last vertex.
+    /// Sets the texture coordinates of the vertex added last.
     pub fn uv(&mut self, uv: [f32; 2]) {
         self.uvs.resize(self.positions.len(), [0.0; 2]);
         if let Some(last) = self.uvs.last_mut() {
@@ -119,7 +122,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Returns `true` if a colour was set.
+    /// Returns `true` if [`Builder::color`] was called.
     pub fn has_colors(&self) -> bool {
         !self.colors.is_empty()
     }
@@ -173,7 +176,7 @@ impl<'a> Builder<'a> {
     /// Adds a polygon as triangles: a fan around its first corner.
     ///
     /// # Errors
-    /// The errors of [`Builder::triangle`].
+    /// Fails in the same cases as [`Builder::triangle`].
     pub fn polygon(
         &mut self,
         corners: &[u32],
@@ -185,10 +188,11 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Checks the mesh and converts it to its compact form.
+    /// Checks the mesh and returns it as a [`TriangleMesh`], without the triangles whose area is 0.
     ///
     /// # Errors
-    /// Fails if no triangle has an area, or a coordinate is not finite or out of range.
+    /// Fails if no triangle has an area, a number is not finite, a coordinate is out of range, or
+    /// the mesh is too large or too small.
     pub fn finish(mut self) -> Result<TriangleMesh, AssetError> {
         self.check_limits(0, 0)?;
         let source = self.source;
@@ -200,7 +204,7 @@ impl<'a> Builder<'a> {
             ));
         }
         self.coordinates()?;
-        let center = self.center()?;
+        let center = self.center();
         let positions: Vec<[f32; 3]> = self
             .positions
             .drain(..)
@@ -258,23 +262,21 @@ impl<'a> Builder<'a> {
     }
 
     /// Returns the point that is subtracted from all positions before they are converted to single
-    /// precision: the centre of a mesh far from the origin, otherwise zero.
-    fn center(&self) -> Result<[f64; 3], AssetError> {
-        let mut low = [f64::INFINITY; 3];
-        let mut high = [f64::NEG_INFINITY; 3];
-        for p in &self.positions {
-            for i in 0..3 {
-                low[i] = low[i].min(p[i]);
-                high[i] = high[i].max(p[i]);
-            }
-        }
-        let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
-        let max_coordinate = (0..3).map(|i| low[i].abs().max(high[i].abs())).fold(0.0, f64::max);
-        let center: [f64; 3] = std::array::from_fn(|i| 0.5 * (low[i] + high[i]));
-        Ok(if max_coordinate > MAX_OFFSET * extent { center } else { [0.0; 3] })
+    /// precision. This point is the centre of the bounding box if the mesh is far from the origin
+    /// relative to its size, otherwise the origin.
+    fn center(&self) -> [f64; 3] {
+        let positions = self.positions.iter().map(|p| DVec3::from_array(*p));
+        let (low, high) = positions
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
+                (low.min(p), high.max(p))
+            });
+        let max_coordinate = low.abs().max(high.abs()).max_element();
+        let is_far = max_coordinate > MAX_OFFSET * (high - low).max_element();
+        if is_far { (0.5 * (low + high)).to_array() } else { [0.0; 3] }
     }
 
-    /// Removes triangles without area. Adds a note with their number.
+    /// Removes triangles whose area is 0 from the mesh, and adds a note with the number of removed
+    /// ones.
     ///
     /// # Errors
     /// Fails if no triangle is left.
@@ -306,8 +308,9 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Returns unit normals. If some vertices have no normal in the file, their normals are
-    /// computed from the triangles. Returns `None` if no vertex has a normal in the file.
+    /// Returns a unit normal for each vertex. If some vertices have no normal in the file, their
+    /// normals are computed from the triangles. Returns `None` if no vertex has a normal in the
+    /// file.
     fn unit_normals(&mut self, positions: &[[f32; 3]]) -> Option<Vec<[f32; 3]>> {
         let mut normals = std::mem::take(&mut self.normals);
         if normals.is_empty() {
@@ -338,8 +341,8 @@ impl<'a> Builder<'a> {
         Some(normals)
     }
 
-    /// Returns the texture coordinates. Vertices without texture coordinates get zero. Returns
-    /// `None` if the file has none.
+    /// Returns the texture coordinates of the vertices. Vertices without texture coordinates get
+    /// zero. Returns `None` if the file has none.
     ///
     /// # Errors
     /// Fails if a texture coordinate is not finite.

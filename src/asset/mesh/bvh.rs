@@ -8,27 +8,27 @@ use crate::bvh::build::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
 use std::fmt;
 use std::sync::OnceLock;
 
-/// Leaf of the BVH: up to eight triangles. The coordinates of unused slots are NaN.
+/// Leaf of a mesh's BVH: up to eight triangles. The coordinates of unused slots are NaN.
 #[derive(Clone, Debug)]
 #[repr(align(32))]
 pub struct TriangleBlock {
-    /// Coordinates of the triangles, indexed by corner and axis.
+    /// Coordinates of the triangles' corners, indexed by `[corner][axis][triangle]`.
     pub corners: [[[f32; BVH_WIDTH]; 3]; 3],
 }
 
-/// A mesh with its BVH. Memory: about 58 bytes per triangle for the BVH, 12 per triangle for vertex
-/// indices, and 12 to 32 per vertex.
+/// Triangle mesh with its BVH. Memory: about 58 bytes per triangle for the BVH, 12 per triangle for
+/// vertex indices, and 12 to 32 per vertex.
 pub struct Mesh {
     mesh: TriangleMesh,
     boxes: Bvh8,
     leaves: Vec<TriangleBlock>,
-    /// Index of the first triangle of each leaf. The other triangles of the leaf have the following
+    /// Index of the first triangle of each BVH leaf. The triangles of a leaf have consecutive
     /// indices.
     firsts: Vec<u32>,
     smooth: OnceLock<Vec<[f32; 3]>>,
 }
 
-/// Two values are equal only if they are the same allocation: meshes that were read twice from one
+/// Two meshes are equal only if they are the same allocation: meshes that were read twice from one
 /// file differ.
 impl PartialEq for Mesh {
     fn eq(&self, other: &Self) -> bool {
@@ -62,7 +62,8 @@ impl TriangleBlock {
 }
 
 impl Mesh {
-    /// Builds the BVH. The triangles are reordered so that those of a leaf are consecutive.
+    /// Builds the BVH of a mesh. The triangles are reordered so that those of a leaf are
+    /// consecutive.
     pub fn new(mut mesh: TriangleMesh) -> Self {
         let corners = |i: usize| {
             let [a, b, c] = mesh.triangles[i].map(|v| mesh.positions[v as usize]);
@@ -84,29 +85,29 @@ impl Mesh {
         Self { mesh, boxes, leaves, firsts, smooth: OnceLock::new() }
     }
 
-    /// Returns the triangles, in the order of the leaves.
+    /// Returns the triangles of the mesh, in the order of the BVH's leaves.
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
     }
 
-    /// Returns the BVH, without its leaves.
+    /// Returns the inner nodes of the mesh's BVH, without its leaves.
     pub fn boxes(&self) -> &Bvh8 {
         &self.boxes
     }
 
-    /// Returns the leaves of the BVH.
+    /// Returns the leaves of the mesh's BVH, as blocks of triangles.
     pub fn leaves(&self) -> &[TriangleBlock] {
         &self.leaves
     }
 
-    /// Returns the index of the first triangle of a leaf. The other triangles of the leaf have the
-    /// following indices.
+    /// Returns the index of the first triangle of a BVH leaf. The triangles of a leaf have
+    /// consecutive indices.
     pub fn first_triangle(&self, leaf: usize) -> u32 {
         self.firsts[leaf]
     }
 
-    /// Returns a unit normal per vertex: the normals of the file, if it has them. Otherwise the
-    /// normals are means over the adjacent triangles, computed at the first call.
+    /// Returns a unit normal per vertex: that of the file, if the file has normals. Otherwise it is
+    /// the mean normal of the adjacent triangles; the first call computes these means.
     pub fn smooth_normals(&self) -> &[[f32; 3]] {
         match &self.mesh.normals {
             Some(normals) => normals,
@@ -114,8 +115,8 @@ impl Mesh {
         }
     }
 
-    /// Returns the support function of the mesh: the largest dot product of `direction` with a
-    /// corner of a triangle.
+    /// Returns the largest dot product of `direction` with a corner of a triangle: the support
+    /// function of the mesh.
     pub fn support(&self, direction: [f64; 3]) -> f64 {
         let along = |axis: usize, x: f32| direction[axis] * f64::from(x);
         let mut best = f64::NEG_INFINITY;

@@ -50,8 +50,8 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// Parses and validates the JSON document of the file. Returns the document and the binary chunk of
-/// a GLB file.
+/// Parses and validates the JSON document of the file. Returns two values: the document, and the
+/// binary chunk of a GLB file (`None` if there is none).
 fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), AssetError> {
     // The library subtracts the size of the header from this length without a check for underflow.
     let length = source.bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
@@ -91,7 +91,7 @@ fn roots(document: &Document) -> Vec<Node<'_>> {
     document.nodes().filter(|n| !child[n.index()]).collect()
 }
 
-/// Converts an error of the `gltf` library.
+/// Converts an error of the `gltf` library to an error with file and location.
 fn library_error(source: &FileContents, error: &gltf::Error) -> AssetError {
     let (place, found) = match error {
         gltf::Error::Deserialize(json) => {
@@ -112,7 +112,8 @@ fn library_error(source: &FileContents, error: &gltf::Error) -> AssetError {
     source.error(place, found, "a glTF 2.0 file")
 }
 
-/// Returns the bytes of all buffers.
+/// Returns the bytes of all glTF buffers: from the binary chunk `blob` of a GLB file, from data
+/// URLs, or from files in the folder of `source`.
 fn buffers<'a>(
     source: &FileContents,
     document: &Document,
@@ -161,7 +162,7 @@ fn buffers<'a>(
     Ok(all)
 }
 
-/// A glTF primitive with the transform of its node.
+/// Part of a glTF scene: a primitive (a piece of a mesh) with the transform of its node.
 struct Part<'a> {
     source: &'a FileContents,
     buffers: &'a [Cow<'a, [u8]>],
@@ -249,7 +250,8 @@ impl<'a> Part<'a> {
         Ok(())
     }
 
-    /// Returns the elements of an accessor of single-precision vectors with `N` components.
+    /// Returns the elements of `accessor`, a glTF list of single-precision vectors with `N` (2 or
+    /// 3) components.
     fn floats<const N: usize>(
         &self,
         accessor: Accessor<'a>,
@@ -259,7 +261,8 @@ impl<'a> Part<'a> {
         Ok((0..slice.count).map(move |i| slice.floats(i)))
     }
 
-    /// Returns the texture coordinates of an accessor. Integers are normalised.
+    /// Returns the texture coordinates in `accessor`, a glTF list. Unsigned integers are mapped to
+    /// 0..=1, floats are unchanged.
     fn pairs(&self, accessor: Accessor<'a>) -> Result<impl Iterator<Item = [f32; 2]>, AssetError> {
         let kind = accessor.data_type();
         let slice = self.slice(&accessor, Dimensions::Vec2, kind)?;
@@ -273,8 +276,9 @@ impl<'a> Part<'a> {
         }))
     }
 
-    /// Returns the elements of an accessor. Checks that every element is inside its buffer view,
-    /// and the view inside its buffer.
+    /// Returns the elements of `accessor`, a glTF list. Checks that an element has the shape
+    /// `dimensions` and numbers of the type `kind`, and that all elements are inside of their
+    /// buffer.
     fn slice(
         &self,
         accessor: &Accessor<'a>,
@@ -323,7 +327,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Elements of an accessor, inside the bytes of its buffer.
+/// Elements of a glTF accessor. They are inside of its buffer, as [`Part::slice`] has checked.
 #[derive(Clone, Copy)]
 struct Slice<'a> {
     bytes: &'a [u8],

@@ -21,8 +21,8 @@ pub const MAX_TRIANGLES: usize = 1 << 26;
 /// Largest number of vertices of a mesh: 128 Mi.
 pub const MAX_VERTICES: usize = 1 << 27;
 
-/// A checked triangle mesh. It has at least one triangle, all indices are in range, all numbers are
-/// finite, and every triangle has an area.
+/// Triangle mesh that was checked: it has at least one triangle, all indices are in range, all
+/// numbers are finite, and every triangle has an area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TriangleMesh {
     /// Vertex positions relative to `center`.
@@ -37,18 +37,19 @@ pub struct TriangleMesh {
     pub normals: Option<Vec<[f32; 3]>>,
     /// Texture coordinates per vertex, u to the right and v upwards. `None` if the file has none.
     pub uvs: Option<Vec<[f32; 2]>>,
-    /// Distinct linear base colours. Empty if the file has no colours.
+    /// Distinct linear base colours of triangles. Empty if the file has no colours.
     pub colors: Vec<[f32; 3]>,
-    /// Index into `colors` per triangle. Empty if there are fewer than two colours.
+    /// Index into `colors` for each triangle. Empty if there are fewer than two colours.
     pub color_of: Vec<u16>,
-    /// Corners of the bounding box, relative to `center`.
+    /// Lowest and highest corner of the bounding box, relative to `center`.
     pub bounds: [[f32; 3]; 2],
-    /// Notes for the user about omissions and replacements: sentences without a full stop.
+    /// Notes for the user about parts of the file that were omitted or replaced: sentences without
+    /// a full stop.
     pub notes: Vec<String>,
 }
 
 impl TriangleMesh {
-    /// Adds all data that affects pictures to `hash`.
+    /// Adds all data of the mesh that affects pictures to `hash`.
     pub fn hash_contents(&self, hash: &mut Fnv1a64) {
         let Self {
             positions,
@@ -75,14 +76,14 @@ impl TriangleMesh {
         hash.update(&[u8::from(normals.is_some()), u8::from(uvs.is_some())]);
     }
 
-    /// Peak memory during parsing, per byte of the file at `path`. OBJ needs more than other
-    /// formats, because its positions are read as doubles into vectors that grow. Separate buffer
-    /// files of glTF are not included.
+    /// Returns the estimated peak memory during parsing, in bytes per byte of the mesh file at
+    /// `path`. OBJ needs more than other formats, because its positions are read as doubles into
+    /// vectors that grow. Separate buffer files of glTF are not included.
     pub(super) fn parse_bytes(path: &Path) -> u64 {
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) { 10 } else { 6 }
     }
 
-    /// Parses a file in memory. The format is determined by the extension of the file name.
+    /// Parses a mesh file in memory. The format is determined by the extension of the file name.
     ///
     /// # Errors
     /// Fails if the file is not a valid mesh.
@@ -112,7 +113,8 @@ impl TriangleMesh {
             + 2 * self.color_of.len()
     }
 
-    /// Returns the linear base colour of a triangle. Returns `None` if the file has no colours.
+    /// Returns the linear base colour of triangle number `triangle`. Returns `None` if the file has
+    /// no colours.
     pub fn color(&self, triangle: usize) -> Option<[f32; 3]> {
         let index = self.color_of.get(triangle).copied().unwrap_or(0);
         self.colors.get(usize::from(index)).copied()

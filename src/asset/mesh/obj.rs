@@ -20,7 +20,7 @@ const MAX_MTL_BYTES: u64 = 16 << 20;
 /// Largest number of MTL files of one OBJ file. Further ones are ignored.
 const MAX_MTL_FILES: usize = 64;
 
-/// Colour of triangles without a diffuse colour, in a file with materials.
+/// Linear colour of triangles without a diffuse colour, in an OBJ file with materials.
 const UNCOLORED: [f32; 3] = [1.0; 3];
 
 /// Parses an OBJ file.
@@ -81,7 +81,7 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish().map_err(|error| locate_vertex(source, error))
 }
 
-/// Returns a phrase that describes an error of the parser library.
+/// Returns a phrase that describes an error of the OBJ parser library.
 fn describe(error: LoadError) -> &'static str {
     match error {
         LoadError::ReadError => "this is not UTF-8 text",
@@ -111,8 +111,8 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty())
 }
 
-/// Checks that every index of a face is valid, and that the number of triangles is within the
-/// limit. Returns the numbers of vertices, texture coordinates and normals in the file.
+/// Checks that every index of a face in an OBJ file is valid, and that the number of triangles is
+/// within the limit. Returns three counts of the file: vertices, texture coordinates and normals.
 fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
     let list = |line: &[u8]| match words(line).next() {
         Some(b"v") => Some(0),
@@ -165,7 +165,7 @@ fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
     Ok(totals)
 }
 
-/// Adds the line number to an error about the coordinates of a vertex.
+/// Adds the line number to an error about the coordinates of a vertex in an OBJ file.
 fn locate_vertex(source: &FileContents, error: AssetError) -> AssetError {
     let bad = |line: &[u8]| {
         let mut words = words(line);
@@ -182,9 +182,9 @@ fn locate_vertex(source: &FileContents, error: AssetError) -> AssetError {
     }
 }
 
-/// Reader that passes one line at a time to the parser library and counts the lines. It removes
-/// vertex colours at the end of lines, because the library requires that either all vertices have
-/// colours or none.
+/// Reader of an OBJ file that passes one line at a time to the parser library and counts the lines.
+/// It removes vertex colours at the end of lines, because the library requires that either all
+/// vertices have colours or none.
 struct Lines<'a> {
     rest: &'a [u8],
     line: usize,
@@ -223,14 +223,16 @@ impl BufRead for Lines<'_> {
     }
 }
 
-/// Returns the first four words of a line: `v` and three coordinates.
+/// Returns the beginning of an OBJ line, up to and including its fourth word. For a vertex these
+/// words are `v` and three coordinates.
 fn without_color(line: &[u8]) -> &[u8] {
     let fourth = words(line).nth(3).unwrap_or_default();
     let end = fourth.as_ptr() as usize - line.as_ptr() as usize + fourth.len();
     &line[..end]
 }
 
-/// Results of loading MTL files.
+/// Results of loading the MTL files of an OBJ file: the paths of the files loaded so far, notes for
+/// the user, and the first error.
 #[derive(Default)]
 struct Found {
     seen: Vec<PathBuf>,
@@ -249,9 +251,9 @@ impl<'a> Libraries<'a> {
         Self { source, found: RefCell::default() }
     }
 
-    /// Loads the materials of an MTL file, in the form that the parser library requires. Returns no
-    /// materials for a file that was loaded before. Records a note for a missing file, and an error
-    /// for a path that leads out of the folder.
+    /// Returns the materials of the MTL file `name`. Returns no materials if `name` leads out of
+    /// the folder (recorded as an error), if the file cannot be read (recorded as a note), if it
+    /// was loaded before, or if [`MAX_MTL_FILES`] other files were loaded before.
     fn load(&self, name: &Path) -> MTLLoadResult {
         let nothing = || tobj::load_mtl_buf(&mut &b""[..]);
         let mut found = self.found.borrow_mut();

@@ -11,12 +11,12 @@ use ply_rs_bw::ply::{
     ScalarType,
 };
 
-/// Number of elements that the parser library parses at a time, which limits the memory for parsed
+/// Number of PLY elements that the parser library parses at a time. It limits the memory for parsed
 /// elements.
 const PIECE: usize = 4096;
 
-/// Names of the vertex properties that are used. Programs use different names for the same
-/// property.
+/// Names of the eight PLY vertex properties that are read. Each property has a list of names,
+/// because programs name it differently.
 const NUMBERS: [&[&str]; 8] = [
     &["x"],
     &["y"],
@@ -28,11 +28,11 @@ const NUMBERS: [&[&str]; 8] = [
     &["v", "t", "texture_v"],
 ];
 
-/// Names of the list property that holds the vertex indices of a face.
+/// Names of the PLY list property that holds the vertex indices of a face.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
-/// One vertex or face, filled by the parser library. `numbers` has the properties in the order of
-/// [`NUMBERS`].
+/// One vertex or face of a PLY file, filled by the parser library. `numbers` has the properties of
+/// a vertex in the order of [`NUMBERS`]. `corners` has the vertex indices of a face.
 struct Record {
     numbers: [f64; 8],
     corners: Vec<u32>,
@@ -70,25 +70,23 @@ impl Record {
         if !CORNERS.contains(&name) {
             return PropertyAccessResult::Ignored;
         }
-        // Negative indices are replaced by an index that no mesh has.
-        const NONE: u32 = u32::MAX;
         self.corners = match list {
             Property::ListUInt(list) => list,
-            Property::ListInt(list) => {
-                list.into_iter().map(|i| u32::try_from(i).unwrap_or(NONE)).collect()
-            }
-            Property::ListShort(list) => {
-                list.into_iter().map(|i| u32::try_from(i).unwrap_or(NONE)).collect()
-            }
-            Property::ListChar(list) => {
-                list.into_iter().map(|i| u32::try_from(i).unwrap_or(NONE)).collect()
-            }
-            Property::ListUShort(list) => list.into_iter().map(u32::from).collect(),
-            Property::ListUChar(list) => list.into_iter().map(u32::from).collect(),
+            Property::ListInt(list) => indices(list),
+            Property::ListShort(list) => indices(list),
+            Property::ListChar(list) => indices(list),
+            Property::ListUShort(list) => indices(list),
+            Property::ListUChar(list) => indices(list),
             _ => return PropertyAccessResult::UnsupportedType,
         };
         PropertyAccessResult::Set
     }
+}
+
+/// Converts `list` to vertex indices. Negative numbers become `u32::MAX`, an index that is out of
+/// range in every mesh.
+fn indices<T: TryInto<u32>>(list: Vec<T>) -> Vec<u32> {
+    list.into_iter().map(|index| index.try_into().unwrap_or(u32::MAX)).collect()
 }
 
 /// Parses a PLY file.
@@ -144,8 +142,8 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// Converts an error of the parser library. `byte` is the offset in a binary file; `None` for a
-/// text file.
+/// Converts an error of the PLY parser library to an error with file and location. `byte` is the
+/// offset of the error in a binary file; `None` for a text file.
 fn library_error(source: &FileContents, error: &ParseError, byte: Option<usize>) -> AssetError {
     let place = match (byte, error.line()) {
         (Some(byte), _) => FileLocation::Byte(byte),
@@ -160,7 +158,7 @@ fn library_error(source: &FileContents, error: &ParseError, byte: Option<usize>)
     source.error(place, first.trim_end_matches(['.', ':']), "a PLY file")
 }
 
-/// Checks that the header declares the required elements and properties, and that `left`, the
+/// Checks that a PLY header declares the required elements and properties, and that `left`, the
 /// number of bytes after the header, suffices for the declared elements.
 fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(), AssetError> {
     let missing = |what: &str| {
@@ -200,8 +198,8 @@ fn check_header(source: &FileContents, header: &Header, left: usize) -> Result<(
     Ok(())
 }
 
-/// Returns the smallest size of an element in bytes. In an ASCII file each property needs at least
-/// a digit and a separator.
+/// Returns the smallest number of bytes that an element (vertex or face) takes in a PLY file with
+/// the given encoding. In an ASCII file each property needs at least a digit and a separator.
 fn least_bytes(element: &ElementDef, encoding: Encoding) -> usize {
     let size = |scalar: &ScalarType| match scalar {
         _ if encoding == Encoding::Ascii => 2,

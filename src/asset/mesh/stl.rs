@@ -1,4 +1,4 @@
-//! STL files, ASCII and binary. In the format triangles share no vertices. This module merges
+//! STL files, ASCII and binary. Triangles in this format share no vertices. This module merges
 //! vertices with equal positions, so that normals can be smooth. The normals in the file are
 //! ignored, because they follow from the corners.
 
@@ -8,9 +8,9 @@ use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::builder::{Builder, Welder};
 use std::io::{Cursor, Read, Seek, SeekFrom};
 
-/// Size of the header of a binary file, in bytes.
+/// Number of bytes of the header of a binary STL file.
 const HEADER: usize = 84;
-/// Size of a triangle in a binary file, in bytes.
+/// Number of bytes of a triangle in a binary STL file.
 const TRIANGLE: usize = 50;
 
 /// Parses an STL file.
@@ -88,7 +88,7 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
     builder.finish()
 }
 
-/// Reader that counts lines. Each read of a text file returns at most one line.
+/// Reader of an STL file that counts lines. Each read of a text file returns at most one line.
 struct ByLine<'a> {
     cursor: Cursor<&'a Vec<u8>>,
     line: usize,

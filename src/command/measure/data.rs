@@ -1,6 +1,7 @@
-//! A measurement as JSON and CSV. The keys must not change, because scripts rely on them.
+//! Results of `zerkalo measure` as JSON and CSV. The keys must not change, because scripts rely on
+//! them.
 
-use crate::command::measure::table::About;
+use crate::command::measure::table::MeasureReport;
 use crate::measure::{Measured, Measurement, median, spread};
 use serde::Serialize;
 
@@ -17,11 +18,13 @@ struct Document<'a> {
     reference_linear: f64,
     reference_seconds: f64,
     compared_at_codes: f64,
-    /// Largest relative change of the measured errors if another reference picture were used.
+    /// Relative uncertainty that the noise of the reference picture causes in the measured errors:
+    /// the largest of all measured points.
     errors_spread: f64,
-    /// Largest relative spread of the repeated times in the table.
+    /// Relative spread of a time in the table over repeated renders: the largest of all such times.
     times_spread: f64,
-    /// Largest fraction of the processors' time that other programs used. Null if unknown.
+    /// Largest fraction of the processors' time that other programs used during a measured render.
+    /// Null if unknown.
     taken_by_others: Option<f64>,
     /// Noise targets that were not reached, each with an extrapolated time.
     expected: Vec<Expected>,
@@ -37,11 +40,11 @@ struct Variation<'a> {
     samples_per_second_spread: Option<f64>,
     slope: Option<f64>,
     slope_standard_error: Option<f64>,
-    /// Efficiency: 1 / (linear MSE x seconds).
+    /// Efficiency of the render: 1 / (MSE of the linear picture x seconds).
     efficiency: Option<f64>,
     bias_z: Option<f64>,
     bias_codes: Option<f64>,
-    /// Smallest bias that can be distinguished from noise, in 8-bit levels.
+    /// Smallest bias of the picture that can be distinguished from noise, in 8-bit levels.
     bias_least_codes: Option<f64>,
     crossings: Vec<TimeToTarget>,
     points: Vec<Point>,
@@ -63,7 +66,7 @@ struct Expected {
     seconds_high: f64,
 }
 
-/// One point of a curve of error against time.
+/// Point of an error curve: error of the picture after a number of samples and seconds.
 #[derive(Serialize)]
 struct Point {
     samples: u64,
@@ -77,20 +80,13 @@ struct Point {
     rel_mse: f64,
 }
 
+/// First columns of a line of the CSV file: compared setting, its value, and number of threads. The
+/// other columns are those of [`Point`].
 #[derive(Serialize)]
-struct Line<'a> {
+struct Variant<'a> {
     setting: &'static str,
     name: &'a str,
     threads: usize,
-    samples: u64,
-    spp: f64,
-    seconds: f64,
-    seconds_spread: f64,
-    told_codes: Option<f64>,
-    rmse_codes: f64,
-    rmse_codes_spread: f64,
-    rmse_linear: f64,
-    rel_mse: f64,
 }
 
 fn points(measured: &Measured) -> impl Iterator<Item = Point> {
@@ -138,21 +134,21 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
     }
 }
 
-/// Serialises the measurement as JSON.
-pub fn json(about: &About) -> Vec<u8> {
-    let m = about.measurement;
+/// Serialises the results of `zerkalo measure` as JSON.
+pub fn json(report: &MeasureReport) -> Vec<u8> {
+    let m = report.measurement;
     let steadiness = m.steadiness();
     let expected = |e: &crate::measure::Expected| {
         let (seconds_low, seconds_high) = e.seconds;
         Expected { codes: e.codes, seconds_low, seconds_high }
     };
     let document = Document {
-        scene: about.scene.display().to_string(),
+        scene: report.scene.display().to_string(),
         version: env!("CARGO_PKG_VERSION"),
-        machine: about.machine(),
+        machine: report.machine(),
         size: m.size,
-        lanes: about.lanes,
-        threads: about.threads,
+        lanes: report.lanes,
+        threads: report.threads,
         reference_spp: m.reference_spp,
         reference_codes: m.reference_codes,
         reference_linear: m.reference_linear,
@@ -173,22 +169,13 @@ pub fn json(about: &About) -> Vec<u8> {
 pub fn csv(measurement: &Measurement) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for measured in &measurement.measured {
-        for p in points(measured) {
-            let line = Line {
+        for point in points(measured) {
+            let variant = Variant {
                 setting: measured.experiment.name(),
                 name: &measured.name,
                 threads: measured.threads,
-                samples: p.samples,
-                spp: p.spp,
-                seconds: p.seconds,
-                seconds_spread: p.seconds_spread,
-                told_codes: p.told_codes,
-                rmse_codes: p.rmse_codes,
-                rmse_codes_spread: p.rmse_codes_spread,
-                rmse_linear: p.rmse_linear,
-                rel_mse: p.rel_mse,
             };
-            writer.serialize(line).expect("a vector takes everything");
+            writer.serialize((variant, point)).expect("a vector takes everything");
         }
     }
     writer.into_inner().expect("a vector takes everything")

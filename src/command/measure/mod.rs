@@ -6,16 +6,15 @@ mod table;
 
 use crate::command::args::MeasureArgs;
 use crate::command::signals::Signals;
-use crate::command::{Failure, check_file, print_line, warn, write_file};
+use crate::command::{Failure, check_file, print_line, read_scene_and_warn, write_file};
 use crate::film::{self, Display};
 use crate::measure::{self, Experiment, Plan, Reference};
-use crate::scene::Document;
 use crate::world::{self, AnyWorld};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Experiments that run without `--only` and `--full`.
+/// Experiments (comparisons of settings) that `zerkalo measure` runs without `--only` and `--full`.
 const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];
 
 pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
@@ -24,10 +23,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
         drawing(path).map_err(Failure::Usage)?;
     }
     [&args.json, &args.csv, &args.plot].into_iter().flatten().try_for_each(|p| check_file(p))?;
-    let document = Document::read(&args.scene).map_err(|e| failed(e.to_string()))?;
-    for warning in document.warnings() {
-        warn(&format!("warning: {warning}"));
-    }
+    let document = read_scene_and_warn(&args.scene)?;
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     let display = args.picture.display();
@@ -64,20 +60,25 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
         bar.set_message(progress.step.to_string());
         signals.caught().is_none()
     })
-    .map_err(|e| failed(format!("cannot start {threads} threads: {e}; try fewer by --threads")))?;
+    .map_err(|error| failed(error.to_string()))?;
     bar.finish_and_clear();
 
-    let about =
-        table::About { scene: &args.scene, threads, lanes, single, measurement: &measurement };
-    let printed = print_line(&about.to_string());
+    let report = table::MeasureReport {
+        scene: &args.scene,
+        threads,
+        lanes,
+        single,
+        measurement: &measurement,
+    };
+    let printed = print_line(&report.to_string());
     if let Some(path) = &args.json {
-        write_file(path, &data::json(&about))?;
+        write_file(path, &data::json(&report))?;
     }
     if let Some(path) = &args.csv {
         write_file(path, &data::csv(&measurement))?;
     }
     if let Some(path) = &args.plot {
-        plot(path, &about)?;
+        plot(path, &report)?;
     }
     printed?;
     match signals.caught() {
@@ -86,7 +87,7 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     }
 }
 
-/// File format of a plot.
+/// File format of the plot: SVG or PNG.
 enum Drawing {
     Svg,
     Png,
@@ -100,12 +101,12 @@ fn drawing(path: &Path) -> Result<Drawing, String> {
     }
 }
 
-fn plot(path: &Path, about: &table::About) -> Result<(), Failure> {
-    let title = about.title();
+fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
+    let title = report.title();
     let drawn = match drawing(path).map_err(Failure::Usage)? {
-        Drawing::Svg => measure::plot::svg(about.measurement, &title).map(String::into_bytes),
-        Drawing::Png => measure::plot::pixels(about.measurement, &title).and_then(|pixels| {
-            let (width, height) = measure::plot::size(about.measurement);
+        Drawing::Svg => measure::plot::svg(report.measurement, &title).map(String::into_bytes),
+        Drawing::Png => measure::plot::pixels(report.measurement, &title).and_then(|pixels| {
+            let (width, height) = measure::plot::size(report.measurement);
             Ok(film::png_of_rgb([width, height], &pixels)?)
         }),
     };

@@ -1,20 +1,21 @@
-//! A measurement as a text table.
+//! Results of `zerkalo measure` as a text table.
 
 use crate::measure::{Experiment, Measured, Measurement, Steadiness, TimeToTarget, median};
 use std::fmt;
 use std::path::Path;
 
-/// A measurement, with the scene and the settings that its table names.
-pub struct About<'a> {
+/// Report of `zerkalo measure`: the measurement, and the scene and settings with which it was made.
+/// It is displayed as a text table.
+pub struct MeasureReport<'a> {
     pub scene: &'a Path,
     pub threads: usize,
     pub lanes: &'static str,
-    /// `true` if the scene is traced in single precision by default.
+    /// `true` if the program renders the measured scene in single precision by default.
     pub single: bool,
     pub measurement: &'a Measurement,
 }
 
-impl About<'_> {
+impl MeasureReport<'_> {
     /// Returns the title for a plot of the measurement.
     pub fn title(&self) -> String {
         let [width, height] = self.measurement.size;
@@ -41,7 +42,8 @@ fn time(seconds: f64) -> String {
     }
 }
 
-/// Returns the number of decimals with which `value` is formatted to three significant digits.
+/// Returns the number of decimals with which `value`, at least 1, has three significant digits. For
+/// values below 1 it is 2.
 fn digits(value: f64) -> usize {
     if value >= 99.95 {
         0
@@ -61,8 +63,8 @@ fn reached(target: &TimeToTarget) -> String {
     format!("{bound}{} {}", time(target.seconds), percent(target.spread))
 }
 
-/// Formats a range of seconds, such as `12.0 to 30.0 s`. If both have the same unit, it is written
-/// once.
+/// Formats a range of seconds from its lower to its upper end, such as `12.0 to 30.0 s`. If both
+/// have the same unit, it is written once.
 fn between((low, high): (f64, f64)) -> String {
     let (low, high) = (time(low), time(high));
     match (low.split_once(' '), high.split_once(' ')) {
@@ -71,13 +73,15 @@ fn between((low, high): (f64, f64)) -> String {
     }
 }
 
-/// Relative spread of repeated times above which the table warns that they are unsteady.
+/// Relative spread of a time over repeated renders above which the printed table warns that the
+/// times are unsteady.
 const UNSTEADY: f64 = 0.1;
-/// Fraction of the processors' time used by other programs, above which the table warns.
+/// Fraction of the processors' time that other programs use during a measurement, above which the
+/// printed table warns.
 const STOLEN: f64 = 0.03;
 
-/// Returns a warning if times are unsteady or other programs used the processors. Returns `None`
-/// otherwise.
+/// Returns a warning about the measured times if they are unsteady or other programs used the
+/// processors. Returns `None` otherwise.
 fn caution(steadiness: &Steadiness) -> Option<String> {
     let Steadiness { spread, stolen, .. } = steadiness;
     let others = stolen.filter(|share| *share > STOLEN).map(|share| {
@@ -104,7 +108,7 @@ fn caution(steadiness: &Steadiness) -> Option<String> {
     }
 }
 
-impl fmt::Display for About<'_> {
+impl fmt::Display for MeasureReport<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let m = self.measurement;
         let [width, height] = m.size;
@@ -191,7 +195,7 @@ impl fmt::Display for About<'_> {
     }
 }
 
-impl About<'_> {
+impl MeasureReport<'_> {
     fn heading(&self, f: &mut fmt::Formatter, experiment: Experiment) -> fmt::Result {
         writeln!(
             f,

@@ -7,34 +7,37 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Pause in editing after which the edits are written.
+/// Pause in editing after which unsaved edits are written to the recovery file.
 const DEBOUNCE: Duration = Duration::from_millis(400);
-/// Longest time between an edit and its write, even if edits continue.
+/// Longest time between an edit and its write to the recovery file, even if edits continue.
 const MAX_DELAY: Duration = Duration::from_secs(1);
 
-/// Autosave of a scene. It also finds orphaned edits at the start: unsaved edits of crashed
-/// sessions, in their recovery files.
+/// Autosave of a scene: writes unsaved edits to a recovery file. At the start it also finds
+/// orphaned edits, the unsaved edits of crashed sessions in their recovery files.
 pub struct Autosave {
     /// Recovery file of this session.
     recovery: Recovery,
-    /// State folder of the user.
+    /// State folder of the user (XDG), for recovery files that cannot be written beside the scene
+    /// file.
     state: Option<PathBuf>,
     pending: Option<Pending>,
-    /// Scene in the recovery file, if this session has written it.
+    /// Newest scene that this session has written to the recovery file; `None` if it has written
+    /// none.
     kept: Option<Arc<Scene>>,
     /// Orphaned edits that the user has neither recovered nor discarded. The last entry is offered
     /// next.
     found: Vec<Orphan>,
-    /// Cause of the last failed write, which was reported already.
+    /// Cause of the failure if the last write to the recovery file has failed, otherwise `None`.
+    /// The user is warned only of the first of consecutive failures.
     failed: Option<String>,
 }
 
 /// Edits that have not been written to the recovery file.
 struct Pending {
     scene: Arc<Scene>,
-    /// Time of the oldest unwritten edit.
+    /// Time of the oldest edit that is not in the recovery file yet.
     first: Instant,
-    /// Time of the newest edit.
+    /// Time of the newest edit of the scene.
     last: Instant,
 }
 
@@ -64,7 +67,7 @@ impl Autosave {
     }
 
     /// Records that `scene` was written to the scene file at `path`, and removes the recovery file.
-    /// Edits that were made after `scene` become pending again.
+    /// Edits that were made after `scene` are scheduled for the new recovery file.
     pub fn saved(&mut self, scene: &Arc<Scene>, path: &Path, now: Instant) {
         let newest = self.pending.take().map(|pending| pending.scene).or(self.kept.take());
         self.recovery.forget();
@@ -72,8 +75,8 @@ impl Autosave {
         self.note(newest.filter(|newest| **newest != **scene), now);
     }
 
-    /// Schedules an autosave of `scene` at time `now`. If `scene` is `None`, cancels a scheduled
-    /// autosave and removes the recovery file.
+    /// Schedules an autosave of `scene`, which was edited at time `now`. If `scene` is `None`,
+    /// cancels a scheduled autosave and removes the recovery file.
     pub fn note(&mut self, scene: Option<Arc<Scene>>, now: Instant) {
         match scene {
             Some(scene) => {
@@ -89,14 +92,15 @@ impl Autosave {
         }
     }
 
-    /// Returns the time at which edits must be written. Returns `None` if no edits are
-    /// pending.
+    /// Returns the time at which edits must be written to the recovery file. Returns `None` if no
+    /// edits are pending.
     pub fn due(&self) -> Option<Instant> {
         self.pending.as_ref().map(|p| (p.last + DEBOUNCE).min(p.first + MAX_DELAY))
     }
 
-    /// Writes pending edits to the recovery file, as the text that a save would write to `file`.
-    /// Returns a warning at the first of several consecutive failures.
+    /// Writes pending edits to the recovery file. The text is the one that saving the edited scene
+    /// to `file` would write. Returns a warning if this fails for the first time since the last
+    /// success.
     pub fn write(&mut self, file: &SceneFile) -> Option<Message> {
         let scene = self.pending.take()?.scene;
         let text = file.text_of(&scene);
@@ -120,10 +124,11 @@ impl Autosave {
         }
     }
 
-    /// Returns the path of the recovery file at the end of the session, if it exists.
+    /// Returns the path of the recovery file at the end of the session; `None` if there is no such
+    /// file.
     ///
     /// # Errors
-    /// An explanation if the last edits could not be written.
+    /// Fails with a message for the user if the last edits could not be written.
     pub fn kept(&self) -> Result<Option<PathBuf>, String> {
         match (&self.failed, self.path()) {
             (None, path) => Ok(path.map(Path::to_path_buf)),
@@ -137,7 +142,7 @@ impl Autosave {
         }
     }
 
-    /// Returns a recovery of the same scene that writes to the state folder.
+    /// Returns a writer of recovery files for the same scene that writes to the state folder.
     pub fn elsewhere(&self) -> Recovery {
         self.recovery.elsewhere()
     }
@@ -147,8 +152,9 @@ impl Autosave {
         self.recovery.path()
     }
 
-    /// Searches for orphaned edits and removes incomplete files of killed sessions. `file` is the
-    /// scene file, or the path of an unreadable one. Returns warnings and the first offer.
+    /// Searches for unsaved edits of crashed sessions, and removes incomplete files that killed
+    /// sessions left. `file` is the scene file, or its path if it is unreadable. Returns warnings,
+    /// and an offer to recover the first of the edits if any were found.
     pub fn search(&mut self, file: Result<&SceneFile, &Path>) -> Vec<Message> {
         // Incomplete scene files are in the folder of the scene file, incomplete exports in the
         // working directory.
@@ -180,8 +186,9 @@ impl Autosave {
         messages
     }
 
-    /// Returns the offer of the next orphaned edits, or a warning if they are unreadable. Edits
-    /// that `file` already contains are discarded. Returns `None` if no orphaned edits are left.
+    /// Returns the offer to recover the next edits of a crashed session, or a warning if these
+    /// edits are unreadable. Edits that `file` already contains are discarded. Returns `None` if no
+    /// edits are left. `file` is the scene file, or its path if it is unreadable.
     pub fn offer(&mut self, file: Result<&SceneFile, &Path>) -> Option<Message> {
         loop {
             let orphan = self.found.last()?;
@@ -207,9 +214,9 @@ impl Autosave {
         }
     }
 
-    /// Adopts the offered edits as the unsaved edits of this session. `path` is `None` if the scene
-    /// file is readable. If it is not, `path` is its path, and the result is a scene file with the
-    /// recovered text.
+    /// Adopts the offered edits as the unsaved edits of this session. `path` is the path of the
+    /// scene file if it is unreadable, otherwise `None`. Returns a scene file with the recovered
+    /// text if `path` is given, otherwise `None`.
     pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let orphan = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, orphan.text.clone()).ok());

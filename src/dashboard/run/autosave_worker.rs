@@ -14,15 +14,17 @@ use std::time::Instant;
 pub enum AutosaveJob {
     /// Schedule an autosave of this scene; `None` removes the recovery file.
     Note(Option<Arc<Scene>>),
-    /// Write scheduled edits now, then reply.
+    /// Write scheduled edits now, then send a message to this sender.
     Flush(Sender<()>),
-    /// Update an existing recovery file before this scene is saved, then drop the sender.
+    /// Update an existing recovery file before this scene is saved. The sender is dropped
+    /// afterwards, which informs the receiver.
     Saving(Arc<Scene>, Sender<()>),
-    /// The scene was written to the scene file at this path.
+    /// Record that the scene was written to the scene file at this path.
     Saved(Arc<Scene>, PathBuf),
     Recover,
     Discard,
-    /// Write scheduled edits, reply with the path of the recovery file, and end.
+    /// Write scheduled edits, send the path of the recovery file (if there is one) to this sender,
+    /// and end.
     End(Sender<Result<Option<PathBuf>, String>>),
 }
 
@@ -32,13 +34,13 @@ pub struct AutosaveWorker {
     /// Path of the scene file at the start; `None` for a scene without file.
     pub path: Option<PathBuf>,
     pub shared: SharedFile,
-    /// Jobs of the scene file's thread.
+    /// Sender of jobs to another thread: the one that reads and writes the scene file.
     pub jobs: Sender<Job>,
     pub results: Sender<Message>,
 }
 
 impl AutosaveWorker {
-    /// Executes jobs until [`AutosaveJob::End`].
+    /// Executes jobs of the thread that autosaves, until [`AutosaveJob::End`].
     pub fn run(mut self, inbox: &Receiver<AutosaveJob>) {
         let messages = self.with_file(|autosave, file| autosave.search(file));
         messages.into_iter().for_each(|message| self.send(message));
@@ -98,7 +100,7 @@ impl AutosaveWorker {
         }
     }
 
-    /// Calls `call` with the scene file, or with the path of an unreadable one. The path is empty
+    /// Calls `call` with the scene file, or with its path if it is unreadable. The path is empty
     /// for a scene without a file.
     fn with_file<R>(
         &mut self,

@@ -3,54 +3,56 @@
 use crate::dashboard::run::signals::{block, watch};
 use crate::terminal::flow::{InitialLink, PacingMode, TcpSendQueue};
 use crate::terminal::{
-    Capabilities, Environment, Event, Keyboard, Multiplexer, Reply, Screen, Tty, cell_px,
-    cursor_request, probe, size,
+    Capabilities, Environment, Event, InputReader, Multiplexer, Reply, Screen, Tty, cell_px,
+    cursor_request, query_capabilities, size,
 };
 use rustix::termios::tcgetwinsize;
 use std::io;
 use std::time::{Duration, Instant};
 
-/// Timeout for a reply that the terminal may not support.
+/// Timeout for a reply to a request that the terminal may not support.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Timeout for a reply from a terminal that has replied before.
 const LONG_PATIENCE: Duration = Duration::from_secs(10);
-/// Time that a transfer must take in addition to the round trip for a precise rate.
+/// Shortest duration of a test transfer that gives a precise rate of the connection. The round trip
+/// is not included. The test sends larger and larger transfers until one takes this long.
 const MEASURED: Duration = Duration::from_millis(300);
-/// Size of the largest transfer in bytes. It is used even if it takes less time than [`MEASURED`].
+/// Largest transfer of the test of the connection's rate, in bytes. The test ends with it even if
+/// it takes less than [`MEASURED`].
 const MOST_BYTES: usize = 1 << 20;
 
-/// Capabilities of the terminal and its connection.
+/// Capabilities of the terminal and of its connection, for `zerkalo doctor`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TerminalReport {
-    /// Capabilities of the terminal.
+    /// Capabilities of the terminal, such as true colour and image protocols.
     pub terminal: Capabilities,
-    /// Pacing mode that the dashboard would use to limit its output.
+    /// Method by which a dashboard on this terminal would limit the rate of its output.
     pub mode: PacingMode,
-    /// Columns and rows of the terminal.
+    /// Numbers of columns and rows of the terminal.
     pub cells: [u16; 2],
     /// Width and height of the terminal in pixels; `None` if unknown.
     pub pixels: Option<[u16; 2]>,
-    /// Measured transfer rate in bytes per second; `None` if it was not requested or the connection
-    /// cannot be measured.
+    /// Measured transfer rate in bytes per second. `None` if the measurement was not requested, is
+    /// not possible on this connection, or has failed.
     pub rate: Option<f64>,
 }
 
-/// Probes the terminal of stdin and stdout, and restores its state. If `measure` is `true`, also
-/// measures the transfer rate, which takes a second or more.
+/// Queries the capabilities of the terminal of stdin and stdout, and restores its state. If
+/// `measure` is `true`, also measures the transfer rate, which takes a second or more.
 ///
 /// # Errors
-/// Fails if there is no terminal, or the terminal is closed during the probe.
+/// Fails if there is no terminal, or the terminal is closed during the query.
 pub fn diagnose(environment: Environment, measure: bool) -> io::Result<TerminalReport> {
     // The alternate screen hides text that a terminal prints for requests that it does not support.
     let signals = block()?;
     let screen = Screen::enter()?;
     let tty = screen.tty();
     watch(signals, screen.tty(), Duration::ZERO)?;
-    let mut keyboard = Keyboard::new(&environment);
-    let mut terminal = probe(&tty, &mut keyboard, environment, &|| false)?;
+    let mut input = InputReader::new(&environment);
+    let mut terminal = query_capabilities(&tty, &mut input, environment, &|| false)?;
     let multiplexer = terminal.environment.multiplexer;
     if multiplexer.is_some() && terminal.passthrough.is_none() {
-        terminal.passthrough = answer(&tty, &mut keyboard, multiplexer, &[], PATIENCE)?;
+        terminal.passthrough = answer(&tty, &mut input, multiplexer, &[], PATIENCE)?;
     }
     let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
     let mode = InitialLink::of(&terminal, queue.is_some(), None).mode;
@@ -68,7 +70,7 @@ pub fn diagnose(environment: Environment, measure: bool) -> io::Result<TerminalR
     };
     let rate = match (through, round_trip) {
         (Some(through), Some(round_trip)) if measure => {
-            rate(&tty, &mut keyboard, through, round_trip)?
+            rate(&tty, &mut input, through, round_trip)?
         }
         _ => None,
     };
@@ -81,12 +83,12 @@ pub fn diagnose(environment: Environment, measure: bool) -> io::Result<TerminalR
     Ok(TerminalReport { terminal, mode, cells, pixels, rate })
 }
 
-/// Writes `before` and a request of the cursor position, wrapped for the multiplexer `through` if
-/// there is one. Returns the time until the reply, or `None` if there is no reply within
-/// `patience`.
+/// Writes `before` to the terminal, followed by a request of the cursor position. The request is
+/// wrapped for the multiplexer `through`, if there is one. Returns the time until the reply, or
+/// `None` if no reply arrives within `patience`.
 fn answer(
     tty: &Tty,
-    keyboard: &mut Keyboard,
+    input: &mut InputReader,
     through: Option<Multiplexer>,
     before: &[u8],
     patience: Duration,
@@ -94,7 +96,7 @@ fn answer(
     let requested_at = Instant::now();
     tty.write(&[before, cursor_request(through).as_bytes()].concat())?;
     loop {
-        let events = keyboard.wait(Some(requested_at + patience))?;
+        let events = input.wait(Some(requested_at + patience))?;
         let is_answer = |event: &Event| matches!(event, Event::Reply(Reply::Cursor { .. }));
         if let Some(answer) = events.iter().find(|event| is_answer(&event.event)) {
             return Ok(Some(answer.at.saturating_duration_since(requested_at)));
@@ -105,19 +107,20 @@ fn answer(
     }
 }
 
-/// Measures the transfer rate in bytes per second, by transfers that grow by a factor of 4.
-/// `round_trip` is the time of a reply without a transfer. Returns `None` if a reply does not
-/// arrive.
+/// Measures the transfer rate to the terminal in bytes per second. Each transfer has four times as
+/// many bytes as the one before. `through` is the multiplexer (such as tmux) for which requests are
+/// wrapped, if there is one. `round_trip` is the time of a reply without a transfer. Returns `None`
+/// if a reply does not arrive.
 fn rate(
     tty: &Tty,
-    keyboard: &mut Keyboard,
+    input: &mut InputReader,
     through: Option<Multiplexer>,
     round_trip: Duration,
 ) -> io::Result<Option<f64>> {
     let mut bytes = 1 << 12;
     loop {
         let text = hidden_text(bytes);
-        let Some(took) = answer(tty, keyboard, through, &text, LONG_PATIENCE)? else {
+        let Some(took) = answer(tty, input, through, &text, LONG_PATIENCE)? else {
             return Ok(None);
         };
         let span = took.saturating_sub(round_trip);
@@ -129,8 +132,9 @@ fn rate(
     }
 }
 
-/// Returns `bytes` pseudo-random characters with the attribute "hidden", which start at the upper
-/// left corner. They are random because SSH compression would distort the measured rate.
+/// Returns `bytes` pseudo-random characters with the attribute "hidden", preceded by a jump to the
+/// upper left corner. Regular characters would be compressed by SSH, which would distort the
+/// measured rate.
 fn hidden_text(bytes: usize) -> Vec<u8> {
     let mut text = b"\x1b[8m\x1b[H".to_vec();
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;

@@ -1,14 +1,15 @@
-//! Execution of the effects that `update` returns.
+//! Executor of the effects (saving, rendering, exporting) that the dashboard's function `update`
+//! returns.
 
 use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport, stem};
 use crate::dashboard::run::file_worker::Files;
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
-use crate::dashboard::run::{image_viewer, paths};
+use crate::dashboard::run::{export_paths, image_viewer};
 use crate::film::LinearImage;
 use crate::render::schedule::Settings;
-use crate::render::session::{Session, Snapshot, View};
+use crate::render::session::{Session, Snapshot};
 use crate::render::{Checkpoint, Options};
 use crate::scene::{Scene, SceneFile};
 use crate::terminal::Capabilities;
@@ -22,50 +23,40 @@ use std::time::{Duration, Instant};
 /// use only idle processors.
 const LOW_PRIORITY: i32 = 19;
 
-/// Parameters of an [`EffectRunner`].
-pub struct EffectSetup {
-    /// The scene file, or the path of an unreadable one.
-    pub file: Result<SceneFile, PathBuf>,
-    /// Folder for recovery files that cannot be written beside their scene file.
-    pub state: Option<PathBuf>,
-    /// Number of tracing threads.
-    pub threads: usize,
-    /// Options of scene compilation and sampling.
-    pub options: Options,
-    /// Settings of sample allocation, and stop criteria.
-    pub settings: Settings,
-}
-
-/// Action that the event loop must take after an effect.
+/// Action that the event loop must take after it has executed an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// No action. Results of the effect, if any, arrive as messages.
+    /// The event loop continues. Results of the effect, if there are any, arrive as messages.
     Done,
-    /// The renderer has started a new picture with this generation number.
+    /// The renderer has started a new picture. The value is its generation, the number of the
+    /// version of the scene that it shows.
     Rendering(u64),
     /// Suspend the program and give the terminal back to the shell.
     Suspend,
-    /// End the program.
+    /// End the dashboard and the program.
     Quit,
 }
 
-/// Executor of effects, and source of snapshots.
+/// Executor of the dashboard's effects, such as saving and exporting, and source of snapshots of
+/// the render.
 pub trait Effects {
-    /// Returns the channel that receives a message whenever a new snapshot is published.
+    /// Returns the channel that receives a message whenever the renderer publishes a new snapshot:
+    /// state of the render at one moment, with the picture so far.
     fn wakeup(&self) -> &Receiver<()>;
 
-    /// Takes the latest snapshot. Returns `None` if it has been taken already.
+    /// Takes the renderer's latest snapshot (state of the render at one moment). Returns `None` if
+    /// it has been taken already.
     fn take_snapshot(&self) -> Option<Snapshot>;
 
-    /// Pauses (`true`) or resumes (`false`) rendering. The event loop pauses it while the
-    /// connection is silent.
+    /// Pauses rendering if `resting` is `true`, otherwise resumes it. The event loop pauses it
+    /// while the connection to the terminal is silent.
     fn rest(&self, resting: bool);
 
-    /// Returns the receiver of the results of effects, as messages. Each message must be passed to
-    /// [`Effects::observe`] before it updates the model.
+    /// Returns the receiver of the results of effects, as messages. The caller must pass each
+    /// message to [`Effects::observe`] before it updates the model with the message.
     fn done(&self) -> &Receiver<Message>;
 
-    /// Updates the executor by the result of an effect.
+    /// Updates the state of the executor by `message`, the result of an effect.
     fn observe(&mut self, message: &Message);
 
     /// Executes `effect`. Its results arrive as messages. `frames` is the output to the terminal,
@@ -77,29 +68,30 @@ pub trait Effects {
         terminal: &Capabilities,
     ) -> Outcome;
 
-    /// Writes unsaved edits to the recovery file without waiting for a pause. Blocks until the
-    /// edits are written, at most for `patience`.
+    /// Writes unsaved edits to the recovery file at once, without the usual delay until a pause in
+    /// editing. Blocks until the edits are written, at most for `patience`.
     fn flush(&self, patience: Duration);
 
-    /// Completes pending writes and ends the threads. Returns the remaining results, and the path
-    /// of the recovery file if there are unsaved edits. If these are lost, returns the reason.
+    /// Completes pending writes and ends the threads. Waits until `deadline` for the renderer and
+    /// for pictures that are being written, or without limit if `deadline` is `None`. Unsaved edits
+    /// are written before this wait.
     ///
-    /// After `deadline` it no longer waits for the renderer and for pictures that are being
-    /// written; `None` sets no limit. Unsaved edits never wait for them.
+    /// Returns two values: the remaining messages, and the path of the recovery file. The path is
+    /// `None` if there are no unsaved edits. If unsaved edits are lost, an error with the reason
+    /// takes the place of the path.
     fn finish(
         self: Box<Self>,
         deadline: Option<Instant>,
     ) -> (Vec<Message>, Result<Option<PathBuf>, String>);
 }
 
-/// Executor of effects that edits and renders a scene. It owns the renderer, the thread of the
-/// scene file and the exports.
+/// Executor of effects for a dashboard that edits and renders a scene. It owns the renderer, the
+/// thread of the scene file and the exports.
 pub struct EffectRunner {
     session: Session,
     files: Files,
     exporter: Exporter,
     resized: Option<ResizedExport>,
-    view: View,
     threads: usize,
     niceness: i32,
     options: Options,
@@ -109,9 +101,17 @@ pub struct EffectRunner {
 }
 
 impl EffectRunner {
-    /// Starts the threads.
-    pub fn new(setup: EffectSetup) -> io::Result<Self> {
-        let EffectSetup { file, state, threads, options, settings } = setup;
+    /// Creates the executor for the scene file `file`, or for the path of an unreadable one, and
+    /// starts the threads that render, read and write. `state` is the folder for recovery files
+    /// that cannot be written beside their scene file, and `threads` the number of threads that
+    /// trace rays.
+    pub fn new(
+        file: Result<SceneFile, PathBuf>,
+        state: Option<PathBuf>,
+        threads: usize,
+        options: Options,
+        settings: Settings,
+    ) -> io::Result<Self> {
         let (results, done) = unbounded();
         let stem = match &file {
             Ok(file) => stem(file.path(), file.document().name()),
@@ -120,7 +120,7 @@ impl EffectRunner {
         let session = Session::new(threads, options.clone(), settings)?;
         let files = Files::new(file, state, results.clone())?;
         let exporter = Exporter {
-            file: files.shared(),
+            file: files.shared.clone(),
             folder: PathBuf::new(),
             stem,
             sampler: options.sampling.kind,
@@ -131,7 +131,6 @@ impl EffectRunner {
             files,
             exporter,
             resized: None,
-            view: View::default(),
             threads,
             niceness: 0,
             options,
@@ -141,13 +140,13 @@ impl EffectRunner {
         })
     }
 
-    /// Starts rendering `scene`. Returns its generation number, which the reports about this scene
-    /// contain.
+    /// Starts rendering `scene`. Returns its generation: the number of this version of the scene,
+    /// which is repeated in the renderer's reports.
     pub fn show(&mut self, scene: Arc<Scene>) -> u64 {
         self.session.set_scene(scene)
     }
 
-    /// Continues the render of `checkpoint` and shows `scene`.
+    /// Continues the render of `checkpoint`, and shows its samples as a picture of `scene`.
     pub fn resume(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) {
         self.session.continue_from(scene, checkpoint);
     }
@@ -191,8 +190,8 @@ impl Effects for EffectRunner {
         &self.done
     }
 
-    /// Changes the base name of future exports if `message` reports that the scene was saved at
-    /// another path.
+    /// Derives the names of later exports from the new path, if `message` reports that the scene
+    /// was saved.
     fn observe(&mut self, message: &Message) {
         if let Message::Saved(_, Ok(path)) = message {
             self.exporter.stem = stem(Some(path), "");
@@ -213,14 +212,7 @@ impl Effects for EffectRunner {
                 self.session.set_display(display);
             }
             Effect::Stop(stop) => self.session.set_stop(stop),
-            Effect::Raster(raster) => {
-                self.view.raster = Some(raster);
-                self.session.set_view(self.view);
-            }
-            Effect::Probe(pixel) => {
-                self.view.probe = pixel;
-                self.session.set_view(self.view);
-            }
+            Effect::View(view) => self.session.set_view(view),
             Effect::Pause(true) => self.session.pause(),
             Effect::Pause(false) => self.session.resume(),
             Effect::Threads(threads) => {
@@ -254,10 +246,8 @@ impl Effects for EffectRunner {
                 let request = ExportRequest {
                     scene,
                     format,
-                    display,
-                    stop,
-                    options: self.options.clone(),
-                    settings: self.settings,
+                    options: Options { display, ..self.options.clone() },
+                    settings: Settings { stop, ..self.settings },
                     threads: self.threads,
                 };
                 let started =
@@ -289,7 +279,7 @@ impl Effects for EffectRunner {
         deadline: Option<Instant>,
     ) -> (Vec<Message>, Result<Option<PathBuf>, String>) {
         let resized = self.resized.take();
-        let Self { session, files, results, done, .. } = *self;
+        let Self { session, mut files, results, done, .. } = *self;
         let kept = files.finish();
         let end = move || {
             if let Some(resized) = resized {
@@ -310,8 +300,9 @@ impl Effects for EffectRunner {
     }
 }
 
-/// Executes an effect on the terminal, or one that shows an image file. All other effects are
-/// ignored.
+/// Executes an effect that concerns the terminal: view an image file, copy a path, suspend, or
+/// quit. Other effects are ignored. `frames` is the output to the terminal. A prepared image is
+/// sent to `results`.
 pub fn run_on_terminal(
     effect: Effect,
     frames: &mut FramePipeline,
@@ -320,11 +311,11 @@ pub fn run_on_terminal(
 ) -> Outcome {
     match effect {
         Effect::ViewImage { path, display, screen } => {
-            let line_rate = frames.reading().map(|link| link.rate);
+            let line_rate = frames.flow.reading().map(|link| link.rate);
             let viewport = image_viewer::viewport(terminal, screen, line_rate);
             image_viewer::prepare(path, display, viewport, results.clone());
         }
-        Effect::Copy(path) => frames.copy(&paths::full(&path)),
+        Effect::Copy(path) => frames.copy(&export_paths::full(&path)),
         Effect::Suspend => return Outcome::Suspend,
         Effect::Quit => return Outcome::Quit,
         _ => {}

@@ -1,11 +1,12 @@
-//! Exports to image files: the current picture, or a separate render at another size.
+//! Exports of image files: the current picture, or a separate render at another size.
 
 use crate::dashboard::message::{Exported, Format, Message};
-use crate::dashboard::run::paths;
+use crate::dashboard::run::export_paths;
 use crate::dashboard::run::shared_file::SharedFile;
-use crate::film::{Depth, Display, ImageOutput};
+use crate::disk::Existing;
+use crate::film::{Depth, Film, ImageOutput};
 use crate::render::export::{Provenance, scene_hash};
-use crate::render::schedule::{Settings, Stop};
+use crate::render::schedule::Settings;
 use crate::render::session::{Report, Session, State};
 use crate::render::{EncodedCheckpoint, Options, RenderState};
 use crate::sampling::SamplerKind;
@@ -18,21 +19,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// Polling interval of a render at another size.
+/// Interval at which the progress of a render at another size is polled.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// Writer of exports, with the properties that are common to all exports of a scene.
 #[derive(Clone)]
 pub struct Exporter {
-    /// Text of the scene file, for the metadata.
+    /// Scene file, whose text is written to the metadata of exported images.
     pub file: SharedFile,
-    /// Folder that exports are written to.
+    /// Folder to which image files are written.
     pub folder: PathBuf,
-    /// Beginning of the file names, before the counter.
+    /// Beginning of the names of image files, such as `room` in `room-2.png`.
     pub stem: String,
-    /// Sampler, for the metadata.
+    /// Kind of random numbers with which the picture is rendered, for the metadata of the image.
     pub sampler: SamplerKind,
-    /// `true` if sample allocation is adaptive, for the metadata.
+    /// `true` if noisy pixels get more samples than others (adaptive sample allocation), for the
+    /// metadata of the image.
     pub adaptive: bool,
 }
 
@@ -50,19 +52,11 @@ impl Exporter {
             let target = ImageOutput::from_path(path)?.create_new();
             rendering.write(report, &provenance, display, Depth::Eight, &target)
         };
-        let path = paths::numbered(&self.folder, &self.stem, format.extension(), write)
-            .ok_or_else(|| format!("all names for pictures of {} are in use", self.stem))?
-            .map_err(|error| error.to_string())?;
-        Ok(Exported {
-            scp: paths::scp(&path),
-            path,
-            size: [rendering.film.width(), rendering.film.height()],
-            spp: report.spp.mean,
-            noise_codes: report.noise.map(|noise| noise.rmse_codes),
-        })
+        let path = export_paths::numbered(&self.folder, &self.stem, format.extension(), write)?;
+        Ok(exported(path, &rendering.film, report))
     }
 
-    /// Returns the provenance of pictures of `scene`.
+    /// Returns the origin of pictures of `scene`, for their metadata.
     pub fn provenance(&self, scene: &Scene) -> Provenance {
         let (source, text) = self.source(scene);
         Provenance {
@@ -79,12 +73,13 @@ impl Exporter {
         checkpoint: Option<EncodedCheckpoint>,
     ) -> Result<PathBuf, String> {
         let checkpoint = checkpoint.ok_or("there are no samples to write")?;
-        paths::numbered(&self.folder, &self.stem, "zk", |path| checkpoint.create(path))
-            .ok_or_else(|| format!("all names for checkpoints of {} are in use", self.stem))?
-            .map_err(|error| error.to_string())
+        export_paths::numbered(&self.folder, &self.stem, "zk", |path| {
+            checkpoint.write(path, Existing::Refuse)
+        })
     }
 
-    /// Returns the name of the scene file, and the text that it would have if `scene` were saved.
+    /// Returns two texts: the name of the scene file, and the text that saving `scene` would write
+    /// to it.
     fn source(&self, scene: &Scene) -> (String, String) {
         match self.file.get() {
             Some(file) => {
@@ -97,33 +92,31 @@ impl Exporter {
     }
 }
 
-/// A render at another size that runs in a separate thread.
+/// Export that renders at another size in a separate thread.
 pub struct ResizedExport {
     cancelled: Arc<AtomicBool>,
     thread: JoinHandle<()>,
 }
 
-/// Request for a render at another size.
+/// Request for an export at another size.
 pub struct ExportRequest {
     /// Scene with the requested film size.
     pub scene: Arc<Scene>,
-    /// File format.
+    /// File format of the image.
     pub format: Format,
-    /// Exposure and tone curve.
-    pub display: Display,
-    /// Stop criteria.
-    pub stop: Stop,
-    /// Options of scene compilation and sampling.
+    /// Options of scene compilation and sampling. They include the exposure and tone curve of the
+    /// image.
     pub options: Options,
-    /// Sample allocation.
+    /// Settings of sample allocation (how samples are distributed over the picture), and the stop
+    /// criteria of the render.
     pub settings: Settings,
-    /// Tracing threads.
+    /// Number of threads that trace rays.
     pub threads: usize,
 }
 
 impl ResizedExport {
-    /// Starts the thread. It sends [`Message::ExportProgress`] and finally [`Message::Exported`] to
-    /// `results`. A cancelled render sends no result.
+    /// Starts the thread that renders and writes the image. It sends [`Message::ExportProgress`]
+    /// and finally [`Message::Exported`] to `results`. A cancelled render sends no result.
     pub fn start(
         request: ExportRequest,
         exporter: Exporter,
@@ -143,12 +136,12 @@ impl ResizedExport {
         Ok(Self { cancelled, thread })
     }
 
-    /// Cancels the render. A file that is already being written is completed.
+    /// Cancels the render of the export. A file that is already being written is completed.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Cancels the render and waits until the thread has ended.
+    /// Cancels the render of the export and waits until its thread has ended.
     pub fn end(self) {
         self.cancel();
         if let Err(panic) = self.thread.join() {
@@ -164,13 +157,12 @@ fn render(
     cancelled: &AtomicBool,
     report_progress: &dyn Fn(f64),
 ) -> Option<Result<Exported, String>> {
-    let options = Options { display: request.display, ..request.options };
-    let settings = Settings { stop: request.stop, ..request.settings };
-    let mut session: Session = match Session::new(request.threads, options, settings) {
+    let ExportRequest { scene, format, options, settings, threads } = request;
+    let mut session: Session = match Session::new(threads, options, settings) {
         Ok(session) => session,
-        Err(error) => return Some(Err(format!("cannot start rendering threads: {error}"))),
+        Err(error) => return Some(Err(error.to_string())),
     };
-    session.set_scene(request.scene);
+    session.set_scene(scene);
     loop {
         if cancelled.load(Ordering::Relaxed) {
             return None;
@@ -184,13 +176,26 @@ fn render(
             }
         }
     }
-    let (exporter, format) = (exporter.clone(), request.format);
+    let exporter = exporter.clone();
     let written = session.with(move |rendering, report| exporter.write(rendering, report, format));
     Some(written.unwrap_or_else(|| Err("the renderer has no picture".to_string())))
 }
 
-/// Returns the beginning of the exports' file names, before the counter: the stem of the scene's
-/// file name in `path`, or that of `name` for a scene without a file.
+/// Returns the description of the image at `path` for the user. `film` is the picture in the image,
+/// and `report` the renderer's report on it.
+pub fn exported(path: PathBuf, film: &Film, report: &Report) -> Exported {
+    Exported {
+        scp: export_paths::scp(&path),
+        path,
+        size: [film.width(), film.height()],
+        spp: report.spp.mean,
+        noise_codes: report.noise.map(|noise| noise.rmse_codes),
+    }
+}
+
+/// Returns the beginning of the names of exported files, such as `room` in `room-2.png`. It is the
+/// name of the scene file at `path` without its extension. For a scene without a file, `name` takes
+/// the place of the file name.
 pub fn stem(path: Option<&Path>, name: &str) -> String {
     let path = path.unwrap_or(Path::new(name));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());

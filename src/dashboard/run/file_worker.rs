@@ -22,9 +22,9 @@ const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 const PREPARED_WITHIN: Duration = Duration::from_secs(2);
 /// Longest wait for pending saves when the program ends.
 const SAVED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait for the recovery file when the program ends. If it cannot be written in time, one
-/// in the state folder gets the same time. The sum of the three waits is less than the grace period
-/// after a terminating signal.
+/// Longest wait for the recovery file when the program ends. If the file cannot be written beside
+/// the scene file in this time, one in the user's state folder gets the same time. Both waits and
+/// [`SAVED_WITHIN`] together are shorter than the grace period after a terminating signal.
 const KEPT_WITHIN: Duration = Duration::from_secs(1);
 
 pub(super) enum Job {
@@ -32,7 +32,7 @@ pub(super) enum Job {
         scene: Arc<Scene>,
         path: Option<PathBuf>,
         overwrite: bool,
-        /// Disconnected when the recovery file has been updated to `scene`.
+        /// Receiver that is disconnected as soon as the recovery file has the edits of `scene`.
         prepared: Receiver<()>,
     },
     Load,
@@ -41,12 +41,14 @@ pub(super) enum Job {
     End,
 }
 
-/// Handle of two threads: one for the scene file, and one for the recovery file.
+/// Handle of two threads: one that reads and writes the scene file, and one that writes the
+/// recovery file.
 pub struct Files {
     jobs: Sender<Job>,
     autosaves: Sender<AutosaveJob>,
-    shared: SharedFile,
-    /// Newest unsaved scene.
+    /// Shared handle of the scene file as it was last read or written.
+    pub shared: SharedFile,
+    /// Newest scene with unsaved edits; `None` if all edits are saved.
     unsaved: Option<Arc<Scene>>,
     threads: Option<[Worker; 2]>,
 }
@@ -116,16 +118,16 @@ impl Files {
         self.give_autosave(AutosaveJob::Note(scene));
     }
 
-    /// Writes unsaved edits to the recovery file without waiting for a pause. Blocks until the
-    /// edits are written, at most for `patience`.
+    /// Writes unsaved edits to the recovery file at once, without the usual delay until a pause in
+    /// editing. Waits until the edits are written, but at most for `patience`.
     pub fn flush(&self, patience: Duration) {
         let (done, completion) = bounded(1);
         self.give_autosave(AutosaveJob::Flush(done));
         let _ = completion.recv_timeout(patience);
     }
 
-    /// Adopts the edits of the last [`Message::OrphanedEdits`] as the unsaved edits of this
-    /// session.
+    /// Adopts the edits of the last [`Message::OrphanedEdits`], from a crashed session, as the
+    /// unsaved edits of this session.
     pub fn recover(&self) {
         self.give_autosave(AutosaveJob::Recover);
     }
@@ -140,12 +142,8 @@ impl Files {
     /// edits are kept in the state folder.
     ///
     /// # Errors
-    /// An explanation if there are unsaved edits that cannot be kept.
-    pub fn finish(mut self) -> Result<Option<PathBuf>, String> {
-        self.end()
-    }
-
-    fn end(&mut self) -> Result<Option<PathBuf>, String> {
+    /// Fails with a message for the user if there are unsaved edits that cannot be kept.
+    pub fn finish(&mut self) -> Result<Option<PathBuf>, String> {
         let Some([files, autosave]) = self.threads.take() else { return Ok(None) };
         self.give(Job::End);
         files.join_within(SAVED_WITHIN);
@@ -160,12 +158,7 @@ impl Files {
         }
     }
 
-    /// Returns the shared handle of the scene file as it was last read or written.
-    pub fn shared(&self) -> SharedFile {
-        self.shared.clone()
-    }
-
-    // Sending fails only after a panic of the thread, which `end` propagates.
+    // Sending fails only after a panic of the thread, which `finish` propagates.
 
     fn give(&self, job: Job) {
         let _ = self.jobs.send(job);
@@ -176,14 +169,15 @@ impl Files {
     }
 }
 
-/// Waits for pending writes as [`Files::finish`] does.
+/// Dropping the handle waits for pending writes as [`Files::finish`] does.
 impl Drop for Files {
     fn drop(&mut self) {
-        let _ = self.end();
+        let _ = self.finish();
     }
 }
 
-/// Writes `scene` as unsaved edits of `file` with `recovery`. It uses a thread of its own, because
+/// Writes `scene`, which has unsaved edits of `file`, to the recovery file of `recovery` in the
+/// state folder. Returns the path of the recovery file. The write has a thread of its own, because
 /// the disk of the state folder may not respond either.
 fn keep_elsewhere(
     scene: &Scene,
@@ -205,8 +199,8 @@ fn keep_elsewhere(
         .map_err(|why| format!("unsaved edits are lost: they cannot be kept ({why})"))
 }
 
-/// Modification time and length of a file, by which changes are detected; `None` if the file has no
-/// metadata.
+/// Stamp of a file, by which changes are detected: modification time and length. `None` if the file
+/// has no metadata.
 type FileStamp = Option<(SystemTime, u64)>;
 
 fn stamp(path: &Path) -> FileStamp {
@@ -217,11 +211,13 @@ fn stamp(path: &Path) -> FileStamp {
 struct FileWorker {
     /// Path of the scene file; `None` for a scene without file.
     path: Option<PathBuf>,
-    /// Scene file; `None` if it has never been readable.
+    /// Scene file as last read or written; `None` if it has never been readable.
     file: Option<SceneFile>,
-    /// Stamp of the scene file when it was last read, written or checked.
+    /// Stamp (modification time, length) of the scene file when it was last read, written or
+    /// checked.
     seen: FileStamp,
-    /// User's state folder.
+    /// Folder for the program's state according to the XDG specification; `None` if the user has no
+    /// such folder.
     state: Option<PathBuf>,
     autosaves: Sender<AutosaveJob>,
     shared: SharedFile,
@@ -229,7 +225,7 @@ struct FileWorker {
 }
 
 impl FileWorker {
-    /// Executes jobs until [`Job::End`].
+    /// Executes jobs of the thread that reads and writes scene files, until [`Job::End`].
     fn run(mut self, inbox: &Receiver<Job>) {
         let mut checked = Instant::now();
         loop {
@@ -263,7 +259,8 @@ impl FileWorker {
         let _ = self.results.send(message);
     }
 
-    /// Returns `true` if another program has changed the file since the last read, write or report.
+    /// Returns `true` if another program has changed the scene file since the last read, write or
+    /// check.
     fn changed(&mut self) -> bool {
         let Some(path) = &self.path else { return false };
         let now = stamp(path);
@@ -330,7 +327,8 @@ mod tests {
     use super::*;
     use crate::scene::starter;
 
-    /// Time limit of waits. It is so long that only a failing test reaches it.
+    /// Longest time that a test waits for a message of the file worker. Only a failing test reaches
+    /// it.
     const PATIENCE: Duration = Duration::from_secs(60);
 
     fn opened(path: &Path) -> (Files, Receiver<Message>) {
@@ -357,7 +355,7 @@ mod tests {
         files.save(Arc::new(scene.clone()), None, false);
         let saved = inbox.recv_timeout(PATIENCE).unwrap();
         assert!(matches!(saved, Message::Saved(_, Ok(at)) if at == path));
-        assert_eq!(files.shared().get().unwrap().document().scene(), &scene);
+        assert_eq!(files.shared.get().unwrap().document().scene(), &scene);
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL + CHECK_INTERVAL / 2);
         assert!(quiet.is_err(), "{quiet:?}");
         fs::write(&path, format!("{}\n# more\n", starter())).unwrap();
@@ -386,7 +384,7 @@ mod tests {
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
         files.load();
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_ok());
-        assert!(files.shared().get().is_some());
+        assert!(files.shared.get().is_some());
     }
 
     #[test]
@@ -436,7 +434,8 @@ mod tests {
         assert_eq!(fs::read_to_string(&path).unwrap(), starter());
     }
 
-    /// Returns a scene file in `folder`, and a scene that differs from it.
+    /// Writes a scene file to `folder`. Returns two values: its path, and a scene that differs from
+    /// the one in the file.
     fn edited(folder: &Path) -> (PathBuf, Arc<Scene>) {
         let path = folder.join("a.toml");
         fs::write(&path, starter()).unwrap();
@@ -445,7 +444,9 @@ mod tests {
         (path, Arc::new(scene))
     }
 
-    /// Opens a scene file whose autosave blocks, as on a disk that does not respond.
+    /// Opens the scene file at `path` in a set-up that simulates a disk that does not respond. The
+    /// threads of the returned `Files` block when they send a message, because the test does not
+    /// receive from the returned receiver.
     fn opened_blocking(path: &Path, state: Option<PathBuf>) -> (Files, Receiver<Message>) {
         let (results, inbox) = bounded(0);
         (Files::new(Ok(SceneFile::open(path).unwrap()), state, results).unwrap(), inbox)

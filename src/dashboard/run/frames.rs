@@ -1,5 +1,5 @@
-//! Frame pipeline: draws the model, compares the result with the screen, encodes the differences
-//! and sends them.
+//! Frame pipeline: draws the model, compares the result with the contents of the terminal, encodes
+//! the differences and sends them.
 
 use crate::dashboard::model::Model;
 use crate::dashboard::overlay::Overlay;
@@ -7,9 +7,8 @@ use crate::dashboard::run::image_upload::ImageUpload;
 use crate::dashboard::run::writer::{Writer, Written};
 use crate::dashboard::view::{View, is_settled};
 use crate::terminal::diff::{FrameDiff, TargetFrame};
-use crate::terminal::flow::{FlowControl, FrameBudget, InitialLink, LinkStatus, TcpSendQueue};
+use crate::terminal::flow::{FlowControl, FrameBudget, InitialLink, TcpSendQueue};
 use crate::terminal::{Capabilities, Tty, copied, cursor_request};
-use crossbeam_channel::Receiver;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 use std::io;
@@ -19,41 +18,48 @@ use std::time::{Duration, Instant};
 /// Sequences that start and end a synchronised update, which the terminal displays as a whole.
 const SYNCHRONISED: [&[u8]; 2] = [b"\x1b[?2026h", b"\x1b[?2026l"];
 
-/// Upper bound of the bytes of an acknowledgement request (a request of the cursor position, 14
-/// bytes inside tmux).
+/// Upper bound of the number of bytes of an acknowledgement request. This is a request of the
+/// cursor position, which has at most 14 bytes inside of tmux.
 const ACK_REQUEST_BYTES: usize = 16;
 
-/// Pipeline of frames to the terminal.
+/// Pipeline of frames to the terminal: drawing, difference, flow control, output.
 pub struct FramePipeline {
     view: View,
     diff: FrameDiff,
-    flow: FlowControl,
-    /// Send queue of the SSH connection in the kernel, if it can be read.
+    /// Flow control of the connection to the terminal.
+    pub flow: FlowControl,
+    /// Send queue of the SSH connection in the kernel; `None` if it cannot be read.
     queue: Option<TcpSendQueue>,
-    /// `true` if the terminal supports synchronised updates.
+    /// `true` if the terminal supports synchronised updates, which it displays as a whole.
     synchronised: bool,
-    writer: Writer,
-    /// Time at which the frame that is being written was sent.
+    /// Writer that writes frames to the terminal. Its results must be passed to
+    /// [`FramePipeline::written_at`].
+    pub writer: Writer,
+    /// Time at which the frame that is being written was passed to the writer; `None` if no frame
+    /// is being written.
     writing_since: Option<Duration>,
     /// Number of bytes of all frames sent so far.
     sent: u64,
     /// Last frame that was drawn. Some of its cells may not have been sent yet.
     target: Buffer,
-    /// Position of the text cursor, if visible.
+    /// Position of the text cursor; `None` if it is invisible.
     cursor: Option<Position>,
     meta: FrameMeta,
-    /// Sequence that sets the clipboard, to be sent with the next frame; may be empty.
+    /// Escape sequence that sets the terminal's clipboard, to be sent with the next frame. Empty if
+    /// there is nothing to copy.
     clipboard: String,
     tty: Arc<Tty>,
-    /// Upload of the image in the image viewer.
+    /// Upload of the image in the image viewer; `None` if there is no such image.
     upload: Option<ImageUpload>,
-    /// Sequence that removes the previous image, to be sent before the next frame; may be empty.
+    /// Escape sequence that removes the previously viewed image from the screen, to be sent before
+    /// the next frame. Empty if there is nothing to remove.
     removal: Vec<u8>,
     /// `true` if the frame that is being written removes an image.
     removing: bool,
 }
 
-/// Values of the model when `FramePipeline::target` was drawn.
+/// Three values of the model when the last frame was drawn: the version of the picture, its mean
+/// number of samples per pixel, and `true` if it changes only rarely or by user input.
 #[derive(Clone, Copy, Debug, Default)]
 struct FrameMeta {
     version: u64,
@@ -61,16 +67,17 @@ struct FrameMeta {
     settled: bool,
 }
 
-/// Outcome of an attempt to draw.
+/// Outcome of an attempt to draw and send a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DrawOutcome {
     /// The connection has no room for a frame. Nothing was drawn.
     Nothing,
-    /// Only the picture differs visibly from the screen. Its differences will be sent later.
+    /// Only the picture differs visibly from the terminal's contents. Its differences will be sent
+    /// later.
     Deferred,
-    /// The screen has no visible differences from the model.
+    /// The terminal's contents have no visible differences from the model.
     Same,
-    /// A slice of a viewer image was sent. The model was not drawn.
+    /// A part of an image for the viewer was sent. The model was not drawn.
     Slice,
     /// A frame without picture cells was sent.
     Text,
@@ -85,7 +92,7 @@ impl FramePipeline {
         let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
         Ok(Self {
             view: View::default(),
-            diff: FrameDiff::new(),
+            diff: FrameDiff::default(),
             flow: FlowControl::new(InitialLink::of(terminal, queue.is_some(), bandwidth)),
             queue,
             synchronised: terminal.synchronised,
@@ -103,26 +110,26 @@ impl FramePipeline {
         })
     }
 
-    /// Schedules a copy of `text` to the terminal's clipboard. The next frame contains the sequence
-    /// for it.
+    /// Schedules a copy of `text` to the terminal's clipboard. The next frame contains the escape
+    /// sequence for it.
     pub fn copy(&mut self, text: &str) {
         self.clipboard = copied(text);
     }
 
-    /// Marks the contents of the screen as unknown, so that the next frame redraws the whole
+    /// Marks the contents of the terminal as unknown, so that the next frame redraws the whole
     /// screen.
     pub fn forget(&mut self) {
-        self.diff = FrameDiff::new();
+        self.diff = FrameDiff::default();
         self.give_up();
     }
 
-    /// Returns the transferred fraction of the image in the viewer, 0..=1. Returns `None` if there
-    /// is no image.
+    /// Returns the share of the viewed image that was sent to the terminal, 0..=1. Returns `None`
+    /// if no image is viewed.
     pub fn uploaded(&self) -> Option<f64> {
         self.upload.as_ref().map(ImageUpload::share)
     }
 
-    /// Starts an upload if the model's viewer has a new image. Stops the upload of an image that is
+    /// Starts to send the image in the model's viewer if it is new. Stops sending an image that is
     /// no longer in the viewer.
     pub fn follow(&mut self, model: &Model) {
         let image = match &model.overlay {
@@ -136,18 +143,18 @@ impl FramePipeline {
         }
     }
 
-    /// Stops the upload and schedules the removal of the part that was sent.
+    /// Stops sending the viewed image and schedules the removal of the part that was sent.
     fn give_up(&mut self) {
         if let Some(upload) = self.upload.take() {
             let (removal, destroys) = upload.removal();
             self.removal.extend(removal);
             if destroys {
-                self.diff = FrameDiff::new();
+                self.diff = FrameDiff::default();
             }
         }
     }
 
-    /// Sends the next slice of the image upload, at most as large as `budget` allows.
+    /// Sends the next part of the viewed image, at most as large as `budget` allows.
     fn slice(&mut self, now: Duration, budget: FrameBudget) -> DrawOutcome {
         let Some(upload) = self.upload.as_mut().filter(|_| budget.picture) else {
             return DrawOutcome::Nothing;
@@ -179,40 +186,14 @@ impl FramePipeline {
         self.writer.ready()
     }
 
-    /// Returns `true` if the screen differs visibly from the picture, and the number of bytes of
-    /// all frames sent so far.
+    /// Returns two values: `true` if visible differences of the picture remain to be sent to the
+    /// terminal, and the number of bytes of all frames sent so far.
     pub fn load(&self) -> (bool, u64) {
         (self.diff.pending().visible, self.sent)
     }
 
-    /// Returns the status of the connection for display. Returns `None` for a local terminal.
-    pub fn reading(&self) -> Option<LinkStatus> {
-        self.flow.reading()
-    }
-
-    /// Records user input at the time `now` for flow control.
-    pub fn act(&mut self, now: Duration) {
-        self.flow.act(now);
-    }
-
-    /// Records that the terminal acknowledged a frame at time `at`.
-    pub fn acknowledged(&mut self, at: Duration) {
-        self.flow.on_ack(at);
-    }
-
-    /// Returns the longest time to wait for acknowledgements before the terminal is restored.
-    /// Returns `None` if none are outstanding.
-    pub fn awaits(&self) -> Option<Duration> {
-        self.flow.awaits()
-    }
-
-    /// Returns `true` if acknowledgements are outstanding.
-    pub fn is_waiting(&self) -> bool {
-        self.flow.is_waiting()
-    }
-
-    /// Updates flow control: stops waiting for overdue acknowledgements, and reads the length of
-    /// the kernel's send queue.
+    /// Updates flow control at time `now`: stops waiting for overdue acknowledgements of the
+    /// terminal, and reads the length of the kernel's send queue if this is due.
     pub fn look(&mut self, now: Duration) {
         self.flow.expire(now);
         if self.flow.wants_queue_length(now) {
@@ -220,20 +201,16 @@ impl FramePipeline {
         }
     }
 
-    /// Returns the time of the next measurement of the kernel's send queue by
-    /// [`FramePipeline::look`]. Returns `None` if none is needed.
-    pub fn measures_at(&self, now: Duration) -> Option<Duration> {
-        self.flow.measures_at(now)
-    }
-
-    /// Returns the time at which the connection will be treated as silent if no input arrives until
-    /// then. Returns `None` if no bytes are known to be waiting for transmission.
+    /// Returns the time at which the connection to the terminal will count as silent if no input
+    /// arrives until then. Returns `None` if it cannot become silent, because no bytes are known to
+    /// wait for transmission.
     pub fn silent_at(&self) -> Option<Duration> {
         self.flow.silent_at(self.writing_since)
     }
 
-    /// Returns the time from which a frame with new content could be sent. `answers` is `true` if
-    /// the frame would respond to user input.
+    /// Returns the earliest time, `now` or later, at which a frame with new content can be sent.
+    /// `answers` is `true` if the frame would respond to user input; such a frame may be sent
+    /// sooner.
     pub fn snapshot_due(&self, now: Duration, answers: bool) -> Duration {
         match self.flow.allowance(now, answers) {
             Some(_) => now,
@@ -241,9 +218,9 @@ impl FramePipeline {
         }
     }
 
-    /// Returns the time of the next call of [`FramePipeline::draw`]. Returns `None` if there is
-    /// nothing to send until the next event. `changed` is `true` if the model has changed since the
-    /// last frame, `answers` if the frame would respond to user input.
+    /// Returns the time at which [`FramePipeline::draw`] must be called next. Returns `None` if
+    /// there is nothing to send until the next event. `changed` is `true` if the model has changed
+    /// since the last frame, `answers` if the frame would respond to user input.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
         let pending = self.diff.pending();
         let text = changed || pending.text || !self.removal.is_empty();
@@ -255,7 +232,7 @@ impl FramePipeline {
             return upload.is_unfinished().then(slice);
         }
         if !text && !pending.visible {
-            let hidden = pending.hidden?.max(self.flow.refine_at());
+            let hidden = pending.hidden?.max(self.flow.refine_at);
             return Some(if may() { hidden } else { hidden.max(self.flow.wakes_at(now, false)) });
         }
         match self.flow.allowance(now, answers) {
@@ -264,10 +241,10 @@ impl FramePipeline {
         }
     }
 
-    /// Draws the model if it has `changed`, and sends as many of the differences as the connection
-    /// has room for. `answers` is `true` if the frame responds to user input. `image_epoch` is a
-    /// counter that increases when the picture is replaced by a different one instead of refined.
-    /// Requires [`FramePipeline::ready`].
+    /// Draws the model if `changed` is `true`, and sends as many of the differences as the
+    /// connection has room for. `answers` is `true` if the frame responds to user input.
+    /// `image_epoch` is a counter that increases when the picture is replaced by a different one
+    /// instead of refined. Must be called only if [`FramePipeline::ready`] returns `true`.
     pub fn draw(
         &mut self,
         model: &Model,
@@ -340,13 +317,8 @@ impl FramePipeline {
         if frame.picture { DrawOutcome::Picture } else { DrawOutcome::Text }
     }
 
-    /// Returns the receiver of the results of writing frames. Each result must be passed to
-    /// [`FramePipeline::written_at`].
-    pub fn written(&self) -> &Receiver<Written> {
-        self.writer.written()
-    }
-
-    /// Records that a frame was written. Returns the time at which the write was completed.
+    /// Records that a frame was written to the terminal. `frame` is the result of the writer.
+    /// Returns the time at which the write was completed.
     ///
     /// # Errors
     /// Fails if the write failed.

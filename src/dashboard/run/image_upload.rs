@@ -1,29 +1,29 @@
-//! Upload of a viewer image to the terminal in slices.
+//! Upload of an image for the viewer to the terminal, in parts of limited size.
 
 use crate::terminal::image::ViewerImage;
 use std::sync::Arc;
 
-/// Largest size of a slice in bytes. It bounds the latency of keys, because no frame can be sent
-/// while a slice is being written.
+/// Largest size of a slice of the image in bytes. It bounds the latency of keys, because no frame
+/// can be sent while a slice is being written.
 const SLICE: usize = 1 << 18;
 /// String terminator (ST), which ends an incomplete escape sequence.
 const END: &[u8] = b"\x1b\\";
 
-/// An image and the progress of its upload.
+/// Image for the viewer, and the progress of its upload to the terminal.
 #[derive(Debug)]
 pub struct ImageUpload {
     image: Arc<ViewerImage>,
-    /// Number of bytes sent.
+    /// Number of bytes of the image sent so far.
     sent: usize,
-    /// `true` if the bytes sent so far end inside of an escape sequence, whose remainder must be
-    /// sent next.
+    /// `true` if the bytes sent so far end inside of an escape sequence. The remainder of the
+    /// sequence must be sent next.
     open: bool,
-    /// `true` if the image is already visible as half blocks.
+    /// `true` if the image is already visible in half blocks, a coarse preview in terminal cells.
     pub seen: bool,
 }
 
 impl ImageUpload {
-    /// Creates the upload of `image`; nothing has been sent.
+    /// Creates the upload of `image`, of which nothing has been sent.
     pub fn new(image: Arc<ViewerImage>) -> Self {
         Self { image, sent: 0, open: false, seen: false }
     }
@@ -39,30 +39,32 @@ impl ImageUpload {
         self.open
     }
 
-    /// Returns `true` if the upload has begun. The half blocks under the image must not be sent
-    /// from then on.
+    /// Returns `true` if the upload of the image has begun. From then on the half blocks under the
+    /// image, its coarse preview, must not be sent.
     pub fn has_begun(&self) -> bool {
         self.sent > 0
     }
 
-    /// Returns `true` if the upload is incomplete.
+    /// Returns `true` if the upload of the image is incomplete.
     pub fn is_unfinished(&self) -> bool {
         self.sent < self.image.transfer.bytes.len()
     }
 
-    /// Returns `true` if the uploaded image replaces its half blocks already, or may be sent next.
-    /// `waits` is `true` if half blocks still differ visibly from the screen.
+    /// Returns `true` if the next output may be a part of the image: its upload has begun, or it
+    /// may begin because the half blocks are visible. Half blocks are a coarse preview of the image
+    /// in terminal cells. `waits` is `true` if the screen does not show all of them yet.
     pub fn follows(&self, waits: bool) -> bool {
         self.has_begun() || self.is_unfinished() && (self.seen || !waits)
     }
 
-    /// Returns the transferred fraction of the image, 0..=1.
+    /// Returns the fraction of the image's bytes that have been sent to the terminal, 0..=1.
     pub fn share(&self) -> f64 {
         let all = self.image.transfer.bytes.len().max(1);
         self.sent as f64 / all as f64
     }
 
-    /// Appends the next slice, of about `room` bytes, to `out`.
+    /// Appends the next slice of the image's bytes to `out`. The slice has about `room` bytes, the
+    /// number that the connection accepts now, or `SLICE` bytes if that is less.
     pub fn next(&mut self, room: usize, out: &mut Vec<u8>) {
         let transfer = &self.image.transfer;
         let (range, open) = transfer.slice(self.sent, room.min(SLICE));
@@ -70,8 +72,8 @@ impl ImageUpload {
         (self.sent, self.open) = (range.end, open);
     }
 
-    /// Returns the sequence that removes the transferred part of the image, and `true` if the cells
-    /// below must be redrawn after it.
+    /// Returns two values: the escape sequence that removes the part of the image that was sent
+    /// (empty if none was), and `true` if the cells below the image must be drawn again afterwards.
     pub fn removal(&self) -> (Vec<u8>, bool) {
         let transfer = &self.image.transfer;
         if !self.has_begun() {
@@ -81,7 +83,8 @@ impl ImageUpload {
         ([end, &transfer.remove].concat(), transfer.destroys)
     }
 
-    /// Returns a sequence that removes the image at any stage of the upload.
+    /// Returns an escape sequence that removes the image, whatever part of it was sent. It also
+    /// clears the screen if the cells below the image must be drawn again.
     pub fn any_removal(&self) -> Vec<u8> {
         let clear: &[u8] = if self.image.transfer.destroys { b"\x1b[2J" } else { b"" };
         [END, &self.image.transfer.remove, clear].concat()

@@ -12,12 +12,13 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-/// Longest duration of the transfer of an image. On slow connections the image is downscaled to
-/// meet it.
+/// Longest duration of sending an image to the terminal. On slow connections the image is
+/// downscaled to meet it.
 const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
 
-/// Returns the limits for an image: protocol, size and bytes. The terminal has `screen` columns and
-/// rows. `line_rate` is the rate of its connection in bytes per second; `None` is a local terminal.
+/// Returns the limits for an image in the viewer: protocol, size and bytes. The terminal has
+/// `screen` columns and rows. `line_rate` is the rate of its connection in bytes per second; `None`
+/// for a local terminal.
 pub fn viewport(
     terminal: &Capabilities,
     screen: [u16; 2],

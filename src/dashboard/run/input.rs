@@ -1,8 +1,8 @@
-//! Conversion of terminal events to messages.
+//! Conversion of terminal events to messages for the model.
 
 use crate::dashboard::message::Message;
 use crate::terminal::event::{Mouse, MouseKind};
-use crate::terminal::{Keyboard, Timed};
+use crate::terminal::{InputReader, TimedEvent};
 use crossbeam_channel::{Receiver, unbounded};
 use std::io;
 use std::thread;
@@ -11,19 +11,20 @@ use std::time::Instant;
 /// User input with the time at which it was read.
 #[derive(Debug)]
 pub struct Input {
-    /// Time at which the event was read; for joined events, the time of the first event.
+    /// Time at which the input event was read. Several events joined into one have the time of the
+    /// first.
     pub at: Instant,
-    /// Message for the model.
+    /// Message about the input, for the dashboard's model.
     pub message: Message,
 }
 
 /// Starts a thread that reads terminal events until a read fails. The receiver gets the events, and
 /// the error last.
-pub fn read(mut keyboard: Keyboard) -> io::Result<Receiver<io::Result<Timed>>> {
+pub fn read(mut reader: InputReader) -> io::Result<Receiver<io::Result<TimedEvent>>> {
     let (sender, receiver) = unbounded();
     thread::Builder::new().name("reader".into()).spawn(move || {
         loop {
-            match keyboard.wait(None) {
+            match reader.wait(None) {
                 Ok(events) => {
                     if events.into_iter().any(|event| sender.send(Ok(event)).is_err()) {
                         break;
@@ -39,8 +40,9 @@ pub fn read(mut keyboard: Keyboard) -> io::Result<Receiver<io::Result<Timed>>> {
     Ok(receiver)
 }
 
-/// Appends `input` to the pending inputs, or joins it with the last one of the same kind. A joined
-/// drag has the newest position, a joined resize the newest size. Wheel ticks are added up.
+/// Appends `input` to `queue`, the user input that waits to be handled. Two successive drags become
+/// one element with the newest position, two resizes one with the newest size. Successive wheel
+/// ticks are added up.
 pub fn join(queue: &mut Vec<Input>, input: Input) {
     if let Some(last) = queue.last_mut() {
         match (&mut last.message, &input.message) {

@@ -1,55 +1,58 @@
-//! Job control (suspend and resume), resizing, and loss of the terminal.
+//! Job control by the shell (suspend and resume), resizing, and loss of the terminal.
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::Dashboard;
 use crate::dashboard::run::signals::{HUNG_UP, SignalEvent, StopTarget, stop};
-use crate::terminal::{Timed, Tty, size};
+use crate::terminal::{TimedEvent, Tty, size};
 use crossbeam_channel::Receiver;
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Time without another resize before a resize takes effect.
+/// Time for which the terminal's size must stay unchanged before its last change takes effect.
 const SETTLED: Duration = Duration::from_millis(90);
-/// Maximum time between the first resize of a series and its effect.
+/// Longest time after the first of several changes of the terminal's size until they take effect.
 const LONGEST: Duration = Duration::from_millis(400);
-/// Longest wait for the autosave before the program is suspended.
+/// Longest wait for the write of the recovery file before the program is suspended.
 const SECURED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait for the stop signal to take effect. The program resumes by itself after it.
+/// Longest wait until the stop signal has stopped the process. After it the program resumes by
+/// itself.
 const STOPS_WITHIN: Duration = Duration::from_millis(500);
 
-/// The terminal, and the receivers of its events.
+/// Terminal, and the receivers of its events.
 pub(super) struct TerminalIo {
-    /// Terminal for output.
+    /// Terminal, for output.
     pub tty: Arc<Tty>,
-    /// Receiver of input events.
-    pub input: Receiver<io::Result<Timed>>,
-    /// Receiver of signals.
+    /// Receiver of the terminal's input events.
+    pub input: Receiver<io::Result<TimedEvent>>,
+    /// Receiver of signals to the process.
     pub signals: Receiver<SignalEvent>,
     /// Receiver of the notification that the terminal has been restored for good, for example by a
     /// panic.
     pub left: Receiver<()>,
 }
 
-/// Debounce of resize signals: the times of the first and last resize of a series.
+/// Debounce of changes of the terminal's size: a series of changes takes effect once. The two times
+/// are those of the first and of the last change of the series. `None` if no change is pending.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ResizeDebounce(Option<(Duration, Duration)>);
 
 impl ResizeDebounce {
-    /// Records a resize at time `now`.
+    /// Records a change of the terminal's size at time `now`.
     pub fn note(&mut self, now: Duration) {
         let first = self.0.map_or(now, |(first, _)| first);
         self.0 = Some((first, now));
     }
 
-    /// Returns the time at which a pending resize takes effect. Returns `None` if none is pending.
+    /// Returns the time at which a pending change of the terminal's size takes effect. Returns
+    /// `None` if no change is pending.
     pub fn due(&self) -> Option<Duration> {
         self.0.map(|(first, last)| (last + SETTLED).min(first + LONGEST))
     }
 }
 
 impl Dashboard {
-    /// Handles a signal. Returns the exit status if the program is to end.
+    /// Handles a signal. Returns the exit status if the program is to end, otherwise `None`.
     pub(super) fn handle_signal(
         &mut self,
         event: SignalEvent,
@@ -67,8 +70,9 @@ impl Dashboard {
         }
     }
 
-    /// Restores the terminal and stops the processes of `target`. Resumes when the shell continues
-    /// them. Returns the exit status if the program is to end instead.
+    /// Restores the terminal and stops the processes of `target`. Sets up the terminal again when
+    /// the shell continues them. Returns the exit status if the program is to end instead,
+    /// otherwise `None`.
     pub(super) fn suspend(&mut self, target: StopTarget, terminal_io: &TerminalIo) -> Option<u8> {
         // Unsaved edits are written first, because the program may never be resumed.
         self.effects.flush(SECURED_WITHIN);
@@ -90,8 +94,8 @@ impl Dashboard {
         end
     }
 
-    /// Sets up the terminal again and redraws the whole screen. Returns an exit status if the
-    /// terminal is gone.
+    /// Sets up the terminal again after a suspension and redraws the whole screen. Returns the exit
+    /// status [`HUNG_UP`] if the terminal is gone, otherwise `None`.
     fn resume(&mut self, terminal_io: &TerminalIo) -> Option<u8> {
         if terminal_io.tty.resume().is_err() {
             return Some(HUNG_UP);

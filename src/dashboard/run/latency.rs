@@ -6,62 +6,58 @@ use std::io;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Frame that is taken as the response to an event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Answer {
-    /// The next frame of any kind.
-    Screen,
-    /// The first frame with a picture of this scene generation or a later one.
-    Picture(u64),
-}
-
-/// An event that has no response yet.
+/// Input event to which no frame has responded yet.
 #[derive(Clone, Copy, Debug)]
 struct Awaiting {
     read: Instant,
-    answer: Answer,
+    /// Generation (version number of the scene) of the oldest picture that responds to the event;
+    /// newer pictures respond, too. 0 if any frame is a response.
+    scene: u64,
 }
 
-/// An event that has been responded to.
+/// Input event to which a frame has responded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Answered {
-    /// Time at which the event was read, since the start of the recorder.
+    /// Time at which the input event was read, measured from the start of the recorder.
     read: Duration,
-    /// `true` if the response is a new picture.
+    /// `true` if the response to the input is a new picture.
     picture: bool,
     /// Time from reading the event until the response was written.
     after: Duration,
 }
 
-/// Recorder of input latencies. Latencies are stored only on request. Events without a response are
-/// always tracked, because frames that respond to an event are sent without waiting for the frame
-/// interval.
+/// Recorder of input latencies. Input events without a response are always tracked: a frame that
+/// responds to one is sent without waiting for the frame interval. Latencies are stored only on
+/// request.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,
-    /// Events that no frame has responded to.
+    /// Input events to which no frame has responded.
     awaiting: Vec<Awaiting>,
-    /// Events that the frame being written responds to.
+    /// Input events to which the frame that is being written responds.
     in_flight: Vec<Awaiting>,
-    /// Events with their latencies; `None` if latencies are not stored.
+    /// Input events with their latencies. `None` if latencies are not stored, because they were not
+    /// requested.
     answered: Option<Vec<Answered>>,
     load: Load,
 }
 
-/// Output sent while the screen differed visibly from the picture.
+/// Traffic to the terminal during the times at which its contents differed visibly from the picture
+/// that it should show.
 #[derive(Clone, Copy, Debug, Default)]
 struct Load {
-    /// Values of the last update: time, `true` if the screen differed from the picture, and bytes
-    /// sent until then.
+    /// Three values of the last update: its time, `true` if the terminal then differed visibly from
+    /// the picture that it should show, and the number of bytes sent to the terminal since the
+    /// start.
     last: (Duration, bool, u64),
-    /// Total time during which the screen differed from the picture.
+    /// Total time during which the terminal differed from the picture.
     waited: Duration,
-    /// Bytes sent during that time.
+    /// Number of bytes that were sent to the terminal while it differed from the picture.
     bytes: u64,
 }
 
 impl LatencyRecorder {
-    /// Creates a recorder. If `remember` is `true`, latencies are stored for
+    /// Creates a recorder of input latencies. If `remember` is `true`, they are stored for
     /// [`LatencyRecorder::write`] and [`LatencyRecorder::summary`].
     pub fn new(remember: bool) -> Self {
         Self {
@@ -73,29 +69,23 @@ impl LatencyRecorder {
         }
     }
 
-    /// Records an event that was read at `read` and has been handled. `scene` is the scene
-    /// generation that the response must show; `None` if any frame is a response.
+    /// Records an input event that was read at `read` and has been handled. `scene` is the
+    /// generation (number of a version of the scene) that the response must show; `None` if any
+    /// frame is a response.
     pub fn event(&mut self, read: Instant, scene: Option<u64>) {
-        let answer = scene.map_or(Answer::Screen, Answer::Picture);
-        self.awaiting.push(Awaiting { read, answer });
+        self.awaiting.push(Awaiting { read, scene: scene.unwrap_or(0) });
     }
 
-    /// Returns `true` if a frame with the picture of generation `scene` would respond to an event.
+    /// Returns `true` if a frame with the picture of generation `scene` (version number of the
+    /// scene) would respond to an input event.
     pub fn replies(&self, scene: u64) -> bool {
-        self.awaiting.iter().any(|waiting| waiting.answered_by(scene))
+        self.awaiting.iter().any(|waiting| waiting.scene <= scene)
     }
 
-    /// Records that a frame with the picture of generation `scene` is being written; 0 is a frame
-    /// without picture.
+    /// Records that a frame is being written. `scene` is the generation (number of a version of the
+    /// scene) of its picture; 0 means a frame without picture.
     pub fn sent(&mut self, scene: u64) {
-        let in_flight = &mut self.in_flight;
-        self.awaiting.retain(|waiting| {
-            let answered = waiting.answered_by(scene);
-            if answered {
-                in_flight.push(*waiting);
-            }
-            !answered
-        });
+        self.in_flight.extend(self.awaiting.extract_if(.., |waiting| waiting.scene <= scene));
     }
 
     /// Records that the frame passed to [`LatencyRecorder::sent`] was completely written at `at`.
@@ -104,16 +94,16 @@ impl LatencyRecorder {
             if let Some(answered) = &mut self.answered {
                 answered.push(Answered {
                     read: waiting.read.saturating_duration_since(self.began),
-                    picture: waiting.answer != Answer::Screen,
+                    picture: waiting.scene > 0,
                     after: at.saturating_duration_since(waiting.read),
                 });
             }
         }
     }
 
-    /// Records the state of the connection at the time `now`, after a frame. `waits` is `true` if
-    /// the screen differs visibly from the picture; `sent` is the number of bytes sent since the
-    /// start.
+    /// Records the traffic to the terminal at the time `now`, after a frame. `waits` is `true` if
+    /// the terminal differs visibly from the picture that it should show. `sent` is the number of
+    /// bytes sent since the start.
     pub fn line(&mut self, now: Duration, waits: bool, sent: u64) {
         let Load { last: (before, waited, known), .. } = self.load;
         if waited {
@@ -127,8 +117,8 @@ impl LatencyRecorder {
     }
 
     /// Writes a CSV file with one line per event. The columns are the seconds from the start until
-    /// the event was read, the kind of response, and the latency in milliseconds. Events without
-    /// response are left out.
+    /// the event was read, the kind of response (`picture`, or `screen` for any other frame), and
+    /// the latency in milliseconds. Events without response are left out.
     pub fn write(&self, path: &Path) -> io::Result<()> {
         let mut table = "read_seconds,answer,milliseconds\n".to_string();
         for Answered { read, picture, after } in self.answered.iter().flatten() {
@@ -139,7 +129,9 @@ impl LatencyRecorder {
         disk::write(path, table.as_bytes()).map_err(io::Error::other)
     }
 
-    /// Returns the lines of a summary: one for each kind of response, and one for the traffic.
+    /// Returns the lines of a summary of input latencies: one for events with a picture as
+    /// response, one for other events, and one for the traffic to the terminal. Lines without data
+    /// are left out.
     pub fn summary(&self) -> Vec<String> {
         let summary_of = |wanted: bool, name: &str| {
             let of_kind = self.answered.iter().flatten().filter(|a| a.picture == wanted);
@@ -169,17 +161,8 @@ impl LatencyRecorder {
     }
 }
 
-impl Awaiting {
-    fn answered_by(&self, scene: u64) -> bool {
-        match self.answer {
-            Answer::Screen => true,
-            Answer::Picture(wanted) => scene >= wanted,
-        }
-    }
-}
-
-/// Returns a quantile: the smallest element of `sorted` that is at least as large as the fraction
-/// `share` (0 to 1) of all elements. Returns 0 if `sorted` is empty.
+/// Returns a quantile of `sorted`: the smallest element that at least the fraction `share` (0 to 1)
+/// of all elements do not exceed. Returns 0 if `sorted` is empty.
 fn quantile(sorted: &[Duration], share: f64) -> Duration {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied().unwrap_or_default()

@@ -5,6 +5,7 @@ mod autosave;
 mod autosave_worker;
 mod diagnose;
 mod effects;
+mod export_paths;
 mod exporter;
 mod file_worker;
 mod frames;
@@ -13,7 +14,6 @@ mod image_viewer;
 mod input;
 mod job_control;
 mod latency;
-mod paths;
 mod shared_file;
 mod signals;
 mod watch_runner;
@@ -21,7 +21,7 @@ mod worker;
 mod writer;
 
 use crate::dashboard::message::{Effect, Exported, Message};
-use crate::dashboard::model::{Model, Start};
+use crate::dashboard::model::Model;
 use crate::dashboard::update::update;
 use crate::render::plan::WatchedFilms;
 use crate::render::schedule::{Settings, Stop};
@@ -30,10 +30,11 @@ use crate::render::{Checkpoint, Options};
 use crate::scene::{SceneErrors, SceneFile};
 use crate::terminal::flow::LinkStatus;
 use crate::terminal::{
-    Capabilities, Environment, Event, Keyboard, Reply, Screen, Timed, probe, size,
+    Capabilities, Environment, Event, InputReader, Reply, Screen, TimedEvent, query_capabilities,
+    size,
 };
 use crossbeam_channel::{Receiver, after, never, select};
-use effects::{EffectRunner, EffectSetup, Effects, Outcome};
+use effects::{EffectRunner, Effects, Outcome};
 use frames::{DrawOutcome, FramePipeline};
 use input::Input;
 use job_control::{ResizeDebounce, TerminalIo};
@@ -48,57 +49,67 @@ use watch_runner::WatchRunner;
 pub use crate::dashboard::model::Colors;
 pub use diagnose::{TerminalReport, diagnose};
 
-/// Parameters of a dashboard.
+/// Parameters with which a dashboard is run.
 pub struct Setup {
-    /// The scene file. An unreadable file is given by its path and errors.
+    /// Scene file. An unreadable file is given by its path and errors.
     pub file: Result<SceneFile, (PathBuf, SceneErrors)>,
-    /// Checkpoint of this scene to continue.
+    /// Checkpoint of this scene whose render is continued; `None` for a new render.
     pub checkpoint: Option<Checkpoint>,
-    /// Folder for recovery files that cannot be written beside their scene file.
+    /// Folder for recovery files that cannot be written beside their scene file; `None` if there is
+    /// none.
     pub state: Option<PathBuf>,
     /// Number of tracing threads, at least 1.
     pub threads: usize,
     /// Options of scene compilation and sampling.
     pub options: Options,
-    /// Settings of sample allocation, and the initial stop criteria.
+    /// Settings of sample allocation (how samples are distributed over the picture), and the
+    /// initial stop criteria.
     pub settings: Settings,
     /// Settings of the terminal.
     pub terminal: TerminalSetup,
-    /// CSV file to write input latencies to; `None` to measure none.
+    /// Path of the CSV file to which input latencies are written; `None` to measure none.
     pub trace: Option<PathBuf>,
 }
 
-/// Settings of the terminal.
+/// Settings of the terminal, from the command line and the environment.
 #[derive(Debug)]
 pub struct TerminalSetup {
-    /// Colour depth of the terminal; `None` to use the detected one.
+    /// Set of colours that is used on the terminal; `None` to use the detected one.
     pub colors: Option<Colors>,
-    /// Terminal-related environment variables.
+    /// Environment variables that describe the terminal.
     pub environment: Environment,
-    /// Fixed bandwidth in bytes per second; `None` to adapt to the connection.
+    /// Fixed rate of output in bytes per second; `None` to adapt it to the connection.
     pub bandwidth: Option<f64>,
 }
 
-/// Result of running a dashboard.
+/// Result of a dashboard session that has ended.
 #[derive(Debug)]
 pub struct Ended {
-    /// Exit status, if a signal has ended the dashboard.
+    /// Exit status if a signal or the loss of the terminal has ended the dashboard; `None` if the
+    /// user has quit.
     pub signalled: Option<u8>,
-    /// Results of exports that finished after the screen was restored.
+    /// Image or error of each export that ended after the screen was restored.
     pub exported: Vec<Result<Exported, String>>,
-    /// Path of the recovery file, if there are unsaved edits. The next start offers to recover
-    /// them. The error explains why unsaved edits are lost.
+    /// Path of the recovery file with the unsaved edits, which the next start offers to recover.
+    /// `None` if all edits are saved. The error explains why unsaved edits are lost.
     pub kept: Result<Option<PathBuf>, String>,
-    /// Results of checkpoints that were written after the screen was restored.
+    /// Path or error of each checkpoint that was written after the screen was restored.
     pub checkpoints: Vec<Result<PathBuf, String>>,
     /// Lines of the summary of input latencies; empty unless [`Setup::trace`] is set.
     pub latencies: Vec<String>,
 }
 
+impl Ended {
+    fn new(signalled: Option<u8>, kept: Result<Option<PathBuf>, String>) -> Self {
+        let (exported, checkpoints, latencies) = Default::default();
+        Self { signalled, exported, kept, checkpoints, latencies }
+    }
+}
+
 /// Runs a dashboard on the terminal of stdin and stdout until the user quits or a signal arrives.
 pub fn run(setup: Setup) -> io::Result<Ended> {
     let Setup { file, checkpoint, state, threads, options, settings, terminal, trace } = setup;
-    let (start, file) = match file {
+    let (scene, file) = match file {
         Ok(file) => (Ok(Arc::new(file.document().scene().clone())), Ok(file)),
         Err((path, errors)) => (Err(errors), Err(path)),
     };
@@ -106,48 +117,33 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         Ok(file) => (file.path().map(PathBuf::from), file.document().name().to_string()),
         Err(path) => (Some(path.clone()), String::new()),
     };
-    let mut effects = EffectRunner::new(EffectSetup { file, state, threads, options, settings })?;
-    if let Ok(scene) = &start {
-        // Rendering starts while the terminal is probed.
+    let mut effects = EffectRunner::new(file, state, threads, options, settings)?;
+    if let Ok(scene) = &scene {
+        // Rendering starts while the terminal replies to the capability queries.
         match checkpoint {
             Some(checkpoint) => effects.resume(Arc::clone(scene), checkpoint),
             None => drop(effects.show(Arc::clone(scene))),
         }
     }
-    let start = Start {
-        path,
-        name,
-        scene: start,
-        screen: [0; 2],
-        colors: Colors::True,
-        stop: settings.stop,
-        threads,
-        max_threads: std::thread::available_parallelism().map_or(threads, usize::from),
-    };
-    run_on_terminal(Box::new(effects), start, terminal, trace)
+    let mut model = Model::new(path, &name, scene, settings.stop, threads);
+    model.max_threads = std::thread::available_parallelism().map_or(threads, usize::from);
+    run_on_terminal(Box::new(effects), model, terminal, trace)
 }
 
 /// Shows `films`, which other processes write, until the user quits or a signal arrives. `threads`
 /// threads compute noise estimates and pictures; none of them traces.
 pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
-    let start = Start {
-        path: None,
-        name: String::new(),
-        scene: Ok(Arc::default()),
-        screen: [0; 2],
-        colors: Colors::True,
-        stop: Stop::default(),
-        threads,
-        max_threads: threads,
-    };
+    let model = Model::new(None, "", Ok(Arc::default()), Stop::default(), threads);
     let effects = WatchRunner::new(films, threads)?;
-    run_on_terminal(Box::new(effects), start, terminal, None)
+    run_on_terminal(Box::new(effects), model, terminal, None)
 }
 
-/// Runs a dashboard. Size and colours of the terminal replace those of `start`.
+/// Runs a dashboard with the model `model`, whose effects are executed by `effects`. The screen
+/// size and the colours in `model` are replaced by those of the terminal. `trace` is the path of
+/// the file for input latencies.
 fn run_on_terminal(
     effects: Box<dyn Effects>,
-    start: Start,
+    mut model: Model,
     terminal: TerminalSetup,
     trace: Option<PathBuf>,
 ) -> io::Result<Ended> {
@@ -155,20 +151,15 @@ fn run_on_terminal(
     let signals = signals::block()?;
     let screen = Screen::enter()?;
     let signals = signals::watch(signals, screen.tty(), signals::PATIENCE)?;
-    let mut keyboard = Keyboard::new(&environment);
+    let mut input = InputReader::new(&environment);
     let ending = || signals.is_ending();
-    let probed = probe(&screen.tty(), &mut keyboard, environment, &ending);
-    let Ok((terminal, screen_size)) = probed.and_then(|terminal| Ok((terminal, size()?))) else {
-        return Ok(Ended {
-            signalled: Some(HUNG_UP),
-            exported: Vec::new(),
-            kept: Ok(None),
-            latencies: Vec::new(),
-            checkpoints: Vec::new(),
-        });
+    let capabilities = query_capabilities(&screen.tty(), &mut input, environment, &ending);
+    let Ok((terminal, screen_size)) = capabilities.and_then(|terminal| Ok((terminal, size()?)))
+    else {
+        return Ok(Ended::new(Some(HUNG_UP), Ok(None)));
     };
-    let colors = colors.unwrap_or(terminal.colors);
-    let model = Model::new(Start { screen: screen_size, colors, ..start });
+    model.screen = screen_size;
+    model.colors = colors.unwrap_or(terminal.colors);
     let mut dashboard = Dashboard {
         model,
         effects,
@@ -190,13 +181,9 @@ fn run_on_terminal(
     }
     // The resize passes the raster size on to the renderer.
     dashboard.dispatch(Message::Resize(dashboard.model.screen));
-    let input = input::read(keyboard)?;
-    let terminal_io = TerminalIo {
-        tty: screen.tty(),
-        input,
-        signals: signals.events,
-        left: screen.left().clone(),
-    };
+    let input = input::read(input)?;
+    let terminal_io =
+        TerminalIo { tty: screen.tty(), input, signals: signals.events, left: screen.left.clone() };
     let result = dashboard.watch(&terminal_io);
     // Only the user's own end waits for pictures that are being written.
     let deadline = (!matches!(result, Ok(None))).then(|| Instant::now() + signals::ENDED_WITHIN);
@@ -209,13 +196,7 @@ fn run_on_terminal(
     // The screen is restored before the remaining files are written, which may take a while.
     drop(screen);
     let (finished, kept) = dashboard.effects.finish(deadline);
-    let mut ended = Ended {
-        signalled: result?,
-        exported: Vec::new(),
-        kept,
-        checkpoints: Vec::new(),
-        latencies: Vec::new(),
-    };
+    let mut ended = Ended::new(result?, kept);
     for message in finished {
         match message {
             Message::Exported(result) => ended.exported.push(result),
@@ -238,22 +219,22 @@ struct Dashboard {
     terminal: Capabilities,
     latency: LatencyRecorder,
     began: Instant,
-    /// Generation number of the scene that the visible picture shows.
+    /// Generation of the visible picture: the version number of the scene that it shows.
     shown: u64,
     /// Counter that increases when the picture is replaced by a different one. It stays when more
     /// samples refine the same picture.
     image_epoch: u64,
-    /// Debounce of resize signals.
+    /// Changes of the terminal's size that have not taken effect yet.
     resizing: ResizeDebounce,
     /// Time at which the model last received the connection's status or upload progress.
     status_sent_at: Duration,
-    /// `true` if rendering is paused because the connection is silent.
+    /// `true` if rendering is paused because the terminal no longer replies.
     resting: bool,
-    /// `true` if the model has changed since the last frame.
+    /// `true` if the model has changed since the last frame was drawn.
     changed: bool,
-    /// `true` if the program is suspended after the current messages.
+    /// `true` if the program is to be suspended after the messages that are being handled.
     suspend: bool,
-    /// `true` if the program quits after the current messages.
+    /// `true` if the program is to quit after the messages that are being handled.
     quit: bool,
 }
 
@@ -263,10 +244,10 @@ impl Dashboard {
     fn watch(&mut self, terminal_io: &TerminalIo) -> io::Result<Option<u8>> {
         let wakeup = self.effects.wakeup().clone();
         let done = self.effects.done().clone();
-        let written = self.frames.written().clone();
+        let written = self.frames.writer.written.clone();
         let silence = never();
         let mut waiting = Vec::new();
-        // Signals that arrived during the terminal probe are handled before the first frame.
+        // Signals that arrived during the capability query are handled before the first frame.
         while let Ok(event) = terminal_io.signals.try_recv() {
             if let Some(status) = self.handle_signal(event, terminal_io) {
                 return Ok(Some(status));
@@ -316,7 +297,7 @@ impl Dashboard {
                 self.enqueue(event, &mut waiting);
             }
             for Input { at, message } in waiting.drain(..) {
-                self.frames.act(self.began.elapsed());
+                self.frames.flow.record_input(self.began.elapsed());
                 let scene = self.dispatch(message);
                 self.latency.event(at, scene);
             }
@@ -333,17 +314,17 @@ impl Dashboard {
     }
 
     /// Handles a terminal reply at once, and appends user input to `waiting`.
-    fn enqueue(&mut self, Timed { at, event }: Timed, waiting: &mut Vec<Input>) {
+    fn enqueue(&mut self, TimedEvent { at, event }: TimedEvent, waiting: &mut Vec<Input>) {
         let message = match event {
             Event::Key(key) => Message::Key(key),
             Event::Mouse(mouse) => Message::Mouse(mouse),
             Event::Paste(text) => Message::Paste(text),
             Event::Reply(Reply::Cursor { .. }) => {
-                self.frames.acknowledged(at.saturating_duration_since(self.began));
+                self.frames.flow.on_ack(at.saturating_duration_since(self.began));
                 return;
             }
             Event::Reply(reply @ (Reply::Graphics(true) | Reply::Version(_))) => {
-                // Replies that pass through a multiplexer may arrive after the probe.
+                // Replies that pass through a multiplexer may arrive after the capability query.
                 self.terminal.learn(&reply);
                 return;
             }
@@ -354,21 +335,22 @@ impl Dashboard {
 
     /// Waits for outstanding replies of the terminal before it is restored. Otherwise the shell
     /// would read the replies as input.
-    fn await_answers(&mut self, input: &Receiver<io::Result<Timed>>) {
-        let end = self.frames.awaits().map(|wait| Instant::now() + wait);
+    fn await_answers(&mut self, input: &Receiver<io::Result<TimedEvent>>) {
+        let end = self.frames.flow.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
             match input.recv_timeout(left) {
                 Ok(Ok(event)) => self.enqueue(event, &mut Vec::new()),
                 _ => break,
             }
-            if !self.frames.is_waiting() {
+            if !self.frames.flow.is_waiting() {
                 break;
             }
         }
     }
 
-    /// Updates the model with a message and executes the resulting effects. Returns the generation
-    /// number of the new scene if the response to the message needs a newly rendered picture.
+    /// Updates the model with a message and executes the resulting effects. If the response to the
+    /// message needs a newly rendered picture, returns the generation of the new scene (the number
+    /// of its version), otherwise `None`.
     fn dispatch(&mut self, message: Message) -> Option<u64> {
         let mut awaited = None;
         let is_snapshot = matches!(message, Message::Snapshot(_));
@@ -420,8 +402,8 @@ impl Dashboard {
         }
     }
 
-    /// Returns the time until a frame with a new snapshot may be sent. Returns `None` while the
-    /// last frame is still being written.
+    /// Returns the time from now until a frame with a new picture may be sent. Returns `None` while
+    /// the last frame is still being written.
     fn wants_snapshot(&self) -> Option<Duration> {
         let now = self.began.elapsed();
         let due = self.frames.snapshot_due(now, self.latency.replies(u64::MAX));
@@ -435,8 +417,8 @@ impl Dashboard {
         }
     }
 
-    /// Draws a frame if differences are pending and the connection has room. Returns the time until
-    /// the next frame or timeout. Returns `None` if neither is due before the next event.
+    /// Draws a frame if one is due and the connection has room for it. Returns the time from now
+    /// until the next frame or timeout. Returns `None` if neither is due before the next event.
     fn draw(&mut self) -> Option<Duration> {
         let now = self.began.elapsed();
         if let Some(due) = self.resizing.due() {
@@ -446,7 +428,7 @@ impl Dashboard {
             self.resize();
         }
         self.frames.look(now);
-        let reading = self.frames.reading();
+        let reading = self.frames.flow.reading();
         let mode = |link: &Option<LinkStatus>| link.as_ref().map(|link| link.mode);
         let mode_changed = mode(&reading) != mode(&self.model.link);
         if mode_changed || self.changed && self.status_sent_at + STATUS_INTERVAL <= now {
@@ -484,14 +466,15 @@ impl Dashboard {
                 };
             }
         }
-        let measures_at = self.frames.measures_at(now);
+        let measures_at = self.frames.flow.measures_at(now);
         let silent_at = self.rest(now);
         let times = [self.model.next_timeout(), due, measures_at, silent_at];
         times.into_iter().flatten().min().map(|at| at.saturating_sub(now))
     }
 
-    /// Pauses rendering while the connection is silent, because pictures would not arrive. Returns
-    /// the time at which rendering will be paused if nothing is received until then.
+    /// Pauses rendering while the terminal does not reply, because pictures would not arrive.
+    /// Returns the time at which rendering will be paused if no reply arrives until then. Returns
+    /// `None` if rendering is paused for this reason already, or if no reply is expected.
     fn rest(&mut self, now: Duration) -> Option<Duration> {
         let silent_at = self.frames.silent_at();
         let is_silent = silent_at.is_some_and(|at| at <= now);
@@ -502,9 +485,11 @@ impl Dashboard {
     }
 }
 
-/// Minimum interval between updates of the connection's status and upload progress on the screen.
+/// Shortest interval between updates of the connection's status and of the upload's progress on the
+/// screen.
 const STATUS_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Default stop criterion: a noise of 0.5 8-bit levels, half a quantisation step of the image file.
+/// Default stop criterion: noise of half an 8-bit level, which is half a quantisation step of the
+/// image file.
 pub const DEFAULT_STOP: Stop =
     Stop { spp: None, noise_codes: Some(0.5), rmse_linear: None, seconds: None };

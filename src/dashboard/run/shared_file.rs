@@ -1,9 +1,9 @@
-//! The scene file as last read or written, shared between threads.
+//! Handle of the scene file as last read or written, shared between threads.
 
 use crate::scene::{Recovery, SceneFile};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Shared handle of the scene file. No lock is held during disk access.
+/// Shared handle of the scene file as last read or written. No lock is held during disk access.
 #[derive(Clone)]
 pub struct SharedFile(Arc<Mutex<State>>);
 
@@ -13,23 +13,26 @@ struct State {
 }
 
 impl SharedFile {
-    /// Creates a handle without a file. `elsewhere` writes recovery files to the state folder.
+    /// Creates a handle without a scene file. `elsewhere` is the writer of recovery files in the
+    /// state folder.
     pub fn new(elsewhere: Recovery) -> Self {
         Self(Arc::new(Mutex::new(State { file: None, elsewhere })))
     }
 
-    /// Returns the file. Returns `None` if it has never been readable.
+    /// Returns the scene file as last read or written. Returns `None` if it has never been
+    /// readable.
     pub fn get(&self) -> Option<Arc<SceneFile>> {
         self.state().file.clone()
     }
 
-    /// Sets the file.
+    /// Sets the scene file that [`SharedFile::get`] returns.
     pub fn put(&self, file: &SceneFile) {
         let file = Some(Arc::new(file.clone()));
         self.state().file = file;
     }
 
-    /// Returns the writer of recovery files in the state folder.
+    /// Returns the writer of recovery files in the user's state folder, for use if the disk of the
+    /// scene file does not respond.
     pub fn elsewhere(&self) -> Recovery {
         self.state().elsewhere.elsewhere()
     }

@@ -12,11 +12,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-/// Grace period of the dashboard after a terminating signal.
+/// Grace period after a terminating signal. If the dashboard has not ended by then, the thread that
+/// handles signals restores the terminal and ends the program.
 pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Time within which the dashboard ends after a terminating signal even if the renderer is busy, so
-/// that it can report where unsaved edits are kept.
+/// Longest time from a terminating signal to the end of the dashboard, even if the renderer is
+/// busy. It is shorter than the grace period, so that the program can still report where unsaved
+/// edits are kept.
 pub(super) const ENDED_WITHIN: Duration = Duration::from_secs(4);
 
 /// Number that is added to the number of a signal to form the exit status, as in shells.
@@ -28,19 +30,19 @@ pub(super) const HUNG_UP: u8 = (SIGNALLED + SIGHUP) as u8;
 /// Meaning of a signal for the event loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SignalEvent {
-    /// The program is to end with this exit status: 129, 130, 131 or 143.
+    /// End of the program with this exit status: 129, 130, 131 or 143.
     End(u8),
-    /// The terminal may have a new size.
+    /// Possible change of the terminal's size (SIGWINCH).
     Resized,
-    /// The program is to stop until it is continued (SIGTSTP).
+    /// Suspension of the program until it is continued (SIGTSTP).
     Stop,
-    /// The program has been continued (SIGCONT).
+    /// Continuation of the program after a suspension (SIGCONT).
     Continue,
 }
 
-/// Stream of signal events.
+/// Signals to the process, as events.
 pub(super) struct Signals {
-    /// Receiver of the events, in the order of the signals.
+    /// Receiver of the signal events, in the order of the signals.
     pub events: Receiver<SignalEvent>,
     /// `true` after a terminating signal has arrived.
     ending: Arc<AtomicBool>,
@@ -53,18 +55,18 @@ impl Signals {
     }
 }
 
-/// Processes to stop.
+/// Processes to suspend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum StopTarget {
-    /// This process.
+    /// This process alone.
     Itself,
-    /// The process group, as for Ctrl-Z in a shell.
+    /// All processes of this process's group, which Ctrl-Z in a shell suspends.
     Group,
 }
 
 /// Registers signal handlers, which queue signals until [`watch`] handles them. Must be called
 /// before the terminal enters raw mode, because the default handlers would end the program without
-/// restoring it.
+/// leaving this mode.
 pub(super) fn block() -> io::Result<iterator::Signals> {
     iterator::Signals::new([SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])
 }
@@ -100,9 +102,10 @@ pub(super) fn watch(
     Ok(Signals { events, ending })
 }
 
-/// Stops the processes of `target`, possibly with a delay. It sends SIGTTIN, because SIGTSTP has a
-/// handler in this program. Without a shell that could continue the processes, nothing happens: in
-/// orphaned process groups the kernel ignores every stop signal except SIGSTOP.
+/// Stops the processes of `target`; they may still run for a moment after the return. The signal is
+/// SIGTTIN, because SIGTSTP has a handler in this program. Without a shell that could continue the
+/// processes, nothing happens: in orphaned process groups the kernel ignores every stop signal
+/// except SIGSTOP.
 pub(super) fn stop(target: StopTarget) -> io::Result<()> {
     match target {
         StopTarget::Itself => kill_process(getpid(), Signal::TTIN)?,

@@ -1,15 +1,15 @@
-//! Execution of effects while files are watched: the picture is displayed and exported; there is no
+//! Execution of effects in `zerkalo watch`: the picture is displayed and exported; there is no
 //! scene to edit or render.
 
 use crate::dashboard::message::{Effect, Exported, Format, Message};
 use crate::dashboard::run::effects::{Effects, Outcome, run_on_terminal};
-use crate::dashboard::run::exporter::stem;
+use crate::dashboard::run::export_paths;
+use crate::dashboard::run::exporter::{exported, stem};
 use crate::dashboard::run::frames::FramePipeline;
-use crate::dashboard::run::paths;
 use crate::film::file::FilmFileHeader;
 use crate::film::{Depth, Film, ImageData, ImageOutput, LinearImage, WholeFilm};
 use crate::render::plan::WatchedFilms;
-use crate::render::session::{Report, Snapshot, View, WatchSession};
+use crate::render::session::{Report, Snapshot, WatchSession};
 use crate::terminal::Capabilities;
 use crossbeam_channel::{Receiver, Sender, unbounded};
 use std::io;
@@ -20,18 +20,17 @@ use std::time::{Duration, Instant};
 /// Longest wait for the first report on the watched files.
 const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
 
-/// Executor of effects that shows watched files.
+/// Executor of effects in `zerkalo watch`, which shows film files of other processes.
 pub struct WatchRunner {
     session: WatchSession,
-    view: View,
-    /// Number of exports that have not been written yet.
+    /// Number of exported images that have not been written yet.
     exporting: usize,
     results: Sender<Message>,
     done: Receiver<Message>,
 }
 
 impl WatchRunner {
-    /// Starts the thread that reads the files.
+    /// Starts the thread that reads the watched film files.
     pub fn new(films: WatchedFilms, threads: usize) -> io::Result<Self> {
         let (results, done) = unbounded();
         let reports = results.clone();
@@ -43,7 +42,7 @@ impl WatchRunner {
         if let Ok(report) = done.recv_timeout(FIRST_REPORT_WITHIN) {
             let _ = results.send(report);
         }
-        Ok(Self { session, view: View::default(), exporting: 0, results, done })
+        Ok(Self { session, exporting: 0, results, done })
     }
 
     fn export(&mut self, format: Format) {
@@ -59,7 +58,8 @@ impl WatchRunner {
     }
 }
 
-/// Writes a picture to a file with the next free name. The name begins with that of the scene file.
+/// Writes the picture of `film` to a file with the next free name. The name begins with that of the
+/// scene file.
 fn write(
     film: &Film,
     header: &FilmFileHeader,
@@ -79,16 +79,8 @@ fn write(
         let mut bands = WholeFilm { film, metadata: &header.metadata };
         ImageOutput::from_path(path)?.create_new().write(&image, &mut bands)
     };
-    let path = paths::numbered(Path::new(""), &stem, format.extension(), create)
-        .ok_or_else(|| format!("all names for pictures of {stem} are in use"))?
-        .map_err(|error| error.to_string())?;
-    Ok(Exported {
-        scp: paths::scp(&path),
-        path,
-        size: [film.width(), film.height()],
-        spp: report.spp.mean,
-        noise_codes: report.noise.map(|noise| noise.rmse_codes),
-    })
+    let path = export_paths::numbered(Path::new(""), &stem, format.extension(), create)?;
+    Ok(exported(path, film, report))
 }
 
 impl Effects for WatchRunner {
@@ -119,14 +111,7 @@ impl Effects for WatchRunner {
         terminal: &Capabilities,
     ) -> Outcome {
         match effect {
-            Effect::Raster(raster) => {
-                self.view.raster = Some(raster);
-                self.session.set_view(self.view);
-            }
-            Effect::Probe(pixel) => {
-                self.view.probe = pixel;
-                self.session.set_view(self.view);
-            }
+            Effect::View(view) => self.session.set_view(view),
             Effect::Display(display) => self.session.set_display(display),
             Effect::Pin => {
                 let results = self.results.clone();

@@ -1,4 +1,4 @@
-//! Threads with a limited wait for their end.
+//! Threads whose end is awaited for a limited time.
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, bounded};
 use std::io;
@@ -23,8 +23,8 @@ impl Worker {
         Ok(Self { thread, ended })
     }
 
-    /// Waits for the end of the thread, for at most `patience`; `Duration::MAX` means without
-    /// limit. Returns `false` if it has not ended.
+    /// Waits for the end of the thread for at most `patience`, or without limit if this is
+    /// `Duration::MAX`. Returns `true` if the thread has ended.
     pub fn join_within(self, patience: Duration) -> bool {
         if self.ended.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {
             return false;

@@ -7,20 +7,22 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Instant;
 
-/// Result of writing a frame.
+/// Result of writing a frame to the terminal.
 pub struct Written {
-    /// Time at which the write was completed.
+    /// Time at which writing to the terminal was completed.
     pub at: Instant,
-    /// Result of the write.
+    /// Success, or the error of writing to the terminal.
     pub result: io::Result<()>,
-    /// Buffer of the frame, to be reused.
+    /// Buffer that held the frame, to be reused.
     buffer: Vec<u8>,
 }
 
-/// Handle of the thread that writes one frame at a time.
+/// Handle of the thread that writes frames to the terminal, one at a time.
 pub struct Writer {
     frames: Sender<Vec<u8>>,
-    written: Receiver<Written>,
+    /// Receiver of the results of writing frames, one for each frame. Each result must be passed to
+    /// [`Writer::done`].
+    pub written: Receiver<Written>,
     /// `true` if a frame is being written.
     in_flight: bool,
     /// Empty buffer, for reuse by the next frame.
@@ -28,7 +30,7 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Starts the thread, which writes to `tty`.
+    /// Starts the thread that writes frames to `tty`.
     pub fn new(tty: Arc<Tty>) -> io::Result<Self> {
         let (frames, inbox) = bounded::<Vec<u8>>(1);
         let (outbox, written) = bounded(1);
@@ -59,20 +61,15 @@ impl Writer {
         self.spare = buffer;
     }
 
-    /// Passes a frame to the thread. Requires [`Writer::ready`].
+    /// Passes a frame to the writing thread. Requires [`Writer::ready`].
     pub fn send(&mut self, frame: Vec<u8>) {
         debug_assert!(self.ready(), "one frame at a time");
         // Sending fails only after a panic of the thread.
         self.in_flight = self.frames.send(frame).is_ok();
     }
 
-    /// Returns the receiver of the results of writing frames. Each result must be passed to
-    /// [`Writer::done`].
-    pub fn written(&self) -> &Receiver<Written> {
-        &self.written
-    }
-
-    /// Records that a frame was written. Returns the time at which the write was completed.
+    /// Records that a frame was written to the terminal. Returns the time at which the write was
+    /// completed.
     ///
     /// # Errors
     /// Fails if the write failed.

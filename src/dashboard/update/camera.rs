@@ -7,22 +7,24 @@ use crate::scene::edit::{
     Edit, EditError, Target, bounds, pivot_distance, recall_view, scene_bounds, step_length,
 };
 
-/// Degrees per step of an orbit or a roll.
+/// Angle in degrees of one step of orbiting or rolling the camera.
 const ORBIT_DEGREES: f64 = 5.0;
-/// Degrees per step of a look.
+/// Angle in degrees of one step of turning the camera about the eye.
 const LOOK_DEGREES: f64 = 3.0;
-/// Step of a pan, as a fraction of the distance between camera and pivot (the point that the camera
-/// orbits).
+/// Length of one step of panning the camera, as a fraction of the distance between camera and pivot
+/// (the point that the camera orbits).
 const PAN_SHARE: f64 = 0.05;
-/// Factor by which a coarse dolly step towards the pivot multiplies the distance to it.
+/// Factor of the distance between the camera and its pivot (the point that it orbits) for a coarse
+/// step towards the pivot.
 const DOLLY: f64 = 0.9;
-/// Factor by which a fine dolly step towards the pivot multiplies the distance to it.
+/// Factor of the distance between the camera and its pivot (the point that it orbits) for a fine
+/// step towards the pivot.
 const DOLLY_FINE: f64 = 0.99;
-/// Factor by which a zoom step inwards multiplies the visible width.
+/// Factor by which a zoom step inwards multiplies the width of the camera's view.
 const ZOOM: f64 = 0.95;
 
-/// Returns the components of a direction: to the right and upwards. Both are 0 for directions along
-/// the view direction.
+/// Returns the components of `direction` on the screen, to the right and upwards. Each is one
+/// of -1, 0 and 1. Both are 0 for directions along the view direction.
 fn right_up(direction: Direction) -> [f64; 2] {
     match direction {
         Direction::Left => [-1.0, 0.0],
@@ -34,9 +36,10 @@ fn right_up(direction: Direction) -> [f64; 2] {
 }
 
 impl UpdateContext<'_> {
-    /// Replaces the camera by the result of `f`, whose arguments are the camera and the distance to
-    /// the pivot. Camera moves of all kinds have the same label, so consecutive ones can merge into
-    /// one undo step.
+    /// Replaces the camera by the result of `f`. The arguments of `f` are the camera and the
+    /// distance from the eye to the pivot, the point that the camera orbits. `coalesce` decides if
+    /// the move joins the previous undo step. All camera moves have the same label, so that moves
+    /// of different kinds can form one undo step.
     pub(super) fn set_camera(&mut self, coalesce: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
         let scene = self.scene();
         let camera = f(&scene.camera, pivot_distance(scene));
@@ -69,7 +72,8 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
     }
 
-    /// Dollies by `ticks` of the wheel. Positive ticks move the camera nearer.
+    /// Moves the camera by `ticks` of the mouse wheel: nearer to its pivot (the point that it
+    /// orbits) if they are positive, otherwise farther away.
     pub(super) fn dolly_by_wheel(&mut self, ticks: i32) {
         let factor = DOLLY.powi(ticks.clamp(-50, 50));
         self.set_camera(Coalesce::Repeat, |camera, distance| camera.dolly(factor, distance));
@@ -96,7 +100,7 @@ impl UpdateContext<'_> {
         self.set_camera(Coalesce::Repeat, |camera, _| camera.roll(degrees));
     }
 
-    /// Widens the view angle by `steps` steps. Negative steps narrow it.
+    /// Widens the camera's view angle by `steps` steps. Negative steps narrow it.
     pub(super) fn view_angle(&mut self, steps: i32) {
         self.set_camera(Coalesce::Repeat, |camera, _| camera.zoom(ZOOM.powi(-steps)));
         let (key, degrees) = self.scene().camera.view_angle.key_degrees();
@@ -104,7 +108,7 @@ impl UpdateContext<'_> {
     }
 
     /// Moves the camera so that the selection fills the picture. If the selection has no bounds,
-    /// the scene does.
+    /// the whole scene fills it.
     pub(super) fn frame(&mut self) {
         let scene = self.scene();
         let ball = bounds(scene, &self.model.selection).unwrap_or_else(|| scene_bounds(scene));
@@ -134,8 +138,9 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Orbits by a drag of `right` and `down` half cells. The scene moves in the direction of the
-    /// drag. A drag across the full width of the picture is half a turn.
+    /// Orbits the camera by a drag of `right` and `down` half cells (upper or lower halves of
+    /// terminal cells). The scene moves in the direction of the drag. A drag across the full width
+    /// of the picture turns it by 180 degrees.
     pub(super) fn orbit_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(180.0);
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -143,8 +148,9 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Looks around by a drag of `right` and `down` half cells. A drag across the full width of the
-    /// picture is a quarter turn.
+    /// Turns the camera about the eye by a drag of `right` and `down` half cells (upper or lower
+    /// halves of terminal cells). A drag across the full width of the picture turns it by 90
+    /// degrees.
     pub(super) fn look_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(90.0);
         self.set_camera(Coalesce::Gesture, |camera, _| {
@@ -152,8 +158,9 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Pans by a drag of `right` and `down` half cells. Points at the distance of the pivot stay
-    /// under the mouse.
+    /// Pans the camera by a drag of `right` and `down` half cells (upper or lower halves of
+    /// terminal cells). Points as far from the eye as the pivot, the point that the camera orbits,
+    /// stay under the mouse.
     pub(super) fn pan_by_hand(&mut self, right: f64, down: f64) {
         let share = self.per_half_cell(2.0 * self.half_width());
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -161,15 +168,16 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Returns half the visible width at distance 1.
+    /// Returns half the width of the camera's view at distance 1 from the eye, in scene units.
     pub(super) fn half_width(&self) -> f64 {
         let scene = self.scene();
         let [width, height] = scene.film.size.map(f64::from);
         scene.camera.half_size(width / height)[0]
     }
 
-    /// Returns the amount for a drag of one half cell. `across` is the amount for a drag across the
-    /// full width of the picture.
+    /// Returns the size of the camera movement for a drag of one half cell (upper or lower half of
+    /// a terminal cell). `across` is its size for a drag across the full width of the picture.
+    /// Returns 0 if the terminal is too small for a picture.
     pub(super) fn per_half_cell(&self, across: f64) -> f64 {
         self.model.layout().map_or(0.0, |layout| across / layout.raster[0] as f64)
     }

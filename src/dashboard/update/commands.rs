@@ -1,6 +1,6 @@
 //! Command table: each row is a command with its keys, label, hints, availability and function.
 //!
-//! Key dispatch, hint line, help, palette and docs/keys.md are derived from the table.
+//! Key dispatch, hint line, help, command palette and docs/keys.md are derived from the table.
 
 use crate::dashboard::key_context::KeyContext::{self, *};
 use crate::dashboard::message::{Effect, Format};
@@ -14,57 +14,45 @@ use std::collections::HashMap;
 use std::sync::OnceLock;
 use {Chapter as C, HintLine as H};
 
-/// Chapters of the help.
+/// Chapter of the help, which groups commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Chapter {
-    /// Camera and viewpoints.
+    /// Chapter of commands on the camera and on stored cameras.
     Camera,
-    /// Lights.
+    /// Chapter of commands on lights.
     Light,
-    /// The mirror.
+    /// Chapter of commands on the mirror: the reflecting material of the selection or the scene.
     Mirror,
-    /// Objects.
+    /// Chapter of commands on objects.
     Objects,
-    /// Panels, fields and the selection.
+    /// Chapter of commands on panels, on properties and on the selection.
     Panels,
-    /// Undo, files and quitting.
+    /// Chapter of commands on undo, files and quitting.
     File,
-    /// Display, export and comparison of the picture.
+    /// Chapter of commands on display, export and comparison of the picture.
     Picture,
-    /// Progress and resources of rendering.
+    /// Chapter of commands on progress and resources of rendering.
     Render,
-    /// Help.
+    /// Chapter of commands that open the help.
     Help,
 }
 
 /// State of the dashboard that selects the hints in the hint line, the last row of the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum HintLine {
-    /// No key has been pressed yet.
+    /// State before the first key is pressed.
     First,
-    /// The picture has the focus.
-    Picture,
-    /// The selection is being moved.
-    Moving,
-    /// The selection is being turned.
-    Turning,
-    /// The camera flies.
-    Flying,
-    /// The probe moves over the picture.
-    Probing,
-    /// The outline has the focus.
-    Outline,
-    /// The inspector has the focus.
-    Inspector,
-    /// A list or question is open.
+    /// State in which no overlay is open and keys are looked up in this context.
+    In(KeyContext),
+    /// State in which a list or a question is open.
     List,
-    /// A form is open.
+    /// State in which a form for a new object or light is open.
     Form,
-    /// Text is being typed.
+    /// State in which the user types text.
     Typing,
-    /// The help or the inventory is open.
+    /// State in which the help or the list of scene features is open.
     Reading,
-    /// Files are watched.
+    /// State in which film files are watched (`zerkalo watch`).
     Watching,
 }
 
@@ -72,40 +60,41 @@ pub enum HintLine {
 /// commands, such as those of all arrow keys.
 #[derive(Clone, Copy, Debug)]
 pub struct Hint {
-    /// States in which the hint is shown.
+    /// States of the dashboard in which the hint line contains this hint.
     pub lines: &'static [HintLine],
     /// Position of the hint in the hint line; smaller numbers come first.
     pub position: u8,
-    /// Keys as displayed, such as `PgUp PgDn`.
+    /// Keys as the hint shows them, such as `PgUp PgDn`.
     pub keys: &'static str,
     /// Effect of the keys, in a word or two.
     pub text: &'static str,
 }
 
-/// A row of the command table.
+/// Command of the dashboard: a row of the command table.
 #[derive(Clone, Copy, Debug)]
 pub struct Command {
-    /// Chapter of the help.
+    /// Chapter of the help that lists the command.
     pub chapter: Chapter,
-    /// Description in a few words, for help, palette and docs/keys.md. Unique.
+    /// Description in a few words, for help, command palette and docs/keys.md. No other command has
+    /// the same.
     pub label: &'static str,
     /// Contexts of the command, each with the names of its keys there, separated by spaces. A
-    /// command without keys runs only from the palette.
+    /// command without keys runs only from the command palette.
     pub keys: &'static [(KeyContext, &'static str)],
-    /// Hints in the hint line. They may also describe related commands, which then have no hints of
-    /// their own.
+    /// Hints about the command in the hint line. They may also describe related commands, which
+    /// then have no hints of their own.
     pub hints: &'static [Hint],
-    /// `true` if the command runs while a value is being typed, which stays as it is. Other
-    /// commands first apply the value.
+    /// `true` if the command itself handles a value that is being typed, as the commands of Enter
+    /// and Esc do. For all other commands, the typed value is applied before they run.
     pub(super) while_typing: bool,
     /// `true` if the command also runs in the viewer of exported images. All other keys close the
     /// viewer.
     pub(super) over_image: bool,
     /// `true` if the command also runs in `zerkalo watch`, where nothing is edited or rendered.
     pub while_watching: bool,
-    /// Returns `true` if the command can run on the model.
+    /// Function that returns `true` if the command can run on the model.
     pub(super) available: fn(&Model) -> bool,
-    /// Runs the command.
+    /// Function that runs the command.
     pub(super) run: fn(&mut UpdateContext<'_>),
 }
 
@@ -142,32 +131,33 @@ fn with_scene(model: &Model) -> bool {
     !model.file.unreadable
 }
 
-/// Returns `true` if there is a scene, or if a palette or question is open, whose answers do not
-/// need a scene.
+/// Returns `true` if there is a scene, or if the command palette or a question is open, which the
+/// user can answer without a scene.
 fn with_scene_or_choice(model: &Model) -> bool {
-    with_scene(model) || matches!(model.overlay, Some(Overlay::Palette(_) | Overlay::Question(_)))
+    with_scene(model)
+        || matches!(model.overlay, Some(Overlay::CommandPalette(_) | Overlay::Question(_)))
 }
 
 fn always(_: &Model) -> bool {
     true
 }
 
-/// Every command, in the order of the help.
+/// All commands of the dashboard, in the order of the help.
 #[rustfmt::skip] // One line per row keeps the table readable.
 pub static COMMANDS: &[Command] = &[
-    command(C::Camera, "orbit left", &[(Picture, "Left")], |c| c.orbit(Left)).hints(&[hint(&[H::First], 1, "arrows", "turn"), hint(&[H::Picture], 1, "arrows", "orbit")]),
+    command(C::Camera, "orbit left", &[(Picture, "Left")], |c| c.orbit(Left)).hints(&[hint(&[H::First], 1, "arrows", "turn"), hint(&[H::In(Picture)], 1, "arrows", "orbit")]),
     command(C::Camera, "orbit right", &[(Picture, "Right")], |c| c.orbit(Right)),
     command(C::Camera, "orbit up", &[(Picture, "Up")], |c| c.orbit(Up)),
     command(C::Camera, "orbit down", &[(Picture, "Down")], |c| c.orbit(Down)),
-    command(C::Camera, "dolly in", &[(Picture, "PageUp")], |c| c.dolly(In, Coarse)).hints(&[hint(&[H::Picture], 2, "PgUp PgDn", "dolly")]),
+    command(C::Camera, "dolly in", &[(Picture, "PageUp")], |c| c.dolly(In, Coarse)).hints(&[hint(&[H::In(Picture)], 2, "PgUp PgDn", "dolly")]),
     command(C::Camera, "dolly out", &[(Picture, "PageDown")], |c| c.dolly(Out, Coarse)),
     command(C::Camera, "dolly in, fine", &[(Picture, "Shift-PageUp")], |c| c.dolly(In, Fine)),
     command(C::Camera, "dolly out, fine", &[(Picture, "Shift-PageDown")], |c| c.dolly(Out, Fine)),
-    command(C::Camera, "pan left", &[(Picture, "Shift-Left")], |c| c.pan(Left)).hints(&[hint(&[H::Picture], 3, "Shift", "pan")]),
+    command(C::Camera, "pan left", &[(Picture, "Shift-Left")], |c| c.pan(Left)).hints(&[hint(&[H::In(Picture)], 3, "Shift", "pan")]),
     command(C::Camera, "pan right", &[(Picture, "Shift-Right")], |c| c.pan(Right)),
     command(C::Camera, "pan up", &[(Picture, "Shift-Up")], |c| c.pan(Up)),
     command(C::Camera, "pan down", &[(Picture, "Shift-Down")], |c| c.pan(Down)),
-    command(C::Camera, "look left", &[(Picture, "Ctrl-Left"), (Flying, "Left")], |c| c.look(Left)).hints(&[hint(&[H::Flying], 4, "arrows", "look")]),
+    command(C::Camera, "look left", &[(Picture, "Ctrl-Left"), (Flying, "Left")], |c| c.look(Left)).hints(&[hint(&[H::In(Flying)], 4, "arrows", "look")]),
     command(C::Camera, "look right", &[(Picture, "Ctrl-Right"), (Flying, "Right")], |c| c.look(Right)),
     command(C::Camera, "look up", &[(Picture, "Ctrl-Up"), (Flying, "Up")], |c| c.look(Up)),
     command(C::Camera, "look down", &[(Picture, "Ctrl-Down"), (Flying, "Down")], |c| c.look(Down)),
@@ -176,13 +166,13 @@ pub static COMMANDS: &[Command] = &[
     command(C::Camera, "narrower view angle", &[(Picture, "Alt-Up")], |c| c.view_angle(-1)),
     command(C::Camera, "wider view angle", &[(Picture, "Alt-Down")], |c| c.view_angle(1)),
     command(C::Camera, "fly the camera", &[(Anywhere, "w")], |c| c.enter_mode(Mode::Fly)),
-    command(C::Camera, "fly forward", &[(Flying, "w")], |c| c.fly(In)).hints(&[hint(&[H::Flying], 1, "w s", "forward, back")]),
+    command(C::Camera, "fly forward", &[(Flying, "w")], |c| c.fly(In)).hints(&[hint(&[H::In(Flying)], 1, "w s", "forward, back")]),
     command(C::Camera, "fly back", &[(Flying, "s")], |c| c.fly(Out)),
-    command(C::Camera, "fly left", &[(Flying, "a")], |c| c.fly(Left)).hints(&[hint(&[H::Flying], 2, "a d", "left, right")]),
+    command(C::Camera, "fly left", &[(Flying, "a")], |c| c.fly(Left)).hints(&[hint(&[H::In(Flying)], 2, "a d", "left, right")]),
     command(C::Camera, "fly right", &[(Flying, "d")], |c| c.fly(Right)),
-    command(C::Camera, "fly up", &[(Flying, "r PageUp")], |c| c.fly(Up)).hints(&[hint(&[H::Flying], 3, "r f", "up, down")]),
+    command(C::Camera, "fly up", &[(Flying, "r PageUp")], |c| c.fly(Up)).hints(&[hint(&[H::In(Flying)], 3, "r f", "up, down")]),
     command(C::Camera, "fly down", &[(Flying, "f PageDown")], |c| c.fly(Down)),
-    command(C::Camera, "frame the selection", &[(Anywhere, "f")], |c| c.frame()).hints(&[hint(&[H::Outline], 6, "f", "frame")]),
+    command(C::Camera, "frame the selection", &[(Anywhere, "f")], |c| c.frame()).hints(&[hint(&[H::In(Outline)], 6, "f", "frame")]),
     command(C::Camera, "reset the camera to the file", &[(Picture, "Home")], |c| c.reset_camera()),
     command(C::Camera, "open the aperture", &[(Anywhere, "*")], |c| c.aperture(1.0)),
     command(C::Camera, "close the aperture", &[(Anywhere, "/")], |c| c.aperture(-1.0)),
@@ -198,7 +188,7 @@ pub static COMMANDS: &[Command] = &[
     command(C::Camera, "go to viewpoint 8", &[(Anywhere, "8")], |c| c.recall_view(8)),
     command(C::Camera, "go to viewpoint 9", &[(Anywhere, "9")], |c| c.recall_view(9)),
 
-    command(C::Light, "select the next light", &[(Anywhere, "l")], |c| c.next_light()).hints(&[hint(&[H::Picture], 5, "l ; '", "light")]),
+    command(C::Light, "select the next light", &[(Anywhere, "l")], |c| c.next_light()).hints(&[hint(&[H::In(Picture)], 5, "l ; '", "light")]),
     command(C::Light, "light brighter", &[(Anywhere, "'")], |c| c.intensity(1.0)),
     command(C::Light, "light darker", &[(Anywhere, ";")], |c| c.intensity(-1.0)),
     command(C::Light, "light brighter, fine", &[(Anywhere, "Alt-'")], |c| c.intensity(0.1)),
@@ -206,7 +196,7 @@ pub static COMMANDS: &[Command] = &[
     command(C::Light, "light on or off", &[(Anywhere, "L")], |c| c.switch_light()),
     command(C::Light, "add a light", &[(Anywhere, "A")], |c| c.pick_light()),
 
-    command(C::Mirror, "mirror rougher", &[(Anywhere, "] .")], |c| c.roughness(1.0)).hints(&[hint(&[H::First, H::Picture], 4, "[ ]", "roughness")]),
+    command(C::Mirror, "mirror rougher", &[(Anywhere, "] .")], |c| c.roughness(1.0)).hints(&[hint(&[H::First, H::In(Picture)], 4, "[ ]", "roughness")]),
     command(C::Mirror, "mirror smoother", &[(Anywhere, "[ ,")], |c| c.roughness(-1.0)),
     command(C::Mirror, "mirror rougher, fine", &[(Anywhere, "} >")], |c| c.roughness(0.1)),
     command(C::Mirror, "mirror smoother, fine", &[(Anywhere, "{ <")], |c| c.roughness(-0.1)),
@@ -214,51 +204,51 @@ pub static COMMANDS: &[Command] = &[
     command(C::Mirror, "mirror reflects less", &[(Anywhere, "(")], |c| c.reflection(-1.0)),
     command(C::Mirror, "next lobe of the mirror", &[(Anywhere, "b \\")], |c| c.next_lobe()),
 
-    command(C::Objects, "add an object", &[(Anywhere, "a")], |c| c.pick_object()).hints(&[hint(&[H::First, H::Picture], 6, "a", "add")]),
-    command(C::Objects, "duplicate the selection", &[(Anywhere, "D")], |c| c.duplicate()).hints(&[hint(&[H::Outline], 4, "D", "duplicate")]),
-    command(C::Objects, "delete the selection", &[(Anywhere, "x Delete")], |c| c.delete()).hints(&[hint(&[H::Outline], 5, "x", "delete")]),
-    command(C::Objects, "rename the selection", &[(Anywhere, "e F2")], |c| c.ask_name()).hints(&[hint(&[H::Outline], 3, "e", "rename")]),
-    command(C::Objects, "move the selection", &[(Anywhere, "m")], |c| c.enter_mode(Mode::Move)).hints(&[hint(&[H::First, H::Picture, H::Outline], 7, "m", "move")]),
-    command(C::Objects, "move left", &[(Moving, "Left")], |c| c.move_selection(Left, Coarse)).hints(&[hint(&[H::Moving], 1, "arrows", "in plane")]),
+    command(C::Objects, "add an object", &[(Anywhere, "a")], |c| c.pick_object()).hints(&[hint(&[H::First, H::In(Picture)], 6, "a", "add")]),
+    command(C::Objects, "duplicate the selection", &[(Anywhere, "D")], |c| c.duplicate()).hints(&[hint(&[H::In(Outline)], 4, "D", "duplicate")]),
+    command(C::Objects, "delete the selection", &[(Anywhere, "x Delete")], |c| c.delete()).hints(&[hint(&[H::In(Outline)], 5, "x", "delete")]),
+    command(C::Objects, "rename the selection", &[(Anywhere, "e F2")], |c| c.ask_name()).hints(&[hint(&[H::In(Outline)], 3, "e", "rename")]),
+    command(C::Objects, "move the selection", &[(Anywhere, "m")], |c| c.enter_mode(Mode::Move)).hints(&[hint(&[H::First, H::In(Picture), H::In(Outline)], 7, "m", "move")]),
+    command(C::Objects, "move left", &[(Moving, "Left")], |c| c.move_selection(Left, Coarse)).hints(&[hint(&[H::In(Moving)], 1, "arrows", "in plane")]),
     command(C::Objects, "move right", &[(Moving, "Right")], |c| c.move_selection(Right, Coarse)),
     command(C::Objects, "move away", &[(Moving, "Up")], |c| c.move_selection(In, Coarse)),
     command(C::Objects, "move nearer", &[(Moving, "Down")], |c| c.move_selection(Out, Coarse)),
-    command(C::Objects, "raise", &[(Moving, "PageUp")], |c| c.move_selection(Up, Coarse)).hints(&[hint(&[H::Moving], 2, "PgUp PgDn", "height")]),
+    command(C::Objects, "raise", &[(Moving, "PageUp")], |c| c.move_selection(Up, Coarse)).hints(&[hint(&[H::In(Moving)], 2, "PgUp PgDn", "height")]),
     command(C::Objects, "lower", &[(Moving, "PageDown")], |c| c.move_selection(Down, Coarse)),
-    command(C::Objects, "move left, fine", &[(Moving, "Shift-Left")], |c| c.move_selection(Left, Fine)).hints(&[hint(&[H::Moving], 3, "Shift", "fine")]),
+    command(C::Objects, "move left, fine", &[(Moving, "Shift-Left")], |c| c.move_selection(Left, Fine)).hints(&[hint(&[H::In(Moving)], 3, "Shift", "fine")]),
     command(C::Objects, "move right, fine", &[(Moving, "Shift-Right")], |c| c.move_selection(Right, Fine)),
     command(C::Objects, "move away, fine", &[(Moving, "Shift-Up")], |c| c.move_selection(In, Fine)),
     command(C::Objects, "move nearer, fine", &[(Moving, "Shift-Down")], |c| c.move_selection(Out, Fine)),
     command(C::Objects, "raise, fine", &[(Moving, "Shift-PageUp")], |c| c.move_selection(Up, Fine)),
     command(C::Objects, "lower, fine", &[(Moving, "Shift-PageDown")], |c| c.move_selection(Down, Fine)),
     command(C::Objects, "turn the selection", &[(Anywhere, "r")], |c| c.enter_mode(Mode::Rotate)),
-    command(C::Objects, "turn left", &[(Turning, "Left")], |c| c.turn_selection(Left, Coarse)).hints(&[hint(&[H::Turning], 1, "Left Right", "turn 15°")]),
+    command(C::Objects, "turn left", &[(Turning, "Left")], |c| c.turn_selection(Left, Coarse)).hints(&[hint(&[H::In(Turning)], 1, "Left Right", "turn 15°")]),
     command(C::Objects, "turn right", &[(Turning, "Right")], |c| c.turn_selection(Right, Coarse)),
-    command(C::Objects, "turn left, fine", &[(Turning, "Shift-Left")], |c| c.turn_selection(Left, Fine)).hints(&[hint(&[H::Turning], 2, "Shift", "1°")]),
+    command(C::Objects, "turn left, fine", &[(Turning, "Shift-Left")], |c| c.turn_selection(Left, Fine)).hints(&[hint(&[H::In(Turning)], 2, "Shift", "1°")]),
     command(C::Objects, "turn right, fine", &[(Turning, "Shift-Right")], |c| c.turn_selection(Right, Fine)),
-    command(C::Objects, "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::Moving], 4, "g", "snap to ground")]),
+    command(C::Objects, "snap the selection to ground", &[(Anywhere, "g")], |c| c.snap_to_ground()).hints(&[hint(&[H::In(Moving)], 4, "g", "snap to ground")]),
     command(C::Objects, "give the object its own material", &[(Anywhere, "M")], |c| c.own_material()),
 
-    command(C::Panels, "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).while_watching().hints(&[hint(&[H::Picture], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
+    command(C::Panels, "next panel or field", &[(Anywhere, "Tab"), (Overlay, "Tab")], |c| c.next_panel(1)).while_watching().hints(&[hint(&[H::In(Picture)], 8, "Tab", "panels"), hint(&[H::Watching], 1, "Tab", "files")]),
     command(C::Panels, "previous panel or field", &[(Anywhere, "Shift-Tab"), (Overlay, "Shift-Tab")], |c| c.next_panel(-1)).while_watching(),
     command(C::Panels, "leave, back to the picture", &[(Anywhere, "Esc"), (Moving, "Enter"), (Turning, "Enter"), (Flying, "Enter"), (Probing, "Enter"), (Overlay, "Esc")], |c| c.leave()).while_watching().available(always).while_typing().hints(&[
-        hint(&[H::Moving, H::Turning, H::Flying, H::Probing], 9, "Esc", "done"),
-        hint(&[H::Outline, H::Inspector], 9, "Esc", "picture"),
+        hint(&[H::In(Moving), H::In(Turning), H::In(Flying), H::In(Probing)], 9, "Esc", "done"),
+        hint(&[H::In(Outline), H::In(Inspector)], 9, "Esc", "picture"),
         hint(&[H::List, H::Form], 9, "Esc", "cancel"),
         hint(&[H::Typing], 9, "Esc", "leave as it was"),
         hint(&[H::Reading], 9, "Esc", "close"),
     ]),
     command(C::Panels, "inspect, type a value, choose", &[(Picture, "Enter"), (Outline, "Enter Right"), (Inspector, "Enter 0 1 2 3 4 5 6 7 8 9 - + . #"), (Overlay, "Enter")], |c| c.open()).while_watching().available(with_scene_or_choice).while_typing().hints(&[
-        hint(&[H::Outline], 2, "Enter", "inspect"),
-        hint(&[H::Inspector], 4, "Enter 0-9", "type"),
+        hint(&[H::In(Outline)], 2, "Enter", "inspect"),
+        hint(&[H::In(Inspector)], 4, "Enter 0-9", "type"),
         hint(&[H::List], 2, "Enter", "take"),
         hint(&[H::Form], 3, "type", "a value"),
         hint(&[H::Form], 4, "Enter", "add"),
         hint(&[H::Typing], 1, "Enter", "apply"),
     ]),
     command(C::Panels, "line above", &[(Outline, "Up"), (Inspector, "Up"), (Overlay, "Up")], |c| c.move_cursor(-1)).while_watching().available(always).hints(&[
-        hint(&[H::Outline], 1, "Up Down", "select"),
-        hint(&[H::Inspector, H::Form], 1, "Up Down", "field"),
+        hint(&[H::In(Outline)], 1, "Up Down", "select"),
+        hint(&[H::In(Inspector), H::Form], 1, "Up Down", "field"),
         hint(&[H::List], 1, "Up Down", "choose"),
         hint(&[H::Reading], 1, "Up Down", "scroll"),
         hint(&[H::Watching], 2, "Up Down", "select"),
@@ -268,14 +258,14 @@ pub static COMMANDS: &[Command] = &[
     command(C::Panels, "page down", &[(Outline, "PageDown"), (Inspector, "PageDown"), (Overlay, "PageDown")], |c| c.page(1)).while_watching().available(always),
     command(C::Panels, "first line", &[(Outline, "Home"), (Inspector, "Home"), (Overlay, "Home")], |c| c.move_cursor(isize::MIN / 2)).while_watching().available(always),
     command(C::Panels, "last line", &[(Outline, "End"), (Inspector, "End"), (Overlay, "End")], |c| c.move_cursor(isize::MAX / 2)).while_watching().available(always),
-    command(C::Panels, "field up", &[(Inspector, "Right"), (Overlay, "Right")], |c| c.step_field(1.0)).hints(&[hint(&[H::Inspector, H::Form], 2, "Left Right", "step")]),
+    command(C::Panels, "field up", &[(Inspector, "Right"), (Overlay, "Right")], |c| c.step_field(1.0)).hints(&[hint(&[H::In(Inspector), H::Form], 2, "Left Right", "step")]),
     command(C::Panels, "field down", &[(Inspector, "Left"), (Overlay, "Left")], |c| c.step_field(-1.0)),
-    command(C::Panels, "field up, fine", &[(Inspector, "Shift-Right"), (Overlay, "Shift-Right")], |c| c.step_field(0.1)).hints(&[hint(&[H::Inspector], 3, "Shift", "fine")]),
+    command(C::Panels, "field up, fine", &[(Inspector, "Shift-Right"), (Overlay, "Shift-Right")], |c| c.step_field(0.1)).hints(&[hint(&[H::In(Inspector)], 3, "Shift", "fine")]),
     command(C::Panels, "field down, fine", &[(Inspector, "Shift-Left"), (Overlay, "Shift-Left")], |c| c.step_field(-0.1)),
-    command(C::Panels, "reset the field to its default", &[(Inspector, "Backspace")], |c| c.clear_field()).hints(&[hint(&[H::Inspector], 5, "Backspace", "default")]),
+    command(C::Panels, "reset the field to its default", &[(Inspector, "Backspace")], |c| c.clear_field()).hints(&[hint(&[H::In(Inspector)], 5, "Backspace", "default")]),
     command(C::Panels, "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()).while_watching(),
 
-    command(C::File, "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::Picture], 9, "u", "undo")]),
+    command(C::File, "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::In(Picture)], 9, "u", "undo")]),
     command(C::File, "redo", &[(Anywhere, "U Ctrl-r")], |c| c.redo()),
     command(C::File, "save", &[(Anywhere, "Ctrl-s")], |c| c.save()),
     command(C::File, "save as", &[(Anywhere, "W")], |c| c.ask_path()),
@@ -285,7 +275,7 @@ pub static COMMANDS: &[Command] = &[
     command(C::File, "suspend to the shell", &[(Anywhere, "Ctrl-z"), (Overlay, "Ctrl-z")], |c| c.emit(Effect::Suspend)).while_watching().available(always).over_image(),
     command(C::File, "quit", &[(Anywhere, "q Ctrl-c"), (Overlay, "Ctrl-c")], |c| c.quit()).while_watching().available(always).over_image().hints(&[hint(&[H::First, H::Watching], 13, "q", "quit")]),
 
-    command(C::Picture, "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).while_watching().hints(&[hint(&[H::Picture, H::Watching], 10, "p", "PNG")]),
+    command(C::Picture, "write a PNG", &[(Anywhere, "p")], |c| c.export(Format::Png)).while_watching().hints(&[hint(&[H::In(Picture), H::Watching], 10, "p", "PNG")]),
     command(C::Picture, "write an EXR", &[(Anywhere, "P")], |c| c.export(Format::Exr)).while_watching().hints(&[hint(&[H::Watching], 11, "P", "EXR")]),
     command(C::Picture, "view the last picture", &[(Anywhere, "o")], |c| c.view_last_export()).while_watching(),
     command(C::Picture, "copy the path of the last picture", &[(Anywhere, "y")], |c| c.copy_path()).while_watching(),
@@ -293,20 +283,20 @@ pub static COMMANDS: &[Command] = &[
     command(C::Picture, "cancel the running export", &[(Anywhere, "Ctrl-x")], |c| c.cancel_export()),
     command(C::Picture, "exposure up", &[(Anywhere, "= +")], |c| c.exposure(1.0)).while_watching(),
     command(C::Picture, "exposure down", &[(Anywhere, "-")], |c| c.exposure(-1.0)).while_watching(),
-    command(C::Picture, "exposure 0", &[(Anywhere, "0")], |c| c.reset_exposure()).while_watching(),
+    command(C::Picture, "exposure 0", &[(Anywhere, "0")], |c| c.set_exposure(0.0)).while_watching(),
     command(C::Picture, "next tone curve", &[(Anywhere, "t")], |c| c.next_tone()).while_watching(),
-    command(C::Picture, "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).while_watching().hints(&[hint(&[H::Probing, H::Watching], 3, "v", "views")]),
+    command(C::Picture, "next view: noise, samples, objects, …", &[(Anywhere, "v")], |c| c.next_channel(1)).while_watching().hints(&[hint(&[H::In(Probing), H::Watching], 3, "v", "views")]),
     command(C::Picture, "view before", &[(Anywhere, "V")], |c| c.next_channel(-1)).while_watching(),
     command(C::Picture, "probe a pixel", &[(Anywhere, "i")], |c| c.toggle_probe()).while_watching().hints(&[hint(&[H::Watching], 4, "i", "probe")]),
-    command(C::Picture, "probe left", &[(Probing, "Left")], |c| c.move_probe(Left, Coarse)).while_watching().hints(&[hint(&[H::Probing], 1, "arrows", "move")]),
+    command(C::Picture, "probe left", &[(Probing, "Left")], |c| c.move_probe(Left, Coarse)).while_watching().hints(&[hint(&[H::In(Probing)], 1, "arrows", "move")]),
     command(C::Picture, "probe right", &[(Probing, "Right")], |c| c.move_probe(Right, Coarse)).while_watching(),
     command(C::Picture, "probe up", &[(Probing, "Up")], |c| c.move_probe(Up, Coarse)).while_watching(),
     command(C::Picture, "probe down", &[(Probing, "Down")], |c| c.move_probe(Down, Coarse)).while_watching(),
-    command(C::Picture, "probe left by one pixel", &[(Probing, "Shift-Left")], |c| c.move_probe(Left, Fine)).while_watching().hints(&[hint(&[H::Probing], 2, "Shift", "one pixel")]),
+    command(C::Picture, "probe left by one pixel", &[(Probing, "Shift-Left")], |c| c.move_probe(Left, Fine)).while_watching().hints(&[hint(&[H::In(Probing)], 2, "Shift", "one pixel")]),
     command(C::Picture, "probe right by one pixel", &[(Probing, "Shift-Right")], |c| c.move_probe(Right, Fine)).while_watching(),
     command(C::Picture, "probe up by one pixel", &[(Probing, "Shift-Up")], |c| c.move_probe(Up, Fine)).while_watching(),
     command(C::Picture, "probe down by one pixel", &[(Probing, "Shift-Down")], |c| c.move_probe(Down, Fine)).while_watching(),
-    command(C::Picture, "pin this picture", &[(Anywhere, "k")], |c| c.pin()).while_watching().hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
+    command(C::Picture, "pin this picture", &[(Anywhere, "k")], |c| c.emit(Effect::Pin)).while_watching().hints(&[hint(&[H::Watching], 5, "k c C", "compare")]),
     command(C::Picture, "flip between pinned and live", &[(Anywhere, "c")], |c| c.compare(CompareView::Pinned)).while_watching(),
     command(C::Picture, "difference of pinned and live", &[(Anywhere, "C")], |c| c.compare(CompareView::Difference)).while_watching(),
 
@@ -319,13 +309,13 @@ pub static COMMANDS: &[Command] = &[
     command(C::Render, "low or normal priority", &[], |c| c.priority()),
     command(C::Render, "next colour mode of the terminal", &[(Anywhere, "#")], |c| c.next_colors()).while_watching().available(always),
 
-    command(C::Help, "all keys", &[(Anywhere, "? F1")], |c| c.open_overlay(Overlay::Help { scroll: 0 })).while_watching().available(always).hints(&[hint(&[H::First, H::Picture, H::Watching], 12, "?", "keys")]),
-    command(C::Help, "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.open_palette()).while_watching().available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::Picture], 11, ":", "all")]),
+    command(C::Help, "all keys", &[(Anywhere, "? F1")], |c| c.open_overlay(Overlay::Help { scroll: 0 })).while_watching().available(always).hints(&[hint(&[H::First, H::In(Picture), H::Watching], 12, "?", "keys")]),
+    command(C::Help, "find an action", &[(Anywhere, ": Ctrl-p")], |c| c.open_command_palette()).while_watching().available(always).hints(&[hint(&[H::First], 11, ":", "all actions"), hint(&[H::In(Picture)], 11, ":", "all")]),
     command(C::Help, "inventory of the scene", &[], |c| c.open_overlay(Overlay::Inventory { scroll: 0 })),
 ];
 
 impl Chapter {
-    /// Every chapter with its heading, in the order of the help.
+    /// All chapters of the help with their headings, in order.
     pub const ALL: [(Self, &'static str); 9] = [
         (Self::Camera, "camera"),
         (Self::Light, "light"),
@@ -338,7 +328,7 @@ impl Chapter {
         (Self::Help, "help"),
     ];
 
-    /// Returns the heading of the chapter.
+    /// Returns the heading of the chapter in the help.
     pub fn title(self) -> &'static str {
         Self::ALL[self as usize].1
     }
@@ -370,13 +360,14 @@ impl Command {
         Self { over_image: true, ..self }
     }
 
-    /// Returns all keys of the command with their contexts, such as `Left in the picture` or
-    /// `U Ctrl-r`. `key` formats each key.
+    /// Returns all keys of the command with their contexts as text, such as `Left in the picture`
+    /// or `U Ctrl-r`. `key` formats the name of one key.
     pub fn all_keys(&self, key: impl Fn(&str) -> String) -> String {
         self.formatted_keys(key, |context| Some(context.place()))
     }
 
-    /// Returns the keys that the command has while files are watched and no overlay is open.
+    /// Returns the keys that the command has in `zerkalo watch` while no overlay is open, as text.
+    /// `key` formats the name of one key.
     pub fn watch_keys(&self, key: impl Fn(&str) -> String) -> String {
         self.formatted_keys(key, |context| match context {
             Anywhere | Outline => Some(""),
@@ -385,7 +376,8 @@ impl Command {
         })
     }
 
-    /// Formats the keys of the contexts for which `place` returns a name.
+    /// Formats the keys of the command, grouped by context. `key` formats the name of one key.
+    /// `place` returns the text after the keys of a context, or `None` to leave out the context.
     fn formatted_keys(
         &self,
         key: impl Fn(&str) -> String,

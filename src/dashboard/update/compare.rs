@@ -1,5 +1,5 @@
-//! Commands on the display of the picture: exposure, tone curve, channel, probe, comparison with a
-//! pinned picture.
+//! Commands on the display of the picture: exposure, tone curve, channel, pixel probe, comparison
+//! with a pinned picture (an earlier one that the user has stored).
 
 use crate::dashboard::message::{DisplayChannel, Effect};
 use crate::dashboard::model::{CompareView, Mode};
@@ -7,7 +7,7 @@ use crate::dashboard::update::{Direction, StepSize, UpdateContext, cycled};
 use crate::film::{LinearImage, Tone};
 use std::sync::Arc;
 
-/// Change of exposure per step, in stops.
+/// Change of the displayed picture's exposure per step, in stops.
 const EXPOSURE_STEP: f64 = 0.25;
 /// Largest absolute value of the exposure, in stops. Beyond it every picture is white or black.
 const MOST_EXPOSURE: f64 = 20.0;
@@ -18,11 +18,7 @@ impl UpdateContext<'_> {
         self.set_exposure(ev.clamp(-MOST_EXPOSURE, MOST_EXPOSURE));
     }
 
-    pub(super) fn reset_exposure(&mut self) {
-        self.set_exposure(0.0);
-    }
-
-    fn set_exposure(&mut self, ev: f64) {
+    pub(super) fn set_exposure(&mut self, ev: f64) {
         self.model.display.exposure_ev = ev;
         self.set_display();
         self.say(format!("exposure {ev:+.2} stops"));
@@ -66,10 +62,11 @@ impl UpdateContext<'_> {
         let [width, height] = self.scene().film.size.map(|n| n as usize);
         let pixel = pixel.map(|[x, y]| [x.min(width - 1), y.min(height - 1)]);
         self.model.probe = pixel;
-        self.emit(Effect::Probe(pixel));
+        self.show_view();
     }
 
-    /// Moves the probe by about a cell of the picture (coarse) or a pixel of the film (fine).
+    /// Moves the pixel probe in `direction`. A coarse step is about one terminal cell, a fine step
+    /// one pixel of the film.
     pub(super) fn move_probe(&mut self, direction: Direction, step_size: StepSize) {
         let Some([x, y]) = self.model.probe else {
             self.toggle_probe();
@@ -91,17 +88,14 @@ impl UpdateContext<'_> {
         self.set_probe(Some(to));
     }
 
-    pub(super) fn pin(&mut self) {
-        self.emit(Effect::Pin);
-    }
-
     pub(super) fn pinned(&mut self, picture: Arc<LinearImage>, spp: f64) {
         self.model.comparison.pinned = Some((picture, spp));
         self.repaint();
         self.say(format!("pinned at {spp:.0} spp · c flips · C shows the difference"));
     }
 
-    /// Toggles between the live picture and the view `what` of a comparison.
+    /// Shows the pinned picture (stored by the user for comparison) or its difference to the live
+    /// one, as `what` selects. Shows the live picture if `what` is shown already.
     pub(super) fn compare(&mut self, what: CompareView) {
         if self.model.comparison.pinned.is_none() {
             self.say("No picture is pinned yet · k pins one");

@@ -1,77 +1,48 @@
-//! Commands on the fields of inspector and forms: moving the cursor, stepping and typing values.
+//! Commands on the properties in inspector and forms: moving the cursor, stepping and typing
+//! values.
 
 use crate::dashboard::editor::Editor;
-use crate::dashboard::layout::Focus;
-use crate::dashboard::overlay::{Overlay, Pick, PickFor};
+use crate::dashboard::overlay::{Overlay, PickFor};
 use crate::dashboard::panel_lines::{FieldLine, walk_fields};
 use crate::dashboard::update::{Coalesce, UpdateContext};
-use crate::scene::edit::{self, Edit, EditError, Property, Widget};
+use crate::scene::edit::{self, Edit, EditError, Widget};
 
 impl UpdateContext<'_> {
-    fn cursor(&self) -> usize {
-        match &self.model.overlay {
-            Some(Overlay::Form(form)) => form.cursor,
-            _ => self.model.inspector.cursor,
-        }
-    }
-
-    pub(super) fn set_cursor(&mut self, cursor: usize) {
-        match &mut self.model.overlay {
-            Some(Overlay::Form(form)) => form.cursor = cursor,
-            _ => self.model.inspector.cursor = cursor,
-        }
-    }
-
     fn set_editor(&mut self, editor: Option<Editor>) {
-        match &mut self.model.overlay {
-            Some(Overlay::Form(form)) => {
-                form.editor = editor;
-                form.problem = None;
-            }
-            _ => self.model.inspector.editor = editor,
+        self.model.field_list_mut().editor = editor;
+        if let Some(Overlay::Form(form)) = &mut self.model.overlay {
+            form.problem = None;
         }
     }
 
     pub(super) fn move_field_cursor(&mut self, steps: isize) {
         let lines = self.model.field_lines();
-        self.set_cursor(walk_fields(&lines, self.cursor(), steps));
+        let cursor = &mut self.model.field_list_mut().cursor;
+        *cursor = walk_fields(&lines, *cursor, steps);
     }
 
-    /// Returns the field under the cursor. Returns `None` if there is none.
+    /// Returns the property or number under the cursor of the open form, or of the inspector if no
+    /// form is open. Returns `None` if the line has neither.
     pub(super) fn field(&self) -> Option<FieldLine> {
-        self.model.field_lines().get(self.cursor())?.field().cloned()
+        self.model.field_lines().get(self.model.field_list().cursor)?.field().cloned()
     }
 
-    /// Returns the property of the scene to which `field` belongs. A property that is a list of
-    /// numbers has one field for each number.
-    fn row(&self, field: &FieldLine) -> Option<Property> {
-        let rows = edit::rows(self.scene(), &field.subject).ok()?;
-        rows.into_iter().find(|row| row.key == field.key)
-    }
-
-    /// Opens a text editor for the field under the cursor, with the text `typed`, or with the
-    /// field's value if `typed` is `None`. A switch is toggled instead, and a choice opens its
-    /// list.
+    /// Starts the input of a value for the property under the cursor. If `typed` is a character, a
+    /// text editor opens with it; a space changes a switch or a choice to its next value instead.
+    /// If `typed` is `None`, the editor opens with the present value; a switch is toggled instead,
+    /// and a choice outside of a form opens its list.
     pub(super) fn open_field(&mut self, typed: Option<char>) {
         let Some(field) = self.field() else { return };
-        let words = self.row(&field).map(|row| row.words).unwrap_or_default();
+        let words = field.property.words;
         let chosen = !words.is_empty();
         match typed {
-            None if field.entry == Widget::Switch => self.step_field(1.0),
+            None if field.property.entry == Widget::Switch => self.step_field(1.0),
             None if chosen && !self.in_form() => {
                 let cursor = words.iter().position(|word| word.name == field.value);
-                self.model.overlay = Some(Overlay::Pick(Pick {
-                    purpose: PickFor::Word(field.subject.clone(), field.key.clone()),
-                    title: field.label.clone(),
-                    entries: words
-                        .into_iter()
-                        .map(|word| (word.name, word.doc.to_string()))
-                        .collect(),
-                    cursor: cursor.unwrap_or(0),
-                    scroll: 0,
-                }));
+                let purpose = PickFor::Word(field.subject, field.property.key);
+                self.open_pick(purpose, field.label, words, cursor.unwrap_or(0));
             }
-            Some(' ') if chosen || field.entry == Widget::Switch => self.step_field(1.0),
+            Some(' ') if chosen || field.property.entry == Widget::Switch => self.step_field(1.0),
             Some(' ') => {}
             Some(c) => self.set_editor(Some(Editor::new(c))),
             None => self.set_editor(Some(Editor::new(field.value))),
@@ -82,16 +53,15 @@ impl UpdateContext<'_> {
         matches!(self.model.overlay, Some(Overlay::Form(_)))
     }
 
-    /// Applies the typed value and closes the editor. Returns `false` if the value is not valid;
-    /// the editor then stays open and shows the reason.
+    /// Applies the value that the user has typed and closes the text editor. Returns `false` if the
+    /// value is not valid; the editor then stays open and shows the reason.
     pub(super) fn apply_field(&mut self) -> bool {
         let Some(field) = self.field() else {
             self.set_editor(None);
             return true;
         };
-        let Some(text) = self.model.editor().map(|editor| editor.text().trim().to_string()) else {
-            return true;
-        };
+        let Some(editor) = &self.model.field_list().editor else { return true };
+        let text = editor.text().trim().to_string();
         if text == field.value {
             self.set_editor(None);
             return true;
@@ -103,7 +73,7 @@ impl UpdateContext<'_> {
                 true
             }
             Err(error) => {
-                if let Some(editor) = self.model.editor_mut() {
+                if let Some(editor) = &mut self.model.field_list_mut().editor {
                     editor.problem = Some(error.to_string());
                 }
                 false
@@ -111,16 +81,17 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Returns the edit that sets a field to `text`. If the field is one number of a list, `text`
-    /// may also be the whole list, or a colour in hexadecimal digits.
+    /// Returns the edit that sets the property or number in the line `field` to `text`. If the line
+    /// shows one number of a list, `text` may also be the whole list, or a colour in hexadecimal
+    /// digits.
     fn set_field(&self, field: &FieldLine, text: &str) -> Result<Edit, EditError> {
         let scene = self.scene();
         let whole = text.contains(['#', ',', ';', ' ', '[']);
         match field.component {
             Some(component) if !whole => {
-                edit::set_component(scene, &field.subject, &field.key, component, text)
+                edit::set_component(scene, &field.subject, &field.property.key, component, text)
             }
-            _ => edit::set(scene, &field.subject, &field.key, text),
+            _ => edit::set(scene, &field.subject, &field.property.key, text),
         }
     }
 
@@ -133,27 +104,22 @@ impl UpdateContext<'_> {
             return;
         }
         if let Some(field) = self.field() {
-            let FieldLine { subject, key, component, .. } = &field;
-            let edit = edit::step(self.scene(), subject, key, *component, steps);
+            let FieldLine { subject, property, component, .. } = &field;
+            let edit = edit::step(self.scene(), subject, &property.key, *component, steps);
             self.commit(edit, Coalesce::Repeat);
         }
     }
 
     pub(super) fn clear_field(&mut self) {
         if let Some(field) = self.field() {
-            let edit = edit::set(self.scene(), &field.subject, &field.key, "");
+            let edit = edit::set(self.scene(), &field.subject, &field.property.key, "");
             self.commit(edit, Coalesce::Single);
         }
     }
 
-    /// Sets `key` of `subject` to the value `word`, which was chosen from a list.
+    /// Sets the property `key` of `subject` to the value `word`, which was chosen from a list.
     pub(super) fn set_word(&mut self, subject: &edit::Target, key: &str, word: &str) {
         let edit = edit::set(self.scene(), subject, key, word);
         self.commit(edit, Coalesce::Single);
-    }
-
-    /// Gives the focus to the inspector.
-    pub(super) fn inspect(&mut self) {
-        self.set_focus(Focus::Inspector);
     }
 }

@@ -52,7 +52,8 @@ impl UpdateContext<'_> {
     }
 
     /// Requests that the scene be written to the scene file, or to `path`, which then becomes the
-    /// scene file. `overwrite` permits replacing content from other programs.
+    /// scene file. `overwrite` permits replacing changes by other programs, or an existing file at
+    /// `path`.
     pub(super) fn write(&mut self, path: Option<PathBuf>, overwrite: bool) {
         let scene = Arc::clone(self.model.history.scene());
         self.emit(Effect::Save { scene, path, overwrite });

@@ -1,27 +1,33 @@
-//! Focus and modes: the panel and the part of the scene on which keys act.
+//! Focus (the panel that receives the keys) and modes (the effect of arrow keys and drags in the
+//! picture).
 
 use crate::dashboard::layout::Focus;
-use crate::dashboard::model::{CompareView, Inspector, Mode};
+use crate::dashboard::model::{CompareView, Mode};
 use crate::dashboard::update::{UpdateContext, cycled};
+use crate::scene::edit;
 
 impl UpdateContext<'_> {
-    /// Enters `mode` and gives the focus to the picture. Does nothing if the selection cannot be
-    /// moved or turned in this mode.
+    /// Enters `mode`, which determines the effect of the arrow keys, and gives the focus to the
+    /// picture. If the mode moves or turns the selection and the selection cannot be moved or
+    /// turned, reports an error instead.
     pub(super) fn enter_mode(&mut self, mode: Mode) {
-        let movable = match mode {
-            Mode::Move => self.check_movable(),
-            Mode::Rotate => self.check_turnable(),
-            _ => true,
+        let (scene, selection) = (self.scene(), &self.model.selection);
+        let tried = match mode {
+            Mode::Move => edit::move_by(scene, selection, [0.0; 3]).err(),
+            Mode::Rotate => edit::turn(scene, selection, 0.0).err(),
+            _ => None,
         };
-        if movable {
-            self.end_mode();
-            self.model.focus = Focus::Picture;
-            self.model.mode = mode;
+        if let Some(error) = tried {
+            self.refuse(&error.to_string());
+            return;
         }
+        self.end_mode();
+        self.model.focus = Focus::Picture;
+        self.model.mode = mode;
     }
 
-    /// Leaves the innermost active state. Their order is: overlay, text editor, mode, panel, full
-    /// screen, comparison.
+    /// Leaves one state: the first active one of overlay, text editor, mode, panel, full screen,
+    /// comparison.
     pub(super) fn leave(&mut self) {
         if self.model.overlay.is_some() {
             self.close_overlay();
@@ -39,7 +45,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Returns to the default mode, in which the keys orbit the camera.
+    /// Returns to the default mode of the picture's panel, in which the keys orbit the camera.
     pub(super) fn end_mode(&mut self) {
         self.end_gesture();
         if self.model.mode == Mode::Probe {
@@ -74,7 +80,6 @@ impl UpdateContext<'_> {
     pub(super) fn toggle_fullscreen(&mut self) {
         self.model.fullscreen = !self.model.fullscreen;
         self.model.focus = Focus::Picture;
-        self.model.inspector =
-            Inspector { editor: None, ..std::mem::take(&mut self.model.inspector) };
+        self.model.inspector.editor = None;
     }
 }

@@ -1,6 +1,7 @@
 //! Creation of objects and lights: the user picks a kind from a list, then fills in a form. The
 //! picture previews the new object or light.
 
+use crate::dashboard::model::FieldList;
 use crate::dashboard::overlay::{Form, Overlay, Pick, PickFor};
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::edit::{self, Edit, EditError, Word};
@@ -8,29 +9,31 @@ use std::sync::Arc;
 
 impl UpdateContext<'_> {
     pub(super) fn pick_object(&mut self) {
-        self.pick_kind(PickFor::Object, "add an object", edit::object_kinds());
+        let kinds = edit::object_kinds();
+        self.open_pick(PickFor::Object, "add an object".to_string(), kinds, 0);
     }
 
     pub(super) fn pick_light(&mut self) {
-        self.pick_kind(PickFor::Light, "add a light", edit::light_kinds());
+        self.open_pick(PickFor::Light, "add a light".to_string(), edit::light_kinds(), 0);
     }
 
-    fn pick_kind(&mut self, purpose: PickFor, title: &str, kinds: Vec<Word>) {
-        let entries = kinds.into_iter().map(|word| (word.name, word.doc.to_string())).collect();
-        let title = title.to_string();
+    /// Opens a list of `words`, which are names with descriptions. The user picks one for
+    /// `purpose`. The cursor starts on the word with index `cursor`.
+    pub(super) fn open_pick(
+        &mut self,
+        purpose: PickFor,
+        title: String,
+        words: Vec<Word>,
+        cursor: usize,
+    ) {
+        let entries = words.into_iter().map(|word| (word.name, word.doc.to_string())).collect();
         self.model.overlay =
-            Some(Overlay::Pick(Pick { purpose, title, entries, cursor: 0, scroll: 0 }));
+            Some(Overlay::Pick(Pick { purpose, title, entries, cursor, scroll: 0 }));
     }
 
-    pub(super) fn open_object_form(&mut self, kind: &str) {
-        self.open_form(kind, edit::add_object(self.scene(), kind, None));
-    }
-
-    pub(super) fn open_light_form(&mut self, kind: &str) {
-        self.open_form(&format!("{kind} light"), edit::add_light(self.scene(), kind));
-    }
-
-    fn open_form(&mut self, what: &str, edit: Result<Edit, EditError>) {
+    /// Opens the form for a new object or light of the kind `what`. The result of `edit` is the
+    /// scene that includes it. Shows a notice instead if `edit` is an error.
+    pub(super) fn open_form(&mut self, what: &str, edit: Result<Edit, EditError>) {
         match edit {
             Ok(Edit { scene, subject, label, .. }) => {
                 self.end_mode();
@@ -40,9 +43,7 @@ impl UpdateContext<'_> {
                     subject,
                     label,
                     before: self.model.selection.clone(),
-                    cursor: 0,
-                    scroll: 0,
-                    editor: None,
+                    fields: FieldList::default(),
                     problem: None,
                 }));
                 self.show();

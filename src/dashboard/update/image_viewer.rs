@@ -26,14 +26,14 @@ impl UpdateContext<'_> {
         self.repaint();
     }
 
-    /// Requests the viewed image again for a new screen size.
+    /// Requests that the viewed image be prepared again for a new screen size.
     pub(super) fn refit_image(&mut self) {
         if let Some(Overlay::ViewerImage(viewed)) = &self.model.overlay {
             self.view_image(viewed.path.clone());
         }
     }
 
-    /// Closes the viewer and shows the panels again.
+    /// Closes the viewer of exported images and shows the panels again.
     pub(super) fn close_viewer(&mut self) {
         self.model.overlay = None;
         self.repaint();

@@ -3,7 +3,7 @@
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::key_context::KeyContext;
-use crate::dashboard::model::Model;
+use crate::dashboard::model::{FieldList, Model};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{Command, lookup};
@@ -21,11 +21,20 @@ impl Model {
     /// Returns the text editor that receives the keys. Returns `None` if none is open.
     pub(super) fn editor_mut(&mut self) -> Option<&mut Editor> {
         match &mut self.overlay {
-            Some(Overlay::Palette(palette)) => Some(&mut palette.editor),
+            Some(Overlay::CommandPalette(palette)) => Some(&mut palette.editor),
             Some(Overlay::Prompt(prompt)) => Some(&mut prompt.editor),
-            Some(Overlay::Form(form)) => form.editor.as_mut(),
+            Some(Overlay::Form(form)) => form.fields.editor.as_mut(),
             Some(_) => None,
             None => self.inspector.editor.as_mut(),
+        }
+    }
+
+    /// Returns a mutable reference to the state of the open form's list of properties, or of the
+    /// inspector if no form is open.
+    pub(super) fn field_list_mut(&mut self) -> &mut FieldList {
+        match &mut self.overlay {
+            Some(Overlay::Form(form)) => &mut form.fields,
+            _ => &mut self.inspector,
         }
     }
 }
@@ -73,8 +82,8 @@ impl UpdateContext<'_> {
         self.run(command);
     }
 
-    /// Runs a command, or reports that it needs a scene if there is none, or that nothing is edited
-    /// while files are watched.
+    /// Runs a command if it is available. Otherwise reports the reason to the user: there is no
+    /// scene, or `zerkalo watch` neither edits nor renders.
     pub(super) fn run(&mut self, command: &Command) {
         if self.model.watch.is_some() && !command.while_watching {
             self.refuse("Read-only: `zerkalo watch` edits and renders nothing · ? keys");
@@ -98,15 +107,15 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Updates the palette's list of commands after a change of its text.
+    /// Updates the command palette's list of commands after a change of its text.
     fn text_changed(&mut self) {
-        if let Some(Overlay::Palette(_)) = self.model.overlay {
+        if let Some(Overlay::CommandPalette(_)) = self.model.overlay {
             self.search();
         }
     }
 
-    /// Applies the character `c` to the open list, form or question. Returns `true` if an overlay
-    /// is open; the character then runs no command.
+    /// Applies the typed character `c` to the open list, form or question. Returns `true` if an
+    /// overlay is open; the character then runs no command.
     fn typed_in_overlay(&mut self, c: char) -> bool {
         match &self.model.overlay {
             Some(Overlay::Question(question)) => {
@@ -115,7 +124,7 @@ impl UpdateContext<'_> {
                     self.answer(at);
                 }
             }
-            Some(Overlay::Form(form)) if form.editor.is_none() => self.open_field(Some(c)),
+            Some(Overlay::Form(form)) if form.fields.editor.is_none() => self.open_field(Some(c)),
             Some(Overlay::Pick(_)) => self.jump_to(c),
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) if "?q ".contains(c) => {
                 self.model.overlay = None;

@@ -1,4 +1,4 @@
-//! Commands on the lens of the camera: focus and aperture.
+//! Commands on focus and aperture of the camera.
 
 use crate::camera::{Aperture, Camera};
 use crate::dashboard::update::mouse::first_hit;
@@ -7,15 +7,15 @@ use crate::scene::edit::{self, EditError, bounds};
 use crate::value::{number, round_significant};
 
 impl UpdateContext<'_> {
-    /// Opens the lens by `stops`; negative stops close it.
+    /// Opens the camera's lens by `stops`; negative stops close it.
     pub(super) fn aperture(&mut self, stops: f64) {
         let edit = edit::change_aperture(self.scene(), stops);
         self.commit(edit, Coalesce::Repeat);
         self.say_lens();
     }
 
-    /// Focuses on the probed pixel. Without a probe, focuses on the middle of the selection, or
-    /// else on the middle of the picture.
+    /// Focuses the camera on the probed pixel. Without a pixel probe, focuses on the middle of the
+    /// selection, or else on the middle of the picture.
     pub(super) fn focus(&mut self) {
         let [width, height] = self.scene().film.size.map(|n| n as usize);
         let selection = bounds(self.scene(), &self.model.selection);
@@ -26,7 +26,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Focuses on the object that is visible at the centre of a film pixel.
+    /// Focuses the camera on the object that is visible at the centre of film pixel `pixel`.
     pub(super) fn focus_on_pixel(&mut self, pixel: [usize; 2]) {
         match first_hit(self.scene(), pixel) {
             Some((_, point)) => self.focus_on(point.to_array()),
@@ -56,7 +56,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns a description of aperture and focus for the status line.
+/// Returns a description of the camera's aperture and focus for the status line.
 fn lens_text(camera: &Camera) -> String {
     let distance = number(round_significant(camera.focus_depth(), 4));
     match camera.aperture {

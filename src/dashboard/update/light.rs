@@ -20,8 +20,8 @@ impl UpdateContext<'_> {
         self.say(format!("{label} · ; ' dim, brighten · L on, off · m move"));
     }
 
-    /// Returns the target of light commands: the selected light, ambient light or background,
-    /// otherwise the first light.
+    /// Returns the part of the scene that light commands change: the selected light, ambient light
+    /// or background, otherwise the first light. Fails if there is no light.
     fn target_light(&self) -> Result<Target, EditError> {
         match &self.model.selection {
             s @ (Target::Light(_) | Target::Ambient | Target::Background) => Ok(s.clone()),
@@ -52,7 +52,8 @@ impl UpdateContext<'_> {
         self.commit_light(edit, Coalesce::Single);
     }
 
-    /// Commits an edit of a light and reports its new state.
+    /// Makes the result of an edit of a light the current scene, and reports the light's new state
+    /// in a notice. `coalesce` decides if the edit joins the previous undo step.
     fn commit_light(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         self.commit(edit, coalesce);

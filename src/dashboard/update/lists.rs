@@ -1,14 +1,16 @@
-//! Cursor movement and choice in outline, inspector, palette, lists, help and questions.
+//! Movement of the cursor, and opening of the entry under it, in outline, inspector, command
+//! palette, lists, help and questions.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::hints::help;
 use crate::dashboard::layout::Focus;
-use crate::dashboard::overlay::{Answer, Overlay, Palette, PickFor, Question};
+use crate::dashboard::overlay::{Answer, CommandPalette, Overlay, PickFor, Question};
 use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
 use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{COMMANDS, Command};
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
+use crate::scene::edit;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
 
@@ -51,7 +53,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Moves the cursor by `pages` pages. A page is one row less than the visible rows.
+    /// Moves the cursor of the open overlay or the focused panel by `pages` pages. A page is one
+    /// row less than the visible rows.
     pub(super) fn page(&mut self, pages: isize) {
         let rows = match (self.model.overlay_layout(), self.model.focus) {
             (Some(layout), _) => layout.list.height,
@@ -67,19 +70,15 @@ impl UpdateContext<'_> {
 
     fn move_outline_cursor(&mut self, steps: isize) {
         let lines = outline(self.scene());
-        let entry = |line: &OutlineLine| match line {
-            OutlineLine::Entry { subject, .. } => Some(subject.clone()),
-            OutlineLine::Heading(_) => None,
-        };
         let before = outline_position(&lines, &self.model.selection).unwrap_or(0);
-        let position = lines[..before].iter().filter_map(entry).count();
-        let subjects: Vec<_> = lines.iter().filter_map(entry).collect();
+        let position = lines[..before].iter().filter_map(OutlineLine::subject).count();
+        let subjects: Vec<_> = lines.iter().filter_map(OutlineLine::subject).collect();
         if let Some(subject) = subjects.get(moved(position, steps, subjects.len())) {
-            self.select(subject.clone());
+            self.select((*subject).clone());
         }
     }
 
-    /// Opens or confirms the entry under the cursor.
+    /// Opens or confirms the entry under the cursor, in the open overlay or the focused panel.
     pub(super) fn open(&mut self) {
         match &self.model.overlay {
             Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => self.model.overlay = None,
@@ -88,7 +87,7 @@ impl UpdateContext<'_> {
                 self.model.overlay = None;
                 self.set_stop(Stop { noise_codes, rmse_linear: None, ..self.model.stop });
             }
-            Some(Overlay::Palette(palette)) => {
+            Some(Overlay::CommandPalette(palette)) => {
                 if let Some(found) = palette.found.get(palette.cursor) {
                     let command = &COMMANDS[*found];
                     self.model.overlay = None;
@@ -100,13 +99,18 @@ impl UpdateContext<'_> {
                 let purpose = pick.purpose.clone();
                 self.model.overlay = None;
                 match purpose {
-                    PickFor::Object => self.open_object_form(&name),
-                    PickFor::Light => self.open_light_form(&name),
+                    PickFor::Object => {
+                        self.open_form(&name, edit::add_object(self.scene(), &name, None));
+                    }
+                    PickFor::Light => {
+                        let added = edit::add_light(self.scene(), &name);
+                        self.open_form(&format!("{name} light"), added);
+                    }
                     PickFor::Word(subject, key) => self.set_word(&subject, &key, &name),
                 }
             }
             Some(Overlay::Form(form)) => {
-                if form.editor.is_none() {
+                if form.fields.editor.is_none() {
                     self.confirm_form();
                 } else if self.apply_field() {
                     self.move_field_cursor(1);
@@ -123,14 +127,14 @@ impl UpdateContext<'_> {
                     self.open_field(self.typed);
                 }
             }
-            None => self.inspect(),
+            None => self.set_focus(Focus::Inspector),
         }
     }
 
     /// Closes the text editor of a form if one is open, otherwise closes the overlay.
     pub(super) fn close_overlay(&mut self) {
         match &mut self.model.overlay {
-            Some(Overlay::Form(form)) if form.editor.is_some() => form.editor = None,
+            Some(Overlay::Form(form)) if form.fields.editor.is_some() => form.fields.editor = None,
             Some(Overlay::Form(_)) => self.cancel_form(),
             _ => {
                 self.model.quit_when_saved = false;
@@ -143,8 +147,8 @@ impl UpdateContext<'_> {
         self.model.overlay = Some(overlay);
     }
 
-    pub(super) fn open_palette(&mut self) {
-        self.model.overlay = Some(Overlay::Palette(Palette {
+    pub(super) fn open_command_palette(&mut self) {
+        self.model.overlay = Some(Overlay::CommandPalette(CommandPalette {
             editor: Editor::default(),
             found: self.offered().map(|(i, _)| i).collect(),
             cursor: 0,
@@ -152,16 +156,17 @@ impl UpdateContext<'_> {
         }));
     }
 
-    /// Returns the commands that the palette offers, with their indices in the table.
+    /// Iterates over the commands that the command palette offers, each with its index in the
+    /// command table.
     fn offered(&self) -> impl Iterator<Item = (usize, &'static Command)> + use<> {
         let watching = self.model.watch.is_some();
         COMMANDS.iter().enumerate().filter(move |(_, row)| row.while_watching || !watching)
     }
 
-    /// Updates the palette's list to the commands that match its text, best match first.
+    /// Updates the command palette's list to the commands that match its text, best match first.
     pub(super) fn search(&mut self) {
         let offered = self.offered();
-        let Some(Overlay::Palette(palette)) = &mut self.model.overlay else { return };
+        let Some(Overlay::CommandPalette(palette)) = &mut self.model.overlay else { return };
         let text = palette.editor.text();
         let pattern = Pattern::parse(text, CaseMatching::Ignore, Normalization::Smart);
         let mut matcher = Matcher::new(Config::DEFAULT);
@@ -180,7 +185,8 @@ impl UpdateContext<'_> {
         palette.scroll = 0;
     }
 
-    /// Moves the cursor of a list to the next entry that starts with the letter `c`, cyclically.
+    /// Moves the cursor of the open list to the next entry that starts with the letter `c`,
+    /// cyclically.
     pub(super) fn jump_to(&mut self, c: char) {
         let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
         let begins = |i: &usize| {
@@ -193,16 +199,14 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens a question with `answers`: letter, text and effect of each. `Esc` closes the question
-    /// without an answer.
-    pub(super) fn ask(&mut self, text: String, answers: &[(char, &str, Answer)]) {
-        let answers =
-            answers.iter().map(|(c, words, answer)| (*c, words.to_string(), answer.clone()));
-        let question = Question { text, answers: answers.collect(), cursor: 0 };
+    /// Opens a question to the user with `answers`: letter, text and effect of each. `Esc` closes
+    /// the question without an answer.
+    pub(super) fn ask(&mut self, text: String, answers: &[(char, &'static str, Answer)]) {
+        let question = Question { text, answers: answers.to_vec(), cursor: 0 };
         self.model.overlay = Some(Overlay::Question(question));
     }
 
-    /// Closes the question and carries out the answer with index `at`.
+    /// Closes the open question and carries out the answer with index `at`.
     pub(super) fn answer(&mut self, at: usize) {
         let Some(Overlay::Question(question)) = &self.model.overlay else { return };
         let Some((_, _, answer)) = question.answers.get(at).cloned() else { return };

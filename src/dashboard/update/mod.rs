@@ -1,5 +1,5 @@
-//! State transitions: [`update`] changes the model by a message and returns effects. It has no
-//! access to clock, files or terminal.
+//! State transitions of the dashboard: [`update`] changes the model by a message and returns
+//! effects. It has no access to clock, files or terminal.
 
 mod camera;
 pub mod commands;
@@ -13,7 +13,7 @@ mod keys;
 mod lens;
 mod light;
 mod lists;
-mod mirror;
+mod mirror_material;
 mod mouse;
 mod objects;
 mod prompt;
@@ -22,12 +22,10 @@ mod render;
 mod watch;
 
 use crate::dashboard::message::{Effect, Message};
-use crate::dashboard::model::{Inspector, Model, Notice, Tone};
+use crate::dashboard::model::{FieldList, Model, Notice, Tone};
 use crate::dashboard::overlay::Overlay;
-use crate::dashboard::panel_lines::{
-    PanelLine, nearest_field, outline, outline_position, scrolled,
-};
-use crate::render::session::State;
+use crate::dashboard::panel_lines::{nearest_field, outline, outline_position, scrolled};
+use crate::render::session::{State, View};
 use crate::scene::Scene;
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::sanitized;
@@ -36,40 +34,29 @@ use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Longest time between edits by repeated keys that form one undo step. It is longer than the delay
-/// after which a held key starts to repeat.
+/// Longest time between two edits by repeated keys that form one undo step. It is longer than the
+/// delay after which a held key starts to repeat.
 const REPEAT_WINDOW: Duration = Duration::from_millis(700);
-
-/// Returns the initial effects of a new model.
-pub fn begin(model: &mut Model) -> Vec<Effect> {
-    let mut context = UpdateContext::new(model, Duration::ZERO);
-    context.emit(Effect::Stop(context.model.stop));
-    if !context.model.file.unreadable {
-        context.show();
-    }
-    context.normalize();
-    context.effects
-}
 
 /// Updates the model with a message and returns the effects. `now` is the current time since any
 /// fixed origin.
 pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
-    let mut context = UpdateContext::new(model, now);
+    let mut context = UpdateContext { model, now, effects: Vec::new(), follow: true, typed: None };
     context.expire_notice();
     context.handle(message);
     context.normalize();
     context.effects
 }
 
-/// Context of one call of [`update`].
+/// Context of one call of [`update`]: the model, the time, and the effects so far.
 struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
-    /// `true` if outline and inspector scroll to keep their cursor visible; `false` after updates
-    /// that must not undo scrolling by the user.
+    /// `true` if lists in panels scroll until their cursor is visible. `false` after a message that
+    /// must leave their scroll positions unchanged, such as scrolling by the user.
     follow: bool,
-    /// Character of the key that ran the current command, if the key types one.
+    /// Character of the key that ran the current command; `None` if the key types no character.
     typed: Option<char>,
 }
 
@@ -80,35 +67,32 @@ enum Direction {
     Right,
     Up,
     Down,
-    /// Away from the eye.
+    /// Direction forwards, away from the eye.
     In,
-    /// Towards the eye.
+    /// Direction backwards, towards the eye.
     Out,
 }
 
-/// Size of a step of a command.
+/// Size of the step by which a command changes a value.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum StepSize {
     Coarse,
     Fine,
 }
 
-/// Rule that decides if an edit is merged with the previous one into one undo step.
+/// Rule that decides if an edit forms one undo step with the previous edit.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Coalesce {
-    /// The edit is a separate undo step.
+    /// Rule: the edit is an undo step of its own.
     Single,
-    /// The edit is merged with an edit of the same label at most [`REPEAT_WINDOW`] before.
+    /// Rule: the edit is merged with an edit of the same label at most [`REPEAT_WINDOW`] before.
     Repeat,
-    /// The edit is merged with edits of the same label until the gesture (a drag or mode) ends.
+    /// Rule: the edit is merged with edits of the same label until the gesture (a drag or mode)
+    /// ends.
     Gesture,
 }
 
-impl<'a> UpdateContext<'a> {
-    fn new(model: &'a mut Model, now: Duration) -> Self {
-        Self { model, now, effects: Vec::new(), follow: true, typed: None }
-    }
-
+impl UpdateContext<'_> {
     fn handle(&mut self, message: Message) {
         match message {
             Message::Key(key) => self.key(key),
@@ -165,8 +149,8 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Adds `effect` to the results of the update. It replaces an earlier effect of the same kind,
-    /// except for saves and exports.
+    /// Adds `effect` to the results of the update. It replaces an earlier effect of the same kind
+    /// in these results, except for saves and exports.
     fn emit(&mut self, effect: Effect) {
         if !matches!(effect, Effect::Save { .. } | Effect::Export(_) | Effect::ExportSized { .. }) {
             self.effects.retain(|e| discriminant(e) != discriminant(&effect));
@@ -174,23 +158,31 @@ impl<'a> UpdateContext<'a> {
         self.effects.push(effect);
     }
 
-    /// Marks the cells of the picture as outdated.
+    /// Marks the picture's cells as outdated, so that they are computed again.
     fn repaint(&mut self) {
         self.model.picture_version += 1;
     }
 
-    /// Requests a render of the scene.
+    /// Requests a render of the edited scene.
     fn show(&mut self) {
         let scene = Arc::clone(self.model.scene());
         self.emit(Effect::Show(scene));
         self.repaint();
     }
 
+    /// Requests snapshots with the current raster and the values at the pixel probe.
+    fn show_view(&mut self) {
+        let (raster, probe) = (self.model.raster, self.model.probe);
+        self.emit(Effect::View(View { raster, probe }));
+    }
+
     fn scene(&self) -> &Arc<Scene> {
         self.model.scene()
     }
 
-    /// Commits an edit, or shows its error as a notice. Returns `true` if the scene has changed.
+    /// Makes the result of an edit the current scene, or shows the edit's error as a notice.
+    /// `coalesce` decides if the edit joins the previous undo step. Returns `true` if the scene has
+    /// changed.
     fn commit(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) -> bool {
         match edit {
             Ok(edit) => self.record(edit, coalesce),
@@ -201,8 +193,8 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Makes the scene of `edit` the current one, in the open form or else in the undo history.
-    /// Returns `true` if the scene has changed.
+    /// Stores the result of `edit` in the open form. If no form is open, stores it in the undo
+    /// history as the current scene. Returns `true` if the scene has changed.
     fn record(&mut self, edit: Edit, coalesce: Coalesce) -> bool {
         if let Some(note) = &edit.note {
             self.say(note.clone());
@@ -235,13 +227,14 @@ impl<'a> UpdateContext<'a> {
         changed
     }
 
-    /// Ends the merging of edits, so that the next edit starts a new undo step.
+    /// Ends the gesture in progress, so that the next edit starts a new undo step.
     fn end_gesture(&mut self) {
         self.model.history.end_gesture();
         self.model.last_edit = None;
     }
 
-    /// Commits an edit and selects its target. Returns `true` if the scene has changed.
+    /// Makes the result of an edit the current scene and selects the edited part. Returns `true` if
+    /// the scene has changed.
     fn commit_and_select(&mut self, edit: Result<Edit, EditError>) -> bool {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         let changed = self.commit(edit, Coalesce::Single);
@@ -254,12 +247,12 @@ impl<'a> UpdateContext<'a> {
     fn select(&mut self, subject: Target) {
         if self.model.selection != subject {
             self.model.selection = subject;
-            self.model.inspector = Inspector::default();
+            self.model.inspector = FieldList::default();
         }
     }
 
-    /// Shows a notice for at least `seconds`, and for longer if the text is long. `None` shows
-    /// the notice until the next key.
+    /// Shows the notice `text` for at least `seconds`, and for longer if the text is long. If
+    /// `seconds` is `None`, shows it until the next key.
     fn notify(&mut self, tone: Tone, text: impl Into<String>, seconds: Option<f64>) {
         let text = sanitized(&text.into());
         let until = seconds.map(|seconds| {
@@ -281,7 +274,7 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Removes an expired notice.
+    /// Removes the notice if its time has passed.
     fn expire_notice(&mut self) {
         let over = |notice: &Notice| notice.until.is_some_and(|until| until <= self.now);
         if self.model.notice.as_ref().is_some_and(over) {
@@ -289,8 +282,10 @@ impl<'a> UpdateContext<'a> {
         }
     }
 
-    /// Restores the model's invariants: the selection exists in the scene, cursors are in range and
-    /// visible, and the renderer has the current raster size.
+    /// Restores three invariants of the model after an update. The selection exists in the scene.
+    /// Cursors are in range and visible. The renderer knows the present size of the picture in half
+    /// cells (upper and lower halves of terminal cells). Also requests an autosave if one is
+    /// needed.
     fn normalize(&mut self) {
         if !self.model.selection.exists(self.model.scene()) {
             let last = |len: usize, of: fn(usize) -> Target| len.checked_sub(1).map(of);
@@ -305,7 +300,7 @@ impl<'a> UpdateContext<'a> {
         let raster = self.model.layout().map(|layout| layout.raster);
         if let Some(raster) = raster.filter(|raster| self.model.raster != Some(*raster)) {
             self.model.raster = Some(raster);
-            self.emit(Effect::Raster(raster));
+            self.show_view();
             self.repaint();
         }
         if self.model.watch.is_some() {
@@ -316,20 +311,23 @@ impl<'a> UpdateContext<'a> {
         self.autosave();
     }
 
-    /// Limits cursors and scroll positions of outline, inspector and form to the existing lines.
+    /// Limits cursors and scroll positions of the lists in panels and forms to the existing lines.
     fn normalize_panels(&mut self) {
-        let lines = self.model.field_lines();
-        let follow = self.follow;
-        let overlay_layout = self.model.overlay_layout();
-        let inspector_rows = self.model.inspector_rows();
-        if let Some(Overlay::Form(form)) = &mut self.model.overlay {
-            let rows = overlay_layout.map_or(0, |layout| layout.list.height);
-            normalize_cursor(&mut form.cursor, &mut form.scroll, &lines, rows, follow);
+        let (lines, follow) = (self.model.field_lines(), self.follow);
+        let area = match self.in_form() {
+            true => self.model.overlay_layout().map(|layout| layout.list),
+            false => self.model.inspector_rows().map(|(rows, _)| rows),
+        };
+        let rows = area.map_or(0, |area| usize::from(area.height));
+        let FieldList { cursor, scroll, .. } = self.model.field_list_mut();
+        *cursor = nearest_field(&lines, *cursor);
+        *scroll = (*scroll).min(lines.len().saturating_sub(rows));
+        if follow {
+            *scroll = scrolled(*scroll, *cursor, lines.len(), rows);
+        }
+        if self.in_form() {
             return;
         }
-        let rows = inspector_rows.map_or(0, |(rows, _)| rows.height);
-        let Inspector { cursor, scroll, .. } = &mut self.model.inspector;
-        normalize_cursor(cursor, scroll, &lines, rows, follow);
         if let Some(rows) = self.model.outline_rows() {
             let lines = outline(self.model.scene());
             let rows = usize::from(rows.height);
@@ -341,26 +339,9 @@ impl<'a> UpdateContext<'a> {
     }
 }
 
-/// Returns the item `by` positions after the current one, cyclically. Without a current item,
-/// counts from the first.
+/// Returns the item `by` positions after the first one for which `is_current` is `true`; the last
+/// item is followed by the first. If there is no such item, counts from the first item.
 fn cycled<T>(items: &[T], is_current: impl Fn(&T) -> bool, by: isize) -> &T {
     let position = items.iter().position(is_current).unwrap_or(0) as isize;
     &items[(position + by).rem_euclid(items.len() as isize) as usize]
-}
-
-/// Moves `cursor` to the nearest field of `lines` and limits `scroll` to the list. If `follow` is
-/// `true`, scrolls to make the cursor visible in `rows` rows.
-fn normalize_cursor(
-    cursor: &mut usize,
-    scroll: &mut usize,
-    lines: &[PanelLine],
-    rows: u16,
-    follow: bool,
-) {
-    let rows = usize::from(rows);
-    *cursor = nearest_field(lines, *cursor);
-    *scroll = (*scroll).min(lines.len().saturating_sub(rows));
-    if follow {
-        *scroll = scrolled(*scroll, *cursor, lines.len(), rows);
-    }
 }

@@ -1,4 +1,5 @@
-//! Mouse handling: clicks select or focus, drags orbit or move, the wheel dollies or scrolls.
+//! Mouse handling in the dashboard: clicks select or focus, drags orbit or move, the wheel dollies
+//! or scrolls.
 
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{Drag, Mode};
@@ -7,18 +8,22 @@ use crate::dashboard::panel_lines::{OutlineLine, PanelLine, outline};
 use crate::dashboard::update::UpdateContext;
 use crate::scene::Scene;
 use crate::scene::edit::Target;
-use crate::terminal::Area;
 use crate::terminal::event::{Button, Mouse, MouseKind};
 use glam::DVec3;
+use ratatui::layout::Rect;
 
-/// Lines per tick of the wheel.
+/// Number of lines that a list scrolls per tick of the mouse wheel.
 pub(super) const WHEEL_LINES: i32 = 3;
 
-/// Returns the index of the list line under the mouse. `rows` is the list's area, `scroll` its
-/// first visible line. Returns `None` if the mouse is outside the area.
-pub(super) fn line_at(rows: Area, scroll: usize, mouse: Mouse) -> Option<usize> {
-    let inside = rows.contains(mouse.column, mouse.row);
-    inside.then(|| usize::from(mouse.row - rows.y) + scroll)
+/// Returns `true` if the mouse is in `area`. It is not in an area that is `None` (a folded panel).
+pub(super) fn is_in(mouse: Mouse, area: impl Into<Option<Rect>>) -> bool {
+    area.into().is_some_and(|area| area.contains((mouse.column, mouse.row).into()))
+}
+
+/// Returns the index of the list line under the mouse. `rows` is the list's area, `scroll` the
+/// index of its first visible line. Returns `None` if the mouse is outside of the area.
+pub(super) fn line_at(rows: Rect, scroll: usize, mouse: Mouse) -> Option<usize> {
+    is_in(mouse, rows).then(|| usize::from(mouse.row - rows.y) + scroll)
 }
 
 impl UpdateContext<'_> {
@@ -50,45 +55,40 @@ impl UpdateContext<'_> {
             return;
         }
         let Some(layout) = self.model.layout() else { return };
-        if layout.picture.contains(mouse.column, mouse.row) {
-            let in_picture = layout.image.contains(mouse.column, mouse.row);
+        if is_in(mouse, layout.picture) {
+            let in_picture = is_in(mouse, layout.image);
             self.model.focus = Focus::Picture;
             if !self.moves_or_turns() {
                 self.end_gesture();
             }
-            let last = [mouse.column, mouse.row];
-            let modified = mouse.modified;
-            self.model.drag = Some(Drag { button, modified, last, moved: false, in_picture });
+            self.start_drag(button, mouse, in_picture);
         } else if let Some((rows, _)) = self.model.inspector_rows()
-            && layout.inspector.is_some_and(|area| area.contains(mouse.column, mouse.row))
+            && is_in(mouse, layout.inspector)
         {
             self.press_in_inspector(rows, mouse);
         } else if let Some(rows) = self.model.outline_rows()
-            && layout.outline.is_some_and(|area| area.contains(mouse.column, mouse.row))
+            && is_in(mouse, layout.outline)
         {
             self.press_in_outline(rows, mouse);
         }
     }
 
-    fn press_in_outline(&mut self, rows: Area, mouse: Mouse) {
+    fn press_in_outline(&mut self, rows: Rect, mouse: Mouse) {
         // `rows` is the layout before the focus change, which may unfold the panel.
         let lines = outline(self.scene());
         let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
-        let subject = line.and_then(|line| match line {
-            OutlineLine::Entry { subject, .. } => Some(subject.clone()),
-            OutlineLine::Heading(_) => None,
-        });
+        let subject = line.and_then(OutlineLine::subject).cloned();
         let again =
             self.model.focus == Focus::Outline && subject.as_ref() == Some(&self.model.selection);
         self.set_focus(Focus::Outline);
         match subject {
-            Some(_) if again => self.inspect(),
+            Some(_) if again => self.set_focus(Focus::Inspector),
             Some(subject) => self.select(subject),
             None => {}
         }
     }
 
-    fn press_in_inspector(&mut self, rows: Area, mouse: Mouse) {
+    fn press_in_inspector(&mut self, rows: Rect, mouse: Mouse) {
         let lines = self.model.field_lines();
         let line = line_at(rows, self.model.inspector.scroll, mouse);
         let line = line.filter(|line| lines.get(*line).and_then(PanelLine::field).is_some());
@@ -97,23 +97,23 @@ impl UpdateContext<'_> {
         self.set_focus(Focus::Inspector);
         match line {
             Some(_) if again => self.open_field(None),
-            Some(line) => self.set_cursor(line),
+            Some(line) => self.model.inspector.cursor = line,
             None => {}
         }
     }
 
-    /// Opens the clicked line of the overlay if the cursor is on it already, otherwise moves the
-    /// cursor there.
+    /// Opens the clicked line of the open overlay if the cursor is on it already, otherwise moves
+    /// the cursor there.
     fn press_in_overlay(&mut self, mouse: Mouse) {
         let Some(layout) = self.model.overlay_layout() else { return };
         match &self.model.overlay {
             Some(Overlay::Form(form)) => {
-                let (cursor, typing) = (form.cursor, form.editor.is_some());
-                let line = line_at(layout.list, form.scroll, mouse);
+                let (cursor, typing) = (form.fields.cursor, form.fields.editor.is_some());
+                let line = line_at(layout.list, form.fields.scroll, mouse);
                 let lines = self.model.field_lines();
                 match line.filter(|i| lines.get(*i).and_then(PanelLine::field).is_some()) {
                     Some(line) if line == cursor && !typing => self.open_field(None),
-                    Some(line) if self.apply_field() => self.set_cursor(line),
+                    Some(line) if self.apply_field() => self.model.field_list_mut().cursor = line,
                     _ => {}
                 }
                 return;
@@ -168,8 +168,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Returns `true` in the modes Move and Rotate, in which all edits of the same label form one
-    /// undo step.
+    /// Returns `true` if the current mode moves or rotates the selection. In such a mode, all edits
+    /// with the same label form one undo step.
     fn moves_or_turns(&self) -> bool {
         matches!(self.model.mode, Mode::Move | Mode::Rotate)
     }
@@ -179,9 +179,7 @@ impl UpdateContext<'_> {
             self.probe_at(mouse);
             return;
         }
-        let film = self.scene().film.size;
-        let pixel = self.model.layout().and_then(|l| l.film_pixel(film, mouse.column, mouse.row));
-        if let Some(pixel) = pixel {
+        if let Some(pixel) = self.pixel_at(mouse) {
             if drag.button != Button::Left || drag.modified {
                 return self.focus_on_pixel(pixel);
             }
@@ -196,10 +194,22 @@ impl UpdateContext<'_> {
         }
     }
 
+    /// Returns the pixel of the film (column, row) under the mouse. Returns `None` outside of the
+    /// picture.
+    fn pixel_at(&self, mouse: Mouse) -> Option<[usize; 2]> {
+        self.model.layout()?.film_pixel(self.scene().film.size, mouse.column, mouse.row)
+    }
+
+    /// Records the start of a drag: the press of `button` at the position of `mouse`. `in_picture`
+    /// is `true` if the position is inside of the picture.
+    pub(super) fn start_drag(&mut self, button: Button, mouse: Mouse, in_picture: bool) {
+        let Mouse { column, row, modified, .. } = mouse;
+        let last = [column, row];
+        self.model.drag = Some(Drag { button, modified, last, moved: false, in_picture });
+    }
+
     pub(super) fn probe_at(&mut self, mouse: Mouse) {
-        let film = self.scene().film.size;
-        let pixel = self.model.layout().and_then(|l| l.film_pixel(film, mouse.column, mouse.row));
-        if let Some(pixel) = pixel {
+        if let Some(pixel) = self.pixel_at(mouse) {
             self.set_probe(Some(pixel));
         }
     }
@@ -217,10 +227,9 @@ impl UpdateContext<'_> {
         let Some(layout) = self.model.layout().filter(|_| !self.model.file.unreadable) else {
             return;
         };
-        let over = |area: Option<Area>| area.is_some_and(|a| a.contains(mouse.column, mouse.row));
-        if over(Some(layout.picture)) {
+        if is_in(mouse, layout.picture) {
             self.dolly_by_wheel(ticks);
-        } else if over(layout.inspector) {
+        } else if is_in(mouse, layout.inspector) {
             let rows = self.model.inspector_rows().map(|(rows, _)| rows).unwrap_or_default();
             let under = line_at(rows, self.model.inspector.scroll, mouse);
             let typing = self.model.inspector.editor.is_some();
@@ -234,7 +243,7 @@ impl UpdateContext<'_> {
                 *scroll = scroll.saturating_add_signed(lines);
                 self.follow = false;
             }
-        } else if over(layout.outline) {
+        } else if is_in(mouse, layout.outline) {
             let scroll = &mut self.model.outline_scroll;
             *scroll = scroll.saturating_add_signed(lines);
             self.follow = false;
@@ -242,9 +251,9 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns the index of the object that is visible at the centre of a film pixel (column, row)
-/// through the centre of the lens, and the visible point. Returns `None` if the camera ray hits no
-/// object.
+/// Returns the first object on the camera ray through a film pixel (column, row), as two values:
+/// the index of the object and the visible point. The ray goes through the centre of the lens and
+/// the centre of the pixel. Returns `None` if it hits no object.
 pub(super) fn first_hit(scene: &Scene, [x, y]: [usize; 2]) -> Option<(usize, DVec3)> {
     let camera = &scene.camera;
     let [width, height] = scene.film.size.map(f64::from);

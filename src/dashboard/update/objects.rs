@@ -1,41 +1,34 @@
-//! Moving, turning, duplicating and deleting the selection.
+//! Commands that move, turn, duplicate and delete the selected part of the scene.
 
 use crate::dashboard::model::Mode;
 use crate::dashboard::update::{Coalesce, Direction, StepSize, UpdateContext};
 use crate::scene::edit::{self, bounds, step_length};
 use glam::{DVec2, DVec3};
 
-/// Degrees per step of a rotation.
+/// Angle in degrees of one step of turning the selection.
 const TURN_DEGREES: f64 = 15.0;
 const TURN_DEGREES_FINE: f64 = 1.0;
-/// Largest factor by which the depth component of a drag is lengthened. The exact factor for a
-/// foreshortened ground plane, 1 / sin of the view angle, is unbounded at grazing angles.
+/// Largest factor by which a drag multiplies the movement of the selection in depth. The ground
+/// plane is seen at an angle and therefore appears shortened. To stay under the mouse, the
+/// selection must move farther by the factor 1 / sin(angle between view direction and plane), which
+/// is unbounded at grazing angles.
 const MOST_STRETCH: f64 = 4.0;
 
-/// Returns the coordinate axis in the ground plane that is nearest to `v`.
+/// Returns the coordinate axis in the ground plane, positive or negative, whose direction is
+/// nearest to that of `v`.
 fn nearest_axis(v: DVec3) -> DVec3 {
     if v.x.abs() >= v.z.abs() { DVec3::X * v.x.signum() } else { DVec3::Z * v.z.signum() }
 }
 
 impl UpdateContext<'_> {
-    /// Returns two coordinate axes in the ground plane: those that point most nearly to the right
-    /// and away from the eye in the picture. Steps along coordinate axes keep round coordinates
-    /// round.
+    /// Returns two coordinate axes in the ground plane: the one that points most nearly to the
+    /// right in the picture, and the one that points most nearly away from the eye. Steps along
+    /// coordinate axes keep round coordinates round.
     fn ground_axes(&self) -> [DVec3; 2] {
         let [right, _, _] = self.scene().camera.frame();
         let right = nearest_axis(right);
         // View direction of an upright observer whose right-hand side is `right`.
         [right, DVec3::Y.cross(right)]
-    }
-
-    pub(super) fn check_movable(&mut self) -> bool {
-        let tried = edit::move_by(self.scene(), &self.model.selection, [0.0; 3]);
-        tried.map_err(|error| self.refuse(&error.to_string())).is_ok()
-    }
-
-    pub(super) fn check_turnable(&mut self) -> bool {
-        let tried = edit::turn(self.scene(), &self.model.selection, 0.0);
-        tried.map_err(|error| self.refuse(&error.to_string())).is_ok()
     }
 
     pub(super) fn move_selection(&mut self, direction: Direction, step_size: StepSize) {
@@ -59,16 +52,17 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    /// Returns the rule that merges the current step into an undo step: with the whole gesture in a
-    /// mode or drag, otherwise with recent steps.
+    /// Returns the rule by which the current edit joins an undo step. In a mode that moves or
+    /// turns, and during a drag, all edits of the gesture form one step. Otherwise an edit joins a
+    /// recent one.
     fn gesture(&self) -> Coalesce {
         let in_mode = matches!(self.model.mode, Mode::Move | Mode::Rotate);
         if in_mode || self.model.drag.is_some() { Coalesce::Gesture } else { Coalesce::Repeat }
     }
 
-    /// Moves the selection by a drag of `right` and `down` half cells. It moves vertically if
-    /// `upright` is `true`, otherwise in the ground plane. The selection stays under the mouse as
-    /// far as [`MOST_STRETCH`] allows.
+    /// Moves the selection by a drag of `right` and `down` half cells (upper or lower halves of
+    /// terminal cells). It moves vertically if `upright` is `true`, otherwise in the ground plane.
+    /// The selection stays under the mouse as far as [`MOST_STRETCH`] allows.
     pub(super) fn move_by_hand(&mut self, right: f64, down: f64, upright: bool) {
         let scene = self.scene();
         let [x, _, forward] = scene.camera.frame();

@@ -1,4 +1,4 @@
-//! Prompts for names, paths, stop criteria and sizes.
+//! Prompts of the dashboard for names, paths, stop criteria and sizes.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::message::{Effect, Format};

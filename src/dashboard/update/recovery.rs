@@ -8,7 +8,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 impl UpdateContext<'_> {
-    /// Offers orphaned edits, the unsaved edits of a crashed session.
+    /// Asks the user about recovery of the unsaved edits of a crashed session. Shows a notice
+    /// instead while an overlay or text editor is open.
     pub(super) fn orphaned_edits(&mut self, edits: OrphanedEdits) {
         self.follow = false;
         self.model.orphaned_edits = Some(edits);
@@ -71,8 +72,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Requests an autosave if there are new unsaved edits. Requests the removal of the recovery
-    /// file if all edits are saved, or if the user quits and thereby discards them.
+    /// Requests a write of the recovery file if there are new unsaved edits. Requests its removal
+    /// if all edits are saved, or if the user quits and thereby discards them.
     pub(super) fn autosave(&mut self) {
         let quit = self.effects.iter().position(|effect| *effect == Effect::Quit);
         let unsaved = quit.is_none() && !self.model.file.unreadable && self.model.is_unsaved();
@@ -89,7 +90,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Formats an age, such as `12 minutes ago`.
+/// Formats the age of a recovery file, such as `12 minutes ago`.
 fn ago(age: Duration) -> String {
     let minutes = age.as_secs() / 60;
     let (count, unit) = match minutes {

@@ -29,7 +29,8 @@ impl UpdateContext<'_> {
         self.say(format!("stops {when}"));
     }
 
-    /// Opens the list of noise targets with the cursor on the current target.
+    /// Opens the list of noise targets (noise values at which rendering stops) with the cursor on
+    /// the current target.
     pub(super) fn open_noise_targets(&mut self) {
         let wanted = self.model.stop.noise_codes.unwrap_or(0.5);
         let cursor = QUALITIES.iter().position(|codes| *codes <= wanted);

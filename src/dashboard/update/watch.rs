@@ -1,10 +1,10 @@
-//! Table of watched files: reports, cursor and mouse.
+//! Table of watched film files in `zerkalo watch`: reports, cursor and mouse.
 
 use crate::dashboard::layout::Focus;
-use crate::dashboard::model::{Drag, Mode, WatchTable, short_name};
+use crate::dashboard::model::{Mode, WatchTable, short_name};
 use crate::dashboard::panel_lines::scrolled;
 use crate::dashboard::update::UpdateContext;
-use crate::dashboard::update::mouse::{WHEEL_LINES, line_at};
+use crate::dashboard::update::mouse::{WHEEL_LINES, is_in, line_at};
 use crate::render::schedule::Stop;
 use crate::render::session::{WatchReport, WatchedShards};
 use crate::scene::Scene;
@@ -14,8 +14,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 impl UpdateContext<'_> {
-    /// Stores a report on the watched files. The cursor stays on the same file or shard, even if
-    /// its row changes.
+    /// Stores a report on the watched files. A cursor in the first row stays there. Otherwise it
+    /// follows its file or missing shard (part of the render) if this moves to another row.
     pub(super) fn watched(&mut self, report: WatchReport) {
         let before = self.model.watch.take();
         if let Some(size) = report.size.filter(|size| *size != self.scene().film.size) {
@@ -44,7 +44,8 @@ impl UpdateContext<'_> {
         self.move_watch_cursor(0);
     }
 
-    /// Moves the cursor of the table by `steps` rows, and scrolls to make it visible.
+    /// Moves the cursor of the table of watched files by `steps` rows, and scrolls the table to
+    /// make the cursor visible.
     pub(super) fn move_watch_cursor(&mut self, steps: isize) {
         let rows = self.model.watch_rows().map_or(1, |(rows, _)| usize::from(rows.height));
         let Some(table) = &mut self.model.watch else { return };
@@ -53,17 +54,15 @@ impl UpdateContext<'_> {
         table.scroll = scrolled(table.scroll, table.cursor, len, rows);
     }
 
-    /// Handles mouse events outside of overlays: the table selects and scrolls, the probe follows
-    /// clicks in the picture.
+    /// Handles mouse events in `zerkalo watch` while no overlay is open. In the table of files they
+    /// select a row or scroll. In the picture, a click moves the pixel probe.
     pub(super) fn mouse_on_watch(&mut self, mouse: Mouse) {
         let Some(layout) = self.model.layout() else { return };
-        let in_picture = layout.image.contains(mouse.column, mouse.row);
-        let in_table = layout.outline.is_some_and(|area| area.contains(mouse.column, mouse.row));
+        let in_picture = is_in(mouse, layout.image);
+        let in_table = is_in(mouse, layout.outline);
         match mouse.kind {
             MouseKind::Press(button) => {
-                let last = [mouse.column, mouse.row];
-                let modified = mouse.modified;
-                self.model.drag = Some(Drag { button, modified, last, moved: false, in_picture });
+                self.start_drag(button, mouse, in_picture);
                 if in_table && let Some((rows, _)) = self.model.watch_rows() {
                     self.model.focus = Focus::Outline;
                     let table = self.model.watch.as_ref();

@@ -1,45 +1,39 @@
-//! Drawing of fields and their values, in the inspector and in forms.
+//! Drawing of properties and their values, in the inspector and in forms.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::{Focus, Layout};
-use crate::dashboard::model::Model;
-use crate::dashboard::overlay_layout::wrapped;
+use crate::dashboard::model::{FieldList, Model};
 use crate::dashboard::panel_lines::{FieldLine, PanelLine};
-use crate::dashboard::view::frame::{panel, scroll_mark};
+use crate::dashboard::view::frame::{panel, window};
 use crate::dashboard::view::is_active;
-use crate::dashboard::view::text::{Row, columns, skip};
+use crate::dashboard::view::text::{Row, columns, paragraphs, skip};
 use crate::dashboard::view::theme::Theme;
 use crate::film::Display;
-use crate::scene::edit::Widget;
-use crate::terminal::Area;
+use crate::scene::edit::{Property, Widget};
 use crate::value::{number, round_significant};
 use ratatui::buffer::Buffer;
-use ratatui::layout::Position;
+use ratatui::layout::{Margin, Position, Rect};
 use ratatui::style::{Modifier, Style};
 use std::borrow::Cow;
 
-/// Unit of lengths. Nearly all numbers have this unit; it is therefore shown only for the field
-/// under the cursor.
+/// Name of the unit of lengths. Nearly all numbers have this unit; it is therefore shown only for
+/// the property under the cursor.
 const LENGTH: &str = "scene units";
 
-/// A list of fields and the areas that it is drawn in.
+/// List of properties, and the areas in which it is drawn.
 pub struct Fields<'a> {
-    /// Headings and fields.
+    /// Headings and properties, as lines.
     pub lines: &'a [PanelLine],
-    /// Area of the lines.
-    pub list: Area,
-    /// Area of the help on the field under the cursor.
-    pub help: Area,
-    /// Index of the line under the cursor.
-    pub cursor: usize,
-    /// Index of the first visible line.
-    pub scroll: usize,
-    /// Text editor of the field under the cursor, if one is open.
-    pub editor: Option<&'a Editor>,
-    /// Reason why the last step of a field was refused. It is shown unless the editor has a reason
-    /// of its own.
+    /// Area of the lines of the property list.
+    pub list: Rect,
+    /// Area of the help on the property under the cursor.
+    pub help: Rect,
+    /// Cursor, scroll position and text editor of the property list.
+    pub state: &'a FieldList,
+    /// Reason why the last change of a value by arrow keys was refused; `None` if it was accepted.
+    /// A reason in the text editor is shown in place of this one.
     pub problem: Option<&'a str>,
-    /// `true` if the fields receive the keys.
+    /// `true` if the list receives the keys.
     pub active: bool,
 }
 
@@ -56,42 +50,32 @@ pub fn inspector(
     let active = is_active(model, Focus::Inspector);
     panel(area, &model.selection.title(model.scene()), active, theme, buffer);
     let lines = model.field_lines();
-    let fields = Fields {
-        lines: &lines,
-        list,
-        help,
-        cursor: model.inspector.cursor,
-        scroll: model.inspector.scroll,
-        editor: model.inspector.editor.as_ref(),
-        problem: None,
-        active,
-    };
+    let fields =
+        Fields { lines: &lines, list, help, state: &model.inspector, problem: None, active };
     fields.draw(theme, buffer)
 }
 
 impl Fields<'_> {
-    /// Draws the fields. Returns the position of the text cursor, or `None` if the cursor is
-    /// hidden.
+    /// Draws the list of properties. Returns the position of the text cursor, or `None` if the
+    /// cursor is hidden.
     pub fn draw(&self, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
-        let rows = usize::from(self.list.height);
-        let first = self.scroll.min(self.lines.len().saturating_sub(rows));
-        let label =
-            |line: &PanelLine| line.field().map_or(0, |f| 1 + 2 * f.depth + columns(&f.label));
+        let label = |line: &PanelLine| {
+            line.field().map_or(0, |f| 1 + 2 * f.property.depth + columns(&f.label))
+        };
         let widest = self.lines.iter().map(label).max().unwrap_or(0);
         let labels = widest.min(usize::from(self.list.width) * 9 / 20);
         let mut typing = None;
-        for (row, (i, line)) in (0..).zip(self.lines.iter().enumerate().skip(first).take(rows)) {
+        let border = theme.border(self.active);
+        for (row, i) in window(self.list, self.state.scroll, self.lines.len(), border, buffer) {
             let to = Row::new(buffer, self.list, row);
-            match line {
+            match &self.lines[i] {
                 PanelLine::Heading(title) => heading(to, title, theme),
                 PanelLine::Field(field) => {
-                    let position = self.field(field, i == self.cursor, labels, to, theme);
+                    let position = self.field(field, i == self.state.cursor, labels, to, theme);
                     typing = typing.or(position);
                 }
             }
         }
-        let window = (first, rows, self.lines.len());
-        scroll_mark(self.list, window, theme.border(self.active), buffer);
         if self.active {
             self.say(theme, buffer);
         }
@@ -107,7 +91,7 @@ impl Fields<'_> {
         theme: &Theme,
     ) -> Option<Position> {
         let chosen = chosen && self.active;
-        let (name, value) = match (chosen, field.is_default) {
+        let (name, value) = match (chosen, field.property.is_default) {
             (true, _) => (theme.selected(true), theme.selected(true)),
             (false, true) => (theme.dim(), theme.dim()),
             (false, false) => (theme.dim(), theme.text()),
@@ -115,17 +99,17 @@ impl Fields<'_> {
         if chosen {
             to.fill(name);
         }
-        let indent = 1 + 2 * field.depth;
+        let indent = 1 + 2 * field.property.depth;
         to.skip(indent.min(labels));
         to.put_wide(&field.label, labels.saturating_sub(indent), name).skip(2);
-        if let Some(editor) = self.editor.filter(|_| chosen) {
+        if let Some(editor) = self.state.editor.as_ref().filter(|_| chosen) {
             return typed(editor, &mut to, theme);
         }
         let swatch = field.swatch.and_then(|color| theme.swatch(Display::default().codes_8(color)));
         if let Some(style) = swatch {
             to.put_right(" ", 0, name).put_right("██", 4, style).put_right(" ", 4, name);
         }
-        let words = matches!(field.entry, Widget::Choice | Widget::Kind | Widget::Switch);
+        let words = matches!(field.property.entry, Widget::Choice | Widget::Kind | Widget::Switch);
         match field.value.as_str() {
             "" => to.put("–", theme.dim()),
             words_value if words && chosen => {
@@ -133,46 +117,43 @@ impl Fields<'_> {
             }
             given => to.put(&brief(given), value),
         };
-        let shows_unit = chosen || field.unit != LENGTH;
-        let fits = to.left() >= columns(field.unit) + 2;
-        if shows_unit && fits && !field.unit.is_empty() && !field.value.is_empty() {
+        let shows_unit = chosen || field.property.unit != LENGTH;
+        let fits = to.left() >= columns(field.property.unit) + 2;
+        if shows_unit && fits && !field.property.unit.is_empty() && !field.value.is_empty() {
             let unit = if chosen { name } else { theme.dim() };
-            to.put(" ", unit).put(field.unit, unit);
+            to.put(" ", unit).put(field.property.unit, unit);
         }
         None
     }
 
-    /// Draws help on the field under the cursor: the reason for a refusal if there is one,
-    /// otherwise the field's description and valid input.
+    /// Draws help on the property under the cursor. If its value was refused, this is the reason;
+    /// otherwise it is the property's description and its valid values.
     fn say(&self, theme: &Theme, buffer: &mut Buffer) {
-        let Some(field) = self.lines.get(self.cursor).and_then(PanelLine::field) else { return };
-        let width = self.help.width.saturating_sub(2);
-        let problem = self.editor.and_then(|e| e.problem.as_deref()).or(self.problem);
-        let texts = match problem {
+        let Some(field) = self.lines.get(self.state.cursor).and_then(PanelLine::field) else {
+            return;
+        };
+        let problem =
+            self.state.editor.as_ref().and_then(|e| e.problem.as_deref()).or(self.problem);
+        let mut texts = match problem {
             Some(problem) => vec![(problem.to_string(), theme.bad())],
             None => vec![
-                (field.doc.to_string(), theme.dim()),
-                (expected(field), theme.dim().add_modifier(Modifier::ITALIC)),
+                (field.property.doc.to_string(), theme.dim()),
+                (expected(&field.property), theme.dim().add_modifier(Modifier::ITALIC)),
             ],
         };
-        let lines = texts.iter().flat_map(|(text, style)| {
-            let lines = if text.is_empty() { Vec::new() } else { wrapped(text, width) };
-            lines.into_iter().map(move |line| (line, *style))
-        });
-        for (row, (line, style)) in (0..self.help.height).zip(lines) {
-            Row::new(buffer, self.help, row).put(" ", style).put(&line, style);
-        }
+        texts.retain(|(text, _)| !text.is_empty());
+        paragraphs(self.help.inner(Margin::new(1, 0)), &texts, buffer);
     }
 }
 
-/// Returns a description of a field's valid input and, if the field has another value, of its
-/// default value.
-fn expected(field: &FieldLine) -> String {
-    match &field.default {
-        Some(default) if !default.is_empty() && !field.is_default => {
-            format!("{}; default {default}", field.expected)
+/// Returns a description of a property's valid values. If the present value is not the default, the
+/// description includes the default.
+fn expected(property: &Property) -> String {
+    match &property.default {
+        Some(default) if !default.is_empty() && !property.is_default => {
+            format!("{}; default {default}", property.expected)
         }
-        _ => field.expected.clone(),
+        _ => property.expected.clone(),
     }
 }
 
@@ -200,10 +181,11 @@ pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     Some(Position { x: x + column, y })
 }
 
-/// Rounds a number with many digits to six significant digits, for display outside of the text
-/// editor.
+/// Returns `value` as it is displayed outside of the text editor: a number with many digits is
+/// rounded to six significant ones, any other text is unchanged.
 fn brief(value: &str) -> Cow<'_, str> {
-    /// Largest length of a number, in characters, that is shown with all its digits.
+    /// Largest length of a number, in characters, up to which it is shown with all its digits.
+    /// Longer numbers are rounded.
     const SHORT: usize = 9;
     match value.parse::<f64>() {
         Ok(x) if value.len() > SHORT && x.is_finite() => number(round_significant(x, 6)).into(),

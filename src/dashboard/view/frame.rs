@@ -4,58 +4,63 @@ use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::message::DisplayChannel;
 use crate::dashboard::model::{CompareView, Mode, Model};
 use crate::dashboard::view::legend::Legend;
-use crate::dashboard::view::text::{Row, columns, number, rect};
+use crate::dashboard::view::text::{Row, columns, number};
 use crate::dashboard::view::theme::Theme;
 use crate::film::Tone;
-use crate::terminal::Area;
 use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 use ratatui::widgets::{Block, Clear, Widget};
 
-/// Draws the border of a panel with its title.
-pub fn panel(area: Area, title: &str, focused: bool, theme: &Theme, buffer: &mut Buffer) {
+/// Draws the border of a panel with its title. `focused` is `true` if the panel has the focus.
+pub fn panel(area: Rect, title: &str, focused: bool, theme: &Theme, buffer: &mut Buffer) {
     Block::bordered()
         .border_type(theme.border_type(focused))
         .border_style(theme.border(focused))
-        .render(rect(area), buffer);
+        .render(area, buffer);
     let style = match focused {
         true => theme.accent().add_modifier(Modifier::BOLD),
         false => theme.heading(),
     };
-    let inside = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
+    let inside = Rect { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
     if !title.is_empty() {
         Row::new(buffer, inside, 0).put(" ", style).put(title, style).put(" ", style);
     }
 }
 
 /// Draws an empty box with a border and a title over the panels.
-pub fn overlay(area: Area, title: &str, theme: &Theme, buffer: &mut Buffer) {
-    Clear.render(rect(area).intersection(buffer.area), buffer);
+pub fn overlay(area: Rect, title: &str, theme: &Theme, buffer: &mut Buffer) {
+    Clear.render(area.intersection(buffer.area), buffer);
     panel(area, title, true, theme, buffer);
 }
 
-/// Draws the scroll bar of a list on the border to the right of `area`. The list has `all` lines,
-/// of which `shown` are visible from line `first` on. Draws nothing if all lines are visible.
-pub fn scroll_mark(
-    area: Area,
-    (first, shown, all): (usize, usize, usize),
+/// Draws the scroll bar of a list on the border to the right of `area`, unless all of its `len`
+/// lines are visible. `scroll` is the index of the first visible line; it is reduced if lines below
+/// the end of the list would be visible. Returns two values for each visible line: its row in
+/// `area` and its index.
+pub fn window(
+    area: Rect,
+    scroll: usize,
+    len: usize,
     style: Style,
     buffer: &mut Buffer,
-) {
+) -> impl Iterator<Item = (u16, usize)> + use<> {
     let rows = usize::from(area.height);
-    if all <= shown || rows == 0 {
-        return;
+    let most = len.saturating_sub(rows);
+    let first = scroll.min(most);
+    if most > 0 && rows > 0 {
+        let length = (rows * rows / len).max(1);
+        let top = (rows - length) * first / most;
+        let bar = Rect { x: area.x + area.width, width: 1, ..area };
+        for row in top..top + length {
+            Row::new(buffer, bar, row as u16).put("┃", style);
+        }
     }
-    let length = (rows * shown / all).max(1);
-    let most = all - shown;
-    let top = (rows - length) * first.min(most) / most;
-    for row in top..top + length {
-        let bar = Area { x: area.x + area.width, width: 1, ..area };
-        Row::new(buffer, bar, row as u16).put("┃", style);
-    }
+    (0..area.height).zip(first..len)
 }
 
-/// Draws the border of the picture's panel, with file name, mode, channel, display and legend.
+/// Draws the border of the picture's panel with file name, mode, channel, exposure, tone curve and
+/// legend. Draws nothing in full screen.
 pub fn draw(
     model: &Model,
     layout: &Layout,
@@ -65,7 +70,7 @@ pub fn draw(
 ) {
     let area = layout.picture;
     let bottom = area.height.saturating_sub(1);
-    let inside = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
+    let inside = Rect { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
     if model.fullscreen {
         return;
     }
@@ -103,9 +108,9 @@ pub fn draw(
     }
 }
 
-/// Returns short texts about the picture for its border: the visible channel or comparison, unless
-/// it is the rendered picture, then exposure and tone curve. The second value is `true` for
-/// emphasised texts, those about channel and comparison.
+/// Returns short texts for the border of the picture: the channel or comparison that is shown, the
+/// exposure and the tone curve. Default settings have no text. The second value of each pair is
+/// `true` if the text is emphasised.
 fn chips(model: &Model) -> Vec<(String, bool)> {
     let mut chips = Vec::new();
     match (model.comparison.shown, model.channel) {
@@ -128,8 +133,8 @@ fn chips(model: &Model) -> Vec<(String, bool)> {
     chips
 }
 
-/// Returns a description of the mode. Returns `None` in the default mode, in which the arrow keys
-/// orbit.
+/// Returns a description of the mode of the picture's panel. Returns `None` in the default mode, in
+/// which the arrow keys orbit.
 fn mode(model: &Model) -> Option<String> {
     let selected = || model.selection.title(model.scene());
     Some(match model.mode {

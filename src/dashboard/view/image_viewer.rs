@@ -5,14 +5,16 @@ use crate::dashboard::overlay::ViewedImage;
 use crate::dashboard::view::picture::paint;
 use crate::dashboard::view::text::Row;
 use crate::dashboard::view::theme::Theme;
-use crate::terminal::Area;
 use crate::terminal::cells::PictureCells;
 use crate::terminal::image::{Protocol, ViewerImage};
 use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 
-/// Draws the image in half blocks. If the terminal supports an image protocol, the uploaded image
-/// replaces them later. Returns the cells of the image, or `None` if only text is visible.
+/// Draws the viewed image in half blocks (two pixels per cell). If the terminal supports an image
+/// protocol, the uploaded image replaces them later. Returns the cells of the half blocks. Returns
+/// `None` if the image is still being read, or if its upload has ended and placeholder characters
+/// show it.
 pub fn draw(
     model: &Model,
     viewed: &ViewedImage,
@@ -20,7 +22,7 @@ pub fn draw(
     buffer: &mut Buffer,
 ) -> Option<PictureCells> {
     let [width, height] = model.screen;
-    let last = Area { x: 0, y: height.saturating_sub(1), width, height: 1 };
+    let last = Rect { x: 0, y: height.saturating_sub(1), width, height: 1 };
     let mut row = Row::new(buffer, last, 0);
     row.skip(1);
     let Some(image) = &viewed.image else {
@@ -48,8 +50,9 @@ pub fn draw(
     Some(cells)
 }
 
-/// Returns a description of the image (size and progress of the upload), and a hint if the terminal
-/// shows it in half blocks.
+/// Returns two texts: a description of the image (size and progress of the upload), and a hint at
+/// the requirements of sharper images. The hint is empty if the terminal supports an image
+/// protocol.
 fn description(viewed: &ViewedImage, image: &ViewerImage) -> (String, &'static str) {
     let [width, height] = image.size;
     let whole = format!("{width}×{height}");

@@ -3,12 +3,12 @@
 use crate::dashboard::view::picture::paint;
 use crate::dashboard::view::text::{Row, columns, number};
 use crate::dashboard::view::theme::Theme;
-use crate::terminal::Area;
 use crate::terminal::cells::{PictureCells, Raster, Scale, difference, magnitude};
 use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 use ratatui::style::Style;
 
-/// Width of the colour bar in columns.
+/// Width of the legend's colour bar in columns.
 const BAR: usize = 12;
 
 /// Legend of a false-colour scale: the values at both ends, the unit and a colour bar.
@@ -21,15 +21,15 @@ pub struct Legend {
 }
 
 impl Legend {
-    /// Creates the legend of values on `scale`, in `unit`.
+    /// Creates the legend of false-colour values on `scale`, in `unit`.
     pub fn magnitude(scale: Scale, unit: &str) -> Self {
         let bar = bar(magnitude);
         let [low, high] = [scale.value(0.0), scale.value(1.0)].map(number);
         Self { low, high, unit: unit.to_string(), bar }
     }
 
-    /// Creates the legend of differences from `-end` to `end` in 8-bit levels. `rms` is the root
-    /// mean square of the differences.
+    /// Creates the legend of false-colour differences from `-end` to `end` in 8-bit levels. `rms`
+    /// is the root mean square of the differences.
     pub fn difference(end: f64, rms: f64) -> Self {
         Self {
             low: format!("-{end}"),
@@ -44,9 +44,9 @@ impl Legend {
         columns(&self.low) + columns(&self.high) + columns(&self.unit) + BAR + 5
     }
 
-    /// Draws the legend at the right end of the row `row` of `area`. If there is no room, omits the
-    /// unit, or draws nothing.
-    pub fn draw(&self, area: Area, row: u16, theme: &Theme, buffer: &mut Buffer) {
+    /// Draws the legend at the right end of the row `row` of `area`. Omits the unit if there is no
+    /// room for it. Draws nothing if there is no room for the rest.
+    pub fn draw(&self, area: Rect, row: u16, theme: &Theme, buffer: &mut Buffer) {
         let mut line = Row::new(buffer, area, row);
         let words = columns(&self.unit) + 1;
         let (width, with_words) = match line.left() {
@@ -56,13 +56,13 @@ impl Legend {
         };
         line.skip(line.left() - width).put(" ", theme.text()).put(&self.low, theme.text());
         line.put(" ", theme.text());
-        let bar = Area { x: line.x(), y: area.y + row, width: BAR as u16, height: 1 };
+        let bar = Rect { x: line.x(), y: area.y + row, width: BAR as u16, height: 1 };
         line.skip(BAR).put(" ", Style::new()).put(&self.high, theme.text());
         if with_words {
             line.put(" ", Style::new()).put(&self.unit, theme.dim());
         }
         line.put(" ", Style::new());
-        paint(&PictureCells::new(&self.bar, theme.colors(), false), bar, buffer);
+        paint(&PictureCells::new(&self.bar, theme.colors, false), bar, buffer);
     }
 }
 

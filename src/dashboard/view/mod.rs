@@ -1,4 +1,4 @@
-//! Drawing of the model into a buffer of cells.
+//! Drawing of the dashboard's model into a buffer of terminal cells.
 //!
 //! The cells of the picture are computed separately by [`View::picture`] and cached until one of
 //! their inputs changes.
@@ -11,8 +11,8 @@ mod message_view;
 mod outline;
 mod overlay;
 mod picture;
+mod pixel_probe;
 mod plot;
-mod probe;
 mod status;
 #[cfg(test)]
 mod tests;
@@ -28,27 +28,30 @@ use picture::PictureView;
 pub use picture::is_settled;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
-use text::{Row, rect};
+use text::Row;
 use theme::Theme;
 
-/// View of a model. It caches the cells of the picture.
+/// View of the dashboard's model. It caches the cells of the picture.
 #[derive(Debug, Default)]
 pub struct View {
     imager: PictureView,
-    /// Inputs of the cached picture; `None` before the first one.
+    /// Inputs for which the cells of the picture were computed; `None` before the first picture.
     made_for: Option<Version>,
     picture: PictureCells,
     /// Rectangle of the screen in which the picture was last drawn.
     place: Rect,
-    /// Row-major mask of the cells of `place` that no overlay or mark covers.
+    /// Row-major mask of the cells of `place`: `true` if no overlay or mark covers the cell.
     uncovered: Vec<bool>,
 }
 
-/// Inputs of the picture's cells: the model's picture version, raster size and colour depth.
+/// Inputs of the picture's cells: the model's counter of changes of the picture, the columns and
+/// rows of half cells (upper or lower halves of cells), and the set of colours.
 type Version = (u64, [usize; 2], Colors);
 
 impl View {
-    /// Returns the cells of the picture. Recomputes the cells if their inputs have changed.
+    /// Returns the terminal cells of the rendered picture for the area in `layout`. They are
+    /// cached, and computed again only if an input has changed: the model's counter of changes of
+    /// the picture, the size of the area, or the set of colours.
     pub fn picture(&mut self, model: &Model, layout: &Layout) -> &PictureCells {
         let version = (model.picture_version, layout.raster, model.colors);
         if self.made_for != Some(version) {
@@ -60,8 +63,8 @@ impl View {
         &self.picture
     }
 
-    /// Returns the rectangle of the last drawn picture, and the row-major mask of its cells that
-    /// nothing covers.
+    /// Returns two values: the rectangle of the screen in which the picture was last drawn, and the
+    /// row-major mask of its cells. The mask is `true` for a cell that nothing covers.
     pub fn place(&self) -> (Rect, &[bool]) {
         (self.place, &self.uncovered)
     }
@@ -84,13 +87,13 @@ impl View {
             return None;
         };
         self.picture(model, &layout);
-        frame::draw(model, &layout, self.imager.legend(), &theme, buffer);
+        frame::draw(model, &layout, self.imager.legend.as_ref(), &theme, buffer);
         if model.file.unreadable {
             message_view::broken(model, &layout, &theme, buffer);
         } else {
             picture::paint(&self.picture, layout.image, buffer);
             message_view::failure(model, &layout, &theme, buffer);
-            probe::draw(model, &layout, &theme, buffer);
+            pixel_probe::draw(model, &layout, &theme, buffer);
         }
         status::draw(model, layout.status, &theme, buffer);
         status::hints_line(model, layout.hints, &theme, buffer);
@@ -128,7 +131,7 @@ fn too_small([width, height]: [u16; 2], buffer: &mut Buffer) {
          {height}."
     );
     let lines = crate::dashboard::overlay_layout::wrapped(&text, width.max(1));
-    let area = crate::terminal::Area { x: 0, y: 0, width, height };
+    let area = Rect { x: 0, y: 0, width, height };
     let top = height.saturating_sub(lines.len() as u16) / 2;
     for (row, line) in (top..).zip(&lines) {
         let indent = usize::from(width).saturating_sub(text::columns(line)) / 2;

@@ -1,10 +1,10 @@
 //! Panel of the outline, a list of everything in the scene that can be selected and edited.
 
-use crate::dashboard::layout::{Focus, Layout};
+use crate::dashboard::layout::{BORDER, Focus, Layout};
 use crate::dashboard::message::DisplayChannel;
 use crate::dashboard::model::{CompareView, Model};
 use crate::dashboard::panel_lines::{OutlineLine, outline};
-use crate::dashboard::view::frame::{panel, scroll_mark};
+use crate::dashboard::view::frame::{panel, window};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::text::{Row, columns};
 use crate::dashboard::view::theme::Theme;
@@ -12,21 +12,20 @@ use crate::scene::edit::Target;
 use crate::terminal::cells::object_color;
 use ratatui::buffer::Buffer;
 
-/// Draws the outline. Draws nothing if the panel is folded.
+/// Draws the outline, the list of all parts of the scene. Draws nothing if the panel is folded.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some(area) = layout.outline else { return };
     let active = is_active(model, Focus::Outline);
     panel(area, "outline", active, theme, buffer);
-    let inner = area.inner();
+    let inner = area.inner(BORDER);
     let lines = outline(model.scene());
-    let rows = usize::from(inner.height);
-    let first = model.outline_scroll.min(lines.len().saturating_sub(rows));
     // With the channel of object ids, the outline shows the colour of each object.
     let with_ids =
         model.channel == DisplayChannel::Objects && model.comparison.shown == CompareView::Live;
-    for (row, line) in (0..).zip(lines.iter().skip(first).take(rows)) {
+    let (scroll, border) = (model.outline_scroll, theme.border(active));
+    for (row, i) in window(inner, scroll, lines.len(), border, buffer) {
         let mut to = Row::new(buffer, inner, row);
-        match line {
+        match &lines[i] {
             OutlineLine::Heading(title) => {
                 to.put(" ", theme.heading()).put(title, theme.heading());
             }
@@ -53,5 +52,4 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
             }
         }
     }
-    scroll_mark(inner, (first, rows, lines.len()), theme.border(active), buffer);
 }

@@ -3,12 +3,12 @@
 use crate::dashboard::hints::{HelpLine, help};
 use crate::dashboard::model::Model;
 use crate::dashboard::noise_targets::{ABOUT, Cost};
-use crate::dashboard::overlay::{Form, Overlay, Palette, Pick, Prompt, Question};
-use crate::dashboard::overlay_layout::{OverlayLayout, wrapped};
+use crate::dashboard::overlay::{CommandPalette, Form, Overlay, Pick, Prompt, Question};
+use crate::dashboard::overlay_layout::OverlayLayout;
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::view::fields::{Fields, typed};
-use crate::dashboard::view::frame::{overlay, scroll_mark};
-use crate::dashboard::view::text::{Row, columns, cut, duration, durations};
+use crate::dashboard::view::frame::{overlay, window};
+use crate::dashboard::view::text::{Row, columns, cut, duration, durations, paragraphs};
 use crate::dashboard::view::theme::Theme;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
@@ -22,7 +22,7 @@ pub fn draw(model: &Model, theme: &Theme, buffer: &mut Buffer) -> Option<Positio
         Overlay::Help { scroll } => painter.help(model.watch.is_some(), *scroll),
         Overlay::Inventory { scroll } => painter.inventory(model, *scroll),
         Overlay::NoiseTargets { cursor } => painter.noise_targets(model, *cursor),
-        Overlay::Palette(palette) => return painter.palette(palette),
+        Overlay::CommandPalette(palette) => return painter.palette(palette),
         Overlay::Pick(pick) => painter.pick(pick),
         Overlay::Form(form) => return painter.form(model, form),
         Overlay::Prompt(prompt) => return painter.prompt(prompt),
@@ -45,27 +45,20 @@ impl Painter<'_> {
         overlay(self.place.frame, title, self.theme, self.buffer);
     }
 
-    /// Draws the scroll bar of a list of `len` lines with the first visible line `scroll`. Returns
-    /// the visible lines: row of the screen, and index of the line.
+    /// Draws the scroll bar of the overlay's list. `len` is the number of its lines, and `scroll`
+    /// the index of the first visible one. Returns two values for each visible line: its row of the
+    /// screen and its index.
     fn window(&mut self, scroll: usize, len: usize) -> impl Iterator<Item = (u16, usize)> + use<> {
-        let rows = usize::from(self.place.list.height);
-        let first = scroll.min(len.saturating_sub(rows));
-        let border = self.theme.border(true);
-        scroll_mark(self.place.list, (first, rows, len), border, self.buffer);
-        (0..).zip(first..len.min(first + rows))
+        window(self.place.list, scroll, len, self.theme.border(true), self.buffer)
     }
 
-    /// Draws `text` in the area for help.
+    /// Draws `text` in the overlay's area for help.
     fn say(&mut self, text: &str, style: Style) {
-        let help = self.place.help;
-        let lines = wrapped(text, help.width);
-        for (row, line) in (0..help.height).zip(&lines) {
-            Row::new(self.buffer, help, row).put(line, style);
-        }
+        paragraphs(self.place.help, &[(text.to_string(), style)], self.buffer);
     }
 
-    /// Starts row `row` of a list with a cursor. Returns the row and three styles: for names, other
-    /// text and keys.
+    /// Starts row `row` of the overlay's list. `is_chosen` is `true` for the row under the cursor.
+    /// Returns a writer of the row and three styles: for names, for other text and for keys.
     fn choice(&mut self, row: u16, is_chosen: bool) -> (Row<'_>, [Style; 3]) {
         let theme = self.theme;
         let mut to = Row::new(self.buffer, self.place.list, row);
@@ -130,7 +123,7 @@ impl Painter<'_> {
         self.say(ABOUT, self.theme.dim());
     }
 
-    fn palette(&mut self, palette: &Palette) -> Option<Position> {
+    fn palette(&mut self, palette: &CommandPalette) -> Option<Position> {
         self.frame("all actions");
         let mut input = Row::new(self.buffer, self.place.input, 0);
         input.put(" : ", self.theme.accent());
@@ -166,9 +159,7 @@ impl Painter<'_> {
             lines: &model.field_lines(),
             list: self.place.list,
             help: self.place.help,
-            cursor: form.cursor,
-            scroll: form.scroll,
-            editor: form.editor.as_ref(),
+            state: &form.fields,
             problem: form.problem.as_deref(),
             active: true,
         };

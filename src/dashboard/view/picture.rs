@@ -1,4 +1,5 @@
-//! Conversion of snapshots to rasters of half cells, and drawing of the picture's cells.
+//! Conversion of snapshots to rasters (images of half cells), and drawing of the picture's cells. A
+//! half cell is the upper or lower half of a terminal cell.
 
 use crate::dashboard::message::DisplayChannel;
 use crate::dashboard::model::{CompareView, Model};
@@ -6,35 +7,43 @@ use crate::dashboard::overlay::Overlay;
 use crate::dashboard::view::legend::Legend;
 use crate::film::{Display, LinearImage, TILE};
 use crate::render::session::{Snapshot, State};
-use crate::terminal::Area;
 use crate::terminal::cells::{
-    CellColor, PictureCell, PictureCells, Raster, Scale, depth, difference, normals, objects,
+    NO_HIT, PictureCells, Raster, Scale, difference, normal_color, object_color,
 };
+use crate::world::FirstHit;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
-use ratatui::style::{Color, Style};
+use ratatui::style::Style;
 use std::sync::Arc;
 
-/// Converter of models to rasters. It caches the resampled pinned picture.
+/// Converter of the dashboard's model to rasters: images whose pixels are half cells of the
+/// terminal. It caches the pinned picture (an earlier picture that the user has stored for
+/// comparison) at the size of the raster.
 #[derive(Debug, Default)]
 pub struct PictureView {
-    legend: Option<Legend>,
+    /// Legend of the last raster (image of half cells). `None` if it has no colour scale.
+    pub legend: Option<Legend>,
     pinned: Option<PinnedCache>,
 }
 
-/// The pinned picture, resampled to the size of the raster.
+/// Cache of the pinned picture, which the user has stored for comparison, at the size of the image
+/// on the screen.
 #[derive(Debug)]
 struct PinnedCache {
-    /// Picture at its own resolution.
+    /// Pinned picture (stored by the user for comparison) in pixels of the film, before it is
+    /// resampled to the size on the screen.
     picture: Arc<LinearImage>,
-    /// Width and height of the raster.
+    /// Width and height of the image on the screen, in half cells (upper or lower halves of
+    /// terminal cells).
     size: [usize; 2],
-    /// Linear radiance of each half cell, row-major.
+    /// Linear radiance of the pinned (stored) picture in each half cell (upper or lower half of a
+    /// terminal cell), row-major.
     radiance: Vec<[f32; 3]>,
 }
 
-/// Returns `true` if the picture changes only by user input, or rarely: rendering has ended or is
-/// paused, files are watched, or the pinned picture or an exported image is visible.
+/// Returns `true` if the picture changes rarely or only by user input. This is so if rendering has
+/// ended or is paused, if files are watched, or if the pinned (stored) picture or an exported image
+/// is visible.
 pub fn is_settled(model: &Model) -> bool {
     if let Some(Overlay::ViewerImage(_)) = model.overlay {
         return true;
@@ -46,13 +55,9 @@ pub fn is_settled(model: &Model) -> bool {
 }
 
 impl PictureView {
-    /// Returns the legend of the last raster. Returns `None` if the raster has no colour scale.
-    pub fn legend(&self) -> Option<&Legend> {
-        self.legend.as_ref()
-    }
-
-    /// Returns a raster of `size` (width and height in half cells) that shows the selected channel
-    /// or comparison. The raster is empty if the data is missing.
+    /// Returns an image that shows the selected channel or comparison. `size` is the width and
+    /// height of the image in half cells (upper or lower halves of terminal cells). The image is
+    /// empty if its data are missing.
     pub fn raster(&mut self, model: &Model, size: [usize; 2]) -> Raster {
         self.legend = None;
         let raster = match (model.comparison.shown, model.channel) {
@@ -74,55 +79,40 @@ impl PictureView {
             }
             DisplayChannel::Noise => {
                 let noise = &snapshot.tiles.noise_codes;
-                self.tiles(model, snapshot, "8-bit levels of noise", size, |i| {
-                    noise.get(i).map(|n| f64::from(*n))
-                })
+                self.tiles(model, snapshot, "8-bit levels of noise", size, noise)
             }
             DisplayChannel::Samples => {
-                let spp = &snapshot.tiles.spp;
-                self.tiles(model, snapshot, "samples per pixel", size, |i| {
-                    spp.get(i).map(|n| f64::from(*n))
-                })
+                self.tiles(model, snapshot, "samples per pixel", size, &snapshot.tiles.spp)
             }
-            DisplayChannel::Objects | DisplayChannel::Normals | DisplayChannel::Depth => {
-                let buffer = snapshot.first_hits.as_deref()?;
-                let (columns, rows, texels) = (buffer.columns, buffer.rows, buffer.texels());
-                let hit = |i: usize| texels.get(i).filter(|s| s.object.is_some());
-                let all = columns * rows;
-                let raster = match channel {
-                    DisplayChannel::Objects => {
-                        let ids: Vec<_> = (0..all).map(|i| hit(i).and_then(|s| s.object)).collect();
-                        objects(columns, rows, &ids)
-                    }
-                    DisplayChannel::Normals => {
-                        let found: Vec<_> = (0..all).map(|i| hit(i).map(|s| s.normal)).collect();
-                        normals(columns, rows, &found)
-                    }
-                    _ => {
-                        let found: Vec<_> = (0..all).map(|i| hit(i).map(|s| s.depth)).collect();
-                        let (raster, scale) = depth(columns, rows, &found);
-                        self.legend = Some(Legend::magnitude(scale, "from the eye"));
-                        raster
-                    }
-                };
-                Some(resized(raster, size))
+            DisplayChannel::Objects => {
+                hit_colors(snapshot, size, |hit| hit.object.map_or(NO_HIT, object_color))
+            }
+            DisplayChannel::Normals => hit_colors(snapshot, size, |hit| normal_color(hit.normal)),
+            DisplayChannel::Depth => {
+                let hits = snapshot.first_hits.as_deref()?.texels().iter();
+                let depths = hits.filter(|hit| hit.object.is_some()).map(|hit| hit.depth.into());
+                let scale = Scale { reversed: true, ..Scale::logarithmic(depths) };
+                self.legend = Some(Legend::magnitude(scale, "from the eye"));
+                hit_colors(snapshot, size, |hit| scale.color(hit.depth.into()))
             }
         }
     }
 
-    /// Returns a raster that shows one value per tile in false colour, on a logarithmic scale.
-    /// `value` returns the value of the tile with a given index.
-    fn tiles(
+    /// Returns a raster (image of half cells) that shows one value for each tile of the film in
+    /// false colour, on a logarithmic scale. A tile is a square block of pixels. `values` are the
+    /// values of the tiles, row by row, and `unit` is their unit for the legend. Returns `None` if
+    /// tiles or values are missing.
+    fn tiles<T: Copy + Into<f64>>(
         &mut self,
         model: &Model,
         snapshot: &Snapshot,
         unit: &'static str,
         [width, height]: [usize; 2],
-        value: impl Fn(usize) -> Option<f64>,
+        values: &[T],
     ) -> Option<Raster> {
         let tiles = &snapshot.tiles;
         let all = tiles.columns * tiles.rows;
-        let values: Vec<f64> = (0..all).map(&value).collect::<Option<_>>()?;
+        let values: Vec<f64> = values.get(..all)?.iter().map(|value| (*value).into()).collect();
         let mut scale = Scale::logarithmic(values.iter().copied());
         // The scale spans at most a factor of 1000.
         scale.low = scale.low.max(1e-3 * scale.high);
@@ -151,8 +141,10 @@ impl PictureView {
         self.pinned.as_ref().map(|cached| &*cached.radiance)
     }
 
-    /// Returns a false-colour raster of the difference in luma, live minus pinned, in 8-bit levels.
-    /// The scale ends at the largest absolute difference, rounded up.
+    /// Returns a false-colour raster (image of half cells) of the difference in luma between the
+    /// live picture and the pinned (stored) one, in 8-bit levels: live minus pinned. The scale ends
+    /// at the largest absolute difference, rounded up to 1, 2, 5, 10, 20, 50, … Returns `None` if
+    /// one of the pictures is missing.
     fn difference(&mut self, model: &Model, size: [usize; 2]) -> Option<Raster> {
         let snapshot = model.snapshot.as_deref()?;
         let (live, from) = live_radiance(model, snapshot)?;
@@ -182,8 +174,10 @@ fn round_up(value: f64) -> f64 {
     [1.0, 2.0, 5.0].into_iter().map(|m| m * decade).find(|v| *v >= value).unwrap_or(10.0 * decade)
 }
 
-/// Returns the linear radiance of the snapshot's picture, mixed from its light groups with the
-/// current lights, and the width and height of the picture.
+/// Returns two values: the linear radiance of the renderer's latest picture, and the width and
+/// height of the picture. The radiance is the sum of the contributions of all light groups (lights
+/// with sums of their own in the film), each multiplied by the group's current weight. Returns
+/// `None` before the first picture.
 fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [usize; 2])> {
     let picture = snapshot.picture.as_ref()?;
     let newest = snapshot.mix_for(model.scene());
@@ -191,14 +185,31 @@ fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [
     Some((mixed, [picture.cols, picture.rows]))
 }
 
-/// Applies the display transform to linear radiance.
+/// Returns a raster (image of half cells) with `size` columns and rows. `color` gives the colour of
+/// a first hit, the point at which a camera ray meets an object. Rays without a hit have the colour
+/// [`NO_HIT`]. Returns `None` if the renderer has not reported first hits.
+fn hit_colors(
+    snapshot: &Snapshot,
+    size: [usize; 2],
+    color: impl Fn(&FirstHit) -> [u8; 3],
+) -> Option<Raster> {
+    let hits = snapshot.first_hits.as_deref()?;
+    let pixel = |i: usize| match &hits.texels()[i] {
+        hit if hit.object.is_some() => color(hit),
+        _ => NO_HIT,
+    };
+    Some(resized(Raster::from_fn(hits.columns, hits.rows, pixel), size))
+}
+
+/// Converts linear radiance, row-major, to an image for the terminal (raster) by the display
+/// transform `display`.
 fn displayed(radiance: &[[f32; 3]], display: &Display, [width, height]: [usize; 2]) -> Raster {
     let to_8 = display.to_8();
     Raster::from_fn(width, height, |i| to_8(radiance[i].map(f64::from)))
 }
 
-/// Scales a raster to the given size without interpolation. After a resize it is applied to the old
-/// picture until the next snapshot.
+/// Scales an image to the given width and height without interpolation. After a change of the
+/// terminal's size, this adapts the last picture until the renderer returns one of the new size.
 fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
     if [raster.width, raster.height] == [width, height] || raster.pixels.is_empty() {
         return raster;
@@ -210,23 +221,23 @@ fn resized(raster: Raster, [width, height]: [usize; 2]) -> Raster {
 }
 
 /// Draws `cells` into `area` from its upper left corner. Cells outside of `area` are omitted.
-pub fn paint(cells: &PictureCells, area: Area, buffer: &mut Buffer) {
+pub fn paint(cells: &PictureCells, area: Rect, buffer: &mut Buffer) {
     for row in 0..area.height.min(cells.rows) {
         for column in 0..area.width.min(cells.columns) {
             let Some(cell) = cells.cell(column, row) else { continue };
             if let Some(to) = buffer.cell_mut((area.x + column, area.y + row)) {
-                let [fg, bg] = colors(cell);
                 to.set_char(cell.glyph);
-                to.set_style(Style::new().fg(fg).bg(bg));
+                to.set_style(Style::new().fg(cell.fg).bg(cell.bg));
             }
         }
     }
 }
 
-/// Returns the rectangle of the screen that [`paint`] drew `cells` into, and a row-major mask of
-/// the cells that still show the picture because nothing was drawn over them.
-pub fn visible_mask(cells: &PictureCells, area: Area, buffer: &Buffer) -> (Rect, Vec<bool>) {
-    let Area { x, y, width, height } = area;
+/// Returns two values: the rectangle of the screen that [`paint`] drew `cells` into, and a
+/// row-major mask of its cells. The mask is `true` for a cell that still shows the picture, because
+/// nothing was drawn over it.
+pub fn visible_mask(cells: &PictureCells, area: Rect, buffer: &Buffer) -> (Rect, Vec<bool>) {
+    let Rect { x, y, width, height } = area;
     let (width, height) = (width.min(cells.columns), height.min(cells.rows));
     let place = Rect { x, y, width, height }.intersection(buffer.area);
     let visible_mask = place.positions().map(|at| {
@@ -234,17 +245,9 @@ pub fn visible_mask(cells: &PictureCells, area: Area, buffer: &Buffer) -> (Rect,
             return false;
         };
         let same_glyph = now.symbol().chars().eq([cell.glyph]);
-        same_glyph && [now.fg, now.bg] == colors(cell) && now.modifier.is_empty()
+        same_glyph && [now.fg, now.bg] == [cell.fg, cell.bg] && now.modifier.is_empty()
     });
     (place, visible_mask.collect())
-}
-
-fn colors(cell: &PictureCell) -> [Color; 2] {
-    [cell.fg, cell.bg].map(|ink| match ink {
-        CellColor::Plain => Color::Reset,
-        CellColor::Rgb([r, g, b]) => Color::Rgb(r, g, b),
-        CellColor::Indexed(index) => Color::Indexed(index),
-    })
 }
 
 #[cfg(test)]

@@ -1,19 +1,20 @@
-//! Convergence plot: noise over seconds of tracing on logarithmic axes, with the noise target and
-//! the estimated time at which the target is reached.
+//! Convergence plot: noise (estimated error of the picture) over seconds of tracing on logarithmic
+//! axes, with the noise target and the estimated time at which the target is reached.
 
-use crate::dashboard::layout::Layout;
+use crate::dashboard::layout::{BORDER, Layout};
 use crate::dashboard::model::Model;
 use crate::dashboard::view::frame::panel;
 use crate::dashboard::view::text::{Row, columns, number};
 use crate::dashboard::view::theme::Theme;
-use crate::terminal::Area;
 use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 use ratatui::symbols::Marker;
 use ratatui::widgets::Widget;
 use ratatui::widgets::canvas::{Canvas, Line};
 
-/// Values at the ends of a logarithmic axis, both greater than 0.
+/// Logarithmic axis of the convergence plot: the smallest and the largest value on it, both greater
+/// than 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Axis {
     low: f64,
@@ -21,8 +22,9 @@ struct Axis {
 }
 
 impl Axis {
-    /// Creates an axis for all positive finite `values`, with a margin of a tenth of its length at
-    /// both ends. Returns `None` if there are no such values.
+    /// Creates an axis that contains all positive finite `values`. The lower end is at most the
+    /// smallest value divided by 1.1, the upper end at least the largest value times 1.1, and they
+    /// differ by at least a factor of 2. Returns `None` if there are no such values.
     fn around(values: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
         for value in values.filter(|v| *v > 0.0 && v.is_finite()) {
@@ -36,14 +38,14 @@ impl Axis {
         })
     }
 
-    /// Returns the position of `value` on the axis: 0 at the lower end, 1 at the upper end.
-    /// Positions beyond the ends are not clamped.
+    /// Returns the relative position of `value` on the axis: 0 at the lower end, 1 at the upper
+    /// end. Positions beyond the ends are not clamped.
     fn part(&self, value: f64) -> f64 {
         (value / self.low).ln() / (self.high / self.low).ln()
     }
 
-    /// Returns the values of the ticks: powers of ten. If the axis spans less than a factor of 50,
-    /// also 2 and 5 times these.
+    /// Returns the values of the axis's ticks. These are powers of ten. If the ends of the axis
+    /// differ by less than a factor of 50, twice and five times the powers have ticks, too.
     fn ticks(&self) -> Vec<f64> {
         let steps: &[f64] = if self.high / self.low < 50.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let first = self.low.log10().floor() as i32;
@@ -53,7 +55,7 @@ impl Axis {
     }
 }
 
-/// Formats the value of a tick without trailing zeros, such as `0.5` or `20`.
+/// Formats the value of an axis's tick without trailing zeros, such as `0.5` or `20`.
 fn label(value: f64) -> String {
     if (1e-3..1e6).contains(&value) {
         // Products with negative powers of ten are not exact.
@@ -63,12 +65,12 @@ fn label(value: f64) -> String {
     }
 }
 
-/// Draws the plot. Draws nothing if the layout has no area for it.
+/// Draws the convergence plot. Draws nothing if the layout has no area for it.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some(area) = layout.plot else { return };
     panel(area, "convergence", false, theme, buffer);
-    let inner = area.inner();
-    let points = model.convergence.points();
+    let inner = area.inner(BORDER);
+    let points = &model.convergence.points;
     let Some(last) = points.last() else {
         let middle = inner.height / 2;
         let text = "no estimate of the noise yet";
@@ -76,7 +78,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
         Row::new(buffer, inner, middle).skip(indent).put(text, theme.dim());
         return;
     };
-    let corner = Area { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
+    let corner = Rect { x: area.x + 2, width: area.width.saturating_sub(4), ..area };
     let mut title = Row::new(buffer, corner, 0);
     title.skip(14).put_right(&format!(" {} levels ", number(last.noise_codes)), 0, theme.text());
     let target = model.stop.noise_codes.filter(|t| *t > 0.0);
@@ -133,15 +135,15 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
             let point = place(last.seconds, last.noise_codes);
             canvas.draw(&line(point, point, theme.accent()));
         })
-        .render(crate::dashboard::view::rect(plot), buffer);
+        .render(plot, buffer);
 }
 
-/// Number of dashes of a dashed line.
+/// Number of dashes of a dashed line in the convergence plot.
 const DASHES: usize = 16;
 
-/// Draws both axes inside `area`. Returns the area between them for the plot. Returns `None` if
-/// there is no room.
-fn axes(area: Area, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> Option<Area> {
+/// Draws both axes of the convergence plot inside of `area`. Returns the area between them for the
+/// plot. Returns `None` if there is no room.
+fn axes(area: Rect, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> Option<Rect> {
     let ticks: Vec<_> = y.ticks().into_iter().map(|t| (t, label(t))).collect();
     let labels = ticks.iter().map(|(_, l)| columns(l)).max().unwrap_or(0) as u16;
     let left = labels + 2;
@@ -149,12 +151,12 @@ fn axes(area: Area, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
         return None;
     }
     let plot =
-        Area { x: area.x + left, y: area.y, width: area.width - left - 1, height: area.height - 2 };
+        Rect { x: area.x + left, y: area.y, width: area.width - left - 1, height: area.height - 2 };
     let line = theme.border(false);
     for row in 0..plot.height {
-        Row::new(buffer, Area { x: plot.x - 1, width: 1, ..plot }, row).put("│", line);
+        Row::new(buffer, Rect { x: plot.x - 1, width: 1, ..plot }, row).put("│", line);
     }
-    let foot = Area { x: plot.x - 1, width: plot.width + 1, ..area };
+    let foot = Rect { x: plot.x - 1, width: plot.width + 1, ..area };
     Row::new(buffer, foot, plot.height).put("└", line).put(&"─".repeat(plot.width.into()), line);
     let mut free = plot.height;
     for (tick, text) in &ticks {
@@ -163,7 +165,7 @@ fn axes(area: Area, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
         if row < free {
             let indent = usize::from(labels) - columns(text);
             Row::new(buffer, area, row).skip(indent).put(text, theme.dim());
-            Row::new(buffer, Area { x: plot.x - 1, width: 1, ..plot }, row).put("┤", line);
+            Row::new(buffer, Rect { x: plot.x - 1, width: 1, ..plot }, row).put("┤", line);
             free = row;
         }
     }
@@ -174,9 +176,9 @@ fn axes(area: Area, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
         let start = column.saturating_sub(columns(&text) as u16 / 2).max(area.x);
         let end = start + columns(&text) as u16;
         if start >= free && end <= area.x + area.width && column < plot.x + plot.width {
-            let label_area = Area { x: start, width: end - start, ..area };
+            let label_area = Rect { x: start, width: end - start, ..area };
             Row::new(buffer, label_area, plot.height + 1).put(&text, theme.dim());
-            Row::new(buffer, Area { x: column, width: 1, ..area }, plot.height).put("┬", line);
+            Row::new(buffer, Rect { x: column, width: 1, ..area }, plot.height).put("┬", line);
             free = end + 1;
         }
     }

@@ -7,23 +7,25 @@ use crate::dashboard::view::text::{Row, columns, duration, durations, number};
 use crate::dashboard::view::theme::Theme;
 use crate::dashboard::view::watch;
 use crate::render::schedule::StoppedBy;
-use crate::render::session::{Report, State, WatchReport};
-use crate::terminal::Area;
+use crate::render::session::{Report, State};
 use crate::terminal::Multiplexer;
 use crate::terminal::flow::PacingMode;
 use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 
-/// A part of the status line.
+/// Part of the status line, such as the noise or the sample count. A part is shown or omitted as a
+/// whole.
 struct Part {
-    /// Order of omission if the line is too long: parts with larger values are omitted first.
+    /// Order in which parts are omitted if the status line is too long: the part with the largest
+    /// number first.
     expendable: u8,
-    /// Pieces of text, each with a style.
+    /// Pieces of the part's text, each with the style in which it is drawn.
     text: Vec<(String, Style)>,
 }
 
 /// Draws the status line. If it is too long, omits whole parts until the others fit.
-pub fn draw(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
+pub fn draw(model: &Model, area: Rect, theme: &Theme, buffer: &mut Buffer) {
     let mut parts = parts(model, theme);
     let width = |parts: &[Part]| -> usize {
         parts.iter().flat_map(|p| &p.text).map(|(text, _)| columns(text)).sum::<usize>()
@@ -45,9 +47,6 @@ pub fn draw(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
 }
 
 fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
-    if let Some(table) = &model.watch {
-        return watch_parts(model, &table.report, theme);
-    }
     let part = |expendable, text| Part { expendable, text };
     let plain = |text: String| (text, theme.text());
     let dim = |text: &str| (text.to_string(), theme.dim());
@@ -57,35 +56,47 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
         let text = format!("writing {width}×{height}  {:.0} %", 100.0 * export.progress);
         parts.push(part(0, vec![(text, theme.accent())]));
     }
+    let watching = model.watch.is_some();
+    if let Some(table) = &model.watch {
+        let summary = watch::summary(&table.report, theme).into_iter().enumerate();
+        parts.extend(summary.map(|(i, text)| part(u8::from(i > 0), vec![text])));
+    }
     let Some(snapshot) = &model.snapshot else {
         let text = if model.file.unreadable { "nothing to trace" } else { "compiling" };
-        parts.push(part(0, vec![dim(text)]));
+        parts.extend((!watching).then(|| part(0, vec![dim(text)])));
         return parts;
     };
     let report = &snapshot.report;
-    parts.insert(0, part(0, vec![state(model, report, theme)]));
-    if matches!(report.state, State::Idle | State::Failed(_)) {
-        return parts;
+    if !watching {
+        parts.insert(0, part(0, vec![state(model, report, theme)]));
+        if matches!(report.state, State::Idle | State::Failed(_)) {
+            return parts;
+        }
     }
-    parts.push(part(1, spp(model, report, theme)));
-    if matches!(report.state, State::Tracing) {
+    parts.push(part(if watching { 3 } else { 1 }, spp(model, report, theme)));
+    if matches!(report.state, State::Tracing) && !watching {
         let speed = report.recent_samples_per_second * 1e-6;
         parts.push(part(4, vec![plain(number(speed)), dim(" Ms/s")]));
     }
     if let Some(noise) = report.noise {
         parts.push(part(2, noise_part(model, report, noise.rmse_codes, theme)));
     }
-    if let Some(limit) = model.stop.seconds {
-        let text = format!("{} of {}", duration(report.seconds), duration(limit));
-        parts.push(part(3, vec![plain(text)]));
-    } else {
-        parts.push(part(6, vec![dim(&duration(report.seconds))]));
+    match model.stop.seconds {
+        _ if watching => {}
+        Some(limit) => {
+            let text = format!("{} of {}", duration(report.seconds), duration(limit));
+            parts.push(part(3, vec![plain(text)]));
+        }
+        None => parts.push(part(6, vec![dim(&duration(report.seconds))])),
     }
     for warning in report.warnings() {
         parts.push(part(3, vec![(warning, theme.warn())]));
     }
     if let Some(link) = &model.link {
         parts.push(part(6, vec![plain(rate(link.rate)), dim(" "), dim(mode(link.mode))]));
+    }
+    if watching {
+        return parts;
     }
     let precision = if report.lanes.starts_with("f64") { "double" } else { "single" };
     parts.push(part(7, vec![dim(precision)]));
@@ -98,32 +109,8 @@ fn parts(model: &Model, theme: &Theme) -> Vec<Part> {
     parts
 }
 
-/// Returns the parts of the status line in `zerkalo watch`.
-fn watch_parts(model: &Model, watched: &WatchReport, theme: &Theme) -> Vec<Part> {
-    let part = |expendable, text| Part { expendable, text };
-    let mut parts: Vec<Part> = watch::summary(watched, theme)
-        .into_iter()
-        .enumerate()
-        .map(|(i, text)| part(if i == 0 { 0 } else { 1 }, vec![text]))
-        .collect();
-    let Some(snapshot) = &model.snapshot else { return parts };
-    let report = &snapshot.report;
-    parts.push(part(3, spp(model, report, theme)));
-    if let Some(noise) = report.noise {
-        parts.push(part(2, noise_part(model, report, noise.rmse_codes, theme)));
-    }
-    for warning in report.warnings() {
-        parts.push(part(3, vec![(warning, theme.warn())]));
-    }
-    if let Some(link) = &model.link {
-        let rate = (rate(link.rate), theme.text());
-        parts.push(part(6, vec![rate, (format!(" {}", mode(link.mode)), theme.dim())]));
-    }
-    parts
-}
-
-/// Formats a rate with two or three digits, such as `118 KB/s`. More digits would change too often
-/// to read.
+/// Formats the rate of the connection with two or three digits, such as `118 KB/s`. More digits
+/// would change too often to read.
 fn rate(bytes_per_second: f64) -> String {
     let kilobytes = bytes_per_second / 1e3;
     match kilobytes {
@@ -175,8 +162,8 @@ fn spp(model: &Model, report: &Report, theme: &Theme) -> Vec<(String, Style)> {
     text
 }
 
-/// Formats the noise, its target and the time until the target, such as `noise 0.84 → 0.5 levels in
-/// 3–5 s`.
+/// Formats the picture's noise `codes` in 8-bit levels, the noise target, and the estimated time
+/// until the target is reached, such as `noise 0.84 → 0.5 levels in 3–5 s`.
 fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<(String, Style)> {
     let dim = |text: &str| (text.to_string(), theme.dim());
     let mut text = vec![dim("noise "), (number(codes), theme.text())];
@@ -194,8 +181,8 @@ fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<
     text
 }
 
-/// Draws the notice if there is one, otherwise the hints.
-pub fn hints_line(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer) {
+/// Draws the hint line: the notice if there is one, otherwise the key hints.
+pub fn hints_line(model: &Model, area: Rect, theme: &Theme, buffer: &mut Buffer) {
     let mut row = Row::new(buffer, area, 0);
     row.skip(1);
     if let Some(notice) = &model.notice {
@@ -213,8 +200,8 @@ pub fn hints_line(model: &Model, area: Area, theme: &Theme, buffer: &mut Buffer)
     }
 }
 
-/// Removes hints until the others fit in `width` columns. The first hint and the last two, which
-/// lead to all commands, are removed last.
+/// Removes key hints until the others fit in `width` columns. The last two hints, which lead to all
+/// commands, are removed after those in the middle, and the first hint last of all.
 fn fitting(mut hints: Vec<&Hint>, width: usize) -> Vec<&Hint> {
     let width_of = |hints: &[&Hint]| -> usize {
         let columns_of = |hint: &&Hint| columns(hint.keys) + 1 + columns(hint.text) + 3;

@@ -1,7 +1,7 @@
-//! Text in rows of cells. Its width is measured in columns; text that is too long is truncated with
-//! an ellipsis.
+//! Text in rows of terminal cells. Its width is measured in columns; text that is too long is
+//! truncated with an ellipsis.
 
-use crate::terminal::Area;
+use crate::dashboard::overlay_layout::wrapped;
 use crate::value::sanitized;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -45,17 +45,12 @@ pub fn skip(text: &str, skipped: usize) -> &str {
     start.map_or("", |(at, _)| &text[at..])
 }
 
-/// Converts an area to a ratatui rectangle.
-pub fn rect(area: Area) -> Rect {
-    Rect { x: area.x, y: area.y, width: area.width, height: area.height }
-}
-
 /// Writer of a row of cells, which is filled from left to right.
 pub struct Row<'a> {
     buffer: &'a mut Buffer,
-    /// Column of the next text.
+    /// Column of the screen at which the next text begins.
     x: u16,
-    /// Column after the last free one.
+    /// Column of the screen after the last free one of the row.
     end: u16,
     y: u16,
 }
@@ -63,30 +58,30 @@ pub struct Row<'a> {
 impl<'a> Row<'a> {
     /// Creates a writer for row `row` of `area`, counted from 0. Nothing is drawn outside of
     /// `area`.
-    pub fn new(buffer: &'a mut Buffer, area: Area, row: u16) -> Self {
-        let bounds = rect(area).intersection(buffer.area);
+    pub fn new(buffer: &'a mut Buffer, area: Rect, row: u16) -> Self {
+        let bounds = area.intersection(buffer.area);
         let y = area.y.saturating_add(row);
         let inside = row < area.height && (bounds.top()..bounds.bottom()).contains(&y);
         let (x, end) = if inside { (bounds.left(), bounds.right()) } else { (0, 0) };
         Self { buffer, x, end, y }
     }
 
-    /// Returns the number of free columns.
+    /// Returns the number of free columns of the row.
     pub fn left(&self) -> usize {
         usize::from(self.end.saturating_sub(self.x))
     }
 
-    /// Returns the column of the next text on the screen.
+    /// Returns the column of the screen at which the next text begins.
     pub fn x(&self) -> u16 {
         self.x
     }
 
-    /// Returns the row on the screen.
+    /// Returns the row's position on the screen, counted from 0.
     pub fn y(&self) -> u16 {
         self.y
     }
 
-    /// Draws `text`, truncated to the free columns.
+    /// Draws `text` in the free columns of the row, truncated if necessary.
     pub fn put(&mut self, text: &str, style: Style) -> &mut Self {
         let left = self.left();
         if left > 0 {
@@ -97,8 +92,8 @@ impl<'a> Row<'a> {
         self
     }
 
-    /// Draws `text`, truncated or padded to `width` columns, or to the free columns if those are
-    /// fewer.
+    /// Draws `text`, truncated or padded to `width` columns, or to the free columns of the row if
+    /// those are fewer.
     pub fn put_wide(&mut self, text: &str, width: usize, style: Style) -> &mut Self {
         let width = width.min(self.left());
         let text = safe(text);
@@ -107,8 +102,8 @@ impl<'a> Row<'a> {
         self.put(&visible, style).skip(gap)
     }
 
-    /// Draws `text` at the right end of the free columns. Draws nothing if there is no room for
-    /// `text` and `gap` free columns before it.
+    /// Draws `text` at the right end of the row's free columns. Draws nothing if there is no room
+    /// for `text` and `gap` free columns before it.
     pub fn put_right(&mut self, text: &str, gap: usize, style: Style) -> &mut Self {
         let text = safe(text);
         let width = columns(&text);
@@ -119,13 +114,13 @@ impl<'a> Row<'a> {
         self
     }
 
-    /// Leaves `columns` columns unchanged.
+    /// Skips `columns` columns of the row, which stay unchanged.
     pub fn skip(&mut self, columns: usize) -> &mut Self {
         self.x += columns.min(self.left()) as u16;
         self
     }
 
-    /// Sets the style of the free columns.
+    /// Sets the style of the row's free columns.
     pub fn fill(&mut self, style: Style) -> &mut Self {
         let area = Rect { x: self.x, y: self.y, width: self.end - self.x, height: 1 };
         if area.width > 0 {
@@ -135,7 +130,18 @@ impl<'a> Row<'a> {
     }
 }
 
-/// Escapes control characters, because the buffer would drop them without notice.
+/// Draws texts below each other, from the top of `area` on. Each has a style and is wrapped at the
+/// width of `area`. An empty text is an empty line.
+pub fn paragraphs(area: Rect, texts: &[(String, Style)], buffer: &mut Buffer) {
+    let lines = texts.iter().flat_map(|(text, style)| {
+        wrapped(text, area.width).into_iter().map(move |line| (line, *style))
+    });
+    for (row, (line, style)) in (0..area.height).zip(lines) {
+        Row::new(buffer, area, row).put(&line, style);
+    }
+}
+
+/// Escapes control characters in `text`, because the buffer would drop them without notice.
 fn safe(text: &str) -> Cow<'_, str> {
     if text.chars().any(char::is_control) {
         Cow::Owned(sanitized(text))
@@ -144,7 +150,7 @@ fn safe(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// Formats `value` to three significant digits.
+/// Formats `value` with about three significant digits, such as `1.50`, `21.3` or `1.20e6`.
 pub fn number(value: f64) -> String {
     match value.abs() {
         v if v >= 9.995e5 || v < 5e-4 && v > 0.0 => format!("{value:.2e}"),
@@ -167,8 +173,8 @@ pub fn durations(from: f64, to: f64) -> String {
     if from == to { format!("{to} {unit}") } else { format!("{from}–{to} {unit}") }
 }
 
-/// Returns the value and the unit (s, min, h) of `seconds`, in the unit that suits a duration of
-/// `reference` seconds.
+/// Converts `seconds` to a unit (s, min, h or days) that suits a duration of `reference` seconds.
+/// Returns two texts: the converted number and the name of the unit.
 fn in_unit(seconds: f64, reference: f64) -> (String, &'static str) {
     let (value, unit) = match reference {
         r if r < 99.5 => (seconds, "s"),
@@ -203,11 +209,11 @@ mod tests {
     #[test]
     fn text_is_clipped_to_its_area() {
         let mut buffer = Buffer::empty(Rect::new(0, 0, 8, 2));
-        let area = Area { x: 2, y: 1, width: 4, height: 1 };
+        let area = Rect { x: 2, y: 1, width: 4, height: 1 };
         Row::new(&mut buffer, area, 0).put("abcdefgh", Style::new());
         Row::new(&mut buffer, area, 1).put("outside", Style::new());
-        Row::new(&mut buffer, Area { x: 7, y: 0, width: 9, height: 9 }, 0).put("yz", Style::new());
-        let wide = Area { x: 0, y: 0, width: 6, height: 1 };
+        Row::new(&mut buffer, Rect { x: 7, y: 0, width: 9, height: 9 }, 0).put("yz", Style::new());
+        let wide = Rect { x: 0, y: 0, width: 6, height: 1 };
         Row::new(&mut buffer, wide, 0)
             .put_right("r\u{1b}", 0, Style::new())
             .put_right("R", 0, Style::new())

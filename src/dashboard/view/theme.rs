@@ -3,18 +3,20 @@
 //! The tones are readable on both dark and light backgrounds. The most important text has the
 //! terminal's default colour.
 
-use crate::terminal::cells::{Colors, nearest_indexed};
+use crate::terminal::cells::{Colors, nearest_xterm};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::widgets::BorderType;
 
-/// Styles of a colour depth, with one method for each meaning.
+/// Styles of the user interface for a set of terminal colours, with one method for each kind of
+/// text or border.
 #[derive(Clone, Copy, Debug)]
 pub struct Theme {
-    colors: Colors,
+    /// Set of terminal colours that the theme uses.
+    pub colors: Colors,
 }
 
-/// A colour in three colour depths: 24 bits, an index of the 256-colour palette, and one of 16
-/// colours.
+/// Colour of the user interface at three colour depths: 24 bits, index of xterm's 256 colours, one
+/// of 16 colours.
 type Tone = ([u8; 3], u8, Color);
 
 const ACCENT: Tone = ([98, 160, 242], 75, Color::Cyan);
@@ -27,7 +29,7 @@ const SELECTED_GROUND: Tone = ([40, 62, 98], 24, Color::Reset);
 const SELECTED_TEXT: Tone = ([242, 245, 250], 255, Color::Reset);
 
 impl Theme {
-    /// Creates the theme of a colour depth.
+    /// Creates the theme for a set of terminal colours.
     pub fn new(colors: Colors) -> Self {
         Self { colors }
     }
@@ -55,32 +57,32 @@ impl Theme {
         Style::new().fg(Color::Reset).remove_modifier(Modifier::DIM)
     }
 
-    /// Returns the style of secondary text: labels, units, defaults.
+    /// Returns the style of secondary text: labels, units, default values.
     pub fn dim(&self) -> Style {
         self.toned(DIM, Modifier::DIM)
     }
 
-    /// Returns the style of headings.
+    /// Returns the style of headings in lists.
     pub fn heading(&self) -> Style {
         self.dim().remove_modifier(Modifier::DIM).add_modifier(Modifier::BOLD)
     }
 
-    /// Returns the style of active elements and keys.
+    /// Returns the style of active elements and of keys.
     pub fn accent(&self) -> Style {
         self.toned(ACCENT, Modifier::BOLD)
     }
 
-    /// Returns the style of success.
+    /// Returns the style of messages about success.
     pub fn good(&self) -> Style {
         self.toned(GOOD, Modifier::BOLD)
     }
 
-    /// Returns the style of warnings.
+    /// Returns the text style of warnings.
     pub fn warn(&self) -> Style {
         self.toned(WARN, Modifier::BOLD)
     }
 
-    /// Returns the style of refusals and failures.
+    /// Returns the style of messages about refusals and failures.
     pub fn bad(&self) -> Style {
         self.toned(BAD, Modifier::BOLD)
     }
@@ -112,18 +114,13 @@ impl Theme {
         }
     }
 
-    /// Returns the colour depth.
-    pub fn colors(&self) -> Colors {
-        self.colors
-    }
-
-    /// Returns the style of a swatch of the 8-bit colour. Returns `None` if the terminal cannot
-    /// show the colour.
+    /// Returns the style of a colour sample in the 8-bit colour [r, g, b]. Returns `None` if the
+    /// terminal cannot show the colour.
     pub fn swatch(&self, [r, g, b]: [u8; 3]) -> Option<Style> {
         match self.colors {
             Colors::True => Some(Style::new().fg(Color::Rgb(r, g, b))),
             Colors::Indexed => {
-                let index = nearest_indexed([r, g, b]);
+                let index = nearest_xterm([r, g, b]);
                 Some(Style::new().fg(Color::Indexed(index)))
             }
             Colors::Sixteen | Colors::Mono => None,

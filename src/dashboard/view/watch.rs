@@ -1,24 +1,24 @@
-//! Drawing of the table of watched files, and of their summary in the status line.
+//! Drawing of the table of watched film files, and of their summary in the status line.
 
 use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::model::{Model, WatchTable, short_name};
 use crate::dashboard::overlay_layout::wrapped;
-use crate::dashboard::view::frame::{panel, scroll_mark};
+use crate::dashboard::view::frame::{panel, window};
 use crate::dashboard::view::is_active;
 use crate::dashboard::view::text::{Row, cut};
 use crate::dashboard::view::theme::Theme;
 use crate::render::session::{WatchReport, WatchedShards, WatchedState};
-use crate::terminal::Area;
 use crate::value::sanitized;
 use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 use ratatui::style::Style;
 use std::time::Duration;
 
-/// Width of the column of ages, in columns of the terminal.
+/// Width of the table's column of ages, in columns of the terminal.
 const AGE: usize = 7;
-/// Width of the column of percentages, in columns of the terminal.
+/// Width of the table's column of percentages, in columns of the terminal.
 const SHARE: usize = 5;
-/// Width of the column of sample counts, in columns of the terminal.
+/// Width of the table's column of sample counts, in columns of the terminal.
 const SAMPLES: usize = 12;
 
 /// Draws the table of watched files. Draws nothing if the panel is folded.
@@ -32,15 +32,14 @@ pub fn draw(
     let (Some(area), Some((rows, details))) = (layout.outline, model.watch_rows()) else { return };
     let active = is_active(model, Focus::Outline);
     panel(area, &title(&table.report), active, theme, buffer);
-    let head = Area { y: rows.y - 1, height: 1, ..rows };
+    let head = Rect { y: rows.y - 1, height: 1, ..rows };
     let name = if table.report.complete.is_some() { " shard" } else { " file" };
     let mut to = Row::new(buffer, head, 0);
     right(&mut to, [("written", AGE), ("", SHARE), ("samples", SAMPLES)], theme.heading());
     to.put(name, theme.heading());
     let shards = &table.report.shards;
-    let (height, first) = (usize::from(rows.height), table.scroll);
-    for (row, (i, shard)) in (0..).zip(shards.iter().enumerate().skip(first).take(height)) {
-        let mut to = Row::new(buffer, rows, row);
+    for (row, i) in window(rows, table.scroll, shards.len(), theme.border(active), buffer) {
+        let (shard, mut to) = (&shards[i], Row::new(buffer, rows, row));
         let (mark, style) = mark(&shard.state, theme);
         let (plain, dim, style) = match i == table.cursor {
             true => {
@@ -52,38 +51,38 @@ pub fn draw(
         to.put(mark, style);
         let age = shard.age.map_or(String::new(), age);
         let late = if shard.state == WatchedState::Late { style } else { dim };
-        to.put_right(&age_column(&age), 0, late);
+        right(&mut to, [(&age, AGE)], late);
         match &shard.state {
-            WatchedState::Missing | WatchedState::Refused(_) => {
-                to.put_right(word(&shard.state), 1, style);
+            WatchedState::Missing => {
+                to.put_right("missing", 1, style);
+            }
+            WatchedState::Refused(_) => {
+                to.put_right("not used", 1, style);
             }
             _ => {
-                to.put_right(&format!("{:>SHARE$}", share(shard)), 0, plain);
-                to.put_right(&format!("{:>SAMPLES$}", samples(shard)), 0, dim);
+                right(&mut to, [(&share(shard), SHARE)], plain);
+                right(&mut to, [(&samples(shard), SAMPLES)], dim);
             }
         }
         let label = label(shard);
         to.put(&cut(&label, to.left()), plain);
     }
-    scroll_mark(rows, (first, height, shards.len()), theme.border(active), buffer);
     if let Some(selected) = shards.get(table.cursor) {
         explain(selected, details, theme, buffer);
     }
 }
 
-/// Draws `texts` at the right end of a row, each right-aligned in the given width.
+/// Draws `texts` into a table row; the first one is at the right end, each next one to its left.
+/// Each element is a text and the width in columns in which it is right-aligned.
 fn right<const N: usize>(to: &mut Row, texts: [(&str, usize); N], style: Style) {
     for (text, width) in texts {
         to.put_right(&format!("{text:>width$}"), 0, style);
     }
 }
 
-fn age_column(age: &str) -> String {
-    format!("{age:>AGE$}")
-}
-
-/// Draws the path and the state of a watched file, or of missing shards, below the table.
-fn explain(shard: &WatchedShards, area: Area, theme: &Theme, buffer: &mut Buffer) {
+/// Draws details below the table of watched files: the path and the state of one file, or the state
+/// of shards (parts of the render) that have no file.
+fn explain(shard: &WatchedShards, area: Rect, theme: &Theme, buffer: &mut Buffer) {
     if area.height == 0 {
         return;
     }
@@ -91,9 +90,13 @@ fn explain(shard: &WatchedShards, area: Area, theme: &Theme, buffer: &mut Buffer
     let (_, style) = mark(&shard.state, theme);
     let width = area.width.saturating_sub(2);
     let path = shard.path.as_ref().map(|path| sanitized(&path.display().to_string()));
+    let path = path.map_or(String::new(), |path| format!("{path}: "));
     let text = match &shard.state {
+        WatchedState::Complete => path + "complete",
+        WatchedState::Running => path + "unfinished, written in the last three minutes",
+        WatchedState::Late => path + "unfinished, not written for three minutes",
+        WatchedState::Missing => path + "there is no such file",
         WatchedState::Refused(reason) => sanitized(reason),
-        state => format!("{}{}", path.map_or(String::new(), |p| format!("{p}: ")), sentence(state)),
     };
     for (row, line) in (1..area.height).zip(wrapped(&text, width)) {
         let style = if row == 1 { style } else { theme.text() };
@@ -108,7 +111,8 @@ fn title(report: &WatchReport) -> String {
     }
 }
 
-/// Returns the name of a row: the numbers of its shards, or the name of its file.
+/// Returns the name of a row in the table of watched files: the numbers of the shards (parts of a
+/// render) in the file, or the name of the file if they are unknown.
 fn label(shard: &WatchedShards) -> String {
     match (&shard.path, shard.shards.as_str()) {
         (Some(path), "") => short_name(path),
@@ -126,27 +130,9 @@ fn mark(state: &WatchedState, theme: &Theme) -> (&'static str, Style) {
     }
 }
 
-fn word(state: &WatchedState) -> &'static str {
-    match state {
-        WatchedState::Complete => "complete",
-        WatchedState::Running => "running",
-        WatchedState::Late => "late",
-        WatchedState::Missing => "missing",
-        WatchedState::Refused(_) => "not used",
-    }
-}
-
-fn sentence(state: &WatchedState) -> &'static str {
-    match state {
-        WatchedState::Complete => "complete",
-        WatchedState::Running => "unfinished, written in the last three minutes",
-        WatchedState::Late => "unfinished, not written for three minutes",
-        WatchedState::Missing => "there is no such file",
-        WatchedState::Refused(_) => "not used",
-    }
-}
-
-/// Formats the fraction of its samples that a row has, in percent, rounded down.
+/// Formats the progress of a watched film file in percent, rounded down. 100 % is the number of
+/// samples that its shards (parts of the render) have when they are complete. Empty if this number
+/// is unknown.
 fn share(shard: &WatchedShards) -> String {
     match shard.total {
         Some(total) if total > 0 => {
@@ -157,8 +143,8 @@ fn share(shard: &WatchedShards) -> String {
     }
 }
 
-/// Formats the number of samples in a row's file and the number that its shards need, such as
-/// `1.2/4.8M`.
+/// Formats two numbers of samples, such as `1.2/4.8M`: those in a watched film file, and those of
+/// its shards (parts of a render) when they are complete. The second is omitted if it is unknown.
 fn samples(shard: &WatchedShards) -> String {
     let most = shard.total.unwrap_or(shard.samples).max(1) as f64;
     let units = [(1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k")];
@@ -173,7 +159,7 @@ fn samples(shard: &WatchedShards) -> String {
     }
 }
 
-/// Formats an age in whole units, such as `40 s`, `12 min`, `3 h` or `2 d`.
+/// Formats the age of a watched film file in whole units, such as `40 s`, `12 min`, `3 h` or `2 d`.
 fn age(age: Duration) -> String {
     let seconds = age.as_secs();
     match seconds {
@@ -184,8 +170,8 @@ fn age(age: Duration) -> String {
     }
 }
 
-/// Returns the summary of the watched files for the status line: state, percentage of the samples,
-/// and numbers of files that are late, missing or refused.
+/// Returns the summary of the watched files for the status line, as texts with their styles: state,
+/// percentage of the samples, and numbers of files that are late, missing or refused.
 pub fn summary(report: &WatchReport, theme: &Theme) -> Vec<(String, Style)> {
     let mut texts = Vec::new();
     match report.complete {

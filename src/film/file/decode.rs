@@ -1,5 +1,5 @@
-//! Reader of film files. It compares every length with the length of the file before it allocates
-//! memory.
+//! Reader of film files (`.zk`). It compares every length with the length of the file before it
+//! allocates memory.
 
 use crate::disk::open_regular;
 use crate::film::display::Display;
@@ -22,10 +22,10 @@ use std::path::{Path, PathBuf};
 /// Smallest number of bytes that a tile takes in a film file.
 const RECORD_BYTES: u64 = 8;
 
-/// Error that makes a film file unusable.
+/// Error that makes a film file (`.zk`) unusable.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReadError {
-    /// Path of the file.
+    /// Path of the film file.
     pub path: PathBuf,
     /// Description of the error, as a clause of a sentence.
     pub what: String,
@@ -41,19 +41,26 @@ impl fmt::Display for ReadError {
 
 impl std::error::Error for ReadError {}
 
-/// Returns `true` if the file at `path` begins like a film file.
+impl ReadError {
+    /// Creates the error of reading the film file `path`. `what` describes the error, and `remedy`
+    /// advises the user; both are clauses.
+    pub(crate) fn new(path: &Path, what: impl Into<String>, remedy: &str) -> Self {
+        Self { path: path.to_path_buf(), what: what.into(), remedy: remedy.to_string() }
+    }
+}
+
+/// Returns `true` if the file at `path` begins with the magic bytes of film files (`.zk`).
 pub fn is_film_file(path: &Path) -> bool {
     let mut start = [0; MAGIC.len()];
     open_regular(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == MAGIC
 }
 
-/// Reader of a film file. Everything before the tiles has been read.
+/// Reader of a film file (`.zk`) that has read everything before the tiles.
 #[derive(Debug)]
 pub struct FilmReader<R> {
     input: Input<R>,
     header: FilmFileHeader,
-    /// First chunk after the header, which has been read: `TILE`, or `DONE` for a film without
-    /// samples.
+    /// First chunk after the header, already read: a `TILE` chunk, or the `DONE` chunk.
     next: Chunk,
     checksums: crc32fast::Hasher,
 }
@@ -63,7 +70,7 @@ pub struct FilmReader<R> {
 struct Input<R> {
     path: PathBuf,
     bytes: R,
-    /// Number of bytes that remain to be read.
+    /// Number of bytes of the film file that remain to be read.
     left: u64,
 }
 
@@ -80,16 +87,11 @@ impl FilmReader<BufReader<File>> {
     /// # Errors
     /// Fails if the file cannot be read, is no film file, or is damaged.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        let error = |what: String, remedy: &str| ReadError {
-            path: path.to_path_buf(),
-            what,
-            remedy: remedy.to_string(),
-        };
         let opened = open_regular(path).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (length, file) = opened.map_err(|e| match e.kind() {
-            ErrorKind::NotFound => error("there is no such file".into(), "check its name"),
-            ErrorKind::InvalidInput => error(e.to_string(), "name a file"),
-            _ => error(e.to_string(), "check its name and permissions"),
+            ErrorKind::NotFound => ReadError::new(path, "there is no such file", "check its name"),
+            ErrorKind::InvalidInput => ReadError::new(path, e.to_string(), "name a file"),
+            _ => ReadError::new(path, e.to_string(), "check its name and permissions"),
         })?;
         Self::new(path, BufReader::with_capacity(1 << 16, file), length)
     }
@@ -150,14 +152,16 @@ impl<R: Read> FilmReader<R> {
         Ok(Self { input, header, next, checksums })
     }
 
-    /// Header of the film: everything before the tiles.
+    /// Returns everything in the file before the tiles: size, scales, seed, light weights,
+    /// metadata.
     pub fn header(&self) -> &FilmFileHeader {
         &self.header
     }
 
-    /// Reads the film.
+    /// Reads the tiles of the film file. Returns its header and its film.
     ///
     /// # Errors
+    ///
     /// Fails if the file cannot be read or is damaged.
     pub fn read(self) -> Result<(FilmFileHeader, Film), ReadError> {
         let mut film = Film::new(self.header.film.clone());
@@ -197,8 +201,9 @@ impl<R: Read> FilmReader<R> {
         self.visit_tiles(|_, _| Some(()))
     }
 
-    /// Calls `visit` for each `TILE` chunk with the numbers of its tiles and the encoded records of
-    /// these tiles. `visit` returns `None` if a record is not valid.
+    /// Calls `visit` for each `TILE` chunk. The arguments are a reader of the chunk's tile records
+    /// and the range of the tiles' numbers. Returns the header of the file. If `visit` returns
+    /// `None` because a record is not valid, the result is an error.
     fn visit_tiles(
         self,
         mut visit: impl FnMut(&mut Fields, Range<usize>) -> Option<()>,
@@ -243,8 +248,8 @@ impl FilmFileHeader {
     }
 }
 
-/// Decodes the `HEAD` chunk of a file with `length` bytes. Metadata and further chunks of the
-/// result are empty.
+/// Decodes the `HEAD` chunk of a film file with `length` bytes. Metadata and further chunks of the
+/// result are empty. Returns `None` if a field is not valid.
 fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
     let [width, height, groups] = [fields.u32()?, fields.u32()?, fields.u32()?].map(|n| n as usize);
     let tiles = width.div_ceil(TILE) as u64 * height.div_ceil(TILE) as u64;
@@ -293,8 +298,7 @@ fn decode_metadata(fields: &mut Fields) -> Option<Vec<(String, String)>> {
 
 impl<R: Read> Input<R> {
     fn error(&self, what: impl Into<String>, remedy: &str) -> ReadError {
-        let (path, remedy) = (self.path.clone(), remedy.to_string());
-        ReadError { path, what: what.into(), remedy }
+        ReadError::new(&self.path, what, remedy)
     }
 
     fn damaged(&self, what: impl Into<String>) -> ReadError {
@@ -304,7 +308,7 @@ impl<R: Read> Input<R> {
         )
     }
 
-    /// Reads `length` bytes. `part` names this part of the file in error messages.
+    /// Reads `length` bytes of the film file. `part` names this part of the file in error messages.
     fn take(&mut self, length: u64, part: &str) -> Result<Vec<u8>, ReadError> {
         let cut = |input: &Self| {
             let what = format!("it ends in the middle of {part}: it was not copied as a whole");
@@ -349,8 +353,8 @@ impl<R: Read> Input<R> {
     }
 }
 
-/// Reader of the fields in a byte string, from its start. Each method consumes the bytes that it
-/// reads, and returns `None` if there are too few bytes or the value is not valid.
+/// Reader of the fields (numbers, texts) in a byte string, from its start. Each method consumes the
+/// bytes that it reads, and returns `None` if there are too few bytes or the value is not valid.
 pub struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -359,39 +363,41 @@ impl<'a> Fields<'a> {
         Self(bytes)
     }
 
-    /// Returns `true` if no bytes are left.
+    /// Returns `true` if no bytes are left to read.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Reads `length` bytes.
+    /// Reads `length` bytes. Returns `None` if fewer are left.
     pub fn take(&mut self, length: usize) -> Option<&'a [u8]> {
         let (taken, rest) = self.0.split_at_checked(length)?;
         self.0 = rest;
         Some(taken)
     }
 
-    /// Reads an unsigned 8-bit number.
+    /// Reads an unsigned 8-bit number. Returns `None` at the end of the bytes.
     pub fn u8(&mut self) -> Option<u8> {
         self.take(1).map(|bytes| bytes[0])
     }
 
-    /// Reads an unsigned 32-bit number, little-endian.
+    /// Reads an unsigned 32-bit number, little-endian. Returns `None` if too few bytes are left.
     pub fn u32(&mut self) -> Option<u32> {
         self.take(4).and_then(|bytes| bytes.try_into().ok()).map(u32::from_le_bytes)
     }
 
-    /// Reads an unsigned 64-bit number, little-endian.
+    /// Reads an unsigned 64-bit number, little-endian. Returns `None` if too few bytes are left.
     pub fn u64(&mut self) -> Option<u64> {
         self.take(8).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes)
     }
 
-    /// Reads a 64-bit floating-point number, little-endian.
+    /// Reads a 64-bit floating-point number, little-endian. Returns `None` if too few bytes are
+    /// left.
     pub fn f64(&mut self) -> Option<f64> {
         self.u64().map(f64::from_bits)
     }
 
-    /// Reads a UTF-8 text that is preceded by its length in bytes (u32).
+    /// Reads a UTF-8 text that is preceded by its length in bytes (u32). Returns `None` if too few
+    /// bytes are left or they are not UTF-8.
     pub fn text(&mut self) -> Option<String> {
         let length = self.u32()? as usize;
         String::from_utf8(self.take(length)?.to_vec()).ok()

@@ -1,6 +1,6 @@
-//! Writer of film files.
+//! Writer of film files (`.zk`).
 
-use crate::disk::{Existing, Replacement, WriteError};
+use crate::disk::{Existing, WriteError, replace_file};
 use crate::film::file::{
     DONE, FilmFileHeader, HEAD, MAGIC, META, TILES, TILES_PER_CHUNK, Tag, VERSION, tile_record,
 };
@@ -8,11 +8,11 @@ use crate::film::store::Film;
 use std::io::Write;
 use std::path::Path;
 
-/// Length of the checksum at the end of a chunk \[bytes\].
+/// Number of bytes of the checksum at the end of a film file's chunk.
 pub(super) const CHECKSUM_BYTES: usize = 4;
 
 impl FilmFileHeader {
-    /// Encodes everything before the tiles.
+    /// Encodes the part of the film file before the tiles.
     pub fn encode(&self) -> Vec<u8> {
         let mut out = [&MAGIC[..], &VERSION.to_le_bytes()].concat();
         out.extend(chunk(HEAD, |head| self.encode_head(head)));
@@ -48,13 +48,13 @@ impl FilmFileHeader {
     }
 }
 
-/// Number of `TILE` chunks of a film.
+/// Returns the number of `TILE` chunks in the film file of `film`.
 pub fn tile_chunks(film: &Film) -> usize {
     film.tile_count().div_ceil(TILES_PER_CHUNK)
 }
 
-/// Encodes the `TILE` chunk with the number `index`, which is below [`tile_chunks`]. Samples of an
-/// unfinished first pass are left out.
+/// Encodes the `TILE` chunk with the number `index`, which is below [`tile_chunks`]. Leaves out the
+/// samples of a tile in which only some pixels have their first sample.
 pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
     let first = index * TILES_PER_CHUNK;
     let count = (film.tile_count() - first).min(TILES_PER_CHUNK);
@@ -65,8 +65,9 @@ pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
     })
 }
 
-/// Encodes the last chunk of a file, which has a checksum of all `pieces`: the encoded header and
-/// all encoded tiles.
+/// Encodes the last chunk of a film file. `pieces` are the encoded header and the encoded tile
+/// chunks. The chunk has one checksum of the header's bytes and of the checksums of the tile
+/// chunks.
 pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
     let mut checksum = crc32fast::Hasher::new();
     // The header holds several chunks. Its own bytes stand for their checksums.
@@ -81,28 +82,17 @@ pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
     })
 }
 
-/// Writes a film file from its encoded pieces: header, tiles, end. The file at `path` is replaced
-/// when the new one is complete and stored on the disk.
+/// Writes a film file from its encoded pieces: header, tiles, end. An existing file at `path` is
+/// replaced when the new one is complete and stored on the disk, or refused, as `existing` says.
 ///
 /// # Errors
-/// Fails if the file cannot be written; an existing file is then unchanged.
-pub fn write_film_file(path: &Path, pieces: &[Vec<u8>]) -> Result<(), WriteError> {
-    write_pieces(path, pieces, Existing::Replace)
-}
-
-/// Writes a film file as [`write_film_file`] does, but fails if `path` exists.
-///
-/// # Errors
-/// Fails if the file exists or cannot be written.
-pub fn create_film_file(path: &Path, pieces: &[Vec<u8>]) -> Result<(), WriteError> {
-    write_pieces(path, pieces, Existing::Refuse)
-}
-
-fn write_pieces(path: &Path, pieces: &[Vec<u8>], existing: Existing) -> Result<(), WriteError> {
-    let mut replacement = Replacement::begin(path, existing)?;
-    let written = pieces.iter().try_for_each(|piece| replacement.temporary().write_all(piece));
-    written.map_err(|error| replacement.explain(&error))?;
-    replacement.commit()
+/// Fails if the file cannot be written or is refused; an existing file is then unchanged.
+pub fn write_film_file(
+    path: &Path,
+    pieces: &[Vec<u8>],
+    existing: Existing,
+) -> Result<(), WriteError> {
+    replace_file(path, existing, |file| pieces.iter().try_for_each(|piece| file.write_all(piece)))
 }
 
 fn text(text: &str, out: &mut Vec<u8>) {

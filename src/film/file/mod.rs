@@ -16,12 +16,13 @@
 //! | `DONE` | number of tiles (u64), and the CRC-32 (u32) of all bytes before the first `TILE` chunk and the checksums of the `TILE` chunks; the end of the file |
 //!
 //! A text has its length in bytes (u32) before it. A tile record begins with the sample counts of A
-//! and B (u32 each) and ends there if both are 0. Then follow the number of samples above the
-//! film's limit (u64), the number of invalid samples (u64), the number of remembered ones (u8) with
-//! index, x, y (u32 each) and replicate (u8), and the sums. Sums are stored in planes, in the order
-//! replicate, group, channel. A plane has the number of bytes of its largest sum (u8, 0 to 8), then
-//! the low bytes of the sum of each pixel inside the picture, row by row. This takes about 60 % of
-//! the memory of the film, and less time than writing the rest would take.
+//! and B, the two halves of the samples (u32 each), and ends there if both are 0. Then follow the
+//! number of samples above the largest value that the film can store (u64), the number of invalid
+//! samples (u64), the number of their stored positions (u8), index, x, y (u32 each) and replicate
+//! (u8) of each position, and the sums. Sums are stored in planes, in the order replicate, group,
+//! channel. A plane has the number of bytes of its largest sum (u8, 0 to 8), then the low bytes of
+//! the sum of each pixel inside the picture, row by row. This takes about 60 % of the film's
+//! memory. The encoding takes less time than writing the other 40 % would take.
 
 mod decode;
 mod encode;
@@ -30,7 +31,7 @@ mod tests;
 mod tile_record;
 
 pub use decode::{Fields, FilmReader, ReadError, is_film_file};
-pub use encode::{create_film_file, encode_end, encode_tiles, tile_chunks, write_film_file};
+pub use encode::{encode_end, encode_tiles, tile_chunks, write_film_file};
 
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
@@ -39,14 +40,14 @@ use std::collections::BTreeMap;
 
 /// First bytes of a film file.
 const MAGIC: [u8; 8] = *b"\x89ZKF\r\n\x1a\n";
-/// Version of the format that is written and read.
+/// Version of the film file format that is written and read.
 const VERSION: u32 = 1;
-/// Number of tiles in a `TILE` chunk.
+/// Number of tiles in a `TILE` chunk of a film file; the last chunk may have fewer.
 const TILES_PER_CHUNK: usize = 64;
-/// Largest width and height of a film that is read [pixels].
+/// Largest width and height, in pixels, of a film that is read from a file.
 const MAX_SIDE: usize = 1 << 17;
 
-/// Tag of a chunk: four ASCII letters.
+/// Tag of a film file's chunk: four ASCII letters.
 pub type Tag = [u8; 4];
 
 const HEAD: Tag = *b"HEAD";
@@ -57,16 +58,17 @@ const DONE: Tag = *b"DONE";
 /// Contents of a film file except for the tiles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmFileHeader {
-    /// Size, scales, seed and precision of the film.
+    /// Size, scales, random seed and precision of the film.
     pub film: Header,
     /// Weight of each light group in the picture.
     pub weights: LightWeights,
-    /// Name of each light group.
+    /// Name of each light group of the film.
     pub group_names: Vec<String>,
-    /// Display transform with which the noise was estimated.
+    /// Display transform with which the noise of the picture was estimated.
     pub display: Display,
     /// Keys and values that describe the picture, as in picture files.
     pub metadata: Vec<(String, String)>,
-    /// Further chunks by tag. The tags `HEAD`, `META`, `TILE` and `DONE` are not allowed.
+    /// Further chunks of the film file by tag. The tags `HEAD`, `META`, `TILE` and `DONE` are not
+    /// allowed.
     pub chunks: BTreeMap<Tag, Vec<u8>>,
 }

@@ -6,8 +6,8 @@ use crate::film::{Film, InvalidSample, TILE};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Returns a film with sums of all sizes, empty tiles, partial tiles, and tiles with different
-/// sample counts.
+/// Returns a film whose integer sums need 0 to 8 bytes. Some of its tiles have no samples, some are
+/// cut by the edge of the picture, and their sample counts differ.
 fn sample_film() -> Film {
     let mut film = film(150, 37, &[2f64.powi(20), 2f64.powi(-3)]);
     let mut rng = Rng(7);
@@ -75,12 +75,12 @@ fn saturated_sums_are_restored() {
         }
         tile.advance(0, 1 << 20);
     });
-    assert_eq!((film.saturated(), film.saturated_pixels()), (2, 2));
+    assert_eq!(film.saturated_pixels(), 2);
     let mut pieces = vec![header_of(&film).encode()];
     pieces.push(encode_tiles(&film, 0));
     pieces.push(encode_end(&film, &pieces));
     let (_, restored) = read(&pieces.concat()).unwrap();
-    assert_eq!((restored.saturated(), restored.saturated_pixels()), (2, 2));
+    assert_eq!(restored.saturated_pixels(), 2);
     assert_eq!(restored.bytes(), film.bytes());
 }
 

@@ -1,17 +1,17 @@
-//! Encoding of tiles in film files.
+//! Encoding of tiles in film files (`.zk`).
 
 use crate::film::TILE;
 use crate::film::file::decode::Fields;
 use crate::film::invalid::{INVALID_REMEMBERED, InvalidSample, InvalidSamples};
 use crate::film::tile::{TILE_PIXELS, Tile};
 
-/// Largest value of a sample, in integer steps of the film.
+/// Largest value of a single sample as an integer, that is, multiplied by its light group's scale.
 const LARGEST_SAMPLE: u64 = 1 << 49;
 
-/// Number of bytes of a sum in memory.
+/// Number of bytes of one of the film's integer sums in memory.
 const WORD: usize = 8;
 
-/// Appends the record of a tile to `out`. `None` is a tile without samples.
+/// Appends the film file's record of a tile to `out`. `None` is a tile without samples.
 pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     let Some(tile) = tile.filter(|tile| tile.counts() != [0; 2]) else {
         return out.extend([0; 8]);
@@ -38,8 +38,9 @@ pub(super) fn encode(tile: Option<&Tile>, out: &mut Vec<u8>) {
     }
 }
 
-/// Appends the plane of sum `i`: the low bytes of this sum of each pixel, as many as the largest
-/// sum needs.
+/// Appends a plane to `out`: the integer sum with the index `i` of each pixel. `pixels` has all
+/// sums of each pixel. The plane begins with one byte, the number of low bytes that the largest sum
+/// needs. Every sum follows with this number of bytes.
 fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
     let all = pixels.iter().fold(0, |all, sums| all | sums[i] as u64);
     let bytes = (64 - all.leading_zeros()).div_ceil(8) as usize;
@@ -57,7 +58,8 @@ fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
     out.truncate(end);
 }
 
-/// Reads a record into `tile`, which is empty. Returns `None` if the record is not valid.
+/// Reads the film file's record of a tile into `tile`, which is empty. Returns `None` if the record
+/// is not valid.
 pub(super) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Option<()> {
     let counts = [fields.u32()?, fields.u32()?];
     let saturated_samples = fields.u64()?;
@@ -116,7 +118,8 @@ fn invalid_samples(fields: &mut Fields) -> Option<Vec<InvalidSample>> {
     (samples.is_sorted() && samples.iter().all(|s| s.replicate < 2)).then_some(samples)
 }
 
-/// Iterates over the pixels of a tile that are inside the picture, row by row.
+/// Iterates over the pixels of a tile that are inside the picture, row by row. The argument is the
+/// width and height, in pixels, of this part of the tile.
 fn inside([width, height]: [usize; 2]) -> impl Iterator<Item = usize> {
     (0..height).flat_map(move |y| (0..width).map(move |x| y * TILE + x))
 }

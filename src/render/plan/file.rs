@@ -1,8 +1,10 @@
-//! Plan files: text with one setting or tile per line, in a fixed order, and a checksum at the end.
+//! Plan files of renders that are divided among shards: text with one setting or tile per line, in
+//! a fixed order, and a checksum at the end.
 //!
-//! The line of a tile has four fields: samples per replicate in the base, samples per replicate in
-//! the merged picture, the expected number of rays per sample, and `g` if a path has sampled a
-//! glossy lobe, otherwise `-`.
+//! The line of a tile has four fields. The first is its base: the number of samples per pixel that
+//! each replicate (half of the samples) had when the plan started. The second is this number in the
+//! merged picture, the third is the expected number of rays per sample. The fourth is `g` if a path
+//! has sampled a glossy lobe, otherwise `-`.
 
 use crate::disk::open_regular;
 use crate::film::{Display, Tone};
@@ -23,10 +25,10 @@ const TITLE: &str = "zerkalo plan 1";
 const MAX_BYTES: u64 = 1 << 26;
 /// Largest width and height of a planned picture in pixels.
 const MAX_SIDE: u32 = 1 << 14;
-/// Length of the shortest line of a tile in bytes.
+/// Number of bytes of the shortest line of a tile in a plan file.
 const MIN_TILE_BYTES: usize = 8;
 
-/// Beginning of the first line of every version of the format.
+/// Beginning of the first line of plan files, whatever their version.
 const START: &[u8] = b"zerkalo plan ";
 
 /// Returns `true` if the file at `path` begins like a plan file.
@@ -70,12 +72,12 @@ impl Plan {
         text
     }
 
-    /// Checksum of the plan. Plans with equal checksums are equal.
+    /// Returns the checksum of the plan, a hash of its text. Plans with equal checksums are equal.
     pub fn checksum(&self) -> u64 {
         fnv1a64(self.body().as_bytes())
     }
 
-    /// Formats all lines before the checksum.
+    /// Formats all lines of the plan file before the checksum.
     fn body(&self) -> String {
         let s = &self.settings;
         let base = s.base_plan.map_or("pilot".to_string(), |plan| format!("{plan:016x}"));
@@ -175,9 +177,7 @@ impl Plan {
             size.iter().all(|n| (1..=MAX_SIDE).contains(n)).then_some(size)
         })?;
         let seed = lines.setting("seed", "an integer from 0", number)?;
-        let sampler = lines.setting("sampler", "sobol or random", |text| {
-            [SamplerKind::Sobol, SamplerKind::Random].into_iter().find(|kind| kind.name() == text)
-        })?;
+        let sampler = lines.setting("sampler", "sobol or random", SamplerKind::from_name)?;
         let precision = lines.setting("precision", "single or double", |text| {
             ["single", "double"].contains(&text).then(|| text.to_string())
         })?;
@@ -235,13 +235,13 @@ impl Plan {
     }
 }
 
-/// Remedy in errors of damaged files.
+/// Advice to the user in errors about damaged plan files.
 const DAMAGED: &str = "copy it again or plan again";
 
-/// Lines of a plan file.
+/// Lines of a plan file that remain to be parsed.
 struct Lines<'a> {
     path: &'a Path,
-    /// Number of the latest line.
+    /// Number of the line that was read last, counted from 1.
     line: usize,
     rest: &'a str,
 }
@@ -258,8 +258,8 @@ impl<'a> Lines<'a> {
         Some(line)
     }
 
-    /// Reads the line of the setting `key` and parses its value. `expected` describes valid values
-    /// in error messages.
+    /// Reads the next line of the plan file, which must have the setting `key`, and parses its
+    /// value. `expected` describes valid values in error messages.
     fn setting<T>(
         &mut self,
         key: &str,
@@ -303,7 +303,8 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Parses a number. The text must begin with a digit or a minus sign.
+/// Parses a number of a plan file. The text must begin with a digit or a minus sign. Returns `None`
+/// for any other text.
 fn number<T: FromStr>(text: &str) -> Option<T> {
     let digits = text.strip_prefix('-').unwrap_or(text);
     digits.starts_with(|c: char| c.is_ascii_digit()).then(|| text.parse().ok())?
@@ -318,7 +319,7 @@ mod tests {
         Plan::parse(Path::new("job.plan"), text.as_bytes()).map_err(|e| e.to_string())
     }
 
-    /// Returns the text of a plan with `from` replaced by `to` and a correct checksum.
+    /// Returns the text of a plan file with `from` replaced by `to` and a correct checksum.
     fn altered(from: &str, to: &str) -> String {
         let text = plan(8, &[[4, 16], [8, 8], [16, 480]]).body();
         assert_eq!(text.matches(from).count(), 1, "{from} in {text}");

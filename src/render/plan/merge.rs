@@ -1,20 +1,22 @@
-//! Merging: adds the films of a plan's shards.
+//! Merging: adds the films of the shards of a plan, which different processes have traced.
 
+use crate::film::Film;
 use crate::film::file::{FilmFileHeader, FilmReader};
-use crate::film::{Film, Noise};
-use crate::render::plan::members::{Plans, ShardFiles, join, shard_name};
+use crate::render::plan::merge_inputs::{Plans, ShardFiles, join, shard_name};
 use crate::render::plan::part::{Part, PartShard, ranges};
 use crate::render::plan::{BASE, Plan};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Sum of the films of a plan's shards.
+/// Merged film: the sum of the films of a plan's shards.
 pub struct Merged {
-    /// Sum of the films.
+    /// Film with the samples of all merged files.
     pub film: Film,
-    /// Header of the film file with the lowest shard, with the plan and all shards of the sum.
+    /// Header of the merged film. It is the header of the file with the lowest shard number; the
+    /// plan and the list of all merged shards are added.
     pub header: FilmFileHeader,
-    /// Plan and shards of the film.
+    /// Plan of the film, and the numbers of the shards (parts of the planned render) that are in
+    /// it.
     pub part: Part,
 }
 
@@ -27,21 +29,21 @@ impl Merged {
     /// plans, if two files hold the same shard, or if shards are missing or unfinished without
     /// `partial`.
     pub fn of_files(paths: &[PathBuf], partial: bool) -> Result<Self, String> {
-        let (mut plans, mut members, mut readers) = (Plans::default(), Vec::new(), Vec::new());
+        let (mut plans, mut inputs, mut readers) = (Plans::default(), Vec::new(), Vec::new());
         for path in paths {
             let reader = FilmReader::open(path).map_err(|e| e.to_string())?;
             let part = Part::of_header(path, reader.header())?;
             let part = part.ok_or_else(|| without_plan(path))?;
-            members.push(plans.member(path, part));
+            inputs.push(plans.input(path, part));
             readers.push(reader);
         }
-        let (plan, shards) = join(&mut members)?;
+        let (plan, shards) = join(&mut inputs)?;
         if !partial {
             check_complete(&plan, &shards)?;
         }
-        let rays = members.iter().map(|member| member.rays).sum();
-        let mut files: Vec<_> = members.iter().zip(readers).collect();
-        files.sort_by_key(|(member, _)| member.shards[0].number);
+        let rays = inputs.iter().map(|input| input.rays).sum();
+        let mut files: Vec<_> = inputs.iter().zip(readers).collect();
+        files.sort_by_key(|(input, _)| input.shards[0].number);
         let shards: Vec<PartShard> = shards.into_values().map(|(_, shard)| shard).collect();
         let mut sum: Option<(Film, FilmFileHeader)> = None;
         for (_, reader) in files {
@@ -69,14 +71,9 @@ impl Merged {
         part.record(&mut header);
         Ok(Self { film, header, part })
     }
-
-    /// Estimated error of the merged picture. `None` if a tile has no samples.
-    pub fn noise(&self) -> Option<Noise> {
-        self.film.noise(&self.header.weights, &self.header.display)
-    }
 }
 
-/// Returns the message about the film file at `path`, which belongs to no plan.
+/// Returns the error message about the film file at `path`, which belongs to no plan.
 pub(super) fn without_plan(path: &Path) -> String {
     format!(
         "cannot add {} to other films: it belongs to no plan; name files that `zerkalo render \

@@ -1,18 +1,18 @@
 //! Plans: renders that are divided among shards, which other processes or machines trace.
 //!
 //! A plan fixes the sample count of every tile before the shards start, because shards do not
-//! communicate. A pilot, which is an adaptive render to a coarser noise, predicts the counts
-//! ([`Schedule::predict`]). Its samples are the start of the sample sequence of every tile, the
-//! *base* of the plan; the shards trace the rest. The sum of base and all shards therefore holds
-//! the samples `0..end` of each tile in both replicates, like an adaptive render that has stopped
-//! there, and equals the film of one process bit for bit.
+//! communicate. A pilot is an adaptive render that ends at a noise above the target. Its noise
+//! estimates predict the counts ([`Schedule::predict`]). Its samples are the *base* of the plan,
+//! the start of the sample sequence of every tile. The shards trace the rest. The sum of base and
+//! all shards therefore holds the samples `0..end` of each tile in both replicates, like an
+//! adaptive render that has stopped there. It equals the film of one process bit for bit.
 //!
 //! [`Schedule::predict`]: crate::render::schedule::Schedule::predict
 
 mod division;
 mod file;
-mod members;
 mod merge;
+mod merge_inputs;
 mod part;
 mod shard_render;
 #[cfg(test)]
@@ -32,67 +32,75 @@ use crate::sampling::SamplerKind;
 /// Largest number of shards of a plan.
 pub const MAX_SHARDS: u32 = 1 << 16;
 
-/// Number of the base in lists of shards. Shards have the numbers from 1.
+/// Number that stands for the base in lists of shards. The base is the set of samples that a plan
+/// started from, such as those of a pilot render. Shards have the numbers from 1.
 pub const BASE: u32 = 0;
 
-/// Settings of a plan: the inputs of its samples, and its noise target.
+/// Settings of a render that is divided among shards: the inputs of its samples, and its noise
+/// target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSettings {
     /// Path of the scene file as the user gave it.
     pub source: String,
-    /// Hash of the scene and of the files that it names.
+    /// Hash of the text of the scene and of the files that it names.
     pub scene_hash: String,
-    /// Width and height in pixels.
+    /// Width and height of the picture in pixels.
     pub size: [u32; 2],
-    /// Seed of the samples.
+    /// Random seed of all samples of the planned render.
     pub seed: u64,
-    /// Sample sequence.
+    /// Kind of the random numbers: Sobol points or independent numbers.
     pub sampler: SamplerKind,
-    /// Precision of the geometry, `single` or `double`.
+    /// Floating-point precision of the render, `single` or `double`.
     pub precision: String,
     /// Display transform under which the noise is estimated.
     pub display: Display,
-    /// Largest number of samples per pixel in tiles with glossy lobes; 0 for no limit.
+    /// Largest number of samples per pixel in tiles with glossy lobes, over the whole render; 0 for
+    /// no limit.
     pub rays_per_pixel: u32,
-    /// Target: RMSE of the displayed picture in 8-bit levels.
+    /// Noise target: RMSE of the displayed picture in 8-bit levels.
     pub noise_codes: f64,
-    /// Number of shards, 1 to [`MAX_SHARDS`]. They are numbered from 1.
+    /// Number of shards into which the render is divided, 1 to [`MAX_SHARDS`]. Each is for one
+    /// process. They are numbered from 1.
     pub shards: u32,
-    /// Checksum of the plan whose merged film is the base; `None` if the base is the pilot.
+    /// Checksum of the earlier plan whose film, merged from its shards, this plan continues. `None`
+    /// if it continues a pilot render, from whose noise the samples of each tile were planned.
     pub base_plan: Option<u64>,
 }
 
-/// Plan of a render that is divided among shards.
+/// Plan of a render that is divided among shards: the number of samples of each tile, fixed in
+/// advance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Settings that determine the samples, and the target.
+    /// Settings of the planned render: the inputs of its samples, and its noise target.
     pub settings: PlanSettings,
     /// Expected RMSE of the merged picture in 8-bit levels.
     pub predicted_codes: f64,
-    /// Exponents of convergence in tiles without and with glossy lobes: RMSE ~ n^-slope for n
-    /// samples.
+    /// Exponents s of the error, RMSE ~ n^-s for n samples: first of tiles without glossy lobes,
+    /// then of tiles with them.
     pub slopes: [f64; 2],
-    /// Tiles in row order.
+    /// Sample counts of the picture's tiles, in row order.
     pub tiles: Vec<PlannedTile>,
 }
 
-/// Numbers of samples of one tile.
+/// Sample counts of one tile in a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlannedTile {
-    /// Samples per replicate in the base.
+    /// Base of the tile: samples per pixel that it had before the plan in each replicate (half of
+    /// the samples), from a pilot render or an earlier plan.
     pub base: u32,
-    /// Samples per replicate in the merged film; at least `base`.
+    /// Samples per pixel in each replicate (half of the samples) of the merged film of all shards.
+    /// They include `base`, the samples that the plan started from.
     pub end: u32,
-    /// Expected number of rays per sample.
+    /// Expected number of rays per sample in this tile.
     pub rays_per_sample: f32,
     /// `true` if a path in the tile has sampled a glossy lobe.
     pub glossy: bool,
 }
 
 impl Plan {
-    /// Plans the render that continues the samples of `schedule` until its noise target.
-    /// `usual_slopes` (see [`Plan::slopes`]) replace slopes that the schedule has not measured.
-    /// Returns `None` if the schedule has no noise target, or no estimate of the noise.
+    /// Creates the plan of a render that continues from the samples of `schedule` and ends at its
+    /// noise target. `usual_slopes` (see [`Plan::slopes`]) replace slopes that the schedule has not
+    /// measured. Returns `None` if the schedule has no noise target, or no estimate of the noise.
     pub fn of_schedule(
         schedule: &Schedule,
         usual_slopes: [f64; 2],
@@ -114,17 +122,20 @@ impl Plan {
         })
     }
 
-    /// Expected number of rays of `shard`.
+    /// Returns the expected number of rays of all samples that the shard with the number `shard`
+    /// traces.
     pub fn rays(&self, shard: u32) -> f64 {
         self.rays_of(self.ranges(shard).into_iter())
     }
 
-    /// Expected number of rays of the base and all shards together.
+    /// Returns the expected number of rays of the whole merged picture: those of the base (the
+    /// samples that the plan started from) and of all shards.
     pub fn all_rays(&self) -> f64 {
         self.rays_of(self.tiles.iter().map(|tile| 0..tile.end))
     }
 
-    /// Expected number of rays of the sample indices `ranges` of all tiles.
+    /// Returns the expected number of rays for the samples with the indices `ranges` in both
+    /// replicates (halves of the samples). `ranges` has a range of indices for each tile.
     fn rays_of(&self, ranges: impl Iterator<Item = std::ops::Range<u32>>) -> f64 {
         let rays = |(tile, range): (usize, std::ops::Range<u32>)| {
             let samples = 2.0 * range.len() as f64 * pixels_of(self.settings.size, tile) as f64;
@@ -133,7 +144,8 @@ impl Plan {
         ranges.enumerate().map(rays).sum()
     }
 
-    /// Number of samples of `shard`, over all pixels and both replicates.
+    /// Returns the number of samples that the shard with the number `shard` traces, over all pixels
+    /// and both replicates (halves of the samples).
     pub fn samples(&self, shard: u32) -> u64 {
         let samples = |(tile, range): (usize, std::ops::Range<u32>)| {
             2 * range.len() as u64 * pixels_of(self.settings.size, tile)
@@ -141,7 +153,8 @@ impl Plan {
         self.ranges(shard).into_iter().enumerate().map(samples).sum()
     }
 
-    /// Mean number of samples per pixel in the merged picture, over both replicates.
+    /// Returns the mean number of samples per pixel in the merged picture, over both replicates
+    /// (halves of the samples).
     pub fn spp(&self) -> f64 {
         let size = self.settings.size;
         let samples = |(i, t): (usize, &PlannedTile)| 2 * u64::from(t.end) * pixels_of(size, i);
@@ -150,8 +163,9 @@ impl Plan {
         samples as f64 / (width * height) as f64
     }
 
-    /// Compares the sample counts of `film` with those of the base and of `shards`. Returns the
-    /// number of the first tile with a difference.
+    /// Compares the sample counts of `film` with those that the plan assigns to the shards with the
+    /// numbers `shards`, which may include [`BASE`]. Returns the number of the first tile whose
+    /// counts differ; `None` if all counts agree.
     pub fn differing_tile(&self, film: &Film, shards: &[u32]) -> Option<usize> {
         let mut expected = vec![0u32; self.tiles.len()];
         for shard in shards {
@@ -159,12 +173,12 @@ impl Plan {
                 *sum += range.len() as u32;
             }
         }
-        let counts = |tile: usize| film.tile(tile).map_or([0; 2], |tile| tile.counts());
-        (0..self.tiles.len()).find(|tile| counts(*tile) != [expected[*tile]; 2])
+        (0..self.tiles.len()).find(|tile| film.counts(*tile) != [expected[*tile]; 2])
     }
 
-    /// Returns the schedule that continues `film`, which holds all samples of this plan. Returns
-    /// `None` if a tile has no estimate of its error.
+    /// Returns the schedule that continues `film`, which holds all samples of this plan.
+    /// `estimator` estimates the error of each tile. Returns `None` if it has no estimate for a
+    /// tile.
     pub fn schedule(
         &self,
         film: &Film,
@@ -185,8 +199,8 @@ impl Plan {
         Some(Schedule::of_samples(&samples?, settings))
     }
 
-    /// Returns a phrase for messages: the first setting in which two plans differ, with both
-    /// values.
+    /// Returns a phrase for messages: the first line that differs between the texts of the plans
+    /// `self` and `other`, as it is in each of them.
     fn difference(&self, other: &Self) -> String {
         let [ours, theirs] = [self, other].map(Self::text);
         let different = ours.lines().zip(theirs.lines()).find(|(a, b)| a != b);

@@ -1,38 +1,41 @@
-//! Parts: film files that hold the samples of some shards of a plan, together with the plan.
+//! Film files of planned renders: they hold the samples of some shards of a plan, together with the
+//! plan.
 
 use crate::film::file::FilmFileHeader;
 use crate::render::plan::{BASE, Plan};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Tag of the chunk with the text of the plan.
+/// Tag of the film file's chunk with the text of the plan.
 const PLAN_TAG: [u8; 4] = *b"PLAN";
-/// Tag of the chunk with the shards in the film: a line `rays N`, then a line `shard K complete` or
-/// `shard K unfinished` for each shard.
+/// Tag of the film file's chunk that lists the shards (parts of a render) in the film. The chunk
+/// has a line `rays N`, then a line `shard K complete` or `shard K unfinished` for each shard.
 const PART_TAG: [u8; 4] = *b"PART";
 
-/// Plan that a film file contains, and the shards that its film holds.
+/// Part of a planned render: the plan that a film file contains, and the shards that its film
+/// holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// The plan.
+    /// Plan of the render to which the film belongs.
     pub plan: Plan,
-    /// Shards in ascending order.
+    /// Shards that the film holds, in ascending order.
     pub shards: Vec<PartShard>,
-    /// Number of rays of all samples in the film.
+    /// Number of rays of all samples in the part's film.
     pub rays: u64,
 }
 
-/// State of one shard in a film file.
+/// State of one shard (one process's part of a planned render) in a film file: complete or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PartShard {
-    /// Number of the shard; [`BASE`] is the base.
+    /// Number of the shard; [`BASE`] means the samples that the plan started from.
     pub number: u32,
-    /// `true` if the film holds all samples of the shard.
+    /// `true` if the film holds all samples of this shard.
     pub complete: bool,
 }
 
 impl Part {
-    /// Adds the plan, the shards and the metadata entry `Shards` to `header`.
+    /// Adds the plan, the shards and the metadata entry `Shards` to `header`, the header of a film
+    /// file.
     pub fn record(&self, header: &mut FilmFileHeader) {
         let mut text = format!("rays {}\n", self.rays);
         for PartShard { number, complete } in &self.shards {
@@ -92,25 +95,22 @@ impl Part {
         (!shards.is_empty()).then_some(Self { plan, shards, rays })
     }
 
-    /// Returns `true` if the film holds all samples of the plan.
+    /// Returns `true` if the part's film holds all samples of the plan.
     pub fn is_whole(&self) -> bool {
         self.plan.is_whole(&self.shards)
     }
 
-    /// Returns the shards that the film does not hold completely, such as `3, 5-7`. `None` if it
-    /// holds all.
+    /// Returns the numbers of the shards (parts of the render) that are missing or incomplete in
+    /// the film, such as `3, 5-7`. `None` if the film holds all.
     pub fn missing(&self) -> Option<String> {
-        let complete = |number: &u32| {
-            let found = self.shards.binary_search_by_key(number, |shard| shard.number);
-            found.is_ok_and(|i| self.shards[i].complete)
-        };
-        let missing = (BASE..=self.plan.settings.shards).filter(|number| !complete(number));
-        let missing: Vec<u32> = missing.collect();
+        let complete = self.shards.iter().filter(|shard| shard.complete);
+        let missing = self.plan.absent(&complete.map(|shard| shard.number).collect::<Vec<_>>());
         (!missing.is_empty()).then(|| ranges(&missing))
     }
 
-    /// Returns the metadata entry `Shards`: shards in the film, number of all shards, unfinished
-    /// and missing ones, and the plan. Example: `0-2, 4 of 5, unfinished 4, missing 3, 5, plan
+    /// Returns the metadata entry `("Shards", value)` for the film file. The value lists the shards
+    /// in the film, the number of shards in the plan, the unfinished and the missing shards, and
+    /// the plan's checksum. Example: `0-2, 4 of 5, unfinished 4, missing 3, 5, plan
     /// 0123456789abcdef`.
     fn origin(&self) -> (String, String) {
         let numbers = |wanted: &dyn Fn(&PartShard) -> bool| -> Vec<u32> {
@@ -119,8 +119,7 @@ impl Part {
         let here = numbers(&|_| true);
         let mut text = format!("{} of {}", ranges(&here), self.plan.settings.shards);
         let unfinished = numbers(&|shard| !shard.complete);
-        let absent = (BASE..=self.plan.settings.shards).filter(|n| here.binary_search(n).is_err());
-        for (state, numbers) in [("unfinished", unfinished), ("missing", absent.collect())] {
+        for (state, numbers) in [("unfinished", unfinished), ("missing", self.plan.absent(&here))] {
             if !numbers.is_empty() {
                 text += &format!(", {state} {}", ranges(&numbers));
             }
@@ -130,7 +129,14 @@ impl Part {
 }
 
 impl Plan {
-    /// Returns `true` if a film with `shards` holds all samples of the plan.
+    /// Returns the numbers of the plan's shards that are not among `numbers`, which are in
+    /// ascending order.
+    pub(super) fn absent(&self, numbers: &[u32]) -> Vec<u32> {
+        let all = BASE..=self.settings.shards;
+        all.filter(|number| numbers.binary_search(number).is_err()).collect()
+    }
+
+    /// Returns `true` if a film that holds `shards` has all samples of this plan.
     pub(super) fn is_whole(&self, shards: &[PartShard]) -> bool {
         let numbers = BASE..=self.settings.shards;
         shards.iter().map(|shard| shard.number).eq(numbers)

@@ -1,46 +1,52 @@
-//! Render of the samples that a plan assigns to one shard.
+//! Render of the samples that a plan assigns to one shard, in steps between which the film can be
+//! saved.
 
 use crate::film::TILE_PIXELS;
-use crate::render::RenderState;
-use crate::render::plan::pixels_of;
 use crate::render::schedule::{SAMPLE_ALIGNMENT, Spp};
 use crate::render::session::{Report, State};
 use crate::render::wave::{Job, Wave};
+use crate::render::{RenderState, threads};
 use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// Target duration of a step, in seconds. The caller can save the film between two steps.
+/// Target duration in seconds of a step in the render of a shard (one process's part of a plan).
+/// The caller can save the film between two steps.
 const STEP_SECONDS: f64 = 0.25;
-/// Target duration of one job, in seconds. It is short, so that all threads have work until the end
-/// of a step.
+/// Target duration in seconds of one tracing job in a shard's render. A job traces samples of one
+/// tile. Jobs are short, so that all threads have work until the end of a step.
 const JOB_SECONDS: f64 = 0.01;
-/// Largest number of samples per pixel and replicate of a job, even if tracing is so fast that
-/// [`JOB_SECONDS`] allows more.
+/// Largest number of samples per pixel of a tracing job, even if [`JOB_SECONDS`] allows more. A job
+/// traces samples of one tile in one replicate (half of the samples).
 const LONGEST_JOB: u32 = 1 << 20;
-/// Number of samples, over all pixels, of the first step. It measures the speed of tracing.
+/// Number of samples, over all pixels, of the first step of a shard's render. The speed of tracing
+/// is measured in this step. The lengths of the next steps follow from it.
 const FIRST_STEP_SAMPLES: u64 = 1 << 18;
 
-/// Render of the samples of one shard. After each step, both replicates of every tile hold the same
-/// number of samples, the first ones of the tile's range. A render can therefore continue a film
-/// that was saved between two steps.
+/// Render of the samples of one shard (one process's part of a plan), in steps of about a quarter
+/// of a second. After each step, both replicates (halves of the samples) of every tile hold equally
+/// many samples: the first ones of the shard's range in this tile. A film that was saved between
+/// two steps can therefore be continued.
 pub struct ShardRender {
-    state: RenderState,
+    /// Compiled scene and the film with the samples of the shard so far.
+    pub state: RenderState,
     pool: rayon::ThreadPool,
-    /// Samples that remain to be traced in both replicates.
+    /// Jobs that remain to be traced. Each is traced in both replicates (halves of the samples).
     remaining: VecDeque<Job>,
-    /// Number of all samples of the shard, and of those in the film, over all pixels.
+    /// `[samples of the complete shard, samples that the film holds so far]`, over all pixels and
+    /// both replicates (halves of the samples).
     samples: [u64; 2],
     rays: u64,
-    /// Number of samples and seconds of all steps so far, for the speed of tracing.
+    /// `(samples traced, seconds of tracing)` in all steps so far, from which the speed of tracing
+    /// follows.
     measured: (u64, f64),
 }
 
 impl ShardRender {
     /// Continues the render of a shard on `threads` threads. `ranges` are the shard's sample
-    /// indices in each tile. The film of `state` holds the first samples of some of these ranges,
-    /// which took `rays` rays.
+    /// indices in each tile. The film of `state` may already hold the first samples of some ranges;
+    /// these samples took `rays` rays.
     ///
     /// # Errors
     /// Fails if the sample counts of a tile cannot come from an interrupted render of these ranges,
@@ -51,21 +57,17 @@ impl ShardRender {
         rays: u64,
         threads: usize,
     ) -> Result<Self, String> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(|e| format!("cannot start {threads} threads: {e}; try fewer by --threads"))?;
+        let pool = threads::pool(threads, 0).map_err(|error| error.to_string())?;
         let mut remaining = VecDeque::new();
         let mut samples = [0; 2];
-        let size = [state.film.width(), state.film.height()].map(|n| n as u32);
         for (tile, range) in ranges.iter().enumerate() {
-            let counts = state.film.tile(tile).map_or([0; 2], |tile| tile.counts());
+            let counts = state.film.counts(tile);
             let [done, total] = [counts[0], range.len() as u32];
             if counts[1] != done || done > total {
                 let what = format!("{counts:?} samples in A and B of tile {tile}");
                 return Err(format!("the film has {what}, which are not those of its shard"));
             }
-            let pixels = pixels_of(size, tile);
+            let pixels = state.film.tile_pixels(tile);
             samples[0] += 2 * u64::from(total) * pixels;
             samples[1] += 2 * u64::from(done) * pixels;
             if done < total {
@@ -76,7 +78,8 @@ impl ShardRender {
         Ok(Self { state, pool, remaining, samples, rays, measured: (0, 0.0) })
     }
 
-    /// Traces samples for about a quarter of a second. Returns `false` if no samples are left.
+    /// Traces samples of the shard for about a quarter of a second. Returns `false` if no samples
+    /// are left.
     pub fn step(&mut self) -> bool {
         let speed = match self.measured {
             (samples, seconds) if seconds > 0.0 => samples as f64 / seconds,
@@ -112,9 +115,8 @@ impl ShardRender {
             let report = self.state.trace_wave(&wave, &self.pool, &AtomicBool::new(false));
             self.rays += report.reports.iter().flatten().map(|report| report.rays).sum::<u64>();
         }
-        let size = [self.state.film.width(), self.state.film.height()].map(|n| n as u32);
         for job in &wave.jobs {
-            traced += 2 * u64::from(job.count) * pixels_of(size, job.tile as usize);
+            traced += 2 * u64::from(job.count) * self.state.film.tile_pixels(job.tile as usize);
         }
         self.samples[1] += traced;
         self.measured.0 += traced;
@@ -124,28 +126,18 @@ impl ShardRender {
         true
     }
 
-    /// Compiled scene and film.
-    pub fn state(&self) -> &RenderState {
-        &self.state
-    }
-
-    /// Returns the compiled scene and film.
-    pub fn into_state(self) -> RenderState {
-        self.state
-    }
-
-    /// Number of rays of all samples in the film.
+    /// Returns the number of rays of all samples in the shard's film.
     pub fn rays(&self) -> u64 {
         self.rays
     }
 
-    /// Fraction of the shard's samples that the film holds, 0..=1.
+    /// Returns the fraction of the shard's samples that the film holds, 0..=1.
     pub fn progress(&self) -> f64 {
         let [total, done] = self.samples;
         if total == 0 { 1.0 } else { done as f64 / total as f64 }
     }
 
-    /// Report on the film, with the progress of the shard.
+    /// Returns the report on the shard's film, with the progress of the shard.
     pub fn report(&self) -> Report {
         let [total, done] = self.samples;
         let (traced, seconds) = self.measured;
@@ -164,7 +156,8 @@ impl ShardRender {
             progress: Some(self.progress()),
             recent_samples_per_second: speed,
             lanes: self.state.world.lanes(),
-            ..Report::idle(self.pool.current_num_threads())
+            threads: self.pool.current_num_threads(),
+            ..Report::default()
         }
     }
 }

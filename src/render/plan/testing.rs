@@ -1,11 +1,12 @@
-//! Plans with given sample counts, for tests.
+//! Render plans with given sample counts, for tests.
 
 use crate::film::Display;
 use crate::render::plan::{Plan, PlanSettings, PlannedTile};
 use crate::sampling::SamplerKind;
 
-/// Creates a plan for `shards` shards and a picture with one row of tiles. Each entry of `tiles` is
-/// for one tile: the samples per replicate in the base and in the merged picture.
+/// Creates the plan of a picture with one row of tiles, divided into `shards` parts. Each entry of
+/// `tiles` has two sample counts of a tile, per pixel and replicate: in the base (the samples that
+/// the plan starts from) and in the merged picture.
 pub fn plan(shards: u32, tiles: &[[u32; 2]]) -> Plan {
     let tile = |[base, end]: &[u32; 2]| PlannedTile {
         base: *base,

@@ -1,15 +1,16 @@
-//! Watched films: film files that other processes write. They are read again when they are
-//! replaced, and their sum is kept.
+//! Watched films: film files that other processes write, and the sum of their films. A file is read
+//! again when it is replaced.
 //!
-//! Complete files do not change, so that their sum is kept; the unfinished files are added to a
-//! copy of it. The memory is that of two films, whatever the number of files.
+//! The sum of the complete files is kept in memory, because these files do not change. The
+//! unfinished files are added to a copy of this sum. The memory is that of two films, whatever the
+//! number of files.
 
 use crate::film::Film;
-use crate::film::file::{Fields, FilmFileHeader, FilmReader, ReadError};
-use crate::render::checkpoint::CLOCK;
-use crate::render::memory;
-use crate::render::plan::members::{Member, Plans, join};
+use crate::film::file::{FilmFileHeader, FilmReader, ReadError};
+use crate::render::checkpoint::seconds_of;
+use crate::render::memory_budget;
 use crate::render::plan::merge::without_plan;
+use crate::render::plan::merge_inputs::{MergeInput, Plans, join};
 use crate::render::plan::part::{Part, PartShard, ranges};
 use crate::render::plan::{BASE, Plan, is_plan_file};
 use std::collections::BTreeMap;
@@ -18,40 +19,44 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
-/// Age at which an unfinished file is considered late. `zerkalo render` replaces its files every
-/// minute.
+/// Time since the last replacement of an unfinished film file, after which the file counts as late.
+/// `zerkalo render` replaces its files every minute.
 const LATE: Duration = Duration::from_secs(180);
 
 /// Film files that other processes write, and the sum of their films.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct WatchedFilms {
     files: Vec<WatchedFile>,
     plans: Plans,
-    /// Plan file that the user named, as a member without shards. `None` if film files were named.
-    named: Option<Member>,
-    /// Plan that all files share. `None` for a checkpoint, or before the first file is read.
+    /// Plan file that the user named, as an input of a merge; it holds no shards. `None` if the
+    /// user named film files.
+    named: Option<MergeInput>,
+    /// Plan that all film files share. `None` for a checkpoint, or before the first file is read.
     plan: Option<Arc<Plan>>,
-    /// Sum of the complete files, and the stamps of these files by their index in `files`.
+    /// `(stamps, sum)` of the complete film files: their stamps (time, length, inode) by their
+    /// index in `files`, and the sum of their films. `None` before a file is read.
     complete: Option<(BTreeMap<usize, FileStamp>, Film)>,
-    /// Sum of all files. `None` if no file can be read, or if all files are complete and `complete`
-    /// is this sum.
+    /// Sum of all film files. `None` if no file can be read. Also `None` if all files are complete,
+    /// because `complete` then has the sum.
     all: Option<Film>,
     header: Option<FilmFileHeader>,
 }
 
-/// File that may be replaced by another process at any time.
+/// Film file that another process may replace at any time.
 #[derive(Debug)]
 struct WatchedFile {
     path: PathBuf,
-    /// Number of the shard that the file should hold. `None` if the user named film files instead
-    /// of a plan.
+    /// Number of the shard that the film file should hold. `None` if the user named film files
+    /// instead of a plan.
     shard: Option<u32>,
-    /// Stamp of the file when it was last read. `None` for a missing file.
+    /// Stamp of the film file (time, length, inode) when it was last read. `None` for a missing
+    /// file.
     stamp: Option<FileStamp>,
     contents: Contents,
-    /// Number of samples that the file contributes to the sum, over all pixels.
+    /// Number of samples, over all pixels, that the film file contributes to the sum.
     samples: u64,
-    /// Number of samples that the plan assigns to the shards of the file, over all pixels.
+    /// Number of samples, over all pixels, that the plan assigns to the shards of the film file.
+    /// `None` before the file is added to the sum, and for files without a plan.
     total: Option<u64>,
 }
 
@@ -66,61 +71,56 @@ struct FileStamp {
 #[derive(Debug)]
 enum Contents {
     Missing,
-    /// The file cannot be used; the text is the reason.
+    /// Refused: the film file cannot be used. The text is the reason.
     Refused(String),
-    Part(Member),
+    Part(MergeInput),
     /// Checkpoint of a render without a plan. The number is its seconds of rendering.
     Checkpoint(f64),
 }
 
-/// State of a watched file, or of missing shards.
+/// State of a watched film file, or of shards (parts of the render) that no file holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum WatchedState {
-    /// The file holds all samples of its shards.
+    /// Complete: the film file holds all samples of its shards.
     Complete,
-    /// The file is unfinished, and was replaced in the last three minutes.
+    /// Running: the film file is unfinished, and was replaced in the last three minutes.
     Running,
-    /// The file is unfinished, and has not been replaced for three minutes.
+    /// Late: the film file is unfinished, and has not been replaced for three minutes.
     Late,
-    /// There is no file.
+    /// Missing: no film file holds these shards.
     Missing,
-    /// The file cannot be used; the text is the reason.
+    /// Refused: the film file cannot be used. The text is the reason.
     Refused(String),
 }
 
-/// State of a watched file, or of shards of the plan that no file holds.
+/// State of a watched film file, or of shards of the plan that no file holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WatchedShards {
-    /// Numbers of the shards, such as `3` or `5-7`; empty if they are unknown.
+    /// Numbers of the shards (parts of the render) in the file, or of those that no file holds,
+    /// such as `3` or `5-7`; empty if they are unknown.
     pub shards: String,
-    /// Path of the file. `None` for shards that no file holds.
+    /// Path of the film file. `None` for shards that no file holds.
     pub path: Option<PathBuf>,
-    /// State of the file.
+    /// State of the watched film file: complete, unfinished, missing or unusable.
     pub state: WatchedState,
-    /// Number of samples in the file, over all pixels.
+    /// Number of samples in the film file, over all pixels and both replicates (halves of the
+    /// samples).
     pub samples: u64,
-    /// Number of samples that the plan assigns to the shards of the file. `None` if it is unknown.
+    /// Number of samples, over all pixels, that the plan assigns to the shards of the file. `None`
+    /// if it is unknown.
     pub total: Option<u64>,
-    /// Time since the file was written.
+    /// Time since the film file was written. `None` if there is no file.
     pub age: Option<Duration>,
 }
 
 impl WatchedFilms {
-    /// Reads the film files at `paths`, which may be missing. The path of a plan file means the
-    /// film files of its shards: `job.plan` means `job-0.zk`, `job-1.zk` and so on.
+    /// Reads the film files at `paths`, which may be missing. A plan file stands for the film files
+    /// of its shards: `job.plan` for `job-0.zk`, `job-1.zk` and so on.
     ///
     /// # Errors
     /// Fails if a plan file cannot be used, or if the films of two files cannot be added.
     pub fn open(paths: &[PathBuf]) -> Result<Self, String> {
-        let mut films = Self {
-            files: Vec::new(),
-            plans: Plans::default(),
-            named: None,
-            plan: None,
-            complete: None,
-            all: None,
-            header: None,
-        };
+        let mut films = Self::default();
         for path in paths {
             if is_plan_file(path) {
                 films.name_plan(path)?;
@@ -138,14 +138,14 @@ impl WatchedFilms {
 
     fn name_plan(&mut self, path: &Path) -> Result<(), String> {
         let plan = Plan::read(path).map_err(|error| error.to_string())?;
-        let member = self.plans.member(path, Part { plan, shards: Vec::new(), rays: 0 });
-        if let Some(other) = self.named.replace(member) {
+        let input = self.plans.input(path, Part { plan, shards: Vec::new(), rays: 0 });
+        if let Some(other) = self.named.replace(input) {
             let [one, two] = [other.path.display(), path.display()];
             return Err(format!("{one} and {two} are two plans; name one of them"));
         }
         // The base of a later round has a name of its own.
-        let base_plan = self.named.as_ref().and_then(|member| member.plan.settings.base_plan);
-        let shards = self.named.as_ref().map_or(0, |member| member.plan.settings.shards);
+        let base_plan = self.named.as_ref().and_then(|input| input.plan.settings.base_plan);
+        let shards = self.named.as_ref().map_or(0, |input| input.plan.settings.shards);
         let first = if base_plan.is_some() { BASE + 1 } else { BASE };
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let file = |shard| {
@@ -155,7 +155,8 @@ impl WatchedFilms {
         Ok(())
     }
 
-    /// Reads the files that were replaced since the last call. Returns `true` if there are any.
+    /// Reads the film files that were replaced since the last call. Returns `true` if there were
+    /// any.
     pub fn poll(&mut self) -> bool {
         let changed = self.read_changed();
         if changed.is_empty() {
@@ -166,28 +167,31 @@ impl WatchedFilms {
         true
     }
 
-    /// Sum of the films. `None` if no file can be read.
+    /// Returns the sum of all films. Returns `None` if no file can be read.
     pub fn film(&self) -> Option<&Film> {
         self.all.as_ref().or(self.complete.as_ref().map(|(_, film)| film))
     }
 
-    /// Header of the sum's film file, with plan and shards. `None` if no file can be read.
+    /// Returns the header of a film file that would hold the sum of all films, with plan and
+    /// shards. Returns `None` if no file can be read.
     pub fn header(&self) -> Option<&FilmFileHeader> {
         self.header.as_ref()
     }
 
-    /// Plan that all files share. `None` for a checkpoint, or before the first file is read.
+    /// Returns the plan that all files share. Returns `None` for a checkpoint, or before the first
+    /// file is read.
     pub fn plan(&self) -> Option<&Plan> {
         self.plan.as_deref()
     }
 
-    /// Number of rays of all samples.
+    /// Returns the number of rays of all samples in the films.
     pub fn rays(&self) -> u64 {
-        self.members().map(|(_, member)| member.rays).sum()
+        self.inputs().map(|(_, input)| input.rays).sum()
     }
 
-    /// Seconds of rendering: for a checkpoint those of its render, otherwise the time between the
-    /// oldest and the newest file.
+    /// Returns the seconds of rendering. For a checkpoint they are those of its render. For the
+    /// files of a plan they are the time between the modifications of the oldest and the newest
+    /// file.
     pub fn seconds(&self) -> f64 {
         if let [WatchedFile { contents: Contents::Checkpoint(seconds), .. }] = self.files[..] {
             return seconds;
@@ -199,17 +203,19 @@ impl WatchedFilms {
             .map_or(0.0, |d| d.as_secs_f64())
     }
 
-    /// Number of complete shards and number of all shards, the base included in both. `None`
-    /// without a plan.
+    /// Returns `[number of complete shards, number of all shards of the plan]`. A shard is the
+    /// share of the plan's samples that one process traces. The base, which holds the samples that
+    /// the plan started from, counts as a shard. Returns `None` without a plan.
     pub fn complete_shards(&self) -> Option<[usize; 2]> {
         let plan = self.plan.as_ref()?;
-        let shards = self.members().flat_map(|(_, member)| &member.shards);
+        let shards = self.inputs().flat_map(|(_, input)| &input.shards);
         Some([shards.filter(|shard| shard.complete).count(), plan.settings.shards as usize + 1])
     }
 
-    /// Returns the state of all files at the time `now`, and the shards without a file. They are
-    /// ordered by urgency: missing and refused files, late, running, complete. Files of equal state
-    /// are ordered by the fraction of their samples, smallest first.
+    /// Returns the state of all files at the time `now`, and of the shards (parts of the render)
+    /// without a file. The most urgent states are first: refused, missing, late, running, complete.
+    /// Files with the same state, late or running, are in ascending order of the share of their
+    /// samples that is traced.
     pub fn shards(&self, now: SystemTime) -> Vec<WatchedShards> {
         let mut rows: Vec<_> = self.files.iter().map(|file| file.row(now)).collect();
         rows.extend(self.unnamed().map(|shards| WatchedShards {
@@ -235,21 +241,17 @@ impl WatchedFilms {
     fn unnamed(&self) -> Option<String> {
         let plan = self.plan.as_ref().filter(|_| self.named.is_none())?;
         let mut held: Vec<u32> =
-            self.members().flat_map(|(_, m)| &m.shards).map(|shard| shard.number).collect();
+            self.inputs().flat_map(|(_, m)| &m.shards).map(|shard| shard.number).collect();
         held.sort_unstable();
-        let absent = (BASE..=plan.settings.shards).filter(|n| held.binary_search(n).is_err());
-        let absent: Vec<u32> = absent.collect();
+        let absent = plan.absent(&held);
         (!absent.is_empty()).then(|| ranges(&absent))
     }
 
-    fn members(&self) -> impl Iterator<Item = (usize, &Member)> {
-        self.files.iter().enumerate().filter_map(|(i, file)| match &file.contents {
-            Contents::Part(member) => Some((i, member)),
-            _ => None,
-        })
+    fn inputs(&self) -> impl Iterator<Item = (usize, &MergeInput)> {
+        self.files.iter().enumerate().filter_map(|(i, file)| Some((i, file.input()?)))
     }
 
-    /// Reads the files whose stamps have changed. Returns their indices.
+    /// Reads the film files whose stamps (time, length, inode) have changed. Returns their indices.
     fn read_changed(&mut self) -> Vec<usize> {
         let mut changed = Vec::new();
         for (i, file) in self.files.iter_mut().enumerate() {
@@ -264,59 +266,52 @@ impl WatchedFilms {
         changed
     }
 
-    /// Refuses each of the `changed` files whose film cannot be added to the films of the other
-    /// files. Returns the first reason.
+    /// Checks that the films of all files can be added; returns `None` if they can. Otherwise
+    /// refuses each of the `changed` files whose film cannot be added to those of the unchanged
+    /// files and of the `changed` files before it. The returned text is the reason of the failed
+    /// check of all files.
     fn accept(&mut self, changed: &[usize]) -> Option<String> {
-        let mut refused = None;
         let all: Vec<usize> = (0..self.files.len()).collect();
-        if let Err(message) = self.try_join(&all) {
-            let mut accepted: Vec<usize> =
-                all.iter().copied().filter(|i| !changed.contains(i)).collect();
-            for i in changed {
-                accepted.push(*i);
-                if let Err(message) = self.try_join(&accepted) {
-                    accepted.pop();
-                    self.files[*i].contents = Contents::Refused(message);
-                }
+        let refused = self.try_join(&all).err()?;
+        let mut accepted: Vec<usize> =
+            all.iter().copied().filter(|i| !changed.contains(i)).collect();
+        for i in changed {
+            accepted.push(*i);
+            if let Err(message) = self.try_join(&accepted) {
+                accepted.pop();
+                self.files[*i].contents = Contents::Refused(message);
             }
-            refused = Some(message);
         }
-        refused
+        Some(refused)
     }
 
     /// Checks that the films of the files with the indices `numbers` can be added, and stores their
-    /// plan.
+    /// common plan. Returns an error message if they cannot be added.
     fn try_join(&mut self, numbers: &[usize]) -> Result<(), String> {
         let checkpoint = |i: &&usize| matches!(self.files[**i].contents, Contents::Checkpoint(_));
-        let parts: Vec<usize> = numbers
-            .iter()
-            .copied()
-            .filter(|i| matches!(self.files[*i].contents, Contents::Part(_)))
-            .collect();
+        let parts = numbers.iter().copied().filter(|i| self.files[*i].input().is_some());
+        let parts: Vec<usize> = parts.collect();
         if let Some(checkpoint) = numbers.iter().find(checkpoint)
             && self.files.len() + usize::from(self.named.is_some()) > 1
         {
             return Err(without_plan(&self.files[*checkpoint].path));
         }
-        let mut members: Vec<Member> = self.named.iter().cloned().collect();
-        members.extend(parts.iter().filter_map(|i| match &self.files[*i].contents {
-            Contents::Part(member) => Some(member.clone()),
-            _ => None,
-        }));
-        if members.is_empty() {
+        let mut inputs: Vec<MergeInput> = self.named.iter().cloned().collect();
+        inputs.extend(parts.iter().filter_map(|i| self.files[*i].input().cloned()));
+        if inputs.is_empty() {
             return Ok(());
         }
-        let (plan, _) = join(&mut members)?;
+        let (plan, _) = join(&mut inputs)?;
         self.plan = Some(plan);
-        let joined = members.drain(usize::from(self.named.is_some())..);
-        for (i, member) in parts.into_iter().zip(joined) {
-            self.files[i].contents = Contents::Part(member);
+        let joined = inputs.drain(usize::from(self.named.is_some())..);
+        for (i, input) in parts.into_iter().zip(joined) {
+            self.files[i].contents = Contents::Part(input);
         }
         Ok(())
     }
 
-    /// Adds the films of all accepted files. If one of them cannot be added, refuses it and starts
-    /// again.
+    /// Adds the films of all accepted files to the sum. If a film cannot be added, its file is
+    /// refused, and the sum is computed again.
     fn add(&mut self) {
         while let Err((i, message)) = self.try_add() {
             self.files[i].contents = Contents::Refused(message);
@@ -324,12 +319,15 @@ impl WatchedFilms {
         }
     }
 
-    /// Adds the films of all accepted files. An error contains the index of the file that cannot be
-    /// added, and the reason.
+    /// Adds the films of all accepted files to the sum of films.
+    ///
+    /// # Errors
+    ///
+    /// Returns the index of the file that cannot be added, and the reason.
     fn try_add(&mut self) -> Result<(), (usize, String)> {
         (self.all, self.header) = (None, None);
         let mut order: Vec<(u32, usize)> =
-            self.members().map(|(i, member)| (member.shards[0].number, i)).collect();
+            self.inputs().map(|(i, input)| (input.shards[0].number, i)).collect();
         order.sort_unstable();
         let (complete, unfinished): (Vec<usize>, Vec<usize>) =
             order.iter().map(|(_, i)| *i).partition(|i| self.files[*i].is_complete());
@@ -370,16 +368,20 @@ impl WatchedFilms {
         Ok(())
     }
 
-    /// Adds the film of the file with the index `i` to `film`. The error is that of `try_add`.
+    /// Adds the film of the file with the index `i` to `film`.
+    ///
+    /// # Errors
+    ///
+    /// Returns the index `i` and the reason why the film cannot be added.
     fn add_file(&mut self, i: usize, film: &mut Film) -> Result<(), (usize, String)> {
         let before = film.samples();
         self.open_film(i)?.add_to(film).map_err(|error| (i, error.to_string()))?;
         let samples = film.samples() - before;
         let file = &mut self.files[i];
         file.samples = samples;
-        if let (Contents::Part(member), None) = (&file.contents, file.total) {
-            let samples = |shard: &PartShard| member.plan.samples(shard.number);
-            file.total = Some(member.shards.iter().map(samples).sum());
+        if let (Contents::Part(input), None) = (&file.contents, file.total) {
+            let samples = |shard: &PartShard| input.plan.samples(shard.number);
+            file.total = Some(input.shards.iter().map(samples).sum());
         }
         let expected = file.total.unwrap_or(samples);
         if samples > expected || file.is_complete() && samples != expected {
@@ -397,10 +399,10 @@ impl WatchedFilms {
         FilmReader::open(&self.files[i].path).map_err(|error| (i, error.to_string()))
     }
 
-    /// Returns `header` with the plan and the shards of all files.
+    /// Returns `header` with the plan that all files share and the list of all shards in the files.
     fn with_shards(&self, mut header: FilmFileHeader) -> FilmFileHeader {
         let mut shards: Vec<PartShard> =
-            self.members().flat_map(|(_, member)| member.shards.clone()).collect();
+            self.inputs().flat_map(|(_, input)| input.shards.clone()).collect();
         shards.sort_unstable();
         if let Some(plan) = self.plan.as_ref().filter(|_| !shards.is_empty()) {
             let plan = Plan::clone(plan);
@@ -410,12 +412,16 @@ impl WatchedFilms {
     }
 }
 
-/// Creates a film without samples, with the size of `header`. Fails if there is not enough memory.
+/// Creates a film without samples with the size, scales and seed of `header`.
+///
+/// # Errors
+///
+/// Fails if there is not enough memory.
 fn empty(header: &FilmFileHeader) -> Result<Film, String> {
     let film = &header.film;
     let (size, groups) = ([film.width, film.height].map(|n| n as u32), film.scales.len());
-    memory::check(size, groups, 0)?;
-    Film::try_new(film.clone()).map_err(|_| memory::refused(size, groups))
+    memory_budget::check(size, groups, 0)?;
+    Film::try_new(film.clone()).map_err(|_| memory_budget::refused(size, groups))
 }
 
 impl WatchedFile {
@@ -423,7 +429,7 @@ impl WatchedFile {
         Self { path, shard, stamp: None, contents: Contents::Missing, samples: 0, total: None }
     }
 
-    /// Reads and verifies the file, and updates its state.
+    /// Reads and verifies the film file, and updates its state.
     fn read(&mut self, plans: &mut Plans) {
         (self.samples, self.total) = (0, None);
         self.contents = if self.stamp.is_none() {
@@ -437,28 +443,32 @@ impl WatchedFile {
         let text = |error: ReadError| error.to_string();
         let header = FilmReader::open(&self.path).and_then(FilmReader::verify).map_err(text)?;
         if let Some(part) = Part::of_header(&self.path, &header)? {
-            return Ok(Contents::Part(plans.member(&self.path, part)));
+            return Ok(Contents::Part(plans.input(&self.path, part)));
         }
-        let seconds = header.chunks.get(&CLOCK).and_then(|clock| Fields::new(clock).f64());
-        Ok(Contents::Checkpoint(seconds.filter(|s| s.is_finite() && *s >= 0.0).unwrap_or(0.0)))
+        Ok(Contents::Checkpoint(seconds_of(&header)))
+    }
+
+    /// Returns the file as an input of a merge; `None` if it has no plan or cannot be used.
+    fn input(&self) -> Option<&MergeInput> {
+        match &self.contents {
+            Contents::Part(input) => Some(input),
+            _ => None,
+        }
     }
 
     fn is_complete(&self) -> bool {
-        match &self.contents {
-            Contents::Part(member) => member.shards.iter().all(|shard| shard.complete),
-            _ => false,
-        }
+        self.input().is_some_and(|input| input.shards.iter().all(|shard| shard.complete))
     }
 
     fn row(&self, now: SystemTime) -> WatchedShards {
         // The clocks of two machines may differ.
         let age = |stamp: FileStamp| now.duration_since(stamp.modified).unwrap_or_default();
         let age = self.stamp.map(age);
-        let shards = match &self.contents {
-            Contents::Part(member) => {
-                ranges(&member.shards.iter().map(|shard| shard.number).collect::<Vec<_>>())
+        let shards = match self.input() {
+            Some(input) => {
+                ranges(&input.shards.iter().map(|shard| shard.number).collect::<Vec<_>>())
             }
-            _ => self.shard.map_or(String::new(), |shard| shard.to_string()),
+            None => self.shard.map_or(String::new(), |shard| shard.to_string()),
         };
         let state = match &self.contents {
             Contents::Missing => WatchedState::Missing,
@@ -473,7 +483,7 @@ impl WatchedFile {
 }
 
 impl WatchedState {
-    /// Rank in the order of display; 0 is the most urgent.
+    /// Returns the rank of this state in the list that users see; 0, the most urgent, is first.
     fn rank(&self) -> u8 {
         match self {
             Self::Refused(_) => 0,
@@ -486,7 +496,8 @@ impl WatchedState {
 }
 
 impl FileStamp {
-    /// Returns the stamp of the file at `path`, or `None` if there is no such file.
+    /// Returns the stamp (time, length, inode) of the file at `path`, or `None` if there is no such
+    /// file.
     fn of(path: &Path) -> Option<Self> {
         let metadata = fs::metadata(path).ok()?;
         #[cfg(unix)]

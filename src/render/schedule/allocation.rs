@@ -1,10 +1,10 @@
-//! Adaptive sampling: allocates the next samples to the tiles in which they reduce the picture's
-//! error most per ray.
+//! Adaptive sampling: allocates the next samples, in rounds, to the tiles in which they reduce the
+//! picture's error most per ray.
 //!
 //! Each tile has two estimates of its error, from disjoint sets of its pixels. The *allocation
 //! estimate* selects and ranks tiles. The *validation estimate* is reported to the user; allocation
-//! uses it only in means over many tiles. The error of tiles is thereby measured on pixels that
-//! did not select them (cross-fitting, Chernozhukov et al. 2018).
+//! uses it only in means over many tiles. The error of tiles is thereby measured on pixels that did
+//! not select them (cross-fitting, Chernozhukov et al. 2018).
 //!
 //! The expected error of a tile is calibrated by similar tiles. Tiles with similar allocation
 //! estimates and sample counts form a *class*. The expected error is mostly the mean of the
@@ -20,45 +20,58 @@ use crate::render::wave::Job;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Rays of one decision, as a share of the rays traced so far. It is small enough that later
-/// estimates can correct a decision, and large enough that threads rarely wait for each other
-/// between waves.
-const DECISION_SHARE: f64 = 0.1;
-/// Share of a decision's rays that goes to the tiles with the fewest samples, whatever their
-/// estimates are. No estimate contains a feature that no sample has hit; this share finds such
-/// features. Measured on 30 sparse pictures (stars and balls of the size of a pixel,
-/// `tests/honesty`): the true error exceeds the reported one by 18 % in the mean with a share of
-/// 1/16, by 16 % with 1/8, by 13 % with 1/4. The physical mirror room takes 60.7 million rays to an
-/// RMSE of 0.00068 with 1/32, 61.7 million with 1/16, 64.8 million with 1/8.
+/// Number of rays that one round of adaptive sampling allocates, as a share of the rays traced so
+/// far. A round is one decision on the next samples of all tiles. It is small enough that later
+/// noise estimates can correct a round, and large enough that threads rarely wait for each other
+/// between rounds.
+const ROUND_SHARE: f64 = 0.1;
+/// Share of the rays of an allocation round that goes to the tiles with the fewest samples,
+/// whatever their noise estimates are. No estimate contains a feature that no sample has hit; this
+/// share finds such features.
+///
+/// Measured on 30 sparse pictures (stars and balls of the size of a pixel,
+/// `tests/error_estimates`): the true error exceeds the reported one by 18 % in the mean with a
+/// share of 1/16, by 16 % with 1/8, by 13 % with 1/4. The physical mirror room takes 60.7 million
+/// rays to an RMSE of 0.00068 with 1/32, 61.7 million with 1/16, 64.8 million with 1/8.
 pub(super) const EXPLORATION: f64 = 0.0625;
-/// Smallest number of blocks of samples that one decision allocates. If there are fewer tiles, it
-/// is the number of tiles. It gives every thread work until the end of the wave.
+/// Smallest number of sample blocks that an allocation round gives to tiles. A round gives fewer
+/// only if fewer tiles can get samples, or if fewer blocks suffice for the error target. A block is
+/// a run of samples of every pixel of a tile. So many blocks keep every thread busy until the end
+/// of the round.
 const MIN_BLOCKS: usize = 64;
-/// Smallest gain of further tiles in a decision, as a share of the gain of the tiles that have
-/// already doubled their sample count in it. Those tiles get no more samples in the decision,
-/// because an estimate is reliable for one doubling only.
+/// Limit of the gain (error reduction per ray) below which an allocation round ends early, as a
+/// share of the largest gain of a tile that was set aside. A tile is set aside for the rest of the
+/// round when its next block would more than double its sample count, because a noise estimate is
+/// reliable for one doubling only. The round gives at least [`MIN_BLOCKS`] blocks before it ends
+/// early.
 const WORTHWHILE: f64 = 0.25;
-/// Weight of a tile's own allocation estimate, relative to the validation estimate of one tile of
-/// its class.
+/// Weight per pixel of a tile's own allocation estimate in its expected error. The validation
+/// estimates of all tiles of its class (tiles with similar estimates) have the weight 1 per pixel.
 const OWN_WEIGHT: f64 = 0.25;
-/// Number of tiles below which a class is widened by the nearest classes. The validation estimate
-/// of a tile then has little weight in its own expected error. In a class of few tiles, those whose
-/// estimate is low by chance would get no samples, and the sum of the validation estimates, which
-/// is reported, would be too low. True over reported error of 40 pictures of balls of a pixel and
-/// of stars (`tests/honesty`, 48 to 64 seeds each): 1.02 to 1.55 without widening, 0.96 to 1.24
-/// with 9 tiles, 0.94 to 1.23 with 17.
+/// Number of tiles below which a class (tiles with similar error estimates) is widened by the
+/// nearest classes.
+///
+/// In a small class, each tile's own validation estimate has a large weight in its expected error.
+/// Tiles whose estimate is low by chance would get no samples. The reported error, the sum of these
+/// estimates, would then be too low. Ratio of true to reported error in 40 pictures of stars and of
+/// balls as small as a pixel (`tests/error_estimates`, 48 to 64 seeds each): 1.02 to 1.55 without
+/// widening, 0.96 to 1.24 with 9 tiles, 0.94 to 1.23 with 17.
 const MIN_CLASS_TILES: f64 = 17.0;
-/// Largest distance of a class by which another one is widened: a factor of 4 in the estimate, or
-/// two octaves of the sample count.
+/// Largest distance between a class (tiles with similar error estimates) and a class that widens
+/// it. The distance is the sum of two numbers: the factors of sqrt(2) between the allocation
+/// estimates and those between the sample counts. A factor of 4 in one of them is a distance of 4.
 const MAX_CLASS_DISTANCE: u32 = 4;
 
-/// A block of samples that a decision may allocate to a tile.
+/// Block of samples that an allocation round may give to a tile. A block is a run of samples of
+/// every pixel of the tile.
 pub(super) struct Candidate {
-    /// Expected decrease of the summed squared error, per ray.
+    /// Expected decrease of the picture's error per ray of the block. The error is the sum of the
+    /// squared errors of all pixels.
     gain: f64,
-    /// Samples per replicate of the tile before the block.
+    /// Samples per pixel that the tile has in each replicate (half of the samples) without this
+    /// block of samples.
     pub count: u32,
-    /// Number of the tile.
+    /// Number of the tile that gets this block of samples.
     pub tile: usize,
 }
 
@@ -74,15 +87,17 @@ impl PartialOrd for Candidate {
     }
 }
 impl Ord for Candidate {
-    /// Orders candidates by gain. If gains are equal, the tile with fewer samples is preferred,
-    /// then the tile with the lower number.
+    /// Compares two blocks of samples by their gain. Of two blocks with equal gains, the greater is
+    /// that of the tile with fewer samples. If the samples are equal too, it is that of the tile
+    /// with the lower number.
     fn cmp(&self, other: &Self) -> Ordering {
         let fewer = other.count.cmp(&self.count).then(other.tile.cmp(&self.tile));
         self.gain.total_cmp(&other.gain).then(fewer)
     }
 }
 
-/// Model of how a tile's error falls with the samples per replicate: `scale * n^(-2 slope)`.
+/// Model of the decrease of a tile's mean squared error with the number n of samples per pixel in
+/// each replicate (half of the samples): `scale * n^(-2 slope)`.
 #[derive(Clone, Copy)]
 pub(super) struct ErrorModel {
     scale: f64,
@@ -90,31 +105,37 @@ pub(super) struct ErrorModel {
 }
 
 impl ErrorModel {
-    /// Mean squared error after `count` samples per replicate.
+    /// Returns the mean squared error of the tile after `count` samples per pixel and replicate
+    /// (half of the samples).
     pub fn mse(&self, count: u32) -> f64 {
         self.scale * f64::from(count).powf(-2.0 * self.slope)
     }
 
-    /// Returns the model with the same slope that has the error `mse` at `count` samples.
+    /// Returns an error model with the slope of this one and the mean squared error `mse` at
+    /// `count` samples.
     fn through(&self, count: u32, mse: f64) -> Self {
         Self { scale: mse * f64::from(count).powf(2.0 * self.slope), ..*self }
     }
 }
 
-/// Error models of one tile, fitted to its allocation estimates and to its validation estimates.
+/// Error models of one tile. One is fitted to its allocation estimates, which select tiles; the
+/// other to its validation estimates, which are reported.
 struct TileModels {
     allocation: ErrorModel,
     validation: ErrorModel,
 }
 
-/// Class of similar tiles: octave of the sample count, and half octave of the allocation estimate
-/// of the variance per sample. The second is `None` if the estimate is 0.
+/// Class of similar tiles: `(floor(log2 n), floor(2 log2 v))`. Here n is the sample count of the
+/// tile, and v is the allocation estimate of its variance per sample. The second number is `None`
+/// if v is 0.
 type Class = (u32, Option<i32>);
 
-/// Returns the size of the next block of a tile with `count` samples per replicate. Below one
-/// packet the block ends at the next power of two, and from an unaligned count at the next packet
-/// boundary. Otherwise it has about a quarter of `count`: a power of two and at least a packet, so
-/// that blocks stay aligned to the well distributed blocks of the sample sequence.
+/// Returns the length of the next block of a tile with `count` samples per pixel and replicate
+/// (half of the samples). A block is a run of samples that is allocated as a whole. If `count` is
+/// below [`SAMPLE_ALIGNMENT`], the block ends at the next power of two; if it is no multiple of
+/// [`SAMPLE_ALIGNMENT`], at the next multiple. Otherwise the length is about a quarter of `count`:
+/// a power of two and at least [`SAMPLE_ALIGNMENT`], because such blocks of the sample sequence are
+/// well distributed.
 fn block(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT {
         return (count + 1).next_power_of_two() - count;
@@ -125,19 +146,22 @@ fn block(count: u32) -> u32 {
     }
 }
 
-/// Sample counts that a decision in progress has allocated.
+/// Allocation round in progress: the samples that each tile has got so far. A round is one decision
+/// on the next samples of all tiles.
 pub(super) struct Allocation<'a> {
     schedule: &'a Schedule,
-    /// Samples per replicate of each tile, with the allocated blocks.
+    /// Samples per pixel and replicate (half of the samples) of each tile: those traced so far and
+    /// those allocated in this round.
     pub counts: Vec<u32>,
-    /// Expected number of rays of the allocated blocks.
+    /// Expected number of rays of the samples that this round has allocated so far.
     pub spent: f64,
     blocks: usize,
     samples_left: u64,
 }
 
 impl<'a> Allocation<'a> {
-    /// Starts at the counts of the schedule.
+    /// Starts an allocation round, one decision on the next samples of all tiles. The round starts
+    /// with the samples that the tiles of `schedule` have.
     pub fn new(schedule: &'a Schedule) -> Self {
         Self {
             schedule,
@@ -148,8 +172,10 @@ impl<'a> Allocation<'a> {
         }
     }
 
-    /// Returns the number of samples of the next block of `tile`. Returns 0 if the tile has reached
-    /// its cap, or the picture its mean sample count.
+    /// Returns the length of the next block of `tile` in samples per pixel and replicate (half of
+    /// the samples). A block is a run of samples that is allocated as a whole. Returns 0 if the
+    /// tile has reached its largest sample count ([`Schedule::cap`]), or if the picture has reached
+    /// its requested mean sample count.
     pub fn next_block(&self, tile: usize) -> u32 {
         let (t, count) = (&self.schedule.tiles[tile], self.counts[tile]);
         let affordable =
@@ -162,7 +188,7 @@ impl<'a> Allocation<'a> {
         2.0 * f64::from(samples) * f64::from(t.pixels) * t.rays_per_sample()
     }
 
-    /// Allocates `samples` samples per replicate to `tile`.
+    /// Allocates `samples` further samples per pixel and replicate (half of the samples) to `tile`.
     pub fn allocate(&mut self, tile: usize, samples: u32) {
         self.spent += self.rays(tile, samples);
         self.samples_left -= u64::from(samples) * u64::from(self.schedule.tiles[tile].pixels);
@@ -170,7 +196,8 @@ impl<'a> Allocation<'a> {
         self.counts[tile] += samples;
     }
 
-    /// Allocates one block to each of the tiles with the fewest samples, up to about `rays` rays.
+    /// Allocates one block of samples to each of the tiles with the fewest samples, until the
+    /// allocation round has about `rays` rays in total.
     pub fn explore(&mut self, rays: f64) {
         let mut order: Vec<usize> = (0..self.counts.len()).collect();
         order.sort_by_key(|tile| self.counts[*tile]);
@@ -185,7 +212,8 @@ impl<'a> Allocation<'a> {
         }
     }
 
-    /// Returns the next block of `tile` with its gain under `model`, if the tile is open.
+    /// Returns the next block of samples of `tile` with its gain under the error model `model`.
+    /// Returns `None` if the tile can get no more samples.
     pub fn candidate(&self, tile: usize, model: &ErrorModel) -> Option<Candidate> {
         let (count, samples) = (self.counts[tile], self.next_block(tile));
         let fall = model.mse(count) - model.mse(count + samples);
@@ -203,15 +231,16 @@ impl<'a> Allocation<'a> {
 }
 
 impl Schedule {
-    /// Returns the jobs of the next decision in the adaptive phase, which follows
-    /// [`Schedule::min_samples`].
+    /// Returns the jobs of the next allocation round in the adaptive phase. The tiles with the
+    /// highest gain (error reduction per ray) get samples first. The phase starts when every tile
+    /// has [`Schedule::min_samples`] samples in each replicate (half of the samples).
     pub(super) fn highest_gain(&self) -> Vec<Job> {
         let criterion = self.settings.criterion;
         let models = self.tile_models([self.pooled_slope(false), self.pooled_slope(true)]);
         let expected = self.calibrated(&models);
 
         let mut allocation = Allocation::new(self);
-        let budget = DECISION_SHARE * self.rays as f64;
+        let budget = ROUND_SHARE * self.rays as f64;
         allocation.explore(EXPLORATION * budget);
 
         let over_picture = |rmse: f64| rmse * rmse * self.pixels() as f64;
@@ -245,8 +274,9 @@ impl Schedule {
         allocation.into_jobs()
     }
 
-    /// Returns the expected error of each tile as a function of its sample count. `pooled` are the
-    /// slopes of tiles without and with glossy lobes.
+    /// Returns for each tile a model of its expected error as a function of its sample count.
+    /// `pooled` is `[slope of tiles without glossy lobes, slope of tiles with them]`, with RMSE ~
+    /// n^-slope for n samples.
     pub(super) fn expected_errors(&self, pooled: [f64; 2]) -> Vec<ErrorModel> {
         self.calibrated(&self.tile_models(pooled))
     }
@@ -255,11 +285,12 @@ impl Schedule {
         self.tiles.iter().map(|t| tile_models(t, self.settings.criterion, pooled)).collect()
     }
 
-    /// Returns the expected error of each tile. It is a weighted mean of the validation estimates
-    /// of its class, which is widened if it has few tiles, and of the tile's own allocation
-    /// estimate. The weights are numbers of pixels; that of the own estimate is multiplied by
-    /// [`OWN_WEIGHT`]. The own estimate keeps the expected error above 0 if the validation
-    /// estimates of the class are 0.
+    /// Returns the expected error of each tile as a function of its sample count. The error at the
+    /// present count is a weighted mean of two kinds of estimates: the validation estimates of the
+    /// tile's class (tiles with similar error estimates), and the tile's own allocation estimate. A
+    /// class with few tiles is widened by others. The weight of an estimate is the number of pixels
+    /// of its tile; that of the own estimate is multiplied by [`OWN_WEIGHT`]. The own estimate
+    /// keeps the expected error above 0 if the validation estimates of the class are 0.
     fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
         let variance =
             |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);
@@ -283,9 +314,10 @@ impl Schedule {
     }
 }
 
-/// Returns the sum over `class` and its nearest classes, as far as it takes to reach
-/// [`MIN_CLASS_TILES`]. The validation estimates of the other classes are scaled to the allocation
-/// estimate of `class`. A class without any estimated error is returned alone.
+/// Returns the sum of the validation estimates over the tiles of `class` (tiles with similar error
+/// estimates) and of its nearest classes. Classes are added until there are [`MIN_CLASS_TILES`]
+/// tiles. The validation estimates of the other classes are scaled to the allocation estimate of
+/// `class`. If that estimate is 0, no classes are added.
 fn widened(class: Class, classes: &BTreeMap<Class, WeightedSum>) -> WeightedSum {
     let mut sum = classes[&class];
     let (octave, Some(half_octave)) = class else { return sum };
@@ -304,7 +336,8 @@ fn widened(class: Class, classes: &BTreeMap<Class, WeightedSum>) -> WeightedSum 
     sum
 }
 
-/// Sum of weighted values, with the sum of the weights.
+/// Sum of the validation estimates of tiles, each weighted by the tile's pixels, with the sum of
+/// these weights.
 #[derive(Clone, Copy, Default)]
 struct WeightedSum {
     sum: f64,
@@ -322,8 +355,10 @@ impl WeightedSum {
     }
 }
 
-/// Fits error models to the estimates of a tile. Each estimate is weighted by its sample count.
-/// Estimates at lower counts reduce the influence of chance in the latest one.
+/// Fits two error models to the noise estimates of a tile: one to its allocation estimates, one to
+/// its validation estimates. Each estimate is weighted by its sample count. Earlier estimates, from
+/// fewer samples, reduce the influence of chance in the latest one. `pooled` is `[slope of all
+/// tiles without glossy lobes, slope of all tiles with them]`.
 fn tile_models(tile: &Tile, criterion: Criterion, pooled: [f64; 2]) -> TileModels {
     let slope = tile.slope(criterion, pooled[usize::from(tile.glossy)]);
     let (mut sums, mut weights) = ([0.0; 2], 0.0);

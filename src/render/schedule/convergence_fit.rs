@@ -1,21 +1,24 @@
-//! Convergence fit: the noise of the whole picture as a function of the number of rays,
-//! extrapolated to a target.
+//! Convergence fit: the RMSE of the whole picture as a function of the number of rays, extrapolated
+//! to an error target.
 
 use crate::render::schedule::tile::{FLATTEST, STEEPEST, clamp_slope};
 
-/// Number of recorded points: one for every factor sqrt(2) in rays, over three doublings.
+/// Largest number of points of the convergence fit. A point is a number of rays and the picture's
+/// RMSE after them. From one point to the next the rays grow by a factor of sqrt(2), so that seven
+/// points span three doublings.
 const POINTS: usize = 7;
 
-/// Relative uncertainty of an extrapolated time if the slope is well fitted. The slope decreases a
-/// little during the render, because the rays of exploration are a smaller share of all rays at the
-/// start than at the end. At slope 0.75 this lengthens an extrapolation over two doublings by 4 to
-/// 10 %.
+/// Relative uncertainty of the extrapolated number of rays left until an error target, if the
+/// convergence slope is well fitted. The slope decreases a little during the render, because the
+/// rays of exploration (samples for the tiles with the fewest samples) contribute less to it at the
+/// end. At slope 0.75 this increases the number of rays over two doublings by 4 to 10 %.
 const SPREAD: f64 = 0.15;
 
-/// Noise as a function of rays, over the latest three doublings of the rays.
+/// Convergence fit: RMSE of the picture as a function of rays, over the latest three doublings of
+/// the rays.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConvergenceFit {
-    /// Number of rays and RMSE, oldest first.
+    /// Recorded points, oldest first, each as `(number of rays, RMSE of the picture)`.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -38,10 +41,11 @@ impl ConvergenceFit {
         }
     }
 
-    /// Lower and upper estimate of the total number of rays at which the noise falls to `target`.
-    /// They follow from the steepest and the flattest of the slopes over the latest one, two and
-    /// three doublings. Before the first doubling they follow from the largest and the smallest
-    /// plausible slope. Returns `None` before the first record.
+    /// Returns a lower and an upper estimate of the total number of rays at which the picture's
+    /// RMSE falls to `target`. The RMSE is extrapolated with the steepest and the flattest of three
+    /// slopes: those over the latest one, two and three doublings of the rays. Before the first
+    /// doubling, the largest and the smallest plausible slope replace them. Returns `None` before
+    /// the first record.
     pub fn rays_needed(&self, target: f64) -> Option<(f64, f64)> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {
@@ -59,14 +63,15 @@ impl ConvergenceFit {
         Some((rays + additional(steep) * (1.0 - SPREAD), rays + additional(flat) * (1.0 + SPREAD)))
     }
 
-    /// Slope p of the fit RMSE ~ rays^-p through the first and the last recorded point, which are
-    /// at most three doublings of the rays apart. It is 0.5, that of independent samples, if there
-    /// are fewer than two points.
+    /// Returns the slope p of the fit RMSE ~ rays^-p through the first and the last recorded point,
+    /// which are at most three doublings of the rays apart. It is 0.5, that of independent samples,
+    /// if there are fewer than two points.
     pub fn slope(&self) -> f64 {
         self.fitted_slope().unwrap_or(0.5)
     }
 
-    /// Returns [`ConvergenceFit::slope`] if there are at least two recorded points.
+    /// Returns [`ConvergenceFit::slope`]. Returns `None` if there are fewer than two recorded
+    /// points.
     pub fn fitted_slope(&self) -> Option<f64> {
         let (r0, n0) = *self.points.first()?;
         let (r1, n1) = *self.points.last()?;

@@ -1,11 +1,12 @@
-//! Schedule: chooses the next tiles and their numbers of samples, and ends the render. The schedule
-//! is pure logic. It gets the time as an argument, and learns about the film from the reports of
+//! Schedule: chooses the next tiles and their numbers of samples, and ends the render. It does no
+//! input or output. It gets the time as an argument, and learns about the film from the reports of
 //! finished jobs.
 //!
-//! A decision gives each chosen tile the same sample indices in replicate A and then in replicate
-//! B. At every decision, a tile therefore holds equally many samples of both, and an estimate of
-//! its error. Decisions depend on estimated errors and ray counts, never on time or threads. Time
-//! can only end the render.
+//! The samples of each pixel are divided into two independent halves, the replicates A and B.
+//! Samples are allocated in rounds. A round gives each chosen tile the same sample indices in
+//! replicate A and then in replicate B. Between two rounds, a tile therefore holds equally many
+//! samples of both, and their difference is an estimate of its error. A round depends on estimated
+//! errors and ray counts, never on time or threads. Time can only end the render.
 
 mod allocation;
 mod convergence_fit;
@@ -25,72 +26,82 @@ pub use prediction::{Prediction, TilePrediction, TileSamples, USUAL_SLOPE};
 pub use settings::{Criterion, Settings, Stop, StoppedBy};
 use tile::{Tile, clamp_slope};
 
-/// Samples per replicate that every tile gets before adaptive sampling and noise estimates start.
-/// Estimates from fewer samples are unreliable and take as long as the samples. With a value of 16,
-/// tiles without noise would get a third of all samples of the mirror room scene, and two thirds of
-/// those of the reflecting tracks scene.
+/// Samples per pixel that every tile gets in each replicate (half of the samples) before adaptive
+/// sampling and noise estimates start. Estimates from fewer samples would be unreliable, and their
+/// computation would take as long as the tracing of the samples. With a minimum of 16, tiles
+/// without noise would get a third of all samples of the mirror room scene, and two thirds of those
+/// of the reflecting tracks scene.
 const MIN_SAMPLES: u32 = 4;
-/// Replacement of [`MIN_SAMPLES`] for pictures whose estimated error is concentrated in fewer than
-/// [`FEW_PIXELS`] effective pixels (see [`Noise::effective_pixels`]). Such a picture is sparse or
-/// clean: more samples find its features, estimates from few samples do not.
+/// Samples per pixel and replicate (half of the samples) that replace [`MIN_SAMPLES`] if the
+/// estimated error is concentrated in fewer than [`FEW_PIXELS`] effective pixels (see
+/// [`Noise::effective_pixels`]). Such a picture has either no noise, or a few noisy pixels; more
+/// samples are needed to find them.
 const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
-/// Number of effective pixels below which an estimate is unreliable. With k effective pixels the
-/// relative uncertainty of the RMSE is 1 / sqrt(2 k): 18 % for 16.
+/// Number of effective pixels (Kish) below which a noise estimate is unreliable. With k effective
+/// pixels the relative uncertainty of the RMSE is 1 / sqrt(2 k): 18 % for 16.
 const FEW_PIXELS: f64 = 16.0;
-/// Alignment of sample counts, for counts of at least this value. It is the width of the widest
-/// packets. Narrower packets use the same alignment, because the samples of a picture must not
-/// depend on the processor. The last block of a tile may be shorter.
+/// Number of which the sample counts of tiles are multiples, per pixel and replicate (half of the
+/// samples). Smaller counts, and the count after the last block of a tile, need not be multiples.
+/// It is the number of lanes of the widest SIMD packets of rays. Narrower packets use the same
+/// number, because the samples of a picture must not depend on the processor.
 pub const SAMPLE_ALIGNMENT: u32 = 16;
-/// Samples per replicate at which a tile is full: the largest aligned count for which the sum over
-/// both replicates fits 32 bits.
+/// Samples per pixel in each replicate (half of the samples) at which a tile of the film is full.
+/// It is the largest multiple of [`SAMPLE_ALIGNMENT`] for which the sum over both replicates fits
+/// 32 bits.
 pub const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
 
-/// Returns the number of samples from `count` to the next packet boundary; 0 for counts below one
-/// packet. A count is unaligned if an earlier stop criterion ended inside a packet.
+/// Returns the number of samples from `count` to the next multiple of [`SAMPLE_ALIGNMENT`]. Returns
+/// 0 if `count` is such a multiple, or is smaller than [`SAMPLE_ALIGNMENT`]. A larger count that is
+/// no multiple occurs if a stop criterion ended the render there and the render was then resumed.
 fn to_packet(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT { 0 } else { count.next_multiple_of(SAMPLE_ALIGNMENT) - count }
 }
 
-/// Next step of a render.
+/// Next step of a render, chosen by its schedule.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
-    /// Trace this wave.
+    /// Wave to trace next: a set of jobs that run concurrently.
     Trace(Wave),
-    /// The render is finished, for this reason.
+    /// End of the render, with its reason.
     Finished(StoppedBy),
 }
 
-/// Numbers of samples per pixel in the picture, A and B together.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Numbers of samples per pixel in the picture, over both replicates (halves of the samples).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spp {
-    /// Smallest number in any pixel.
+    /// Smallest number of samples in any pixel.
     pub min: u32,
-    /// Mean over all pixels.
+    /// Mean number of samples over all pixels.
     pub mean: f64,
-    /// Largest number in any pixel.
+    /// Largest number of samples in any pixel.
     pub max: u32,
 }
 
-/// Schedule of one render.
+/// Schedule of one render: sample counts and noise estimates of its tiles, and the jobs to trace
+/// next.
 #[derive(Clone, Debug)]
 pub struct Schedule {
     settings: Settings,
     tiles: Vec<Tile>,
-    /// Jobs of the latest decision, for both replicates.
-    decided: Vec<Job>,
+    /// Jobs of the current allocation round (one decision on the next samples of all tiles). Each
+    /// job is traced twice, once in replicate A and once in replicate B (halves of the samples).
+    round: Vec<Job>,
     estimate: bool,
     replicate: usize,
-    /// Jobs of `decided` that the current replicate still needs.
+    /// Jobs of the current allocation round (one decision on the next samples of all tiles) that
+    /// are not traced yet in the current replicate (half of the samples).
     remaining: Vec<Job>,
     convergence: ConvergenceFit,
-    /// Number of samples traced, all pixels and both replicates.
+    /// Number of samples traced, over all pixels and both replicates (halves of the samples).
     samples: u64,
     rays: u64,
     noise: Option<Noise>,
-    /// Samples per replicate at the latest noise estimate, in phases with equal counts in all
-    /// tiles.
+    /// Samples per pixel and replicate (half of the samples) after the latest uniform allocation
+    /// round that ended with a noise estimate. A uniform round gives all tiles equally many
+    /// samples.
     estimated_at: u32,
-    /// See [`Schedule::with_light_period`].
+    /// Light period: the number of samples of a pixel that together trace a shadow ray to each
+    /// light once; see [`Schedule::with_light_period`].
     light_period: u32,
 }
 
@@ -101,7 +112,7 @@ impl Schedule {
         Self {
             settings,
             tiles: pixels.iter().map(|p| Tile::new(*p)).collect(),
-            decided: Vec::new(),
+            round: Vec::new(),
             estimate: false,
             replicate: 1,
             remaining: Vec::new(),
@@ -114,16 +125,20 @@ impl Schedule {
         }
     }
 
-    /// Returns the schedule of a world in which `light_period` samples of a replicate ask each
-    /// light once; see [`AnyWorld::light_period`](crate::world::AnyWorld::light_period). The error
-    /// falls steeply at this count, and estimates from fewer samples do not show what is left. They
-    /// are discarded as soon as a tile has an estimate from `light_period` samples.
+    /// Returns the schedule with the light period `light_period`. So many samples of a pixel in a
+    /// replicate (half of the samples) together trace a shadow ray to each light once; see
+    /// [`AnyWorld::light_period`](crate::world::AnyWorld::light_period).
+    ///
+    /// The error falls steeply at this count. An error estimated from fewer samples does not
+    /// predict that of more. Such estimates are discarded as soon as a tile has an estimate from
+    /// `light_period` samples.
     pub fn with_light_period(self, light_period: u32) -> Self {
         Self { light_period, ..self }
     }
 
-    /// Returns the next step. `seconds` is the time since the start of the render. The caller
-    /// reports the result of a wave to [`Schedule::complete`] before the next call.
+    /// Returns the next step of the render. `seconds` is the time since the start of the render.
+    /// The caller reports the result of a wave (a set of concurrent jobs) to [`Schedule::complete`]
+    /// before the next call.
     pub fn next(&mut self, seconds: f64) -> Step {
         if self.remaining.is_empty() {
             if self.replicate == 0 {
@@ -132,13 +147,13 @@ impl Schedule {
                 if let Some(reason) = self.reason_to_stop(seconds) {
                     return Step::Finished(reason);
                 }
-                self.decided = self.decide();
-                if self.decided.is_empty() {
+                self.round = self.next_round();
+                if self.round.is_empty() {
                     return Step::Finished(self.reason_without_work());
                 }
                 self.replicate = 0;
             }
-            self.remaining.clone_from(&self.decided);
+            self.remaining.clone_from(&self.round);
         }
         Step::Trace(Wave {
             replicate: self.replicate,
@@ -147,8 +162,9 @@ impl Schedule {
         })
     }
 
-    /// Records the report of the wave that [`Schedule::next`] returned, or of the part that
-    /// [`Wave::cut`] left of it. Jobs that were cut off or cancelled are part of a later wave.
+    /// Records the report of a wave (a set of jobs that run concurrently). It is the wave that
+    /// [`Schedule::next`] returned, or the part that [`Wave::cut`] left of it. Jobs that were cut
+    /// off or cancelled are part of a later wave.
     pub fn complete(&mut self, wave: &Wave, report: &WaveReport) {
         let mut reports = wave.jobs.iter().zip(&report.reports).peekable();
         let mut partial = Vec::new();
@@ -178,7 +194,8 @@ impl Schedule {
         }
     }
 
-    /// Computes the picture's noise from that of its tiles.
+    /// Computes the error of the picture from the estimates of its tiles, and adds it to the
+    /// convergence fit.
     fn update_noise(&mut self) {
         self.noise = Noise::of_tiles(self.tiles.iter().map(|t| t.error));
         if let Some(noise) = self.noise {
@@ -186,34 +203,37 @@ impl Schedule {
         }
     }
 
-    /// Latest estimate of the error of the whole picture.
+    /// Returns the latest estimate of the error of the whole picture. Returns `None` before the
+    /// first estimate.
     pub fn noise(&self) -> Option<Noise> {
         self.noise
     }
 
-    /// Latest estimate of each tile's RMSE in 8-bit levels, in row order; 0 before the first
-    /// estimate.
+    /// Returns the latest estimate of each tile's RMSE as displayed, in 8-bit levels, in row order;
+    /// 0 before the first estimate.
     pub fn tile_noise_codes(&self) -> Vec<f32> {
         let codes = |t: &Tile| t.error.map_or(0.0, |e| e.of_all().codes.sqrt() as f32);
         self.tiles.iter().map(codes).collect()
     }
 
-    /// Latest estimate of each tile's error, in row order; `None` before the first estimate.
+    /// Returns the latest estimate of each tile's error, in row order; `None` before the first
+    /// estimate.
     pub(super) fn tile_estimates(&self) -> impl Iterator<Item = Option<TileNoise>> {
         self.tiles.iter().map(|tile| tile.error)
     }
 
-    /// Number of samples traced so far, over all pixels.
+    /// Returns the number of samples traced so far, over all pixels.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Number of rays traced so far.
+    /// Returns the number of rays traced so far.
     pub fn rays(&self) -> u64 {
         self.rays
     }
 
-    /// Samples per pixel that both replicates hold.
+    /// Returns the numbers of samples per pixel in the picture, over both replicates (halves of the
+    /// samples).
     pub fn spp(&self) -> Spp {
         let counts = || self.tiles.iter().map(|t| 2 * t.done);
         let (pixels, samples) = self.tiles.iter().fold((0u64, 0u64), |(pixels, samples), t| {
@@ -230,7 +250,10 @@ impl Schedule {
         self.tiles.iter().map(|t| u64::from(t.pixels)).sum()
     }
 
-    /// Largest number of samples per replicate that `tile` may get.
+    /// Returns the largest number of samples per pixel that `tile` may have in each replicate (one
+    /// of two independent halves of the samples), at the end of the render. For tiles with a glossy
+    /// lobe it is half of [`Settings::rays_per_pixel`], at least 1. For other tiles, or if that
+    /// setting is 0, it is [`MAX_SAMPLES`].
     fn cap(&self, tile: &Tile) -> u32 {
         match self.settings.rays_per_pixel {
             0 => MAX_SAMPLES,
@@ -239,7 +262,8 @@ impl Schedule {
         }
     }
 
-    /// Returns the root mean square error over the pixels of the tiles for which `selects` is true.
+    /// Returns the root mean square error, in the unit of `criterion`, over all pixels of the tiles
+    /// for which `selects` is true.
     fn pooled(&self, criterion: Criterion, selects: impl Fn(&Tile) -> bool) -> f64 {
         let (sum, pixels) =
             self.tiles.iter().filter(|t| selects(t)).fold((0.0, 0u64), |(s, n), t| {
@@ -248,16 +272,19 @@ impl Schedule {
         (sum / pixels.max(1) as f64).sqrt()
     }
 
-    /// Returns the number of samples per replicate, over all pixels, that are left until the
-    /// requested mean count.
+    /// Returns the number of samples that each replicate (half of the samples) still needs, over
+    /// all pixels, until the picture has the requested mean number of samples per pixel. Returns
+    /// `u64::MAX` if no number is requested.
     fn samples_left(&self) -> u64 {
         let Some(spp) = self.settings.stop.spp else { return u64::MAX };
         let done: u64 = self.tiles.iter().map(|t| u64::from(t.done) * u64::from(t.pixels)).sum();
         (u64::from(spp.div_ceil(2)) * self.pixels()).saturating_sub(done)
     }
 
-    /// Decides on the next jobs and sets `estimate`. Returns no jobs if nothing is left to trace.
-    fn decide(&mut self) -> Vec<Job> {
+    /// Returns the jobs of the next allocation round, one decision on the next samples of all
+    /// tiles. Sets `self.estimate` to `true` if the round ends with noise estimates, otherwise to
+    /// `false`. Returns no jobs if nothing is left to trace.
+    fn next_round(&mut self) -> Vec<Job> {
         self.estimate = true;
         let common = self.common_count();
         if common < self.min_samples() || !self.settings.adaptive {
@@ -267,20 +294,23 @@ impl Schedule {
         }
     }
 
-    /// Samples per replicate that every tile gets before estimates are used.
+    /// Returns the number of samples per pixel that every tile gets in each replicate (half of the
+    /// samples) before noise estimates are used.
     fn min_samples(&self) -> u32 {
-        let sparse = |noise: Noise| self.settings.criterion.effective_pixels(noise) < FEW_PIXELS;
+        let sparse = |noise: Noise| self.settings.criterion.of(noise.effective_pixels) < FEW_PIXELS;
         if self.noise.is_some_and(sparse) { SPARSE_MIN_SAMPLES } else { MIN_SAMPLES }
     }
 
-    /// Smallest number of samples per replicate among the tiles below their cap; [`MAX_SAMPLES`] if
-    /// all tiles have reached it.
+    /// Returns the smallest number of samples per pixel and replicate (half of the samples) among
+    /// the tiles below their cap (see [`Schedule::cap`]); [`MAX_SAMPLES`] if all tiles have reached
+    /// their cap.
     fn common_count(&self) -> u32 {
         let open = self.tiles.iter().filter(|t| t.done < self.cap(t));
         open.map(|t| t.done).min().unwrap_or(MAX_SAMPLES)
     }
 
-    /// Returns jobs with the same sample indices for every tile below its cap.
+    /// Returns jobs that bring all tiles below their cap to the same number of samples. `common` is
+    /// the smallest number of samples per pixel and replicate (half of the samples) among them.
     fn uniform(&mut self, common: u32) -> Vec<Job> {
         let grown = match common {
             // To the next power of two. An earlier stop criterion may have ended between two
@@ -307,10 +337,11 @@ impl Schedule {
         self.jobs(samples)
     }
 
-    /// Returns the number of samples by which a picture with `done` samples per replicate in all
-    /// tiles grows. With an error target it is half of the estimated remaining samples, at most
-    /// `done`. Without an error target it is `done / 8`. With a time limit it is at most
-    /// `done / 8`, because a larger wave would exceed the limit.
+    /// Returns the number of samples that each pixel gets next in each replicate (half of the
+    /// samples), if all tiles have `done` samples per pixel in each. With an error target it is
+    /// half of the estimated remaining samples, at most `done`. Without an error target it is an
+    /// eighth of `done`. With a time limit it is at most an eighth of `done`, because tracing more
+    /// samples at a time would exceed the limit.
     fn uniform_growth(&self, done: u32) -> u32 {
         let eighth = done / 8;
         let Some((criterion, target)) = self.target() else { return eighth };
@@ -328,13 +359,16 @@ impl Schedule {
             .collect()
     }
 
-    /// Returns the slope of the error over all glossy tiles (or over all other tiles), from their
-    /// latest doublings; 0.5 before the first one.
+    /// Returns the convergence slope p of all tiles with a glossy lobe if `glossy` is `true`,
+    /// otherwise of all other tiles: RMSE ~ n^-p for n samples. It is fitted to the latest doubling
+    /// of the sample count of each of these tiles. Returns 0.5 if none of them has doubled its
+    /// count, or their errors are 0.
     fn pooled_slope(&self, glossy: bool) -> f64 {
         self.fitted_slope(glossy).unwrap_or(0.5)
     }
 
-    /// Returns [`Schedule::pooled_slope`] if it follows from doublings.
+    /// Returns [`Schedule::pooled_slope`]. Returns `None` if no such tile has doubled its sample
+    /// count, or their errors are 0.
     fn fitted_slope(&self, glossy: bool) -> Option<f64> {
         let criterion = self.settings.criterion;
         let selected = self.tiles.iter().filter(|t| t.glossy == glossy);

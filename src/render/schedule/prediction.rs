@@ -1,5 +1,6 @@
-//! Prediction: the sample counts at which a picture is expected to meet its error target, from the
-//! estimates at hand. Shards of a plan trace these counts without further decisions.
+//! Prediction of the sample counts at which a picture is expected to meet its error target, from
+//! its noise estimates so far. In a plan that divides a render among processes, each process traces
+//! its part of these counts without adapting them.
 
 use crate::film::TileNoise;
 use crate::render::schedule::allocation::{Allocation, Candidate, EXPLORATION};
@@ -7,55 +8,58 @@ use crate::render::schedule::tile::Tile;
 use crate::render::schedule::{Schedule, Settings};
 use std::collections::BinaryHeap;
 
-/// Slope of the error of a tile, if no tile has doubled its sample count yet: RMSE ~ n^-slope. The
-/// scenes of the gallery have 0.57 to 0.8.
+/// Assumed slope of a tile's error, if no tile has doubled its sample count yet: RMSE ~ n^-slope
+/// for n samples. The scenes of the gallery have 0.57 to 0.8.
 pub const USUAL_SLOPE: f64 = 0.7;
-/// Aim of a prediction relative to the error target. The predicted error is too low by 3 to 6 %
-/// (11 % in the worst of nine renders), because tiles that were selected for high estimates fall
-/// towards the mean of their class.
+/// Error at which the prediction aims, as a share of the error target. It is below 1, because the
+/// true error exceeds the predicted one by 3 to 6 % (11 % in the worst of nine renders).
 const AIM: f64 = 0.95;
 
-/// Predicted end of a render.
+/// Predicted end of a render: sample counts and error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prediction {
-    /// Tiles in row order.
+    /// Present and predicted sample counts of the tiles, in row order.
     pub tiles: Vec<TilePrediction>,
-    /// Expected RMSE of the whole picture, in the unit of the target.
+    /// Expected RMSE of the whole picture, in the unit of the error target (8-bit levels or
+    /// radiance).
     pub rmse: f64,
-    /// Slope of the error of tiles without and with glossy lobes.
+    /// Slopes of the error, RMSE ~ n^-slope for n samples: `[tiles without glossy lobes, tiles with
+    /// them]`.
     pub slopes: [f64; 2],
 }
 
-/// Samples of a tile at hand, and predicted ones.
+/// Sample counts of a tile: those traced so far, and those predicted for the end of the render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TilePrediction {
-    /// Samples per replicate at hand.
+    /// Samples per pixel that the tile has so far in each replicate (half of the samples).
     pub done: u32,
-    /// Predicted samples per replicate; at least `done`.
+    /// Predicted samples per pixel of the tile in each replicate (half of the samples). They
+    /// include `done`, the samples so far.
     pub count: u32,
-    /// Mean number of rays per sample.
+    /// Mean number of rays per sample in this tile.
     pub rays_per_sample: f64,
-    /// `true` if a path has hit a glossy lobe.
+    /// `true` if a path in this tile has hit a glossy lobe.
     pub glossy: bool,
 }
 
-/// Samples that a film holds in one tile.
+/// Statistics of the samples that a film holds in one tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileSamples {
-    /// Number of pixels inside the picture.
+    /// Number of the tile's pixels that are inside the picture.
     pub pixels: u32,
-    /// Samples per replicate.
+    /// Samples per pixel that the film holds in each replicate (half of the samples) of the tile.
     pub count: u32,
-    /// Mean number of rays per sample.
+    /// Mean number of rays per sample in the tile.
     pub rays_per_sample: f64,
-    /// `true` if a path has hit a glossy lobe.
+    /// `true` if a path in the tile has hit a glossy lobe.
     pub glossy: bool,
-    /// Estimated error.
+    /// Estimated error of the tile.
     pub error: TileNoise,
 }
 
 impl Schedule {
-    /// Creates the schedule of a film that holds samples already. All tiles have an estimate.
+    /// Creates the schedule of a film that holds samples already. `samples` describes its tiles in
+    /// row order; each has an estimate of its error.
     pub fn of_samples(samples: &[TileSamples], settings: Settings) -> Self {
         let pixels: Vec<u32> = samples.iter().map(|s| s.pixels).collect();
         let mut schedule = Self::new(&pixels, settings);
@@ -74,9 +78,10 @@ impl Schedule {
 
     /// Predicts the sample counts at which the picture meets its error target. Samples go to the
     /// tiles in which they reduce the error most per ray, as in an adaptive render; the share
-    /// `EXPLORATION` of the rays goes to the tiles with the fewest samples. `usual_slopes` are
-    /// the slopes of tiles without and with glossy lobes, as long as none of them has doubled its
-    /// sample count. Returns `None` without a target, or before the first estimate of the noise.
+    /// `EXPLORATION` of the rays goes to the tiles with the fewest samples. `usual_slopes` is
+    /// `[assumed slope of tiles without glossy lobes, of tiles with them]`. Each is used as long as
+    /// no tile of its kind has doubled its sample count. Returns `None` without an error target, or
+    /// before the first noise estimate.
     pub fn predict(&self, usual_slopes: [f64; 2]) -> Option<Prediction> {
         let (criterion, target) = self.target()?;
         let rmse = criterion.of_picture(self.noise?);

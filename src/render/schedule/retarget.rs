@@ -1,17 +1,18 @@
-//! Changes during a render: new stop criteria, a new cap, and new noise estimates for the samples
-//! at hand.
+//! Changes of a schedule during the render: new stop criteria, a new limit on samples, and new
+//! noise estimates for the samples so far.
 
 use crate::film::TileNoise;
 use crate::render::schedule::tile::Tile;
 use crate::render::schedule::{ConvergenceFit, Schedule, Stop};
 
 impl Schedule {
-    /// Sets the stop criteria. A finished render resumes if the new criteria are not reached.
+    /// Sets the stop criteria of the render. A finished render resumes if the new criteria are not
+    /// reached.
     pub fn set_stop(&mut self, stop: Stop) {
         self.settings.stop = stop;
     }
 
-    /// Sets the cap on samples per pixel of tiles with glossy lobes; see
+    /// Sets the largest number of samples per pixel in tiles with glossy lobes; 0 for no limit. See
     /// [`Settings::rays_per_pixel`](crate::render::schedule::Settings::rays_per_pixel).
     pub fn set_rays_per_pixel(&mut self, cap: u32) {
         self.settings.rays_per_pixel = cap;
@@ -27,13 +28,13 @@ impl Schedule {
         self.convergence = ConvergenceFit::default();
     }
 
-    /// Sets the estimates of all tiles, in row order. They were made between two waves. `None`
-    /// means that the tile has too few samples.
+    /// Sets the noise estimates of all tiles, in row order. `None` means that the tile has too few
+    /// samples for an estimate. Must be called between two waves (sets of concurrent jobs).
     pub fn set_estimates(&mut self, estimates: &[Option<TileNoise>]) {
         for (tile, estimate) in self.tiles.iter_mut().zip(estimates) {
             tile.set_estimate(*estimate);
         }
-        // The current decision may have been made before there were estimates, and then plans none.
+        // The current round may have begun before there were estimates, and then plans none.
         self.estimate |= self.tiles.iter().all(|t| t.error.is_some());
         self.update_noise();
     }

@@ -5,9 +5,9 @@ use crate::film::{Mse, Noise};
 /// Measure of the error that adaptive sampling minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Criterion {
-    /// Error of the displayed picture, in 8-bit levels.
+    /// RMSE of the displayed picture, in 8-bit levels.
     Codes,
-    /// Error in linear radiance.
+    /// RMSE of the picture in linear radiance.
     Linear,
 }
 
@@ -25,26 +25,22 @@ impl Criterion {
             Self::Linear => noise.rmse_linear,
         }
     }
-
-    pub(super) fn effective_pixels(self, noise: Noise) -> f64 {
-        match self {
-            Self::Codes => noise.effective_pixels.codes,
-            Self::Linear => noise.effective_pixels.linear,
-        }
-    }
 }
 
 /// Stop criteria. The first one that is reached ends the render. A render without stop criteria
 /// does not end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stop {
-    /// Mean number of samples per pixel, A and B together; rounded up to an even number.
+    /// Target for the mean number of samples per pixel, over both replicates (halves of the
+    /// samples); rounded up to an even number. `None` for no target.
     pub spp: Option<u32>,
-    /// Estimated RMSE of the whole picture as displayed, in 8-bit levels.
+    /// Target for the estimated RMSE of the whole picture as displayed, in 8-bit levels. `None` for
+    /// no target.
     pub noise_codes: Option<f64>,
-    /// Estimated linear RMSE of the whole picture.
+    /// Target for the estimated RMSE of the whole picture in linear radiance. `None` for no target.
     pub rmse_linear: Option<f64>,
-    /// Seconds of rendering. The limit is tested between waves.
+    /// Time limit of the render in seconds. It is tested between waves, sets of jobs that run
+    /// concurrently. `None` for no limit.
     pub seconds: Option<f64>,
 }
 
@@ -53,21 +49,23 @@ pub struct Stop {
 pub enum StoppedBy {
     /// The mean number of samples per pixel was reached.
     Spp,
-    /// The displayed noise fell to its target.
+    /// The RMSE of the displayed picture fell to its target.
     Noise,
-    /// The linear RMSE fell to its target.
+    /// The RMSE of the picture in linear radiance fell to its target.
     Rmse,
-    /// The time limit was reached.
+    /// The time limit of the render was reached.
     Time,
-    /// All glossy tiles have reached their cap on samples per pixel, and the error of the other
-    /// tiles is at the target.
+    /// At least one tile with a glossy lobe has reached its largest number of samples
+    /// ([`Settings::rays_per_pixel`]). The tiles below their largest number together meet the error
+    /// target, or there are none.
     RaysPerPixel,
-    /// All tiles hold the largest number of samples.
+    /// All tiles of the film hold the largest number of samples.
     Full,
 }
 
 impl StoppedBy {
-    /// Stable name for statistics.
+    /// Returns the name of the reason in printed statistics. It never changes between versions of
+    /// the program.
     pub fn name(self) -> &'static str {
         match self {
             Self::Spp => "spp",
@@ -80,17 +78,19 @@ impl StoppedBy {
     }
 }
 
-/// Settings of the schedule.
+/// Settings of the schedule, which allocates samples to tiles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// `true` if tiles may get different numbers of samples. Otherwise numbers differ only by the
-    /// cap.
+    /// `true` if tiles may get different numbers of samples according to their noise. Otherwise all
+    /// tiles get the same number, except that [`Settings::rays_per_pixel`] limits the samples of
+    /// tiles with a glossy lobe.
     pub adaptive: bool,
     /// Measure of the error that adaptive sampling minimises.
     pub criterion: Criterion,
-    /// Largest number of samples per pixel, A and B together, in tiles with a glossy lobe. It is
-    /// rounded down to an even number, at least 2. 0 means no cap.
+    /// Largest number of samples per pixel in tiles with a glossy lobe, over the whole render and
+    /// both replicates (halves of the samples). It is rounded down to an even number, at least 2. 0
+    /// means no limit.
     pub rays_per_pixel: u32,
-    /// Stop criteria.
+    /// Stop criteria of the render.
     pub stop: Stop,
 }

@@ -1,9 +1,14 @@
 //! State of a schedule as bytes, with which a later process continues it.
 //!
-//! All numbers are little-endian. The state contains the criterion (u8), samples and rays (u64
-//! each), the count of the latest estimate (u32), `estimate` and replicate (u8 each), the noise of
-//! the picture, the points of the convergence fit, the jobs of the decision and the remaining ones,
-//! and the tiles. A list has its length (u32) before it; an option has 0 or 1 (u8).
+//! All numbers are little-endian. A list starts with its length (u32); an option starts with 0
+//! (`None`) or 1 (u8). The parts are, in this order:
+//!
+//! - the criterion (u8), the numbers of samples and rays (u64 each), and the sample count of the
+//!   latest estimate in a uniform round (u32);
+//! - 1 if the allocation round ends with an estimate, otherwise 0 (u8), and the current replicate
+//!   (u8);
+//! - the noise of the picture, and the points of the convergence fit;
+//! - the jobs of the current allocation round, those of them that remain, and the tiles.
 
 use crate::film::file::Fields;
 use crate::film::{Mse, Noise, TileNoise};
@@ -12,7 +17,7 @@ use crate::render::schedule::{Criterion, MAX_SAMPLES, Schedule};
 use crate::render::wave::Job;
 
 impl Schedule {
-    /// Encodes everything that decisions depend on, except for the settings.
+    /// Encodes everything on which the next samples depend, except for the settings.
     pub fn encode(&self) -> Vec<u8> {
         let mut out = Vec::new();
         out.push(match self.settings.criterion {
@@ -31,7 +36,7 @@ impl Schedule {
         }
         length(self.convergence.points.len(), &mut out);
         self.convergence.points.iter().for_each(|(rays, noise)| floats(&[*rays, *noise], &mut out));
-        for jobs in [&self.decided, &self.remaining] {
+        for jobs in [&self.round, &self.remaining] {
             length(jobs.len(), &mut out);
             for job in jobs {
                 [job.tile, job.first, job.count].iter().for_each(|n| out.extend(n.to_le_bytes()));
@@ -50,10 +55,10 @@ impl Schedule {
         out
     }
 
-    /// Restores a state into a new schedule of the same film. `counts` has the numbers of samples
-    /// in A and B of each tile of the film. The noise estimates are discarded if the criterion
-    /// differs. Returns `None` if the state is not valid or does not belong to the film; the
-    /// schedule may then have changed.
+    /// Restores an encoded state into a new schedule of the same film. `counts` has two numbers of
+    /// samples per pixel for each tile of the film, one for each replicate (half of the samples).
+    /// The noise estimates are discarded if the criterion differs. Returns `None` if the state is
+    /// not valid or does not belong to the film; the schedule may then have changed.
     pub fn restore(&mut self, state: &[u8], counts: &[[u32; 2]]) -> Option<()> {
         let mut fields = Fields::new(state);
         let criterion = match fields.u8()? {
@@ -79,7 +84,7 @@ impl Schedule {
         let points = fields.u32()?;
         let point = |_| Some((error(&mut fields)?, error(&mut fields)?));
         self.convergence.points = (0..points).map(point).collect::<Option<_>>()?;
-        self.decided = self.decode_jobs(&mut fields)?;
+        self.round = self.decode_jobs(&mut fields)?;
         self.remaining = self.decode_jobs(&mut fields)?;
         if fields.u32()? as usize != self.tiles.len() || counts.len() != self.tiles.len() {
             return None;
@@ -101,7 +106,8 @@ impl Schedule {
         Some(())
     }
 
-    /// Reads a list of jobs of different tiles.
+    /// Decodes a list of jobs. Returns `None` if the bytes end early, two jobs have the same tile,
+    /// or a job is not valid.
     fn decode_jobs(&self, fields: &mut Fields) -> Option<Vec<Job>> {
         let mut seen = vec![false; self.tiles.len()];
         let jobs = fields.u32()?;
@@ -153,7 +159,8 @@ fn decode_mse(fields: &mut Fields) -> Option<Mse> {
     Some(Mse { linear: error(fields)?, codes: error(fields)? })
 }
 
-/// Reads a number that is not negative. Estimates of extreme pictures may be infinite or NaN.
+/// Decodes the estimated error of a tile or of the picture. In extreme pictures it is infinite or
+/// NaN. Returns `None` if the number is negative or the bytes end early.
 fn error(fields: &mut Fields) -> Option<f64> {
     fields.f64().filter(|value| value.is_nan() || *value >= 0.0)
 }

@@ -1,12 +1,12 @@
-//! End of a render, and the estimated time until the end.
+//! End of a render by its stop criteria, and the estimated time until the end.
 
 use crate::render::schedule::tile::Tile;
 use crate::render::schedule::{Criterion, MAX_SAMPLES, Schedule, StoppedBy};
 
 impl Schedule {
-    /// Lower and upper estimate of the seconds left until the first stop criterion is reached.
-    /// `seconds` is the time since the start of the render. Returns `None` if the time cannot be
-    /// estimated.
+    /// Returns a lower and an upper estimate of the seconds left until the first stop criterion is
+    /// reached. `seconds` is the time since the start of the render. Returns `None` if no stop
+    /// criterion is set or none can be extrapolated yet.
     pub fn eta_seconds(&self, seconds: f64) -> Option<(f64, f64)> {
         let by_noise = self.target().and_then(|(_, target)| self.seconds_to_error(target, seconds));
         let by_spp = self.settings.stop.spp.filter(|_| self.samples > 0).map(|spp| {
@@ -22,9 +22,9 @@ impl Schedule {
             .reduce(|(low, high), (l, h)| (low.min(l), high.min(h)))
     }
 
-    /// Lower and upper estimate of the seconds left until the displayed noise falls to `codes`
-    /// 8-bit levels, whatever the stop criteria are. `seconds` is the time since the start of the
-    /// render. Returns `None` before the first estimate of the noise.
+    /// Returns a lower and an upper estimate of the seconds left until the RMSE of the displayed
+    /// picture falls to `codes` 8-bit levels, whatever the stop criteria are. `seconds` is the time
+    /// since the start of the render. Returns `None` before the first noise estimate.
     pub fn seconds_to_noise(&self, codes: f64, seconds: f64) -> Option<(f64, f64)> {
         let noise = self.noise?;
         if noise.rmse_codes <= codes {
@@ -37,8 +37,9 @@ impl Schedule {
         self.seconds_to_error(target, seconds)
     }
 
-    /// Lower and upper estimate of the seconds left until the error of the current criterion falls
-    /// to `target`.
+    /// Returns a lower and an upper estimate of the seconds left until the error of the picture
+    /// falls to `target`. The error is measured by the criterion of adaptive sampling. `seconds` is
+    /// the time since the start of the render. Returns `None` before the first noise estimate.
     fn seconds_to_error(&self, target: f64, seconds: f64) -> Option<(f64, f64)> {
         let (low, high) = self.convergence.rays_needed(target)?;
         let per_ray = seconds / self.rays.max(1) as f64;
@@ -46,16 +47,18 @@ impl Schedule {
         Some((seconds_until(low), seconds_until(high)))
     }
 
-    /// Estimated share of the render that is done, 0..=1, measured by the nearest stop criterion.
-    /// `seconds` is the time since the start of the render.
+    /// Returns the estimated share of the render that is done, 0..=1. It is the elapsed time over
+    /// the expected total time (see [`Schedule::eta_seconds`]). `seconds` is the time since the
+    /// start of the render. Returns `None` if the total time cannot be estimated.
     pub fn progress(&self, seconds: f64) -> Option<f64> {
         let (low, high) = self.eta_seconds(seconds)?;
         let seconds_left = 0.5 * (low + high);
         Some(if seconds > 0.0 { seconds / (seconds + seconds_left) } else { 0.0 })
     }
 
-    /// Returns the target error and the measure of the error to which it applies. If both measures
-    /// have a target, that of the adaptive criterion is used.
+    /// Returns `(measure of the error, target)` for the error target of the render. If both
+    /// measures have a target, it is that of the measure that adaptive sampling minimises. Returns
+    /// `None` if the render has no error target.
     pub(super) fn target(&self) -> Option<(Criterion, f64)> {
         let codes = self.settings.stop.noise_codes.map(|t| (Criterion::Codes, t));
         let linear = self.settings.stop.rmse_linear.map(|t| (Criterion::Linear, t));
@@ -84,14 +87,17 @@ impl Schedule {
         stop.seconds.filter(|limit| started && seconds >= *limit).map(|_| StoppedBy::Time)
     }
 
-    /// Returns `true` if the picture misses its target only because of the cap on glossy tiles.
+    /// Returns `true` if the error target is met except in tiles that may not get more samples: at
+    /// least one tile has its largest number of samples, and the pooled error of the other tiles
+    /// meets the target. Only tiles with glossy lobes have such a limit, the same for each
+    /// ([`Settings::rays_per_pixel`](crate::render::schedule::Settings::rays_per_pixel)).
     fn capped_at_target(&self) -> bool {
         let Some((criterion, target)) = self.target() else { return false };
         let is_open = |t: &Tile| t.done < self.cap(t);
         self.tiles.iter().any(|t| !is_open(t)) && self.pooled(criterion, is_open) <= target
     }
 
-    /// Returns the reason for which no job is left.
+    /// Returns the reason for which a render ends that has no job left to trace.
     pub(super) fn reason_without_work(&self) -> StoppedBy {
         let open = || self.tiles.iter().filter(|t| t.done < self.cap(t));
         if self.tiles.iter().all(|t| t.done == MAX_SAMPLES) {
@@ -103,8 +109,8 @@ impl Schedule {
         }
     }
 
-    /// Returns `true` if every tile has the minimum number of samples, so that the pooled error is
-    /// reliable.
+    /// Returns `true` if every tile has the minimum number of samples, so that the error over all
+    /// tiles is reliable.
     fn min_samples_reached(&self) -> bool {
         let min_samples = self.min_samples();
         self.tiles.iter().all(|t| t.done >= min_samples.min(self.cap(t)))

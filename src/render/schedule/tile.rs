@@ -1,27 +1,29 @@
-//! Per-tile state of the schedule.
+//! State of one tile in the schedule: sample counts and noise estimates.
 
 use crate::film::TileNoise;
 use crate::render::schedule::Criterion;
 use crate::render::wave::JobReport;
 
-/// Largest number of doublings of the sample count over which a slope is fitted.
+/// Largest number of doublings of a tile's sample count over which the slope of its error is
+/// fitted.
 const DOUBLINGS: u32 = 3;
 
 /// Sample counts and noise estimates of one tile.
 #[derive(Clone, Debug)]
 pub(super) struct Tile {
-    /// Number of pixels inside the picture. Tiles at the right and lower edge have fewer pixels.
+    /// Number of the tile's pixels that are inside the picture, fewer at the right and lower edge.
     pub pixels: u32,
-    /// Samples per pixel in each replicate. At every decision the number is equal for A and B.
+    /// Number of samples per pixel in each replicate of the tile. The replicates A and B are the
+    /// two halves of the samples; between two allocation rounds they have equal numbers.
     pub done: u32,
-    /// Number of rays so far.
+    /// Number of rays traced in the tile so far.
     pub rays: u64,
-    /// `true` if a path has hit a glossy lobe.
+    /// `true` if a path in the tile has hit a glossy lobe.
     pub glossy: bool,
-    /// Latest noise estimate.
+    /// Latest noise estimate of the tile. `None` before the first estimate.
     pub error: Option<TileNoise>,
-    /// Earlier noise estimates, oldest first. From one entry to the next the sample count at least
-    /// doubles.
+    /// Earlier noise estimates of the tile, oldest first. From one entry to the next the sample
+    /// count at least doubles.
     pub history: Vec<TileNoise>,
 }
 
@@ -30,8 +32,9 @@ impl Tile {
         Self { pixels, done: 0, rays: 0, glossy: false, error: None, history: Vec::new() }
     }
 
-    /// Records the report of a job. Discards estimates from fewer than `light_period` samples per
-    /// replicate if the report has one from more.
+    /// Records the report of a job of this tile. If the report has an estimate from at least
+    /// `light_period` samples per replicate (half of the samples), earlier estimates from fewer
+    /// samples are discarded.
     pub fn record(&mut self, report: &JobReport, light_period: u32) {
         self.rays += report.rays;
         self.glossy |= report.glossy;
@@ -43,13 +46,14 @@ impl Tile {
         }
     }
 
-    /// Discards all estimates.
+    /// Discards all noise estimates of the tile.
     pub fn forget_estimates(&mut self) {
         self.error = None;
         self.history.clear();
     }
 
-    /// Replaces all estimates by `estimate`; `None` for too few samples.
+    /// Replaces all noise estimates of the tile by `estimate`; `None` if the tile has too few
+    /// samples for an estimate.
     pub fn set_estimate(&mut self, estimate: Option<TileNoise>) {
         self.forget_estimates();
         if let Some(error) = estimate {
@@ -67,20 +71,22 @@ impl Tile {
         }
     }
 
-    /// Mean number of rays per sample; at least 1, for the camera ray.
+    /// Returns the mean number of rays per sample in the tile; at least 1, for the camera ray.
     pub fn rays_per_sample(&self) -> f64 {
         let samples = 2.0 * f64::from(self.done) * f64::from(self.pixels);
         (self.rays as f64 / samples.max(1.0)).max(1.0)
     }
 
-    /// Latest validation estimate of the mean squared error, which is the reported one; 0 before
-    /// the first estimate.
+    /// Returns the latest validation estimate of the tile's mean squared error, from the pixels
+    /// that do not select tiles for more samples. It is the reported error; 0 before the first
+    /// estimate.
     pub fn mse(&self, criterion: Criterion) -> f64 {
         self.error.map_or(0.0, |e| criterion.of(e.reported))
     }
 
-    /// Iterates over all estimates: the sample count, and the mean squared errors of the allocation
-    /// pixels and of the validation pixels.
+    /// Iterates over all noise estimates of the tile. Each item is `(sample count, [MSE of
+    /// allocation pixels, MSE of validation pixels])`. MSE is the mean squared error. Allocation
+    /// pixels select tiles for more samples; the error of validation pixels is reported.
     pub fn estimates(&self, criterion: Criterion) -> impl Iterator<Item = (f64, [f64; 2])> {
         let latest = self.error.filter(|e| self.history.last() != Some(e));
         let all = self.history.iter().copied().chain(latest);
@@ -89,18 +95,21 @@ impl Tile {
         })
     }
 
-    /// Returns the latest doubling of the sample count: count and error before and after it.
-    /// Returns `None` before the first doubling.
+    /// Returns `[estimate before, estimate after]` the latest doubling of the tile's sample count.
+    /// Each estimate is `(sample count, mean squared error of allocation pixels)`. Allocation
+    /// pixels select tiles for more samples. Returns `None` before the first doubling.
     pub fn last_doubling(&self, criterion: Criterion) -> Option<[(f64, f64); 2]> {
         let [.., before, after] = self.history.as_slice() else { return None };
         Some([before, after].map(|e| (f64::from(e.samples), criterion.of(e.allocation))))
     }
 
-    /// Returns the slope p with which the RMSE falls with the sample count n: RMSE ~ n^-p.
+    /// Returns the slope p with which the tile's RMSE falls with the sample count n: RMSE ~ n^-p.
     ///
-    /// The fit through the first and the last estimate is drawn towards `pooled`, the slope over
-    /// all similar tiles, with the weight of two doublings. The estimate of one tile is uncertain
-    /// by 5 to 35 per cent; a slope over one doubling is therefore uncertain by 0.05 to 0.4.
+    /// It is the mean of two slopes: the fit through the tile's first and last estimate, weighted
+    /// by the doublings between them, and `pooled`, the slope over all similar tiles, with the
+    /// weight of two doublings. The estimate of one tile is uncertain by 5 to 35 per cent; a slope
+    /// over one doubling is therefore uncertain by 0.05 to 0.4. Returns `pooled` before the first
+    /// doubling, or if an error is 0.
     pub fn slope(&self, criterion: Criterion, pooled: f64) -> f64 {
         const PRIOR_DOUBLINGS: f64 = 2.0;
         let [first, .., last] = self.history.as_slice() else { return pooled };
@@ -114,12 +123,13 @@ impl Tile {
     }
 }
 
-/// Slope of independent samples. A smaller fitted slope is regarded as chance.
+/// Convergence slope p of independent samples, RMSE ~ n^-p. A smaller fitted slope is regarded as
+/// chance.
 pub(super) const FLATTEST: f64 = 0.5;
-/// Largest plausible slope. A larger fitted slope is regarded as chance.
+/// Largest plausible convergence slope p, RMSE ~ n^-p. A larger fitted slope is regarded as chance.
 pub(super) const STEEPEST: f64 = 1.0;
 
-/// Clamps a slope to the plausible range; NaN becomes [`FLATTEST`].
+/// Clamps a convergence slope to [`FLATTEST`]..=[`STEEPEST`]; NaN becomes [`FLATTEST`].
 pub(super) fn clamp_slope(p: f64) -> f64 {
     if p.is_nan() { FLATTEST } else { p.clamp(FLATTEST, STEEPEST) }
 }

@@ -1,4 +1,5 @@
-//! Active render: traces one scene piece by piece, estimates its noise, and publishes snapshots.
+//! Active render of a session: traces one scene in pieces of a fraction of a second, estimates its
+//! noise, and publishes snapshots.
 
 use crate::film::{Film, IncrementalDownsample, TileNoise};
 use crate::render::checkpoint::{Checkpoint, EncodedCheckpoint};
@@ -18,38 +19,42 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Target duration of a piece of a wave, in seconds: if the client displays the picture, and if it
-/// does not.
+/// Target durations in seconds of a piece of a wave (a set of jobs that run concurrently): the
+/// first while the client requests a picture or a pixel, the second while it requests neither.
 const PIECE_SECONDS: [f64; 2] = [0.05, 0.25];
-/// Target duration of one job, in seconds. It is short, because a running job cannot be cancelled.
+/// Target duration in seconds of one tracing job. It is short, because a running job cannot be
+/// cancelled.
 const JOB_SECONDS: f64 = 0.005;
-/// Number of pixels of a tile.
+/// Number of pixels of a film tile.
 const TILE_PIXELS: f64 = crate::film::TILE_PIXELS as f64;
-/// Longest expected duration, in seconds, of a first-hit buffer that is traced before the first
-/// picture. A slower one is traced after the picture.
+/// Longest expected tracing time, in seconds, of a first-hit buffer that is traced before the first
+/// picture. A first-hit buffer holds the first hit of a camera ray per pixel. A buffer with a
+/// longer tracing time is traced after the picture.
 const FIRST_HITS_SECONDS: f64 = 0.002;
-/// Assumed seconds per ray of a first-hit buffer before one has been measured: the value of a small
-/// scene.
+/// Assumed seconds per ray of a first-hit buffer (first hits of camera rays) until one has been
+/// measured. It is the value of a small scene.
 const FIRST_HIT_RAY_SECONDS: f64 = 5e-8;
 
-/// Resources of a render, and the receiver of its snapshots.
-pub(super) struct WorkContext<'a> {
-    pub pool: &'a rayon::ThreadPool,
-    pub shared: &'a Shared,
-    pub notify: &'a Sender<()>,
+/// Resources that a render uses: the thread pool, the slot for its newest snapshot, the channel
+/// that announces it, and the optional contents of snapshots that the client has requested.
+pub(super) struct WorkContext {
+    pub pool: rayon::ThreadPool,
+    pub shared: Arc<Shared>,
+    pub notify: Sender<()>,
     pub view: View,
+    /// Generation of the scene (the number of its version).
     pub generation: u64,
 }
 
-impl WorkContext<'_> {
-    /// Returns `true` if a snapshot should be published. The snapshot after the last wave
-    /// (`is_final`) always is. Earlier ones are published only after the client has taken the
-    /// previous one, because they cost time and would be replaced unseen.
+impl WorkContext {
+    /// Returns `true` if a snapshot of the render should be published now. A snapshot with a
+    /// picture takes time. It is therefore published only if the client has taken the previous one,
+    /// or at the end of the render (`is_final`).
     fn snapshot_wanted(&self, is_final: bool) -> bool {
         is_final || self.view == View::default() || self.shared.slot.is_empty()
     }
 
-    /// Publishes `snapshot` and wakes the client.
+    /// Publishes a `snapshot` of the render and wakes the client.
     pub fn put(&self, snapshot: Snapshot) {
         self.shared.slot.put(snapshot);
         // The channel holds one wake-up; a full channel means that one is pending.
@@ -57,30 +62,49 @@ impl WorkContext<'_> {
     }
 }
 
-/// Active render of one scene.
+/// Render of one scene that a session is tracing or has finished: film, schedule and times.
 pub(super) struct ActiveRender {
     pub state: RenderState,
     pub schedule: Schedule,
-    /// Start of the compilation.
+    /// Time at which the compilation of the scene started.
     started: Instant,
     compiled_in: Duration,
-    /// Total time of all waves.
+    /// Total time that the render has spent on tracing rays.
     traced_for: Duration,
-    /// Time from `started` to the first complete picture.
+    /// Time from `started` to the first complete picture. `None` before that picture.
     pub first_picture_after: Option<Duration>,
-    /// `true` if the errors of the tiles must be estimated again, because light weights or display
-    /// transform have changed.
+    /// `true` if the errors of the tiles must be estimated again, because the light weights or the
+    /// display transform have changed.
     pub estimates_stale: bool,
     throughput: Throughput,
     inventory: Arc<str>,
     downsample: Option<IncrementalDownsample>,
     first_hits: Option<Arc<FirstHitBuffer>>,
-    /// Measured seconds per ray of the latest first-hit buffer.
+    /// Measured seconds per ray of the latest first-hit buffer; [`FIRST_HIT_RAY_SECONDS`] before
+    /// the first.
     first_hit_ray_seconds: f64,
 }
 
 impl ActiveRender {
-    /// Compiles `scene` and starts its render. The film of `previous` is reused.
+    /// Creates a render that has not traced yet. Its compilation began at `started`.
+    fn new(state: RenderState, schedule: Schedule, started: Instant) -> Self {
+        Self {
+            schedule,
+            started,
+            compiled_in: started.elapsed(),
+            traced_for: Duration::ZERO,
+            first_picture_after: None,
+            estimates_stale: false,
+            throughput: Throughput::default(),
+            inventory: Arc::from(state.world.inventory()),
+            downsample: None,
+            first_hits: None,
+            first_hit_ray_seconds: FIRST_HIT_RAY_SECONDS,
+            state,
+        }
+    }
+
+    /// Compiles `scene` and starts its render. The memory of the film of `previous` is reused.
     ///
     /// # Errors
     /// Returns the first validation error of the scene.
@@ -91,28 +115,16 @@ impl ActiveRender {
         previous: Option<Self>,
     ) -> Result<Self, String> {
         let started = Instant::now();
-        let first_hit_ray_seconds = previous
-            .as_ref()
-            .map_or(FIRST_HIT_RAY_SECONDS, |previous| previous.first_hit_ray_seconds);
-        let state = RenderState::checked(scene, options, previous.map(|previous| previous.state))?;
+        let (previous, measured) =
+            previous.map(|previous| (previous.state, previous.first_hit_ray_seconds)).unzip();
+        let state = RenderState::checked(scene, options, previous)?;
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
-        Ok(Self {
-            schedule: state.schedule(settings),
-            started,
-            compiled_in: started.elapsed(),
-            traced_for: Duration::ZERO,
-            first_picture_after: None,
-            estimates_stale: false,
-            throughput: Throughput::default(),
-            inventory: Arc::from(state.world.inventory().to_string()),
-            downsample: None,
-            first_hits: None,
-            first_hit_ray_seconds,
-            state,
-        })
+        let schedule = state.schedule(settings);
+        let first_hit_ray_seconds = measured.unwrap_or(FIRST_HIT_RAY_SECONDS);
+        Ok(Self { first_hit_ray_seconds, ..Self::new(state, schedule, started) })
     }
 
-    /// Continues the render of `checkpoint` and shows `scene`.
+    /// Continues the render of `checkpoint`, whose samples are shown as a picture of `scene`.
     ///
     /// # Errors
     /// Returns the reason why the checkpoint cannot be used for this scene.
@@ -127,18 +139,9 @@ impl ActiveRender {
         let settings = Settings { rays_per_pixel: scene.film.rays_per_pixel, ..settings };
         let schedule = resumed.schedule(settings).map_err(|error| error.to_string())?;
         let mut render = Self {
-            schedule,
-            started,
-            compiled_in: started.elapsed(),
             traced_for: Duration::from_secs_f64(resumed.seconds),
             first_picture_after: Some(started.elapsed()),
-            estimates_stale: false,
-            throughput: Throughput::default(),
-            inventory: Arc::from(resumed.state.world.inventory().to_string()),
-            downsample: None,
-            first_hits: None,
-            first_hit_ray_seconds: FIRST_HIT_RAY_SECONDS,
-            state: resumed.state,
+            ..Self::new(resumed.state, schedule, started)
         };
         if resumed.is_relit {
             render.invalidate_estimates();
@@ -156,16 +159,16 @@ impl ActiveRender {
         self.first_picture_after?;
         let report = self.report(context, state);
         let Self { state, schedule, .. } = self;
-        Some(EncodedCheckpoint::new(state, schedule, &report, provenance, context.pool))
+        Some(EncodedCheckpoint::new(state, schedule, &report, provenance, &context.pool))
     }
 
-    /// Seconds spent on tracing.
+    /// Returns the seconds that the render has spent on tracing rays.
     pub fn seconds(&self) -> f64 {
         self.traced_for.as_secs_f64()
     }
 
-    /// Shows `scene` from now on and returns `true` if the samples of the film are valid for it.
-    /// Otherwise returns `false`.
+    /// Shows the samples of the film as a picture of `scene` from now on, if they are valid for it.
+    /// Returns `true` if they are valid; otherwise `false`.
     pub fn try_reuse(&mut self, scene: &Arc<Scene>) -> bool {
         let weights = self.state.mix.clone();
         if !self.state.try_reuse(scene) {
@@ -185,13 +188,13 @@ impl ActiveRender {
         self.estimates_stale = true;
     }
 
-    /// Discards the measured speed, for example after a change of the number of threads.
+    /// Discards the measured speed of tracing, for example after a change of the number of threads.
     pub fn reset_throughput(&mut self) {
         self.throughput = Throughput::default();
     }
 
-    /// Estimates the errors of all tiles. If `cancel_wave` cancels it, returns `false` and changes
-    /// nothing.
+    /// Estimates the errors of all tiles again. If `cancel_wave` becomes `true` before the end,
+    /// returns `false` and changes nothing.
     pub fn reestimate(&mut self, pool: &rayon::ThreadPool, cancel_wave: &AtomicBool) -> bool {
         let (film, estimator) = (&self.state.film, self.state.estimator());
         let estimate =
@@ -209,13 +212,14 @@ impl ActiveRender {
         estimates.is_some()
     }
 
-    /// Traces `wave`, or only a piece of it.
+    /// Traces `wave` (a set of jobs that run concurrently), or only a piece of it, and adds the
+    /// samples to the film.
     pub fn trace(&mut self, wave: Wave, context: &WorkContext) {
-        let flags = context.shared;
+        let flags = &context.shared;
         if self.first_picture_after.is_some() {
             let wave = self.piece(wave, context);
             let start = Instant::now();
-            let report = self.state.trace_wave(&wave, context.pool, &flags.cancel_wave);
+            let report = self.state.trace_wave(&wave, &context.pool, &flags.cancel_wave);
             self.traced_for += start.elapsed();
             self.schedule.complete(&wave, &report);
             self.throughput.record(self.seconds(), self.schedule.samples());
@@ -231,11 +235,11 @@ impl ActiveRender {
                 return;
             }
             let report = coarse.clone();
-            context.put(frame.snapshot(film, Vec::new(), report, downsample, context.pool));
+            context.put(frame.snapshot(film, Vec::new(), report, downsample, &context.pool));
         };
         let report = self.state.trace_first_pass(
             &wave,
-            context.pool,
+            &context.pool,
             &flags.cancel_first_pass,
             &mut publish,
         );
@@ -252,7 +256,8 @@ impl ActiveRender {
         }
     }
 
-    /// Cuts `wave` to a piece of about [`PIECE_SECONDS`], with jobs of about [`JOB_SECONDS`].
+    /// Cuts `wave` (a set of jobs that run concurrently) to a piece of about [`PIECE_SECONDS`],
+    /// with jobs of about [`JOB_SECONDS`].
     fn piece(&self, wave: Wave, context: &WorkContext) -> Wave {
         let seconds = PIECE_SECONDS[usize::from(context.view == View::default())];
         let Some(speed) = self.throughput.samples_per_second().or_else(|| self.mean_speed()) else {
@@ -270,8 +275,9 @@ impl ActiveRender {
         (seconds > 0.0).then(|| self.schedule.samples() as f64 / seconds)
     }
 
-    /// Traces the first-hit buffer of the view. Does nothing if there is one, or if it would take
-    /// longer than `limit` seconds.
+    /// Traces the first-hit buffer (first hits of camera rays) of the size that the client has
+    /// requested. Does nothing if it has been traced already, or if it would take longer than
+    /// `limit` seconds.
     fn update_first_hits(&mut self, context: &WorkContext, limit: f64) {
         let Some([columns, rows]) = context.view.raster else { return };
         if self.first_hits.as_ref().is_some_and(|f| [f.columns, f.rows] == [columns, rows]) {
@@ -286,7 +292,7 @@ impl ActiveRender {
         let RenderState { world, film, .. } = &self.state;
         let size = [film.width(), film.height()];
         let trace = |points: &[[f64; 2]], hits: &mut [_]| world.first_hit(points, hits);
-        let first_hits = FirstHitBuffer::new(size, [columns, rows], trace, context.pool);
+        let first_hits = FirstHitBuffer::new(size, [columns, rows], trace, &context.pool);
         self.first_hits = Some(Arc::new(first_hits));
         self.first_hit_ray_seconds = start.elapsed().as_secs_f64() / rays.max(1.0);
     }
@@ -301,7 +307,9 @@ impl ActiveRender {
         }
     }
 
-    /// Publishes a snapshot if one is wanted; see [`WorkContext::snapshot_wanted`].
+    /// Publishes a snapshot of the render if one is wanted (see [`WorkContext::snapshot_wanted`]).
+    /// `state` is the state of the session. `is_final` is `true` after the last wave (set of
+    /// concurrent jobs) of the render.
     pub fn publish(&mut self, context: &WorkContext, state: State, is_final: bool) {
         // A film that was cleared for a restart is empty. Its coarse picture has been published
         // already.
@@ -315,10 +323,10 @@ impl ActiveRender {
             None => Vec::new(),
         };
         let downsample = &mut self.downsample;
-        context.put(frame.snapshot(&self.state.film, noise, report, downsample, context.pool));
+        context.put(frame.snapshot(&self.state.film, noise, report, downsample, &context.pool));
     }
 
-    /// Report on the progress of the render; `state` is the state of the session.
+    /// Returns the report on the progress of the render; `state` is the state of the session.
     pub fn report(&self, context: &WorkContext, state: State) -> Report {
         let seconds = self.seconds();
         Report {

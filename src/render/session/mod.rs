@@ -1,10 +1,11 @@
 //! Background rendering: a thread that receives scenes, traces them and publishes snapshots.
 //!
-//! A client first sends a command and then raises the cancel flag of the running wave. The worker
-//! first lowers the flag and then receives all commands. In any other order a command could arrive
-//! between the two steps, and wait for the end of a wave that nothing cancels. If several scenes
-//! are waiting, only the newest is compiled. A cancelled wave loses no samples: its remaining jobs
-//! are traced when the render resumes.
+//! A client first sends a command and then raises the cancel flag of the running wave, a set of
+//! jobs that are traced concurrently. The worker (the rendering thread) first lowers the flag and
+//! then receives all commands. In any other order a command could arrive between the two steps, and
+//! wait for the end of a wave that nothing cancels. If several scenes are waiting, only the newest
+//! is compiled. A cancelled wave loses no samples: its remaining jobs are traced when the render
+//! resumes.
 //!
 //! A scene that differs from the active one only in light weights (see [`Relighting`]) keeps the
 //! film, its samples and the schedule; only the noise is estimated again. Long waves are traced in
@@ -19,7 +20,6 @@ mod report;
 mod snapshot;
 #[cfg(test)]
 mod tests;
-mod threads;
 mod throughput;
 mod watch;
 mod worker;
@@ -27,8 +27,9 @@ mod worker;
 use crate::film::Display;
 use crate::render::export::Provenance;
 use crate::render::schedule::{Settings, Stop};
-use crate::render::{Checkpoint, EncodedCheckpoint, Options, RenderState};
+use crate::render::{Checkpoint, EncodedCheckpoint, Options, RenderState, threads};
 use crate::scene::Scene;
+use active_render::WorkContext;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded, unbounded};
 pub use report::{QUALITIES, Report, State};
 use snapshot::Slot;
@@ -41,7 +42,8 @@ use std::time::{Duration, Instant};
 pub use watch::{WatchReport, WatchSession, WatchedShards, WatchedState};
 use worker::Worker;
 
-/// Function that runs on the rendering thread. Its argument is `None` without a film.
+/// Function that a client queues to run on the rendering thread. It gets the state and the report
+/// of the render; `None` if there is no film.
 type Task = Box<dyn FnOnce(Option<(&RenderState, &Report)>) + Send>;
 
 /// Function that gets an encoded checkpoint, or `None` if there is no picture yet.
@@ -61,16 +63,17 @@ enum Command {
     Quit,
 }
 
-/// State that session and worker share in addition to the command channel.
+/// State that the session's handle and its rendering thread share in addition to the command
+/// channel.
 #[derive(Default)]
 struct Shared {
-    /// Cancels the running wave, because commands are waiting.
+    /// Flag that cancels the wave being traced (a set of concurrent jobs), because commands are
+    /// waiting.
     cancel_wave: AtomicBool,
-    /// Cancels the first pass, because a newer scene is waiting.
+    /// Flag that cancels the first pass over the picture, because a newer scene is waiting.
     cancel_first_pass: AtomicBool,
     slot: Slot,
-    /// Number of compilations. Tests read it, because skipped scenes are not visible outside of the
-    /// worker otherwise.
+    /// Number of scenes compiled so far. Tests read it to see which scenes were skipped.
     #[cfg(test)]
     compilations: std::sync::atomic::AtomicUsize,
 }
@@ -88,15 +91,19 @@ impl Session {
     /// Starts a session that traces with `threads` threads.
     ///
     /// # Errors
-    /// Returns the operating system's error if a thread cannot be started.
+    /// Returns an error for the user if a thread cannot be started.
     pub fn new(threads: usize, options: Options, settings: Settings) -> io::Result<Self> {
         let pool = threads::pool(threads, 0)?;
         let (commands, inbox) = unbounded();
         // The channel holds one wake-up; a full channel means that one is pending.
         let (notify, wakeup) = bounded(1);
         let shared = Arc::new(Shared::default());
-        let worker = Worker::new(inbox, notify, Arc::clone(&shared), pool, options, settings);
-        let thread = std::thread::Builder::new().name("session".into()).spawn(|| worker.run())?;
+        let view = View::default();
+        let context =
+            WorkContext { pool, shared: Arc::clone(&shared), notify, view, generation: 0 };
+        let worker = Worker::new(inbox, context, options, settings);
+        let thread = std::thread::Builder::new().name("session".into()).spawn(|| worker.run());
+        let thread = thread.map_err(|error| threads::error_of(threads, error))?;
         Ok(Self { commands, shared, wakeup, generations: 0, thread: Some(thread) })
     }
 
@@ -106,19 +113,14 @@ impl Session {
     ///
     /// [`Relighting::mix`]: crate::render::Relighting::mix
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> u64 {
-        self.generations += 1;
-        self.send(Command::Scene(self.generations, scene));
-        self.shared.cancel_first_pass.store(true, Ordering::Release);
-        self.generations
+        self.begin(|generation| Command::Scene(generation, scene))
     }
 
-    /// Continues the render of `checkpoint` and shows `scene`, as [`Session::set_scene`] does. If
-    /// the checkpoint cannot be used for this scene, reports have the state [`State::Failed`].
+    /// Continues the render of `checkpoint`, whose samples are shown as a picture of `scene`.
+    /// Returns the generation of the scene as [`Session::set_scene`] does. If the checkpoint cannot
+    /// be used for this scene, reports have the state [`State::Failed`].
     pub fn continue_from(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) -> u64 {
-        self.generations += 1;
-        self.send(Command::Resume(self.generations, scene, Box::new(checkpoint)));
-        self.shared.cancel_first_pass.store(true, Ordering::Release);
-        self.generations
+        self.begin(|generation| Command::Resume(generation, scene, Box::new(checkpoint)))
     }
 
     /// Encodes the render as a checkpoint between two pieces of work, and calls `task` with it on
@@ -131,21 +133,19 @@ impl Session {
         self.send(Command::Checkpoint(provenance, Box::new(task)));
     }
 
-    /// Compiles the newest scene again and starts with an empty film. Returns a new generation, as
-    /// [`Session::set_scene`] does.
+    /// Compiles the newest scene again and starts with an empty film. Returns a new generation
+    /// (number of a version of the scene), as [`Session::set_scene`] does.
     pub fn restart(&mut self) -> u64 {
-        self.generations += 1;
-        self.send(Command::Restart(self.generations));
-        self.shared.cancel_first_pass.store(true, Ordering::Release);
-        self.generations
+        self.begin(Command::Restart)
     }
 
-    /// Sets the stop criteria. A finished render resumes if the new criteria are not reached yet.
+    /// Sets the stop criteria of the render. A finished render resumes if the new criteria are not
+    /// reached yet.
     pub fn set_stop(&self, stop: Stop) {
         self.send(Command::Stop(stop));
     }
 
-    /// Sets the display transform under which the noise is estimated. Samples are kept.
+    /// Sets the display transform of the picture whose noise is estimated. Samples are kept.
     pub fn set_display(&self, display: Display) {
         self.send(Command::Display(display));
     }
@@ -161,24 +161,25 @@ impl Session {
         Ok(())
     }
 
-    /// Pauses tracing until [`Session::resume`].
+    /// Pauses the render until [`Session::resume`].
     pub fn pause(&self) {
         self.send(Command::Pause(true));
     }
 
-    /// Resumes tracing after a pause.
+    /// Resumes the render after a pause.
     pub fn resume(&self) {
         self.send(Command::Pause(false));
     }
 
-    /// Sets the contents of snapshots. Initially they contain neither picture nor probe.
+    /// Sets the contents of snapshots. Initially they contain neither picture nor pixel probe.
     pub fn set_view(&self, view: View) {
         self.send(Command::View(view));
     }
 
     /// Queues `task` and returns at once. The task runs on the rendering thread between two pieces
-    /// of work. Its argument is `None` if there is no film: no scene has been set yet, or the scene
-    /// cannot be rendered. Tasks that are still queued when the session ends are dropped.
+    /// of work. It gets the state and the report of the render. It gets `None` if there is no film:
+    /// no scene has been set yet, or the scene cannot be rendered. Tasks that are still queued when
+    /// the session ends are dropped.
     pub fn submit(&self, task: impl FnOnce(Option<(&RenderState, &Report)>) + Send + 'static) {
         self.send(Command::Task(Box::new(task)));
     }
@@ -199,7 +200,7 @@ impl Session {
         receiver.recv().ok()
     }
 
-    /// Channel that receives a message whenever a new snapshot is published.
+    /// Returns the channel that receives a message whenever a new snapshot is published.
     pub fn wakeup(&self) -> &Receiver<()> {
         &self.wakeup
     }
@@ -208,7 +209,7 @@ impl Session {
     /// `limit`.
     ///
     /// # Panics
-    /// If the rendering thread has panicked.
+    /// Panics if the rendering thread has panicked.
     pub fn wait(&self, limit: Duration) -> Option<Snapshot> {
         let deadline = Instant::now() + limit;
         loop {
@@ -230,8 +231,15 @@ impl Session {
         self.shared.slot.take()
     }
 
-    /// Sends the command, then raises the cancel flag. The module's documentation explains the
-    /// order.
+    /// Sends a command to the rendering thread and cancels the first pass. `command` creates the
+    /// command from a new generation (number of a version of the scene). Returns the generation.
+    fn begin(&mut self, command: impl FnOnce(u64) -> Command) -> u64 {
+        self.generations += 1;
+        self.send(command(self.generations));
+        self.shared.cancel_first_pass.store(true, Ordering::Release);
+        self.generations
+    }
+
     fn send(&self, command: Command) {
         // The worker ends only by `Quit`, or by a panic, which `drop` propagates.
         let _ = self.commands.send(command);

@@ -1,7 +1,7 @@
 //! Snapshots: picture and progress of a render at one moment, published by the session.
 
 use crate::film::{
-    DirtyTile, Display, Film, IncrementalDownsample, LightWeights, Probe, Thumbnail,
+    DirtyTile, Display, Film, IncrementalDownsample, LightWeights, PixelProbe, Thumbnail,
 };
 use crate::render::first_hit_buffer::FirstHitBuffer;
 use crate::render::relighting::Relighting;
@@ -10,78 +10,72 @@ use crate::scene::Scene;
 use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Contents of snapshots that a client requests.
+/// Contents that a client requests of snapshots: the size of the picture, and the pixel to probe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct View {
     /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::first_hits`]. `None` requests
-    /// neither picture nor first-hit buffer nor tile maps.
+    /// neither of them, and no [`Snapshot::tiles`].
     pub raster: Option<[usize; 2]>,
-    /// Column and row of the pixel to probe. `None` requests no probe.
+    /// Column and row of the pixel whose samples and error are requested. `None` requests none.
     pub probe: Option<[usize; 2]>,
 }
 
-/// The state of a render at one moment. All fields describe the scene of `report.generation`.
-#[derive(Clone, Debug)]
+/// State of a render at one moment. All fields describe the version of the scene with the number
+/// `report.generation`.
+#[derive(Clone, Debug, Default)]
 pub struct Snapshot {
     /// Progress of the render.
     pub report: Report,
-    /// Mean of each light group over each cell of [`View::raster`]. The client applies the light
-    /// weights. `None` if no picture is requested, or without a film.
+    /// Picture in the size that [`View::raster`] requests. It has the mean radiance of each light
+    /// group (lights that share one weight) in each pixel. The client applies the light weights.
+    /// `None` if no picture is requested, or without a film.
     pub picture: Option<Thumbnail>,
     /// Light weights of the scene in the report; empty without a film.
     pub mix: LightWeights,
-    /// Relighting that computes the light weights of other scenes. `None` without a film.
+    /// Light groups of the film. [`Snapshot::mix_for`] computes from them the light weights of a
+    /// scene whose lights alone were edited since. `None` without a film.
     pub lighting: Option<Arc<Relighting>>,
-    /// First hit in each cell of [`View::raster`]. If tracing it takes long, it is missing in
-    /// snapshots before the first complete picture.
+    /// First hit of the camera ray through each pixel of the smaller image that [`View::raster`]
+    /// requests. `None` if none is requested, or without a scene. Before the first complete picture
+    /// it is also `None` if the tracing of these hits takes long.
     pub first_hits: Option<Arc<FirstHitBuffer>>,
     /// Error and number of samples of each tile.
     pub tiles: Arc<TileMaps>,
-    /// Probe of the requested pixel. `None` if the pixel is outside of the film or no probe is
-    /// requested.
-    pub probe: Option<Probe>,
+    /// Samples and error of the requested pixel. `None` if the pixel is outside of the film or none
+    /// is requested.
+    pub probe: Option<PixelProbe>,
 }
 
 impl Snapshot {
-    /// Creates a snapshot with `report` and without a film.
-    pub(super) fn without_film(report: Report) -> Self {
-        Self {
-            report,
-            picture: None,
-            mix: LightWeights { weights: Vec::new() },
-            lighting: None,
-            first_hits: None,
-            tiles: Arc::default(),
-            probe: None,
-        }
-    }
-
     /// Returns the light weights with which this picture shows `scene`, which may be newer than the
-    /// snapshot. Returns `None` if `scene` needs new samples; only [`Snapshot::mix`] then fits the
-    /// picture.
+    /// snapshot. Returns `None` if `scene` needs new samples, because more than light colours and
+    /// intensities differ. The picture can then only show its own scene, with the weights
+    /// [`Snapshot::mix`].
     pub fn mix_for(&self, scene: &Scene) -> Option<LightWeights> {
         self.lighting.as_ref()?.mix(scene)
     }
 }
 
-/// Values of the film's tiles, in row order. A tile covers [`TILE`](crate::film::TILE) x
-/// [`TILE`](crate::film::TILE) pixels, fewer at the right and lower edge.
+/// RMSE and sample count of each tile of the film, in row order. A tile covers
+/// [`TILE`](crate::film::TILE) x [`TILE`](crate::film::TILE) pixels, fewer at the right and lower
+/// edge.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TileMaps {
-    /// Number of tiles in a row.
+    /// Number of tiles in a row of tiles.
     pub columns: usize,
-    /// Number of rows of tiles.
+    /// Number of rows of tiles of the film.
     pub rows: usize,
-    /// Estimated RMSE of each tile in 8-bit levels; empty before the first estimate.
+    /// Estimated RMSE of each tile as displayed, in 8-bit levels; empty before the first estimate.
     pub noise_codes: Vec<f32>,
-    /// Samples per pixel of each tile, over both replicates.
+    /// Samples per pixel of each tile, over both replicates (halves of the samples).
     pub spp: Vec<u32>,
 }
 
 impl TileMaps {
     pub(super) fn of(film: &Film, noise_codes: Vec<f32>) -> Self {
         let count = |tile: usize| {
-            film.tile(tile).map_or(0, |tile| tile.counts()[0].saturating_add(tile.counts()[1]))
+            let [a, b] = film.counts(tile);
+            a.saturating_add(b)
         };
         let columns = film.tile_columns();
         let rows = film.tile_count() / columns;
@@ -89,7 +83,8 @@ impl TileMaps {
     }
 }
 
-/// Fields whose values are equal in all snapshots of one film.
+/// Inputs of a snapshot besides the film: the contents that the client requests, light weights,
+/// display transform and first hits.
 pub(super) struct Frame {
     pub view: View,
     pub mix: LightWeights,
@@ -99,8 +94,9 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Creates a snapshot of the current film. `downsample` caches the contributions of tiles, so
-    /// that only changed tiles are read.
+    /// Creates a snapshot of `film`. `noise_codes` has the RMSE of each tile in 8-bit levels.
+    /// `downsample` keeps the smaller image of the previous snapshot, so that only changed tiles
+    /// are read again.
     pub fn snapshot(
         &self,
         film: &Film,
@@ -123,8 +119,10 @@ impl Frame {
             Some(_) => Arc::new(TileMaps::of(film, noise_codes)),
             None => Arc::default(),
         };
-        let probe =
-            self.view.probe.and_then(|pixel| Probe::of_film(film, pixel, &self.mix, &self.display));
+        let probe = self
+            .view
+            .probe
+            .and_then(|pixel| PixelProbe::of_film(film, pixel, &self.mix, &self.display));
         Snapshot {
             report,
             picture,
@@ -137,7 +135,8 @@ impl Frame {
     }
 }
 
-/// Slot that holds the latest snapshot. A new snapshot replaces one that has not been taken.
+/// Slot that holds the latest snapshot of a render. A new snapshot replaces one that has not been
+/// taken.
 #[derive(Debug, Default)]
 pub(super) struct Slot(Mutex<Option<Snapshot>>);
 
@@ -154,8 +153,8 @@ impl Slot {
         self.lock().is_none()
     }
 
-    /// Locks the slot. A poisoned lock is used as well, because a client that panicked with the
-    /// lock has left a complete snapshot.
+    /// Locks the slot of the latest snapshot. The lock is usable even if it is poisoned, because a
+    /// client that panicked with the lock has left a complete snapshot.
     fn lock(&self) -> std::sync::MutexGuard<'_, Option<Snapshot>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

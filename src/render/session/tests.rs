@@ -1,5 +1,5 @@
-//! Tests of sessions with small scenes. The expensive scene is a camera inside of a mirroring
-//! sphere.
+//! Tests of sessions with small scenes. The expensive scene has a camera inside of a mirroring
+//! sphere, where every path is long.
 
 use crate::film::Noise;
 use crate::render::schedule::{Criterion, Spp, Stop, StoppedBy};
@@ -9,7 +9,7 @@ use crate::scene::built_in;
 use crate::world;
 use std::time::{Duration, Instant};
 
-/// Time limit of waits. It is so long that only a failing test reaches it.
+/// Longest time that a test waits for the session. Only a failing test reaches it.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn endless() -> Stop {
@@ -33,8 +33,8 @@ fn scene(width: u32) -> Arc<Scene> {
     Arc::new(scene)
 }
 
-/// Returns a scene in which every path has 500 reflections. Its first pass takes 64 times as long
-/// as its coarse picture, which is complete within a fraction of a second.
+/// Returns a scene in which every path has 500 reflections. Its first pass of samples takes 64
+/// times as long as its coarse picture, which is complete within a fraction of a second.
 fn expensive_scene() -> Arc<Scene> {
     const TEXT: &str = r#"
         [film]
@@ -56,7 +56,7 @@ fn expensive_scene() -> Arc<Scene> {
     Arc::new(Scene::parse(TEXT, "test").unwrap())
 }
 
-/// Returns the first snapshot for which `accepts` is true.
+/// Returns the first snapshot of the render for which `accepts` is true.
 fn wait_for(session: &Session, accepts: impl Fn(&Snapshot) -> bool) -> Snapshot {
     let end = Instant::now() + PATIENCE;
     loop {
@@ -67,7 +67,7 @@ fn wait_for(session: &Session, accepts: impl Fn(&Snapshot) -> bool) -> Snapshot 
     }
 }
 
-/// Starts the expensive scene and returns the time to its coarse picture.
+/// Starts the expensive scene and returns the time until its coarse picture is published.
 fn start_expensive_scene(session: &mut Session) -> Duration {
     let start = Instant::now();
     let generation = session.set_scene(expensive_scene());
@@ -121,48 +121,65 @@ fn wait_ignores_messages_of_snapshots_already_taken() {
         let generation = session.set_scene(scene(128));
         let snapshot = session.wait(PATIENCE).expect("a snapshot in time");
         assert_eq!(snapshot.report.generation, generation);
-        wait_for(&session, |s| matches!(s.report.state, State::Finished(_)));
+        // A late client takes only the last snapshot, and no other one follows.
+        if !matches!(snapshot.report.state, State::Finished(_)) {
+            wait_for(&session, |s| matches!(s.report.state, State::Finished(_)));
+        }
     }
+}
+
+/// Checks that `interrupt` ends the first pass of the expensive scene early: within 16 times the
+/// time of the coarse picture. The whole pass takes 64 times. Only one of five attempts must be in
+/// time, because other programs may delay an attempt.
+fn assert_first_pass_is_cancelled(interrupt: impl Fn(Session)) {
+    let mut attempts = Vec::new();
+    for _ in 0..5 {
+        let mut session = session(endless());
+        let coarse = start_expensive_scene(&mut session);
+        let start = Instant::now();
+        interrupt(session);
+        let elapsed = start.elapsed();
+        if elapsed < 16 * coarse {
+            return;
+        }
+        attempts.push((elapsed, coarse));
+    }
+    panic!("times from the interrupt to its effect, and of coarse pictures: {attempts:?}");
 }
 
 #[test]
 fn new_scene_cancels_the_first_pass() {
-    let mut session = session(endless());
-    let coarse = start_expensive_scene(&mut session);
-    let start = Instant::now();
-    let newest = session.set_scene(scene(16));
-    wait_for(&session, |s| s.report.generation == newest && s.report.samples > 0);
-    let elapsed = start.elapsed();
-    assert!(elapsed < 16 * coarse, "{elapsed:?} after a coarse picture in {coarse:?}");
+    assert_first_pass_is_cancelled(|mut session| {
+        let newest = session.set_scene(scene(16));
+        wait_for(&session, |s| s.report.generation == newest && s.report.samples > 0);
+    });
 }
 
 #[test]
 fn dropped_session_cancels_the_first_pass() {
-    let mut session = session(endless());
-    let coarse = start_expensive_scene(&mut session);
-    let start = Instant::now();
-    drop(session);
-    let elapsed = start.elapsed();
-    assert!(elapsed < 16 * coarse, "{elapsed:?} after a coarse picture in {coarse:?}");
+    assert_first_pass_is_cancelled(drop);
 }
 
 #[test]
 fn pause_stops_tracing_and_loses_no_sample() {
-    let mut session = session(Stop { spp: Some(64), ..Stop::default() });
+    let mut session = session(endless());
     session.set_scene(scene(256));
     wait_for(&session, |s| s.report.samples > 0);
     session.pause();
     let paused = wait_for(&session, |s| s.report.state == State::Paused);
+    // The number of samples before the pause depends on the load of the machine.
+    let spp = 64 * (paused.report.spp.max / 64 + 1);
+    session.set_stop(Stop { spp: Some(spp), ..Stop::default() });
     std::thread::sleep(Duration::from_millis(30));
     // A task on the film runs during a pause.
     assert_eq!(session.with(|_, report| report.samples), Some(paused.report.samples));
     session.resume();
     let end = wait_for(&session, |s| matches!(s.report.state, State::Finished(_)));
     assert_eq!(end.report.state, State::Finished(StoppedBy::Spp));
-    assert_eq!(end.report.spp, Spp { min: 64, mean: 64.0, max: 64 });
+    assert_eq!(end.report.spp, Spp { min: spp, mean: f64::from(spp), max: spp });
     let counts = session
         .with(|state, _| state.film.touched().map(|(_, tile)| tile.counts()).collect::<Vec<_>>());
-    assert_eq!(counts, Some(vec![[32, 32]; 64]));
+    assert_eq!(counts, Some(vec![[spp / 2; 2]; 64]));
 }
 
 #[test]
@@ -210,7 +227,7 @@ fn snapshots_hold_what_the_view_requests() {
 
 #[test]
 fn reports_hold_noise_and_time_left() {
-    let mut session = session(Stop { spp: Some(200), ..Stop::default() });
+    let mut session = session(endless());
     session.set_scene(scene(64));
     let running = wait_for(&session, |s| s.report.noise.is_some()).report;
     let Noise { rmse_codes, .. } = running.noise.unwrap();
@@ -221,6 +238,7 @@ fn reports_hold_noise_and_time_left() {
     assert!(running.samples_per_second() > 0.0);
     assert!(running.compile_seconds > 0.0);
     assert!(running.first_picture_seconds.is_some_and(|s| s > running.compile_seconds));
+    session.set_stop(Stop { spp: Some(running.spp.max), ..Stop::default() });
     let end = wait_for(&session, |s| s.report.state != State::Tracing).report;
     assert_eq!(end.progress, Some(1.0));
     assert!(end.seconds >= running.seconds);

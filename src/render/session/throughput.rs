@@ -1,14 +1,16 @@
-//! Throughput: samples per second over the latest second of tracing.
+//! Throughput of tracing: samples per second over the latest second.
 
 use std::collections::VecDeque;
 
-/// Length of the measured time window, in seconds of tracing.
+/// Length of the time window in which the throughput is measured, in seconds of tracing.
 const WINDOW_SECONDS: f64 = 1.0;
 
-/// Sample counts at several times within the latest [`WINDOW_SECONDS`].
+/// Throughput of tracing in the latest second ([`WINDOW_SECONDS`]), computed from recorded sample
+/// counts.
 #[derive(Debug, Default)]
 pub(super) struct Throughput {
-    /// Pairs of tracing time and sample count since the start of the render, oldest first.
+    /// Recorded totals since the start of the render, oldest first, each as `(seconds of tracing,
+    /// number of samples)`.
     marks: VecDeque<(f64, u64)>,
 }
 
@@ -21,7 +23,8 @@ impl Throughput {
         }
     }
 
-    /// Samples per second in the window. Returns `None` before there are two marks.
+    /// Returns the number of samples (over all pixels) per second of tracing in the latest time
+    /// window. Returns `None` before there are two sample counts.
     pub fn samples_per_second(&self) -> Option<f64> {
         let (&(from, first), &(to, last)) = (self.marks.front()?, self.marks.back()?);
         (to > from).then(|| (last - first) as f64 / (to - from))

@@ -1,5 +1,5 @@
-//! Session that shows films of other processes. It traces nothing: a thread reads the files when
-//! they are replaced, and publishes snapshots of their sum.
+//! Session that shows films of other processes. It traces nothing: a thread reads the film files
+//! when they are replaced, and publishes snapshots of the sum of all films.
 
 use crate::film::file::FilmFileHeader;
 use crate::film::{Display, Estimator, Film, IncrementalDownsample, Noise, TileNoise};
@@ -8,21 +8,22 @@ use crate::render::plan::WatchedFilms;
 pub use crate::render::plan::{WatchedShards, WatchedState};
 use crate::render::session::report::Report;
 use crate::render::session::snapshot::{Frame, Slot, Snapshot, View};
-use crate::render::session::threads;
+use crate::render::threads;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TryRecvError, bounded, unbounded};
 use rayon::prelude::*;
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Interval at which the files are checked.
+/// Interval at which the watched film files are checked.
 const POLL: Duration = Duration::from_secs(1);
-/// Pause after a check of the files, relative to its duration. Reading thereby takes at most a
-/// third of the time.
+/// Pause after a check of the watched files, as a multiple of the check's duration. Reading thereby
+/// takes at most a third of the time.
 const REST: u32 = 2;
 
-/// Function that runs on the thread of the session. Its argument is `None` without a film. The
-/// header has the metadata of a picture with its display transform.
+/// Function that a client queues to run on the thread of the watch session. Its argument is the
+/// film, its header and its report; `None` without a film. The header has the metadata of the
+/// picture and its display transform.
 type Task = Box<dyn FnOnce(Option<(&Film, &FilmFileHeader, &Report)>) + Send>;
 
 enum Command {
@@ -31,27 +32,31 @@ enum Command {
     Task(Task),
 }
 
-/// State of the watched files.
+/// State of the film files that a watch session shows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchReport {
-    /// Files and missing shards, the most urgent first. Ages are rounded down, to seconds in the
-    /// first minute and then to minutes.
+    /// State of each film file, and of the shards (parts of the render) without a file; the most
+    /// urgent comes first. The ages of files are rounded down, to seconds in the first minute and
+    /// then to minutes.
     pub shards: Vec<WatchedShards>,
-    /// Number of complete shards, the base included, and of all shards. `None` without a plan.
+    /// `[number of complete shards, number of all shards of the plan]`. The base, which holds the
+    /// samples that the plan started from, counts as a shard. `None` without a plan.
     pub complete: Option<[usize; 2]>,
-    /// Share of the plan's samples in the picture, 0..=1. `None` without a plan.
+    /// Share of the plan's samples that the picture holds, 0..=1. `None` without a plan.
     pub progress: Option<f64>,
-    /// Noise target of the plan in 8-bit levels.
+    /// Noise target of the plan: RMSE of the displayed picture in 8-bit levels. `None` without a
+    /// plan.
     pub target_codes: Option<f64>,
     /// Width and height of the picture in pixels. `None` before the first film.
     pub size: Option<[u32; 2]>,
-    /// Display transform of the films.
+    /// Display transform of the film files.
     pub display: Display,
-    /// Path of the scene file; empty before the first film.
+    /// Path of the scene file from which the films were rendered; empty before the first film.
     pub source: String,
 }
 
-/// Handle of the thread that shows watched films. The thread ends after the handle is dropped.
+/// Handle of the thread that shows films of other processes. The thread ends after the handle is
+/// dropped.
 pub struct WatchSession {
     commands: Sender<Command>,
     slot: Arc<Slot>,
@@ -59,8 +64,8 @@ pub struct WatchSession {
 }
 
 impl WatchSession {
-    /// Starts the thread, with `threads` threads for its computations. It calls `on_report` with
-    /// each report that differs from the previous one.
+    /// Starts the thread that shows `films`, with `threads` threads for its computations. It calls
+    /// `on_report` with each report that differs from the previous one.
     ///
     /// # Errors
     /// Returns the operating system's error if a thread cannot be started.
@@ -88,17 +93,19 @@ impl WatchSession {
         Ok(Self { commands, slot, wakeup })
     }
 
-    /// Sets the contents of snapshots.
+    /// Sets the contents of snapshots that the client requests.
     pub fn set_view(&self, view: View) {
         self.send(Command::View(view));
     }
 
-    /// Sets the display transform under which the noise is estimated, instead of that of the films.
+    /// Sets the display transform of pictures and noise estimates, instead of that of the film
+    /// files.
     pub fn set_display(&self, display: Display) {
         self.send(Command::Display(display));
     }
 
-    /// Queues `task` to run on the thread of the session.
+    /// Queues `task` to run on the thread of the watch session. Its argument is the film, its
+    /// header and its report; `None` without a film.
     pub fn submit(
         &self,
         task: impl FnOnce(Option<(&Film, &FilmFileHeader, &Report)>) + Send + 'static,
@@ -106,7 +113,7 @@ impl WatchSession {
         self.send(Command::Task(Box::new(task)));
     }
 
-    /// Channel that receives a message whenever a new snapshot is published.
+    /// Returns the channel that receives a message whenever a new snapshot is published.
     pub fn wakeup(&self) -> &Receiver<()> {
         &self.wakeup
     }
@@ -116,7 +123,7 @@ impl WatchSession {
         self.slot.take()
     }
 
-    /// Returns `true` if the thread has ended by a panic.
+    /// Returns `true` if the thread of the watch session has ended by a panic.
     pub fn has_ended(&self) -> bool {
         matches!(self.wakeup.try_recv(), Err(TryRecvError::Disconnected))
     }
@@ -133,16 +140,17 @@ struct Worker {
     slot: Arc<Slot>,
     notify: Sender<()>,
     view: View,
-    /// Display transform that replaces that of the films.
+    /// Display transform that the client has set in place of that of the film files. `None` if it
+    /// has set none.
     display: Option<Display>,
-    /// Estimates of the current film.
+    /// Report and noise estimates of the film that is shown. `None` without a film.
     shown: Option<Shown>,
     downsample: Option<IncrementalDownsample>,
-    /// Latest report that was sent.
+    /// Latest report that was sent to the client. `None` before the first.
     reported: Option<WatchReport>,
 }
 
-/// Estimates of a film.
+/// Report on the film that a watch session shows, and RMSE of its tiles in 8-bit levels.
 struct Shown {
     report: Report,
     noise_codes: Vec<f32>,
@@ -173,8 +181,8 @@ impl Worker {
         }
     }
 
-    /// Executes `command` and those queued after it. Publishes a snapshot if they changed its
-    /// contents.
+    /// Executes `command` and those queued after it. Publishes a snapshot if the requested contents
+    /// or the display transform changed.
     fn apply(&mut self, command: Command, inbox: &Receiver<Command>) {
         let mut changed = false;
         let mut next = Some(command);
@@ -207,7 +215,7 @@ impl Worker {
         task(Some((film, &header, &shown.report)));
     }
 
-    /// Estimates the noise of the sum.
+    /// Estimates the noise of the picture that the sum of all films shows.
     fn estimate(&mut self) {
         self.shown = None;
         let (Some(film), Some(header)) = (self.films.film(), self.films.header()) else { return };
@@ -255,7 +263,7 @@ impl Worker {
         let _ = self.notify.try_send(());
     }
 
-    /// Sends a report if it differs from the latest one.
+    /// Sends a report to the client if it differs from the latest one.
     fn report(&mut self, on_report: &dyn Fn(WatchReport)) {
         let report = WatchReport::new(&self.films, self.progress());
         if self.reported.as_ref() != Some(&report) {

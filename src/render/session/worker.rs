@@ -1,60 +1,56 @@
-//! Worker: the session's thread, which receives commands and chooses the next piece of work.
+//! Worker: the rendering thread of a session, which receives commands and chooses the next piece of
+//! work.
 
 use crate::film::Display;
 use crate::render::export::Provenance;
 use crate::render::schedule::{Settings, Step, Stop};
 use crate::render::session::active_render::{ActiveRender, WorkContext};
 use crate::render::session::report::{Report, State};
-use crate::render::session::snapshot::{Snapshot, View};
-use crate::render::session::{CheckpointTask, Command, Shared, Task};
+use crate::render::session::snapshot::Snapshot;
+use crate::render::session::{CheckpointTask, Command, Task};
 use crate::render::{Checkpoint, Options};
 use crate::scene::Scene;
-use crossbeam_channel::{Receiver, Sender};
+use crossbeam_channel::Receiver;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 pub(super) struct Worker {
     inbox: Receiver<Command>,
-    notify: Sender<()>,
-    shared: Arc<Shared>,
-    pool: rayon::ThreadPool,
+    context: WorkContext,
     options: Options,
     settings: Settings,
-    /// Newest scene, with its generation.
-    newest: Option<(u64, Arc<Scene>)>,
+    /// Newest scene that the client has set. `None` before the first.
+    newest: Option<Arc<Scene>>,
     /// `true` if the render of the newest scene has not been started yet.
     pending: bool,
     /// `true` if the newest scene must start with an empty film, even if samples could be reused.
     restart: bool,
-    /// Checkpoint to continue, and the scene to show with its samples.
+    /// Scene to show and checkpoint whose render is to be continued. `None` if there is nothing to
+    /// continue.
     resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
     tasks: Vec<Task>,
     checkpoints: Vec<(Provenance, CheckpointTask)>,
     paused: bool,
-    view: View,
-    /// Active render, or the reason for which the newest scene cannot be rendered.
+    /// Active render; `Ok(None)` if there is none. The error is the reason for which the newest
+    /// scene cannot be rendered.
     work: Result<Option<ActiveRender>, String>,
     /// State of the session after the latest piece of work.
     state: State,
-    /// `true` if there is no work before the next command.
+    /// `true` if there is no work to do before the next command.
     idle: bool,
 }
 
 impl Worker {
     pub fn new(
         inbox: Receiver<Command>,
-        notify: Sender<()>,
-        shared: Arc<Shared>,
-        pool: rayon::ThreadPool,
+        context: WorkContext,
         options: Options,
         settings: Settings,
     ) -> Self {
         Self {
             inbox,
-            notify,
-            shared,
-            pool,
+            context,
             options,
             settings,
             newest: None,
@@ -64,7 +60,6 @@ impl Worker {
             tasks: Vec::new(),
             checkpoints: Vec::new(),
             paused: false,
-            view: View::default(),
             work: Ok(None),
             state: State::Idle,
             idle: true,
@@ -81,12 +76,13 @@ impl Worker {
         }
     }
 
-    /// Receives all queued commands. Waits for one if there is no work.
+    /// Receives all queued commands of the client. Waits for one if there is no work. Returns
+    /// `Break` if the session ends.
     fn listen(&mut self) -> ControlFlow<()> {
         // The flags are lowered before commands are received. The module's documentation explains
         // the order.
-        self.shared.cancel_wave.swap(false, Ordering::AcqRel);
-        self.shared.cancel_first_pass.swap(false, Ordering::AcqRel);
+        self.context.shared.cancel_wave.swap(false, Ordering::AcqRel);
+        self.context.shared.cancel_first_pass.swap(false, Ordering::AcqRel);
         if self.idle {
             match self.inbox.recv() {
                 Ok(command) => self.apply(command)?,
@@ -102,26 +98,26 @@ impl Worker {
     fn apply(&mut self, command: Command) -> ControlFlow<()> {
         match command {
             Command::Scene(generation, scene) => {
-                self.newest = Some((generation, scene));
-                self.pending = true;
+                self.newest = Some(scene);
+                (self.pending, self.context.generation) = (true, generation);
             }
             Command::Resume(generation, scene, checkpoint) => {
                 self.resume = Some((Arc::clone(&scene), checkpoint));
-                self.newest = Some((generation, scene));
-                self.pending = true;
+                self.newest = Some(scene);
+                (self.pending, self.context.generation) = (true, generation);
             }
             Command::Restart(generation) => {
-                if let Some((newest, _)) = &mut self.newest {
-                    *newest = generation;
+                if self.newest.is_some() {
                     (self.pending, self.restart) = (true, true);
+                    self.context.generation = generation;
                 }
             }
             Command::Pause(paused) => self.paused = paused,
-            Command::View(view) => self.view = view,
+            Command::View(view) => self.context.view = view,
             Command::Stop(stop) => self.set_stop(stop),
             Command::Display(display) => self.set_display(display),
             Command::Pool(pool) => {
-                self.pool = pool;
+                self.context.pool = pool;
                 if let Ok(Some(work)) = &mut self.work {
                     work.reset_throughput();
                 }
@@ -151,7 +147,7 @@ impl Worker {
     }
 
     fn start_newest(&mut self) {
-        let Some((_, scene)) = &self.newest else { return };
+        let Some(scene) = &self.newest else { return };
         let restart = std::mem::take(&mut self.restart);
         if let Some((own, checkpoint)) = self.resume.take() {
             self.work = Ok(None);
@@ -168,7 +164,7 @@ impl Worker {
             return;
         }
         #[cfg(test)]
-        self.shared.compilations.fetch_add(1, Ordering::SeqCst);
+        self.context.shared.compilations.fetch_add(1, Ordering::SeqCst);
         let previous = std::mem::replace(&mut self.work, Ok(None)).ok().flatten();
         self.work = ActiveRender::start(scene, &self.options, self.settings, previous).map(Some);
     }
@@ -176,7 +172,7 @@ impl Worker {
     fn run_tasks(&mut self) {
         for (provenance, task) in std::mem::take(&mut self.checkpoints) {
             task(match &self.work {
-                Ok(Some(work)) => work.checkpoint(&provenance, &self.context(), self.state.clone()),
+                Ok(Some(work)) => work.checkpoint(&provenance, &self.context, self.state.clone()),
                 _ => None,
             });
         }
@@ -185,7 +181,7 @@ impl Worker {
         }
         let tasks = std::mem::take(&mut self.tasks);
         let film = match &self.work {
-            Ok(Some(work)) => Some((&work.state, work.report(&self.context(), self.state.clone()))),
+            Ok(Some(work)) => Some((&work.state, work.report(&self.context, self.state.clone()))),
             _ => None,
         };
         for task in tasks {
@@ -193,39 +189,23 @@ impl Worker {
         }
     }
 
-    fn generation(&self) -> u64 {
-        self.newest.as_ref().map_or(0, |(generation, _)| *generation)
-    }
-
-    fn context(&self) -> WorkContext<'_> {
-        WorkContext {
-            pool: &self.pool,
-            shared: &self.shared,
-            notify: &self.notify,
-            view: self.view,
-            generation: self.generation(),
-        }
-    }
-
-    /// Does one piece of work, if there is any.
+    /// Does the next piece of rendering work, if there is any: estimates the noise again if it is
+    /// out of date, traces a piece of a wave (set of concurrent jobs), and publishes a snapshot.
     fn advance(&mut self) {
-        let generation = self.generation();
-        let context = WorkContext {
-            pool: &self.pool,
-            shared: &self.shared,
-            notify: &self.notify,
-            view: self.view,
-            generation,
-        };
+        let context = &self.context;
         self.idle = true;
         let work = match &mut self.work {
             Ok(Some(work)) => work,
             Ok(None) => return,
             Err(reason) => {
                 self.state = State::Failed(reason.clone());
-                let idle = Report::idle(self.pool.current_num_threads());
-                let report = Report { generation, state: self.state.clone(), ..idle };
-                context.put(Snapshot::without_film(report));
+                let report = Report {
+                    generation: context.generation,
+                    state: self.state.clone(),
+                    threads: context.pool.current_num_threads(),
+                    ..Report::default()
+                };
+                context.put(Snapshot { report, ..Snapshot::default() });
                 return;
             }
         };
@@ -234,8 +214,8 @@ impl Worker {
         if work.estimates_stale {
             // The picture is published at once. Its noise follows as soon as it is estimated.
             self.state = if paused { State::Paused } else { State::Tracing };
-            work.publish(&context, self.state.clone(), true);
-            if !work.reestimate(&self.pool, &self.shared.cancel_wave) {
+            work.publish(context, self.state.clone(), true);
+            if !work.reestimate(&context.pool, &context.shared.cancel_wave) {
                 self.idle = false;
                 return;
             }
@@ -246,12 +226,12 @@ impl Worker {
             match work.schedule.next(work.seconds()) {
                 Step::Finished(reason) => State::Finished(reason),
                 Step::Trace(wave) => {
-                    work.trace(wave, &context);
+                    work.trace(wave, context);
                     self.idle = false;
                     State::Tracing
                 }
             }
         };
-        work.publish(&context, self.state.clone(), self.idle);
+        work.publish(context, self.state.clone(), self.idle);
     }
 }

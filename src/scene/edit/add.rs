@@ -1,12 +1,12 @@
 //! Adding objects, lights and materials, with defaults that fit the scene.
 
-use crate::light::{Directional, Environment, Falloff, Light, Point, Spot};
+use crate::light::{Falloff, Light};
 use crate::material::Material;
 use crate::primitive::{Form, ParallelogramForm};
 use crate::scene::edit::bounds::{BoundingSphere, scene_bounds};
-use crate::scene::edit::convert::SPOT_ANGLE;
+use crate::scene::edit::convert::{LIGHT_KINDS, set_kind};
 use crate::scene::edit::placement::place_for;
-use crate::scene::edit::properties::Word;
+use crate::scene::edit::properties::{Word, words};
 use crate::scene::edit::unique_name::{free_light, free_material, free_object};
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scale, Scene, TransformOp};
@@ -14,26 +14,18 @@ use crate::shape::{KINDS, Shape, compose};
 use crate::value::{Color, number, round_nice, round_significant, rounded_to, unit};
 use glam::DVec3;
 
-/// Returns the kinds of object that can be added, with descriptions.
+/// Returns the name and a description of each kind of object that can be added.
 pub fn object_kinds() -> Vec<Word> {
-    KINDS.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
+    words(KINDS)
 }
 
-/// Returns the kinds of light that can be added, with descriptions.
+/// Returns the name and a description of each kind of light that can be added.
 pub fn light_kinds() -> Vec<Word> {
-    let words = [
-        ("point", "Light from one point, such as a lamp."),
-        ("directional", "Light from infinitely far away, such as the sun."),
-        ("spot", "Light from one point into a cone, such as a spotlight."),
-        ("sphere", "Light from a sphere, such as a bulb: soft shadows."),
-        ("rectangle", "Light from one side of a rectangle, such as a window."),
-        ("disk", "Light from one side of a disk."),
-        ("environment", "Light from all directions, such as the sky."),
-    ];
-    words.map(|(name, doc)| Word { name: name.into(), doc: doc.into() }).to_vec()
+    words(LIGHT_KINDS)
 }
 
-/// Colours of new materials, used in turn.
+/// Colours of new materials, linear red, green and blue. A new material gets the first colour that
+/// no other material has.
 const PALETTE: [[f64; 3]; 6] = [
     [0.85, 0.16, 0.11],
     [0.13, 0.28, 0.8],
@@ -43,8 +35,8 @@ const PALETTE: [[f64; 3]; 6] = [
     [0.1, 0.6, 0.65],
 ];
 
-/// Returns a material with the first palette colour that no material of the scene has. If all
-/// colours are used, they are reused in turn.
+/// Returns a material with the first palette colour that no material of the scene has. If all are
+/// used, the number of materials modulo that of the colours selects one.
 fn fresh_material(scene: &Scene) -> Material {
     let used = |color: &[f64; 3]| scene.materials.values().any(|m| m.color.0 == *color);
     let free = PALETTE.iter().find(|color| !used(color));
@@ -97,8 +89,9 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     Edit::checked(next, subject, format!("add {kind}"))
 }
 
-/// Returns transform steps for a shape without a position key of its own. They place the shape
-/// upright on the point `base` and scale its longest side to `size`.
+/// Returns transform steps that place `shape`, which has no position key, upright on the point
+/// `base` and scale the longest side of its bounding box to `size`. The list is empty if the shape
+/// has no bounds.
 fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     // The axis of the canonical cylinder is z; meshes and compounds have y up, as scenes do.
     let mut steps = match shape {
@@ -115,9 +108,10 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     steps
 }
 
-/// Returns the length of a new object, rounded to one digit. It is 0.6 times the median length of
-/// the solids, limited to the scene's bounding radius. Without solids it is 0.15 times that radius,
-/// and 0.6 in an empty scene.
+/// Returns the length of a new object in scene units, rounded to one significant digit. It is 0.6
+/// times the median length of the solids, the objects that are not flat. This median is limited to
+/// 0.01 to 1 times R, the radius of the scene's bounding sphere. Without solids the length is 0.15
+/// R, in an empty scene 0.6.
 fn usual_size(scene: &Scene) -> f64 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let solid = |object: &Object| {
@@ -135,7 +129,8 @@ fn usual_size(scene: &Scene) -> f64 {
     round_significant(0.6 * size, 1)
 }
 
-/// Turns an upright flat shape so that its front faces the camera.
+/// Turns a flat shape about the vertical, to a multiple of 5 degrees, so that its front faces the
+/// camera. Other shapes and flat shapes that are nearly horizontal stay unchanged.
 fn face_camera(shape: &mut Shape, scene: &Scene) {
     let Form::Parallelogram(ParallelogramForm { u, v, .. }) = shape.form() else { return };
     let front = u.cross(v).normalize();
@@ -148,8 +143,8 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
 }
 
 /// Adds a light of the kind `kind` above the scene, to the right or left of the camera: on the side
-/// with fewer lights. Its intensity is that of a scene's only light, or half of that if another
-/// light is on.
+/// with fewer lights. At the centre of the scene it is as bright as a light without falloff with
+/// the intensity 1; half as bright if another light is on.
 ///
 /// # Errors
 /// Fails if there is no such kind.
@@ -170,33 +165,17 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let mut light = Light::default();
     let position = (center + from * (1.5 * radius)).map(|x| round_nice(x, radius)).to_array();
     let direction = (-from).normalize().map(|x| rounded_to(x, -2)).to_array();
+    set_kind(&mut light, kind, position, direction, radius / 5.0);
+    if light.kinds().is_empty() {
+        let found = format!("there is no kind of light called \"{kind}\"");
+        let kinds = crate::light::KINDS.join(", ");
+        return Err(EditError::new(&found, &format!("Expected one of {kinds}.")));
+    }
     let name = match kind {
-        "point" => {
-            light.point = Some(Point { position });
-            "lamp"
-        }
-        "directional" => {
-            light.directional = Some(Directional { direction });
-            "sun"
-        }
-        "spot" => {
-            let (outer_angle, inner_angle) = (SPOT_ANGLE, 0.5 * SPOT_ANGLE);
-            light.spot = Some(Spot { position, direction, outer_angle, inner_angle });
-            "spot"
-        }
-        "environment" => {
-            light.environment = Some(Environment::default());
-            "sky"
-        }
-        _ => {
-            light.set_surface(kind, center + from * (1.5 * radius), direction, radius / 5.0);
-            if light.surface().is_none() {
-                let found = format!("there is no kind of light called \"{kind}\"");
-                let kinds = crate::light::KINDS.join(", ");
-                return Err(EditError::new(&found, &format!("Expected one of {kinds}.")));
-            }
-            "lamp"
-        }
+        "directional" => "sun",
+        "spot" => "spot",
+        "environment" => "sky",
+        _ => "lamp",
     };
     light.name = free_light(scene, name);
     // A second light adds to the first, so that it gets half the intensity.
@@ -223,23 +202,7 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let label = format!("add {}", light.name);
     next.lights.push(light);
     let subject = Target::Light(next.lights.len() - 1);
-    let edit = Edit::checked(next, subject, label)?;
-    Ok(match note {
-        Some(note) => edit.with_note(note),
-        None => edit,
-    })
-}
-
-/// Adds a material that no object uses yet.
-///
-/// # Errors
-/// Returns the first validation error of the edited scene. The new material itself is valid.
-pub fn add_material(scene: &Scene) -> Result<Edit, EditError> {
-    let mut next = scene.clone();
-    let name = free_material(scene, "material");
-    next.materials.insert(name.clone(), fresh_material(scene));
-    let label = format!("add {name}");
-    Edit::checked(next, Target::Material(name), label)
+    Ok(Edit::checked(next, subject, label)?.with_note(note))
 }
 
 #[cfg(test)]

@@ -1,27 +1,28 @@
-//! Bounds of objects and scenes, for framing, step lengths and placement.
+//! Bounds of objects and scenes. They serve to frame objects with the camera, to choose the length
+//! of the arrow keys' steps, and to place new objects.
 
-use crate::primitive::Form;
 use crate::scene::edit::Target;
 use crate::scene::{Object, Scene};
 use crate::value::floor_log10;
 use glam::DVec3;
 
-/// A bounding sphere.
+/// Bounding sphere of an object or scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundingSphere {
-    /// Centre, in scene units.
+    /// Centre of the sphere, in scene units.
     pub center: [f64; 3],
-    /// Radius, in scene units; greater than 0.
+    /// Radius of the sphere, in scene units; greater than 0.
     pub radius: f64,
 }
 
-/// Lowest and highest corner of an axis-aligned box.
+/// Bounding box with sides parallel to the axes: `(lowest corner, highest corner)`.
 pub(super) type Extent = (DVec3, DVec3);
 
-/// Returns a bounding sphere for `subject`: of an object, of a point light, or of all finite
-/// objects with a material. The sphere of a plane has the scene's radius and is centred on the
-/// plane's position. That of a point light has a tenth of the scene's radius. Returns `None` for
-/// any other target.
+/// Returns a bounding sphere for `subject`, a part of the scene. The sphere of a finite object
+/// contains the object. The sphere of a plane is centred on the plane's position and has the radius
+/// R of [`scene_bounds`]. The sphere of a light with a position has the radius of the light, at
+/// least R / 10. The sphere of a material contains all finite objects that use it. Returns `None`
+/// for any other target.
 pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     match subject {
         Target::Object(i) => {
@@ -49,34 +50,36 @@ pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     }
 }
 
-/// Returns the bounding sphere of all solids in the scene. Without solids it is that of all finite
-/// objects; in an empty scene it is the unit sphere about the origin.
+/// Returns the bounding sphere of all solids in the scene, the finite objects that are not flat.
+/// Without solids it is that of all finite objects; without these it is the unit sphere about the
+/// origin.
 pub fn scene_bounds(scene: &Scene) -> BoundingSphere {
     middle(scene).map_or(BoundingSphere { center: [0.0; 3], radius: 1.0 }, ball)
 }
 
-/// Returns the bounding box of all solids. Without solids it is that of all finite objects. Returns
-/// `None` if there are none of either.
+/// Returns the bounding box of all solids in the scene, the finite objects that are not flat.
+/// Without solids it is that of all finite objects. Returns `None` if there are no finite objects.
 fn middle(scene: &Scene) -> Option<Extent> {
     let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
-    let solids = forms.iter().filter(|form| form.is_solid()).filter_map(Form::bounds);
-    solids.reduce(union).or_else(|| forms.iter().filter_map(Form::bounds).reduce(union))
+    let solids = forms.iter().filter(|form| form.is_solid()).filter_map(|form| form.bounds());
+    solids.reduce(union).or_else(|| forms.iter().filter_map(|form| form.bounds()).reduce(union))
 }
 
 pub(super) fn union(a: Extent, b: Extent) -> Extent {
     (a.0.min(b.0), a.1.max(b.1))
 }
 
-/// Returns the sphere through the corners of a box.
+/// Returns the sphere through the corners of a box, which is given by its lowest and highest
+/// corner.
 fn ball((low, high): Extent) -> BoundingSphere {
     let radius = (high - low).length() / 2.0;
     let center = low + (high - low) / 2.0;
     BoundingSphere { center: center.to_array(), radius: radius.max(f64::MIN_POSITIVE) }
 }
 
-/// Returns the coarse step of a coordinate: the power of ten between a hundredth and a tenth of the
-/// diameter of the scene's solids. It is 0.1 in a room with objects a few units apart. A fine step
-/// is a tenth of it.
+/// Returns the coarse step, in scene units, by which arrow keys change a coordinate: the power of
+/// ten between a hundredth and a tenth of the diameter of [`scene_bounds`]. It is 0.1 in a room
+/// with objects a few units apart. A fine step is a tenth of it.
 pub fn step_length(scene: &Scene) -> f64 {
     let exponent = floor_log10(2.0 * scene_bounds(scene).radius) - 1;
     format!("1e{}", exponent.clamp(-12, 8)).parse().unwrap_or(0.1)
@@ -84,7 +87,8 @@ pub fn step_length(scene: &Scene) -> f64 {
 
 /// Returns the distance from the eye to the pivot of camera movements, greater than 0. The pivot is
 /// the camera's target. For a camera with a direction it is the point of the view axis closest to
-/// the centre of the scene.
+/// the centre of [`scene_bounds`]. If this point is behind the eye or close to it, the distance is
+/// the radius of these bounds.
 pub fn pivot_distance(scene: &Scene) -> f64 {
     let eye = DVec3::from_array(scene.camera.eye);
     if let Some(target) = scene.camera.target {

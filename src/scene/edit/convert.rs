@@ -20,36 +20,40 @@ use glam::DVec3;
 use std::f64::consts::PI;
 use toml::{Table, Value};
 
+/// Kinds of light, each with its name and description.
+pub(super) const LIGHT_KINDS: &[Field] = &[
+    kind("point", "Light from one point, such as a lamp."),
+    kind("directional", "Light from infinitely far away, such as the sun."),
+    kind("spot", "Light from one point into a cone, such as a spotlight."),
+    kind("sphere", "Light from a sphere, such as a bulb: soft shadows."),
+    kind("rectangle", "Light from one side of a rectangle, such as a window."),
+    kind("disk", "Light from one side of a disk."),
+    kind("environment", "Light from all directions, such as the sky."),
+];
+
+const fn kind(name: &'static str, doc: &'static str) -> Field {
+    Field::required(name, ValueType::Text, "", doc)
+}
+
 /// Field for the kind of a light. It is a row of the inspector, and no key of scene files.
-pub(super) const KIND: Field = Field::required(
-    "kind",
-    ValueType::OneOf(&[
-        Field::required("point", ValueType::Text, "", "Light from one point."),
-        Field::required("directional", ValueType::Text, "", "Light from infinitely far away."),
-        Field::required("spot", ValueType::Text, "", "Light from one point into a cone."),
-        Field::required("sphere", ValueType::Text, "", "Light from a sphere."),
-        Field::required("rectangle", ValueType::Text, "", "Light from one side of a rectangle."),
-        Field::required("disk", ValueType::Text, "", "Light from one side of a disk."),
-        Field::required("environment", ValueType::Text, "", "Light from all directions."),
-    ]),
-    "",
-    "Kind of light source.",
-);
+pub(super) const KIND: Field =
+    Field::required("kind", ValueType::OneOf(LIGHT_KINDS), "", "Kind of light source.");
 
 /// Field for the choice between `target` and `direction` of a camera. It is a row of the inspector,
 /// and no key of scene files.
 pub(super) const AIM: Field = Field::required(
     "aim",
     ValueType::OneOf(&[
-        Field::required("target", ValueType::Text, "", "Directed at a point."),
-        Field::required("direction", ValueType::Text, "", "A fixed direction."),
+        kind("target", "Directed at a point."),
+        kind("direction", "A fixed direction."),
     ]),
     "",
     "Target point or fixed direction of the camera.",
 );
 
-/// Returns the key in `values` that is one of the mutually exclusive keys of `subject`. Returns
-/// `None` if `values` has none of them.
+/// Returns the key in `values` that is one of the mutually exclusive keys of the edit target
+/// `subject`, such as the kind `point` of a light. Returns `None` if `values` has none of these
+/// keys.
 pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
     crate::scene::edit::toml_view::exclusive_keys(subject)
         .iter()
@@ -57,7 +61,8 @@ pub(super) fn chosen(subject: &Target, values: &Table) -> Option<&'static str> {
         .find(|key| values.contains_key(*key))
 }
 
-/// Converts the value of `key` to the kind `name`. Nothing changes if it has this kind already.
+/// Converts `subject`, an edit target, so that the value of its `key` has the kind `name`, such as
+/// another shape or light. Nothing changes if it has this kind already.
 pub(super) fn switch(
     scene: &Scene,
     subject: &Target,
@@ -92,11 +97,7 @@ pub(super) fn switch(
         _ => {}
     }
     let values = read(&next, subject)?;
-    let edit = finish(&next, subject, key, values)?;
-    Ok(match note {
-        Some(note) => edit.with_note(note),
-        None => edit,
-    })
+    Ok(finish(&next, subject, key, values)?.with_note(note))
 }
 
 /// Returns a shape of the kind `name` with the position, size and rotation of `shape`; `None` if
@@ -139,11 +140,34 @@ fn rotation(shape: &Shape) -> f64 {
 }
 
 /// Angle of the outer cone of spot lights that are added or converted \[degrees\].
-pub(super) const SPOT_ANGLE: f64 = 30.0;
+const SPOT_ANGLE: f64 = 30.0;
 
-/// Converts a light. Its brightness and its direction at the centre of the scene are kept. A light
-/// with a position keeps it; if it also has a direction, it is aimed at the centre of the scene. A
-/// light with a size keeps its size.
+/// Gives `light`, which has no kind, the kind `name`. Of `position`, `direction` and `radius`, the
+/// light takes the values for which the kind has keys. Nothing changes if there is no such kind.
+pub(super) fn set_kind(
+    light: &mut Light,
+    name: &str,
+    position: [f64; 3],
+    direction: [f64; 3],
+    radius: f64,
+) {
+    match name {
+        "point" => light.point = Some(Point { position }),
+        "directional" => light.directional = Some(Directional { direction }),
+        "spot" => {
+            let (outer_angle, inner_angle) = (SPOT_ANGLE, 0.5 * SPOT_ANGLE);
+            light.spot = Some(Spot { position, direction, outer_angle, inner_angle });
+        }
+        "environment" => light.environment = Some(Environment::default()),
+        _ => light.set_surface(name, position.into(), direction, radius),
+    }
+}
+
+/// Converts a light to the kind `name`. The light keeps its position, direction and size where the
+/// new kind has them. A light that had no direction is aimed at the centre of the scene; one that
+/// had no position is placed at a distance of three scene radii from the centre. The irradiance at
+/// the centre is kept if the range of intensities allows it. Returns a note if it requires another
+/// intensity, otherwise `None`.
 fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> {
     if light.kinds() == [name] {
         return None;
@@ -168,16 +192,7 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     };
     let old = light.clone();
     light.clear_kind();
-    match name {
-        "point" => light.point = Some(Point { position }),
-        "directional" => light.directional = Some(Directional { direction }),
-        "spot" => {
-            let (outer_angle, inner_angle) = (SPOT_ANGLE, 0.5 * SPOT_ANGLE);
-            light.spot = Some(Spot { position, direction, outer_angle, inner_angle });
-        }
-        "environment" => light.environment = Some(Environment::default()),
-        _ => light.set_surface(name, position.into(), direction, radius),
-    }
+    set_kind(light, name, position, direction, radius);
     if light.surface().is_none() {
         (light.unit, light.visible) = (LightUnit::Radiance, true);
     }
@@ -188,10 +203,10 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     ((factor - 1.0).abs() > 1e-3 && factor.is_finite()).then(|| refit(light, factor))
 }
 
-/// Returns the irradiance of a light of unit intensity on a surface at `point` that faces the
-/// light, on the axis of a spot light. For an environment it is that of a white environment. For
-/// lights with a size it is that of a distant light of the same area, limited to that of a
-/// hemisphere.
+/// Returns the irradiance that `light` with the intensity 1 would give a surface at `point` that
+/// faces it. A spot light is taken to be aimed at the point, an environment to be white. A light
+/// with a size counts as a light of the same area that is far away. The irradiance is at most that
+/// of a hemisphere of the light's radiance.
 fn irradiance_at(light: &Light, point: DVec3) -> f64 {
     let Some(position) = light.position() else { return PI };
     let squared = (DVec3::from_array(position) - point).length_squared();
@@ -213,7 +228,9 @@ fn irradiance_at(light: &Light, point: DVec3) -> f64 {
     }
 }
 
-/// Changes the falloff of a point or spot light. Its irradiance at the centre of the scene is kept.
+/// Changes the falloff of the light at `index`, a point or spot light. The intensity is changed so
+/// that the irradiance at the centre of the scene is kept. `values` has the present values of the
+/// light's keys.
 pub(super) fn switch_falloff(
     scene: &Scene,
     index: usize,
@@ -248,7 +265,8 @@ fn refit(light: &mut Light, factor: f64) -> String {
     format!("Intensity {old} became {new}: as bright as before in the middle of the scene.")
 }
 
-/// Converts a texture. Its placement on the shape is kept.
+/// Sets the kind of a material's texture or bump map to `name`. `key` is `texture` or `bump`. The
+/// placement of a texture on the shape is kept.
 fn switch_texture(material: &mut Material, key: &str, name: &str) {
     match (key, &material.texture, &material.bump) {
         ("texture", None, _) => material.texture = Texture::new(name),
@@ -260,7 +278,8 @@ fn switch_texture(material: &mut Material, key: &str, name: &str) {
     }
 }
 
-/// Converts a camera so that the picture stays the same, except for rounding.
+/// Converts the value of the camera's `key` to the kind `name`, such as `target` to `direction`.
+/// The picture stays the same, except for rounding.
 fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     if key == "view_angle" {
         let [width, height] = scene.film.size.map(f64::from);

@@ -1,4 +1,4 @@
-//! Duplicating, deleting and renaming.
+//! Duplicating, deleting and renaming of objects, lights, materials and stored cameras.
 
 use crate::scene::Scene;
 use crate::scene::edit::bounds::bounds;
@@ -10,12 +10,14 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::truncated;
 use glam::DVec3;
 
-/// Duplicates an object, a light, a material or a stored camera. The copy is appended to the same
-/// list with a unique name (`cube 2`). The copy of an object is placed beside the original, in a
-/// free place that the camera sees. The copy of a light is placed beside the light.
+/// Duplicates an object, a light, a material or a stored camera. The copy has a unique name such as
+/// `cube 2`; a copy without a name is possible if the original has none. The copy of an object is
+/// moved horizontally to a free place, in the camera's view if possible; that of a plane is moved
+/// down. The copy of a light with a position is moved along x.
 ///
 /// # Errors
-/// Fails for targets that every scene has exactly once.
+/// Fails for targets that every scene has exactly once, such as the current camera, and for targets
+/// that do not exist.
 pub fn duplicate(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     if !subject.exists(scene) {
         return Err(EditError::gone(subject));
@@ -113,15 +115,11 @@ pub fn delete(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
             return Err(EditError::new(&found, "Only its values can be changed."));
         }
     };
-    let edit = Edit::checked(next, select.unwrap_or(Target::Camera), label)?;
-    Ok(match note {
-        Some(note) => edit.with_note(note),
-        None => edit,
-    })
+    Ok(Edit::checked(next, select.unwrap_or(Target::Camera), label)?.with_note(note))
 }
 
-/// Returns the first of the sorted `names` after `gone`, or the last name if there is none. Returns
-/// `None` if `names` is empty.
+/// Returns the name to select after the name `gone` was deleted: the first of the sorted `names`
+/// after it, or else the last one. Returns `None` if `names` is empty.
 fn following<'a>(names: impl Iterator<Item = &'a String> + Clone, gone: &str) -> Option<String> {
     names.clone().find(|name| name.as_str() > gone).or_else(|| names.last()).cloned()
 }
@@ -161,8 +159,8 @@ fn strip(scene: &mut Scene, name: &str) -> Option<String> {
     (!notes.is_empty()).then(|| notes.join(" "))
 }
 
-/// Renames a target. A renamed material is also renamed in all objects and parts that use it. The
-/// name of an object or a light may be empty.
+/// Renames an object, a light, a material or a stored camera. A renamed material is also renamed in
+/// all objects and parts that use it. The name of an object or a light may be empty.
 ///
 /// # Errors
 /// Fails for targets without a name, and for a name that exists already or is not printable.
@@ -226,7 +224,7 @@ pub fn own_material(scene: &Scene, subject: &Target) -> Result<Edit, EditError> 
     next.objects[*index].material = new.clone();
     let label = format!("own material for {}", subject.label(scene));
     Ok(Edit::checked(next, subject.clone(), label)?
-        .with_note(format!("Its material is {} now.", truncated(&new))))
+        .with_note(Some(format!("Its material is {} now.", truncated(&new)))))
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
-//! Arrow steps: the next round value up or down for every kind of number, and the next choice.
+//! Steps of a value by arrow keys: a number changes to the next round number up or down, any other
+//! value to the next choice.
 
 use crate::scene::Scene;
 use crate::scene::edit::bounds::step_length;
-use crate::scene::edit::convert;
 use crate::scene::edit::convert::chosen;
 use crate::scene::edit::parse_value::floats;
 use crate::scene::edit::properties::is_material;
@@ -12,9 +12,10 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, floor_log10, rounded_to};
 use toml::Value;
 
-/// Changes the numbers of `key` by `steps`. Whole numbers are coarse steps, other numbers are fine
-/// steps in tenths: 0.1 is one fine step, -0.3 is three fine steps back. `component` selects one
-/// number, counted from 0. `None` changes all numbers together, and the brightness of a colour.
+/// Changes the numbers of `key` by `steps` arrow steps. A whole number means coarse steps. Any
+/// other number means fine steps, a tenth each: 0.1 is one fine step forward, -0.3 is three fine
+/// steps back. `component` is the index of the number to change. `None` changes all numbers
+/// together; in a colour, it changes the brightness.
 ///
 /// A coarse step changes sizes, intensities and roughness by about a tenth (a fine step by a
 /// hundredth), coordinates by [`step_length`], angles by 5 degrees, shares by 0.05. A key without
@@ -33,9 +34,7 @@ pub fn step(
     steps: f64,
 ) -> Result<Edit, EditError> {
     let values = read(scene, subject)?;
-    let Some(field) = lookup(subject, key) else {
-        return Err(EditError::new(&format!("there is no key {key} here"), ""));
-    };
+    let field = lookup(subject, key)?;
     let Some(rule) = StepRule::of(field, scene) else {
         return toggle(scene, subject, key, steps > 0.0);
     };
@@ -75,8 +74,8 @@ pub fn step(
 }
 
 /// Changes `key` to the next choice, or to the previous one if `forward` is `false`, cyclically.
-/// `key` is an enumeration, a switch, a kind or the material of an object. For an optional key, "no
-/// value" is one of the choices.
+/// The value of `key` is a word of a list, a switch, a kind such as that of a light, or the
+/// material of an object. For an optional key, "no value" is one of the choices.
 ///
 /// # Errors
 /// Fails if there is no such key, or it has no choices.
@@ -87,51 +86,41 @@ pub fn toggle(
     forward: bool,
 ) -> Result<Edit, EditError> {
     let values = read(scene, subject)?;
-    let Some(field) = lookup(subject, key) else {
-        return Err(EditError::new(&format!("there is no key {key} here"), ""));
-    };
+    let field = lookup(subject, key)?;
     let value = get(&values, key);
     let optional = matches!(field.preset, DefaultValue::Without(_));
-    let (words, index): (Vec<&str>, Option<usize>) = match field.takes {
+    let (words, present): (Vec<&str>, Option<&str>) = match field.takes {
         ValueType::Switch => {
             let on = value.and_then(Value::as_bool).unwrap_or(false);
             return crate::scene::edit::set(scene, subject, key, if on { "false" } else { "true" });
         }
         ValueType::OneOf(kinds) => {
-            let present = match get(&values, key).and_then(Value::as_table) {
+            let present = match value.and_then(Value::as_table) {
                 Some(inner) => kinds.iter().find(|k| inner.contains_key(k.name)).map(|k| k.name),
                 None => chosen(subject, &values),
             };
-            let words: Vec<_> = kinds.iter().map(|k| k.name).collect();
-            let index = words.iter().position(|w| Some(*w) == present);
-            return match next(index, words.len(), forward, optional) {
-                Some(index) => convert::switch(scene, subject, key, words[index]),
-                None => crate::scene::edit::set(scene, subject, key, ""),
-            };
+            (kinds.iter().map(|k| k.name).collect(), present)
         }
         ValueType::Choice(choices) => {
-            let words: Vec<_> = choices.iter().map(|c| c.name).collect();
-            let present = value.and_then(Value::as_str);
-            let index = words.iter().position(|w| Some(*w) == present);
-            (words, index)
+            (choices.iter().map(|c| c.name).collect(), value.and_then(Value::as_str))
         }
         _ if is_material(subject, field) => {
-            let words: Vec<_> = scene.materials.keys().map(String::as_str).collect();
-            let present = value.and_then(Value::as_str);
-            let index = words.iter().position(|w| Some(*w) == present);
-            (words, index)
+            let names = scene.materials.keys().map(String::as_str);
+            (names.collect(), value.and_then(Value::as_str))
         }
         _ => {
             let found = format!("{} has no words to choose from", field.name);
             return Err(EditError::new(&found, &format!("Type {}.", field.takes)));
         }
     };
+    let index = words.iter().position(|word| Some(*word) == present);
     let text = next(index, words.len(), forward, optional).map_or("", |index| words[index]);
     crate::scene::edit::set(scene, subject, key, text)
 }
 
-/// Returns the index after `index` (before it, if `forward` is `false`) in a cycle of `n` choices.
-/// If `optional` is `true`, `None` is one more choice. Returns `None` if `n` is 0.
+/// Returns the index of the choice after the choice `index`, or before it if `forward` is `false`.
+/// The `n` choices form a cycle. `None` stands for "no choice", which is part of the cycle if
+/// `optional` is `true`. Returns `None` if `n` is 0.
 fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option<usize> {
     match (index, forward) {
         _ if n == 0 => None,
@@ -145,8 +134,9 @@ fn next(index: Option<usize>, n: usize, forward: bool, optional: bool) -> Option
     }
 }
 
-/// Returns the effective number of a key without a value, from which its first step starts: for
-/// `alpha` and `f0` of a material. Returns `None` for any other key.
+/// Returns the value from which the first arrow step of a key without a value starts. For `alpha`
+/// or `f0` of a material it is the value that follows from other keys of the material. Returns
+/// `None` for any other key.
 fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<Value> {
     let material = match subject {
         Target::Material(name) => scene.materials.get(name),
@@ -161,7 +151,8 @@ fn start(field: &Field, scene: &Scene, subject: &Target) -> Option<Value> {
     }
 }
 
-/// Signed number of steps; `fine` is `true` for fine steps.
+/// Number and kind of arrow steps. The number is negative for steps down. `fine` is `true` for fine
+/// steps, about a tenth as large as coarse ones.
 #[derive(Clone, Copy)]
 struct StepCount {
     steps: i64,
@@ -179,28 +170,30 @@ impl StepCount {
     }
 }
 
-/// Rule by which a number is incremented.
+/// Rule by which an arrow step changes a number.
 #[derive(Clone, Copy)]
 enum StepRule {
-    /// To the next round number (rung), about a tenth larger or smaller. Between 0 and `floor`
-    /// there are no rungs.
+    /// Step to the next rung (1, 1.1, 1.2 ... 9, times a power of ten), about a tenth larger or
+    /// smaller. Between 0 and `floor` there are no rungs.
     Rungs { floor: f64, range: NumberRange },
-    /// By `unit`, or by a tenth of it in fine steps.
+    /// Step by `unit`; a fine step is a tenth of it.
     Units { unit: f64, range: NumberRange },
-    /// By 5 degrees, or by 0.5 in fine steps.
+    /// Step by 5 degrees, or by 0.5 in fine steps.
     Degrees { range: NumberRange },
-    /// By a twentieth of the direction's largest component.
+    /// Step of one component of a direction by 0.05 times the largest power of ten that is not
+    /// above the magnitude of the largest component. A fine step is a tenth of it.
     Direction,
-    /// To the next rung by magnitude; the sign is kept.
+    /// Step to the next rung (1, 1.1, 1.2 ... 9, times a power of ten) of the magnitude; the sign
+    /// is kept.
     Factor,
-    /// By 10, or by 1 in fine steps.
+    /// Step by 10, or by 1 in fine steps.
     Tens { range: NumberRange },
-    /// By doubling or halving, or by 1 in fine steps. The step up from 0 leads to 1.
+    /// Step by doubling or halving, or by 1 in fine steps. The step up from 0 leads to 1.
     Doubles { range: NumberRange },
 }
 
 impl StepRule {
-    /// Returns the rule for `field`; `None` if it has no numbers.
+    /// Returns the rule of arrow steps for the key `field`; `None` if it has no numbers.
     fn of(field: &Field, scene: &Scene) -> Option<Self> {
         Some(match field.takes {
             ValueType::Number(range) | ValueType::Numbers(_, range) => {
@@ -247,7 +240,8 @@ impl StepRule {
         })
     }
 
-    /// Returns `x` after `count` steps. `all` are all numbers of the value, including `x`.
+    /// Returns the number `x` after `count` arrow steps. `all` has all numbers of the value to
+    /// which `x` belongs, such as the three coordinates of a direction.
     fn stepped(self, x: f64, all: &[f64], count: StepCount) -> f64 {
         let StepCount { steps, fine } = count;
         match self {
@@ -288,7 +282,8 @@ fn added(x: f64, unit: f64, StepCount { steps, fine }: StepCount) -> f64 {
     rounded_to(x + width * steps as f64, floor_log10(unit) - 3)
 }
 
-/// Returns `x` clamped to `range`. Returns `old` if `x` is beyond an excluded end of the range.
+/// Returns `x` if it is in `range`, otherwise the nearest end of `range`. If `range` excludes this
+/// end, returns `old`.
 fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     if range.holds(x) {
         x
@@ -301,7 +296,8 @@ fn within(x: f64, range: NumberRange, old: f64) -> f64 {
     }
 }
 
-/// Doubles or halves `x` per coarse step; adds or subtracts 1 per fine step.
+/// Returns `x` after doubling or halving it per coarse step, or adding or subtracting 1 per fine
+/// step. The result is in `range`.
 fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let moved = match steps {
         _ if fine => x + steps as f64,
@@ -311,15 +307,15 @@ fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> 
     within(moved, range, x)
 }
 
-/// Mantissas of the rungs of coarse steps, in hundredths. They are about a tenth apart and include
-/// every digit from 1.00 to 9.00.
+/// Rungs: round numbers between 1 and 10 to which coarse steps lead, in hundredths. They are about
+/// a tenth apart and include every digit from 1.00 to 9.00.
 const RUNGS: [i64; 23] = [
     100, 110, 120, 130, 140, 160, 180, 200, 220, 250, 280, 300, 330, 360, 400, 450, 500, 550, 600,
     650, 700, 800, 900,
 ];
 
-/// Returns the distance between the rungs of fine steps at the mantissa `hundredths`, in
-/// hundredths. These rungs are 1.00, 1.01 ... 2.00, 2.02 ... 5.00, 5.05 ... 9.95.
+/// Returns the width of a fine step at the mantissa `hundredths`. Both are in hundredths. Fine
+/// steps lead to 1.00, 1.01 ... 2.00, 2.02 ... 5.00, 5.05 ... 9.95.
 fn fine_width(hundredths: i64) -> i64 {
     match hundredths {
         ..200 => 1,
@@ -328,8 +324,9 @@ fn fine_width(hundredths: i64) -> i64 {
     }
 }
 
-/// Returns the number `steps` rungs above `x`, which is at least 0. The result is always a rung, so
-/// that steps up and down are inverse.
+/// Returns the number that is `steps` rungs (round numbers such as 1, 1.1, 1.2) above `x`, or below
+/// it for negative `steps`. `x` is at least 0. Between 0 and `floor` there are no round numbers.
+/// The result is always a round number or an end of `range`, so that steps up and down are inverse.
 fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let up = steps > 0;
     let mut x = x;
@@ -345,7 +342,8 @@ fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: 
     x
 }
 
-/// Returns the next rung above or below `x` > 0.
+/// Returns the next round number above `x` if `up` is `true`, otherwise the next one below. `x` is
+/// greater than 0. `fine` selects the round numbers of fine steps.
 fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     let e = floor_log10(x);
     let scale = format!("1e{}", 2 - e).parse().unwrap_or(1.0);
@@ -378,7 +376,7 @@ fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     format!("{hundredths}e{}", e - 2).parse().unwrap_or(x)
 }
 
-/// Scales the brightness of a colour. Black becomes a dark grey.
+/// Returns a colour with its brightness changed by `count` arrow steps. Black becomes a dark grey.
 fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let largest = channels.iter().fold(0.0f64, |m, x| m.max(*x));
     let rule = StepRule::Units { unit: 0.05, range };
@@ -394,8 +392,9 @@ fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64
     channels.iter().map(|x| rounded_to(x * next / largest, floor_log10(next) - 3)).collect()
 }
 
-/// Scales width and height together. Their ratio is kept as far as whole numbers allow. A fine step
-/// is 16 pixels of the width.
+/// Returns a picture size with width and height changed together by `count` arrow steps. A coarse
+/// step doubles or halves them, a fine step changes the width by 16 pixels. Their ratio is kept as
+/// far as whole numbers allow.
 fn resized(sides: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let width = sides[0];
     let next = match count.fine {

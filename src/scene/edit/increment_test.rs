@@ -1,9 +1,9 @@
-//! Arrow steps: round values, inverse steps, limits.
+//! Tests of the arrow keys that step a property's value: round values, steps back, limits.
 
 use crate::scene::edit::{Property, Target, Widget, outline, rows, set, step, toggle};
 use crate::scene::{Scene, built_in};
 
-/// Returns the value of `key` after `steps`.
+/// Returns the value of the property `key` as text, after `steps` steps of the arrow keys.
 fn after(scene: &Scene, subject: &Target, key: &str, steps: f64) -> String {
     let edit = step(scene, subject, key, None, steps).unwrap_or_else(|e| panic!("{key}: {e}"));
     value(&edit.scene, subject, key)
@@ -131,7 +131,8 @@ fn arrow_step_of_missing_key_starts_from_default() {
     assert_eq!(after(&scene, &red, "f0", -1.0), "0.95, 0.95, 0.95");
 }
 
-/// Checks that many steps up and down of every number of every property leave the scene valid.
+/// Checks that the scene stays valid when any number of any property is changed by many arrow
+/// steps, up or down.
 #[test]
 fn arrow_steps_stop_at_range_ends() {
     let scene = built_in();

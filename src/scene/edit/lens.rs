@@ -1,4 +1,4 @@
-//! Focus and aperture of the camera.
+//! Edits of the camera's focus and aperture.
 
 use crate::camera::{Aperture, Camera, Focus};
 use crate::scene::Scene;
@@ -7,13 +7,14 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{floor_log10, round_significant, rounded_to};
 use glam::DVec3;
 
-/// Radius of a lens when a pinhole is opened, as a fraction of the distance of the plane in focus.
-/// The blur of objects at infinity, or at twice that distance, is visible.
+/// Radius of the lens to which a pinhole is opened, as a fraction of the distance of the plane in
+/// focus. It is large enough that objects at infinity, or at twice that distance, are visibly
+/// blurred.
 const FIRST_RADIUS: f64 = 0.02;
 /// Radius below which a lens becomes a pinhole, as a fraction of the distance of the plane in
 /// focus.
 const LAST_RADIUS: f64 = 5e-4;
-/// Range of f-numbers of [`change_aperture`].
+/// Smallest and largest f-number to which [`change_aperture`] leads.
 const F_NUMBERS: [f64; 2] = [0.1, 1000.0];
 
 /// Sets the focus of the camera to `point`. The kind of the focus, distance or point, is kept.
@@ -33,9 +34,9 @@ pub fn focus_on(scene: &Scene, point: [f64; 3]) -> Result<Edit, EditError> {
     edited(scene, camera, "focus")
 }
 
-/// Opens the lens by `stops`; negative stops close it. One stop doubles the area of the lens. A
-/// pinhole opens to a lens of a fiftieth of the distance of the plane in focus; a lens that is
-/// closed far enough becomes a pinhole. A camera without a plane in focus gets one.
+/// Opens the camera's lens by `stops`; negative stops close it. One stop doubles the area of the
+/// lens. A pinhole opens to a lens of a fiftieth of the distance of the plane in focus; a lens that
+/// is closed far enough becomes a pinhole. A camera without a plane in focus gets one.
 ///
 /// # Errors
 /// Returns the first validation error of the edited scene.
@@ -62,8 +63,8 @@ pub fn change_aperture(scene: &Scene, stops: f64) -> Result<Edit, EditError> {
     edited(scene, camera, "aperture")
 }
 
-/// Returns `x` multiplied by `stops` factors of √2, rounded to the scale of the powers of √2. The
-/// result has two digits.
+/// Rounds `x` to the nearest power of √2, multiplies it by √2^`stops`, and returns the product
+/// rounded to two digits, such as 1, 1.4, 2 or 2.8.
 fn stopped(x: f64, stops: f64) -> f64 {
     let position = (2.0 * x.log2()).round() + stops;
     round_significant((0.5 * position).exp2(), 2)
@@ -74,8 +75,9 @@ fn edited(scene: &Scene, camera: Camera, label: &str) -> Result<Edit, EditError>
     Edit::checked(next, Target::Camera, format!("{label} of the camera"))
 }
 
-/// Converts aperture or focus of a camera to the kind `name` so that the picture stays the same,
-/// except for rounding. A pinhole is opened.
+/// Converts the camera's aperture or its focus to the kind `name`. `key` is the key of the one to
+/// convert. The picture stays the same, except for rounding. A pinhole whose aperture is converted
+/// becomes a lens.
 pub(super) fn switch(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     let seen = Scene { camera: camera.clone(), ..scene.clone() };
     let distance = camera.focus_depth();

@@ -12,7 +12,7 @@ mod increment;
 #[cfg(test)]
 mod increment_test;
 mod lens;
-mod mirror;
+mod mirror_material;
 mod parse_value;
 mod placement;
 mod properties;
@@ -24,12 +24,12 @@ mod translate;
 mod unique_name;
 mod viewpoints;
 
-pub use add::{add_light, add_material, add_object, light_kinds, object_kinds};
+pub use add::{add_light, add_object, light_kinds, object_kinds};
 pub use bounds::{BoundingSphere, bounds, pivot_distance, scene_bounds, step_length};
 pub use copy::{delete, duplicate, own_material, rename};
 pub use increment::{step, toggle};
 pub use lens::{change_aperture, focus_on};
-pub use mirror::{adjust_roughness, mirror, next_lobe, reflect};
+pub use mirror_material::{adjust_roughness, mirror, next_lobe, reflect};
 pub use placement::snap_to_ground;
 pub use properties::{Property, Widget, Word, rows};
 pub use rotate::turn;
@@ -42,25 +42,25 @@ use crate::scene::Scene;
 use crate::value::truncated;
 use std::fmt;
 
-/// A scene after an edit.
+/// Result of an edit: the edited scene, and what the editor shows about it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Edit {
-    /// The edited scene, which is valid.
+    /// Edited scene, which is valid.
     pub scene: Scene,
     /// Target to select after the edit: the edited or added target, or the neighbour of a deleted
     /// one.
     pub subject: Target,
     /// Short description for the undo history: `move cube`, `radius of ball`. All steps of one
-    /// gesture have the same label.
+    /// gesture (a drag, a held key) have the same label.
     pub label: String,
     /// Sentence about a side effect of the edit; `None` if there is none.
     pub note: Option<String>,
 }
 
-/// Reason why an edit was refused.
+/// Reason why an edit of a scene was refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EditError {
-    /// Phrase that states the problem.
+    /// Phrase that states why the edit was refused.
     pub found: String,
     /// Expected value or remedy, in sentences; may be empty.
     pub help: String,
@@ -93,7 +93,8 @@ impl EditError {
 }
 
 impl Edit {
-    /// Creates the edit if `scene` is valid; otherwise returns the first validation error.
+    /// Creates the edit to `scene` if it is valid; otherwise returns the first validation error.
+    /// `subject` is selected after the edit, and `label` names it in the undo history.
     fn checked(mut scene: Scene, subject: Target, label: String) -> Result<Self, EditError> {
         scene.resolve();
         match scene.faults().into_iter().next() {
@@ -102,8 +103,7 @@ impl Edit {
         }
     }
 
-    fn with_note(mut self, note: impl Into<String>) -> Self {
-        self.note = Some(note.into());
-        self
+    fn with_note(self, note: Option<String>) -> Self {
+        Self { note, ..self }
     }
 }

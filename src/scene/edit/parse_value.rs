@@ -1,6 +1,7 @@
-//! Parsing and printing of values as users type and read them.
+//! Parsing and formatting of property values as users type and read them.
 
 use crate::scene::edit::EditError;
+use crate::scene::format::emit::color;
 use crate::scene::format::suggest::nearest;
 use crate::value::{Color, Field, ValueType, number, sanitized, truncated};
 use toml::Value;
@@ -63,8 +64,8 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
     }
 }
 
-/// Returns the index in `words` of `text`, or of the only word that starts with `text`. Returns
-/// `None` if there is none or more than one.
+/// Returns the index in `words` of the word that equals `text`, or else of the only word that
+/// starts with `text`. Case is ignored. Returns `None` if no word does, or more than one.
 pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     let text = text.to_lowercase();
     if let Some(at) = words.iter().position(|word| word.to_lowercase() == text) {
@@ -131,8 +132,8 @@ fn digits(part: &str) -> bool {
         && part.bytes().any(|b| b.is_ascii_digit())
 }
 
-/// Formats a value with the shortest digits, and lists without brackets. A colour is formatted as
-/// `#rrggbb` if that is exact and shorter.
+/// Formats a value of the type `takes`: numbers with the shortest digits, lists without brackets. A
+/// colour is formatted as `#rrggbb` if that is exact and shorter.
 pub(super) fn show(takes: ValueType, value: &Value) -> String {
     if let (ValueType::Color(_), Some(color)) = (takes, color(value)) {
         let channels = join(&color.0.map(number));
@@ -166,11 +167,6 @@ pub(super) fn floats(value: &Value) -> Option<Vec<f64>> {
         Value::Array(list) => list.iter().map(one).collect(),
         other => one(other).map(|x| vec![x]),
     }
-}
-
-/// Returns a value of three numbers as a colour; `None` for any other value.
-pub(super) fn color(value: &Value) -> Option<Color> {
-    floats(value)?.try_into().ok().map(Color)
 }
 
 #[cfg(test)]

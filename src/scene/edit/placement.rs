@@ -1,4 +1,5 @@
-//! Placement: support surfaces and free positions for objects.
+//! Placement of objects: on the surfaces that support them, and at positions that are free of other
+//! objects.
 
 use crate::camera::Camera;
 use crate::primitive::Form;
@@ -63,7 +64,8 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Moves an object up by `by`. The new coordinate is not rounded to a short decimal number.
+/// Moves an object up by `by` scene units. The new height is exact, not rounded to a short decimal
+/// number.
 fn lift(object: &mut Object, by: f64) {
     if by == 0.0 {
         return;
@@ -77,8 +79,8 @@ fn lift(object: &mut Object, by: f64) {
     }
 }
 
-/// Returns the points (x, z) at which an object can be supported: its centre and its lowest
-/// corners.
+/// Returns the points (x, z) at which an object can be supported: the centre of its bounding box,
+/// and its lowest corners.
 fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let flat = |p: DVec3| DVec2::new(p.x, p.z);
     let middle = flat(low + (high - low) / 2.0);
@@ -92,8 +94,10 @@ fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     support_points
 }
 
-/// Returns a position for a new object with the lengths `size`, as the centre of its underside. The
-/// position is near the middle of the camera's view, on a surface, and free of other objects.
+/// Returns a position for a new object as the centre of its underside. `size` has the object's
+/// lengths along x, y and z. The position is on a surface, in a place that is free of other objects
+/// and as near as possible to the middle of the camera's view. Places that the camera sees are
+/// preferred.
 pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let eye = DVec3::from_array(scene.camera.eye);
@@ -101,7 +105,7 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let forms: Vec<_> = scene.objects.iter().map(Object::form).collect();
     let aim = eye + forward * crate::scene::edit::pivot_distance(scene);
     let solids: Vec<Extent> =
-        forms.iter().filter(|f| f.is_solid()).filter_map(Form::bounds).collect();
+        forms.iter().filter(|f| f.is_solid()).filter_map(|form| form.bounds()).collect();
     let walls: Vec<&Form> = forms.iter().filter(|form| !form.is_solid()).collect();
     let floors: Vec<&Form> = walls.iter().copied().filter(|form| is_level(form)).collect();
     // New positions are round numbers: whole centimetres for an object of one metre.
@@ -139,14 +143,15 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     hidden.or(outside).unwrap_or_else(|| candidate(DVec2::ZERO))
 }
 
-/// Returns `true` if `form` is flat and its slope is less than 60 degrees, so that objects can rest
-/// on it.
+/// Returns `true` if an object is flat and its slope is less than 60 degrees, so that others can
+/// rest on it.
 fn is_level(form: &Form) -> bool {
     form.plane().is_some_and(|plane| plane.normal.y.abs() > 0.5)
 }
 
-/// Returns the height of the highest of `floors` below the point `at`, or of the lowest above it if
-/// there is none below. Returns `None` if there is neither.
+/// Returns the height of the ground for an object at the point `at`. It is the height of the
+/// highest of the flat objects `floors` below the point, or of the lowest above it if there is none
+/// below. Returns `None` if there is neither.
 fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     let heights = |direction: DVec3| {
         floors.iter().filter_map(move |form| Some(at.y + direction.y * form.cast(at, direction)?))
@@ -154,7 +159,7 @@ fn ground_under(floors: &[&Form], at: DVec3) -> Option<f64> {
     heights(DVec3::NEG_Y).reduce(f64::max).or_else(|| heights(DVec3::Y).reduce(f64::min))
 }
 
-/// Returns `true` if the flat `form` (a wall) intersects the inside of a box.
+/// Returns `true` if the flat object `form` (a wall) intersects the inside of a box.
 fn intersects(form: &Form, (low, high): Extent) -> bool {
     let shrink = (high - low) * 1e-6;
     let (low, high) = (low + shrink, high - shrink);
@@ -172,8 +177,9 @@ fn overlap(a: Extent, b: Extent) -> bool {
     a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()
 }
 
-/// Returns `true` if `point` is inside the picture, at least 15 % of the half size away from its
-/// edges.
+/// Returns `true` if `point` is visible in a picture of `size` pixels, apart from occlusion by
+/// objects, and is not close to an edge. A margin of 7.5 % of the width or height at each edge is
+/// excluded.
 fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
     let [right, up, forward] = camera.frame();
     let to = point - DVec3::from_array(camera.eye);
@@ -184,7 +190,7 @@ fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
         && to.dot(up).abs() < 0.85 * half_height * depth
 }
 
-/// Returns `true` if no form occludes `point` from the eye.
+/// Returns `true` if none of the objects `forms` occludes `point` from the eye.
 fn is_visible(forms: &[Form], eye: DVec3, point: DVec3) -> bool {
     !forms.iter().any(|form| form.cast(eye, point - eye).is_some_and(|t| t < 1.0))
 }

@@ -1,17 +1,19 @@
-//! Properties of a target, as an inspector shows them: one row per key, from the field tables.
+//! Properties of an edit target (camera, light, object, material, ...), as an inspector shows them:
+//! one row per key.
 
 use crate::scene::Scene;
 use crate::scene::edit::convert::{AIM, KIND, chosen};
-use crate::scene::edit::parse_value::{color, floats, show};
+use crate::scene::edit::parse_value::{floats, show};
 use crate::scene::edit::toml_view::{exclusive_keys, fields, get, read};
 use crate::scene::edit::{EditError, Target};
+use crate::scene::format::emit::{color, preset};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, number};
 use toml::{Table, Value};
 
-/// One of the words that a property accepts.
+/// Word that a property accepts as its value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// The word. The name of a material may contain any character that files allow.
+    /// Text of the word. The name of a material may contain any character that files allow.
     pub name: String,
     /// Description of the word; may be empty.
     pub doc: String,
@@ -20,57 +22,59 @@ pub struct Word {
 /// Kind of a property's value, by which an inspector chooses the input element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Widget {
-    /// Any text: a name.
+    /// Widget for free text, such as a name.
     Text,
-    /// `true` or `false`.
+    /// Widget for a switch: the value is `true` or `false`.
     Switch,
-    /// One of [`Property::words`].
+    /// Widget for a choice: the value is one of [`Property::words`].
     Choice,
-    /// One of [`Property::words`], the kind of a shape or a light. It determines other properties.
+    /// Widget for the kind of a shape or a light: the value is one of [`Property::words`]. It
+    /// determines which other properties exist.
     Kind,
-    /// A list of transform steps. Typing one of [`Property::words`] appends a step of that kind.
+    /// Widget for a list of transform steps. Typing one of [`Property::words`] appends a step of
+    /// that kind.
     List,
-    /// One or more numbers.
+    /// Widget for a number, or for a list of numbers such as a position.
     Numbers,
-    /// Three numbers from [`Property::color`], or `#rrggbb`.
+    /// Widget for a colour: three numbers, the linear red, green and blue.
     Color,
 }
 
-/// A property of a target: one row of an inspector.
+/// Property of an edit target: one row of an inspector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Property {
     /// Dotted key, as [`set`](crate::scene::edit::set) requires it: `shape.sphere.radius`,
     /// `transform.0.rotate_y`.
     pub key: String,
-    /// Last part of the key, with spaces.
+    /// Label of the property: the last part of the key, with spaces.
     pub label: String,
-    /// Nesting depth: 0, 1, 2.
+    /// Nesting depth of the property, by which its row is indented: 0, 1 or 2.
     pub depth: usize,
-    /// Kind of the value.
+    /// Kind of the value, which determines the input element of the inspector.
     pub entry: Widget,
     /// Value as text, in the form in which it can be typed; empty if the key has no value.
     pub value: String,
     /// Each number of the value as text: the numbers of a list, or the three channels of a colour.
     /// Empty for other values.
     pub components: Vec<String>,
-    /// Value of a colour: linear red, green, blue.
+    /// Linear red, green and blue of a colour; `None` for other values.
     pub color: Option<[f64; 3]>,
-    /// Unit of the numbers; may be empty.
+    /// Unit of the numbers in the value; may be empty.
     pub unit: &'static str,
     /// Accepted values, as a phrase: `a number from 0 to 1`.
     pub expected: String,
     /// Accepted words of a choice, a kind or a list; empty for other properties.
     pub words: Vec<Word>,
-    /// Description, as a sentence.
+    /// Description of the property, as a sentence.
     pub doc: &'static str,
-    /// `true` if the value equals the default or the key is omitted.
+    /// `true` if the value of the key is its default or the key is omitted.
     pub is_default: bool,
-    /// Default as text; `None` if the key is required.
+    /// Default value as text; `None` if the key is required.
     pub default: Option<String>,
 }
 
-/// Returns the properties of `subject` in the order of its field table. Those of an object's
-/// material belong to another target, [`Target::material`].
+/// Returns the properties of `subject` in the order of its field table. The properties of an
+/// object's material are not included; they belong to the target [`Target::material`].
 ///
 /// # Errors
 /// Fails if the scene has no such target.
@@ -234,22 +238,19 @@ impl PropertyWalker<'_> {
     }
 }
 
-/// Returns `true` if `field` of `subject` names a material.
+/// Returns `true` if the value of `field` in the edit target `subject` is the name of a material.
 pub(super) fn is_material(subject: &Target, field: &Field) -> bool {
     matches!(subject, Target::Object(_)) && field.name == "material"
 }
 
-/// Parses the default value `text`, which is TOML.
-pub(super) fn preset(text: &str) -> Option<Value> {
-    format!("value = {text}").parse::<Table>().ok()?.remove("value")
-}
-
-fn words(kinds: &[Field]) -> Vec<Word> {
+/// Returns a [`Word`] for each of the fields `kinds`, with the name and the help text of the field.
+pub(super) fn words(kinds: &[Field]) -> Vec<Word> {
     kinds.iter().map(|k| Word { name: k.name.into(), doc: k.doc.into() }).collect()
 }
 
-/// Returns a phrase for the accepted values, as in the reference of the scene format but without
-/// the notation of files.
+/// Returns a phrase for the accepted values of the type `takes`, such as `3 numbers, not all zero`.
+/// It differs from the phrase in the manual of the scene format where a user types values in
+/// another notation than files have.
 fn expected(takes: ValueType) -> String {
     match takes {
         ValueType::Text => "text".to_string(),
@@ -320,7 +321,7 @@ mod tests {
         assert_eq!((material.entry, material.words.len()), (Widget::Choice, 6));
     }
 
-    /// Checks that every value can be typed in its displayed form without a change.
+    /// Checks that setting a property to the text of its displayed value changes nothing.
     #[test]
     fn every_row_value_can_be_typed_back() {
         let mut scene = built_in();

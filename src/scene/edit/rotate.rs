@@ -1,4 +1,4 @@
-//! Rotation about the vertical.
+//! Edits that rotate an object or a light about the vertical.
 
 use crate::scene::edit::bounds::scene_bounds;
 use crate::scene::edit::{Edit, EditError, Target};
@@ -113,7 +113,7 @@ mod tests {
     }
 
     /// Checks that rotations keep the position of objects of every kind, with and without a
-    /// transform. Small rotations that add up to a full turn are the identity.
+    /// transform, and that small rotations together change nothing if they add up to a full turn.
     #[test]
     fn turn_keeps_the_middle_and_full_turn_is_identity() {
         for kind in KINDS {

@@ -1,4 +1,4 @@
-//! Setting one value by typed text.
+//! Edits that set one value by typed text.
 
 use crate::scene::Scene;
 use crate::scene::edit::convert;
@@ -12,8 +12,9 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, ValueType};
 use toml::{Table, Value};
 
-/// Sets `key` (of a [`Property`](crate::scene::edit::Property)) to the value in `text`. Empty text
-/// removes `key`: an optional key then has its default, and a transform loses the step.
+/// Sets `key` of `subject` to the value in `text`. Keys are those of its
+/// [`Property`](crate::scene::edit::Property) rows. Empty text removes `key`: an optional key then
+/// has its default, and a transform loses the step.
 ///
 /// # Errors
 /// Returns the reason and the accepted values, if `text` cannot be parsed or the edited scene would
@@ -21,9 +22,7 @@ use toml::{Table, Value};
 pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edit, EditError> {
     let text = text.trim();
     let values = read(scene, subject)?;
-    let Some(field) = lookup(subject, key) else {
-        return Err(EditError::new(&format!("there is no key {key} here"), ""));
-    };
+    let field = lookup(subject, key)?;
     let optional = matches!(field.preset, DefaultValue::Without(_));
     match field.takes {
         ValueType::OneOf(kinds) if !(text.is_empty() && optional) => {
@@ -60,10 +59,11 @@ pub fn set(scene: &Scene, subject: &Target, key: &str, text: &str) -> Result<Edi
     replace(scene, subject, key, values, value)
 }
 
-/// Sets one number of the value of `key`; `component` counts from 0.
+/// Sets one number of the value of `key` to `text`; `component` is the number's index, counted from
+/// 0.
 ///
 /// # Errors
-/// The errors of [`set`].
+/// Returns the errors of [`set`].
 pub fn set_component(
     scene: &Scene,
     subject: &Target,
@@ -91,16 +91,18 @@ pub fn set_component(
 }
 
 /// Returns the field of `key`, including `kind` of a light and `aim` of a camera, which are no keys
-/// of scene files. Returns `None` if `subject` has no such key.
-pub(super) fn lookup(subject: &Target, key: &str) -> Option<&'static Field> {
+/// of scene files. Fails if `subject` has no such key.
+pub(super) fn lookup(subject: &Target, key: &str) -> Result<&'static Field, EditError> {
     match (subject, key) {
-        (Target::Light(_), "kind") => Some(&KIND),
-        (Target::Camera | Target::View(_), "aim") => Some(&AIM),
-        _ => field(fields(subject), key),
+        (Target::Light(_), "kind") => Ok(&KIND),
+        (Target::Camera | Target::View(_), "aim") => Ok(&AIM),
+        _ => field(fields(subject), key)
+            .ok_or_else(|| EditError::new(&format!("there is no key {key} here"), "")),
     }
 }
 
-/// Sets `key` to `value`, removes mutually exclusive keys, and validates the edited scene.
+/// Sets `key` to `value`, removes the keys that exclude it, and validates the edited scene.
+/// `values` has the present values of the keys of `subject`.
 pub(super) fn replace(
     scene: &Scene,
     subject: &Target,
@@ -118,14 +120,12 @@ pub(super) fn replace(
     if !insert_value(&mut values, key, Some(value)) {
         return Err(EditError::new(&format!("{key} cannot be set here"), ""));
     }
-    let edit = finish(scene, subject, key, values)?;
-    Ok(match gone {
-        Some(rival) => edit.with_note(format!("{first} replaces {rival}.")),
-        None => edit,
-    })
+    let note = gone.map(|rival| format!("{first} replaces {rival}."));
+    Ok(finish(scene, subject, key, values)?.with_note(note))
 }
 
-/// Removes `key`.
+/// Removes `key` from `values`, so that it has its default; a step of a transform is removed from
+/// the list. `values` has the present values of the keys of `subject`. `field` describes the key.
 fn clear(
     scene: &Scene,
     subject: &Target,
@@ -149,8 +149,8 @@ fn clear(
     finish(scene, subject, key, values)
 }
 
-/// Creates the edit that replaces the values of `subject` by `values`, after validation of the
-/// edited scene.
+/// Creates the edit that replaces the values of the keys of `subject` by `values`, and validates
+/// the edited scene. `key` is the key that changed; it names the edit in the undo history.
 pub(super) fn finish(
     scene: &Scene,
     subject: &Target,
@@ -161,7 +161,7 @@ pub(super) fn finish(
     Edit::checked(next, subject.clone(), label(scene, subject, key))
 }
 
-/// Returns the label of the edit: `radius of ball`.
+/// Returns the label of an edit of `key` in the undo history: `radius of ball`.
 pub(super) fn label(scene: &Scene, subject: &Target, key: &str) -> String {
     let last = key.rsplit('.').next().unwrap_or(key).replace('_', " ");
     format!("{last} of {}", subject.label(scene))

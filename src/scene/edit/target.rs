@@ -3,50 +3,53 @@
 use crate::scene::{Object, Scene};
 use crate::value::truncated;
 
-/// Selectable and editable part of a scene.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+/// Target of an edit: a part of the scene that can be selected and edited.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Target {
-    /// The current camera.
+    /// Current camera of the scene.
+    #[default]
     Camera,
-    /// A stored camera, by name.
+    /// Stored camera, by its name.
     View(String),
-    /// Ambient light.
+    /// Ambient light of the scene.
     Ambient,
-    /// Radiance of rays that hit no surface.
+    /// Background: the radiance of rays that hit no surface.
     Background,
-    /// A light, by its index in the scene's lights, counted from 0.
+    /// Light, by its index in the scene's list of lights, counted from 0.
     Light(usize),
-    /// An object, by its index in the scene's objects, counted from 0.
+    /// Object, by its index in the scene's list of objects, counted from 0.
     Object(usize),
-    /// A material, by name.
+    /// Material, by its name.
     Material(String),
-    /// Film settings.
+    /// Film settings, such as the size of the picture.
     Film,
-    /// Integrator settings.
+    /// Integrator settings, such as the largest number of reflections.
     IntegratorSettings,
 }
 
-/// A section of the outline.
+/// Section of the outline: the list of all editable parts of a scene in the dashboard. An edit has
+/// a [`Target`], never a section; sections only group the targets on the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Section {
-    /// The current camera and the stored cameras.
+    /// Section of the outline that lists the current camera and the stored cameras.
     Camera,
-    /// Ambient light and background.
+    /// Section of the outline that lists the ambient light and the background.
     Surroundings,
-    /// Lights.
+    /// Section of the outline that lists all lights of the scene.
     Lights,
-    /// Objects of which a part or the whole has a reflecting material.
+    /// Section of the outline that lists the objects of which a part or the whole has a reflecting
+    /// material.
     Mirrors,
-    /// All other objects.
+    /// Section of the outline that lists the objects without a reflecting material.
     Objects,
-    /// Materials.
+    /// Section of the outline that lists all materials of the scene.
     Materials,
-    /// Film and integrator.
+    /// Section of the outline that lists the settings of film and integrator.
     Picture,
 }
 
 impl Section {
-    /// Returns the heading of the section.
+    /// Returns the heading of this section in the dashboard's list of all parts of the scene.
     pub fn title(self) -> &'static str {
         match self {
             Self::Camera => "camera",
@@ -60,7 +63,8 @@ impl Section {
     }
 }
 
-/// Returns all targets of the scene, each once, in the order of the outline.
+/// Returns all edit targets of the scene, each once, in the order in which the dashboard lists
+/// them. Each is a pair `(section of the list, target)`.
 pub fn outline(scene: &Scene) -> Vec<(Section, Target)> {
     let mut list = vec![(Section::Camera, Target::Camera)];
     list.extend(scene.cameras.keys().map(|name| (Section::Camera, Target::View(name.clone()))));
@@ -83,8 +87,9 @@ pub(super) fn reflects(scene: &Scene, index: usize) -> bool {
     mirror_of(scene, index).is_some()
 }
 
-/// Returns the most reflecting material of the object at `index` and its parts, and the reflection
-/// coefficient of that material. Returns `None` if no material reflects.
+/// Returns `(name, coefficient)`: the material with the largest reflection coefficient in the
+/// object at `index` and its parts, and this coefficient. Returns `None` if none of its materials
+/// reflects.
 pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
     let names = scene.objects.get(index).map(Object::materials).unwrap_or_default();
     let known =
@@ -93,7 +98,8 @@ pub(super) fn mirror_of(scene: &Scene, index: usize) -> Option<(&str, f64)> {
 }
 
 impl Target {
-    /// Returns `true` if the scene has the target.
+    /// Returns `true` if `scene` contains the light, object, material or stored camera that this
+    /// target names. Every scene has the other targets.
     pub fn exists(&self, scene: &Scene) -> bool {
         match self {
             Self::View(name) => scene.cameras.contains_key(name),
@@ -108,7 +114,8 @@ impl Target {
         }
     }
 
-    /// Returns the path of keys and indices that leads to the target in a scene file.
+    /// Returns the path of the target in a scene file: keys and list indices (from 0), such as
+    /// `object`, `3`.
     pub(super) fn path(&self) -> Vec<String> {
         let keys: &[&str] = match self {
             Self::Camera => &["camera"],
@@ -124,8 +131,8 @@ impl Target {
         keys.iter().map(|key| key.to_string()).collect()
     }
 
-    /// Returns the name of the target in the outline: `lamp`, `light 2`. An object without a name
-    /// is named by its kind and index: `sphere 3` is the third object. Names from files are
+    /// Returns the name of the target in the dashboard's list: `lamp`, `light 2`. An object without
+    /// a name is named by its kind and index: `sphere 3` is the third object. Names from files are
     /// sanitised and truncated to 40 characters.
     pub fn label(&self, scene: &Scene) -> String {
         let named = |name: Option<&String>| name.filter(|n| !n.is_empty()).map(|n| truncated(n));
@@ -151,8 +158,8 @@ impl Target {
         scene.subject(&self.path())
     }
 
-    /// Returns the target that is the material of an object. A material is its own material. Other
-    /// targets have none.
+    /// Returns the target for a material: for an object its material, for a material this target
+    /// itself. Returns `None` for other targets, or if the scene does not have the material.
     pub fn material(&self, scene: &Scene) -> Option<Self> {
         match self {
             Self::Material(_) => self.exists(scene).then(|| self.clone()),

@@ -1,26 +1,26 @@
-//! One target as a TOML table with the keys of its field table. Only the target is serialised,
-//! never the whole scene.
+//! Conversion of an edit target (a light, an object, the film and so on) to a TOML table of its
+//! values, and back. Only the target is serialised, never the whole scene.
 
 use crate::scene::Scene;
 use crate::scene::edit::{EditError, Target};
-use crate::scene::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, OBJECT_FIELDS, TRACE_FIELDS};
-use crate::value::{Field, ValueType};
+use crate::scene::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
+use crate::value::{Description, Field, ValueType};
 use crate::{camera, light, material};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
-/// Returns the fields of `subject`.
+/// Returns the keys that scene files permit for `subject`, with their types and defaults.
 pub(super) fn fields(subject: &Target) -> &'static [Field] {
     match subject {
         Target::Camera | Target::View(_) => camera::FIELDS,
-        Target::Ambient => AMBIENT_FIELDS,
-        Target::Background => BACKGROUND_FIELDS,
+        Target::Ambient => Ambient::FIELDS,
+        Target::Background => Background::FIELDS,
         Target::Light(_) => light::FIELDS,
-        Target::Object(_) => OBJECT_FIELDS,
+        Target::Object(_) => Object::FIELDS,
         Target::Material(_) => material::FIELDS,
-        Target::Film => FILM_FIELDS,
-        Target::IntegratorSettings => TRACE_FIELDS,
+        Target::Film => FilmSettings::FIELDS,
+        Target::IntegratorSettings => IntegratorSettings::FIELDS,
     }
 }
 
@@ -35,7 +35,8 @@ pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
     }
 }
 
-/// Returns the values of `subject`, including the defaults.
+/// Returns the keys of `subject` with their values in `scene`. Keys with default values are
+/// included.
 pub(super) fn read(scene: &Scene, subject: &Target) -> Result<Table, EditError> {
     fn table<T: Serialize>(part: Option<&T>) -> Option<Table> {
         part.and_then(|part| Table::try_from(part).ok())
@@ -54,7 +55,7 @@ pub(super) fn read(scene: &Scene, subject: &Target) -> Result<Table, EditError> 
     read.ok_or_else(|| EditError::gone(subject))
 }
 
-/// Returns a copy of `scene` with the values of `subject` replaced.
+/// Returns a copy of `scene` in which the values of the keys of `subject` are replaced by `values`.
 pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Scene, EditError> {
     fn fill<T: DeserializeOwned>(part: Option<&mut T>, values: Table) -> Result<(), EditError> {
         let wrong = |e: toml::de::Error| EditError::new(e.message(), "The scene is unchanged.");
@@ -98,7 +99,8 @@ pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Sc
     Ok(next)
 }
 
-/// Returns the field of the dotted `key`; `None` if there is no such key.
+/// Returns the description (type, range, help) of the dotted key `key`. Its parts are keys and list
+/// indices. Returns `None` if there is no such key.
 pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Field> {
     let (first, rest) = match key.split_once('.') {
         Some((first, rest)) => (first, Some(rest)),
@@ -117,7 +119,8 @@ pub(super) fn field(fields: &'static [Field], key: &str) -> Option<&'static Fiel
     }
 }
 
-/// Returns the value of the dotted `key`; `None` if the key is not given.
+/// Returns the value of the dotted `key` in `table`. Its parts are keys and list indices. Returns
+/// `None` if `table` does not have the key.
 pub(super) fn get<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     let mut keys = key.split('.');
     let first = table.get(keys.next()?)?;
@@ -128,8 +131,8 @@ pub(super) fn get<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     })
 }
 
-/// Sets the dotted `key` to `value`, or removes `key` if `value` is `None`. Returns `false` if a
-/// table that should contain `key` is missing.
+/// Sets the dotted `key` of `table` to `value`, or removes `key` if `value` is `None`. Returns
+/// `false` if `table` has no inner table for the parts of `key` before its last dot.
 pub(super) fn insert_value(table: &mut Table, key: &str, value: Option<Value>) -> bool {
     let (outer, last) = match key.rsplit_once('.') {
         Some((outer, last)) => (Some(outer), last),

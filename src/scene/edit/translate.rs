@@ -1,4 +1,4 @@
-//! Translation by a vector.
+//! Edits that move an object, a light or a camera by a vector, in scene units.
 
 use crate::light::{Directional, Light};
 use crate::scene::edit::bounds::scene_bounds;
@@ -8,9 +8,11 @@ use crate::value::{floor_log10, rounded_to, unit};
 use glam::DVec3;
 
 /// Moves an object, a light, the current camera or a stored camera by the vector `by`, in scene
-/// units. An object without a transform is moved by the position keys of its shape, any other
-/// object by a translation after its last step. The direction of a directional light changes as if
-/// the light were a lamp that moves by `by` and stays aimed at the centre of the scene.
+/// units. If an object has no transform, the coordinates in its shape change. Otherwise, or if its
+/// shape has no coordinates (a mesh), a translation moves it as the last step of its transform. A
+/// directional light changes its direction: it is treated as a lamp that moves by `by` and stays
+/// aimed at the origin. The lamp's distance from the origin is three times the radius of the
+/// scene's bounding sphere.
 ///
 /// # Errors
 /// Fails for targets that cannot be moved, and for new coordinates beyond the largest valid one.
@@ -46,8 +48,8 @@ pub fn move_by(scene: &Scene, subject: &Target, by: [f64; 3]) -> Result<Edit, Ed
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Returns `at + by`. Each changed coordinate is rounded to a thousandth of a power of ten, the
-/// largest that is at most the change.
+/// Returns the point `at + by`. Each coordinate that changes is rounded to a multiple of `p /
+/// 1000`, where `p` is the largest power of ten that is at most the absolute change.
 pub(super) fn moved(at: [f64; 3], by: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| match by[i] {
         0.0 => at[i],

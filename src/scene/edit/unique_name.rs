@@ -1,9 +1,10 @@
-//! Unique names.
+//! Unique names for new objects, lights, materials and cameras.
 
 use crate::scene::Scene;
 
-/// Returns `wanted` if it is free, otherwise `wanted` with the smallest free number from 2: `cube`,
-/// `cube 2`, `cube 3`. A number at the end of `wanted` is replaced.
+/// Returns `wanted` if `taken(wanted)` is `false`. Otherwise returns `wanted` with the smallest
+/// number from 2 for which `taken` is `false`: `cube`, `cube 2`, `cube 3`. A number at the end of
+/// `wanted` is replaced.
 pub(super) fn free_name(wanted: &str, taken: impl Fn(&str) -> bool) -> String {
     if !wanted.is_empty() && !taken(wanted) {
         return wanted.to_string();

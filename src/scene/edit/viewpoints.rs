@@ -1,4 +1,4 @@
-//! Stored cameras.
+//! Edits that store the current camera and recall stored cameras.
 
 use crate::scene::Scene;
 use crate::scene::edit::parse_value::name;
@@ -21,9 +21,9 @@ pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError>
     let mut next = scene.clone();
     let old = next.cameras.insert(name.clone(), scene.camera.clone());
     let label = format!("store camera {name}");
-    let edit = Edit::checked(next, Target::View(name.clone()), label)?;
     let replaced = old.is_some_and(|old| old != scene.camera);
-    Ok(if replaced { edit.with_note(format!("View {name} was replaced.")) } else { edit })
+    let note = replaced.then(|| format!("View {name} was replaced."));
+    Ok(Edit::checked(next, Target::View(name), label)?.with_note(note))
 }
 
 /// Makes the stored camera `name` the current camera.

@@ -1,17 +1,20 @@
-//! Comments that belong to the file rather than to the table below them, and the order of tables.
+//! Order of the tables in scene files, and comments above removed tables. An empty line between a
+//! comment and the table below it means that the comment belongs to the file, not to the table.
 
 use toml_edit::{DocumentMut, Item, Table};
 
-/// Keeper of the comments above removed tables. A comment that an empty line separates from its
-/// table belongs to the file, and is kept when the table is removed.
+/// Comments that stay in a scene file although the tables below them are removed. A comment stays
+/// if an empty line separates it from its table.
 #[derive(Default)]
 pub(crate) struct CommentKeeper {
-    /// Position of each removed table in the file, and the separate comment above it.
+    /// One pair for each removed table with such a comment above it: `(ordinal number of the table
+    /// in the file, comment)`.
     comments: Vec<(isize, String)>,
 }
 
 impl CommentKeeper {
-    /// Records the separate comments above the tables of the removed `item`.
+    /// Records the comments that stay in the file when `item` is removed: those that an empty line
+    /// separates from the tables below them in `item`.
     pub(crate) fn removed(&mut self, item: &Item) {
         match item {
             Item::Table(table) => {
@@ -86,8 +89,8 @@ fn prefix(table: &Table) -> &str {
     table.decor().prefix().and_then(|p| p.as_str()).unwrap_or_default()
 }
 
-/// Splits `above`, the text above a table, after its last empty line. The first part is the
-/// separate comment, which belongs to the file. The second part is the comment of the table.
+/// Splits `above`, the text above a table, after its last empty line. Returns `(first part, second
+/// part)`: comments in the first part belong to the file, in the second part to the table.
 fn split(above: &str) -> (&str, &str) {
     let mut cut = 0;
     let mut end = 0;
@@ -108,8 +111,8 @@ fn put_above(table: &mut Table, comment: &str) {
 }
 
 /// Sets the positions of `tables` in the file so that they are written in the order of the slice.
-/// `from` has the index of the old entry that each table was; `None` for a new table. Nothing
-/// changes if the old tables keep their order and new tables come last.
+/// `from` has one entry for each table: its index before the edit, or `None` for a new table.
+/// Nothing changes if the old tables keep their order and new tables come last.
 pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     let old: Vec<usize> = from.iter().flatten().copied().collect();
     let tail_only = from.iter().skip_while(|i| i.is_some()).all(Option::is_none);

@@ -1,12 +1,12 @@
 //! Writing of new parts of a scene file. Only values that differ from the defaults are written, in
-//! the layout of the reference.
+//! the layout of the manual.
 
 use crate::value::{Color, DefaultValue, Field, ValueType};
 use toml::Value;
 use toml_edit::{Array, ArrayOfTables, InlineTable, Item, Table};
 
-/// Returns the TOML item for `value`. `headers` is `true` if tables may have `[headers]`; otherwise
-/// they are inline.
+/// Returns the TOML item for a new `value` in a scene file. `takes` is the type of `value`. If
+/// `headers` is `true`, tables may have `[headers]`; otherwise they are inline.
 pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
     match (takes, value) {
         (ValueType::Table(fields), Value::Table(table)) if headers => {
@@ -51,8 +51,8 @@ pub(crate) fn fresh(takes: ValueType, value: &Value, headers: bool) -> Item {
     }
 }
 
-/// Returns a colour as three numbers, or as `#rrggbb` if that is exact and the numbers would be
-/// long.
+/// Returns a colour as a TOML value: a list of three numbers. If some of them are not whole numbers
+/// and `#rrggbb` represents the colour exactly, returns this form instead.
 fn color_leaf(value: &Value) -> toml_edit::Value {
     let code = color(value).filter(|c| c.0.iter().any(|x| x.fract() != 0.0));
     code.and_then(Color::to_hex).map_or_else(|| leaf(value), toml_edit::Value::from)
@@ -64,8 +64,8 @@ pub(crate) fn color(value: &Value) -> Option<Color> {
     channels.try_into().ok().map(Color)
 }
 
-/// Returns `value`, an entry of a list of the type `list`, as a table that can be converted to an
-/// inline table.
+/// Returns the table for `value`, an entry of a list in a scene file. `list` is the type of that
+/// list. The table can be converted to an inline table.
 pub(crate) fn fresh_entry(list: ValueType, value: &Value) -> Table {
     match (list, value) {
         (ValueType::Tables(fields) | ValueType::ListOf(fields), Value::Table(table)) => {
@@ -75,8 +75,9 @@ pub(crate) fn fresh_entry(list: ValueType, value: &Value) -> Table {
     }
 }
 
-/// Returns a table with the keys of `values` that differ from their defaults. Tables with exactly
-/// one key (`shape`, `view_angle`) are written as dotted keys, all other tables as inline tables.
+/// Returns a table with the keys of `values` that differ from their defaults. Inner tables are
+/// inline. The exceptions are tables in which exactly one key may be given (`shape`, `view_angle`):
+/// they have dotted keys.
 pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Table {
     let mut table = Table::new();
     for field in fields {
@@ -89,13 +90,15 @@ pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Tab
     table
 }
 
-/// Returns `true` if `value` is the default of `field`.
+/// Parses `text`, the default value of a key as TOML. Returns `None` if it is not valid TOML.
+pub(crate) fn preset(text: &str) -> Option<Value> {
+    format!("value = {text}").parse::<toml::Table>().ok()?.remove("value")
+}
+
+/// Returns `true` if `value` is the default of the key `field`.
 fn is_default(field: &Field, value: &Value) -> bool {
     match field.preset {
-        DefaultValue::Is(text) => {
-            let line = format!("value = {text}");
-            line.parse::<toml::Table>().is_ok_and(|table| table.get("value") == Some(value))
-        }
+        DefaultValue::Is(text) => preset(text).as_ref() == Some(value),
         DefaultValue::Required | DefaultValue::Without(_) => false,
     }
 }

@@ -1,13 +1,19 @@
-//! Alignment of the entries of an edited list with those before the edit.
+//! Alignment of lists in scene files: finds the entries of an edited list in the list before the
+//! edit.
 
 use std::collections::{BTreeSet, HashMap};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use toml::Value;
 
-/// Returns for each entry of `new` the index of its origin in `old`, or `None`; no index occurs
-/// twice. Entries match if they have the same name. Otherwise they match if they are equal, or if
-/// they are between the same neighbours and one may be an edit of the other: neither has a name, or
-/// only the names differ. The time is n log n for n entries.
+/// Returns for each entry of `new` the index of its origin in `old`, or `None` for an added entry.
+/// No index occurs twice. The origin of an entry is the first of the following that exists:
+///
+/// - an old entry of the same name,
+/// - an old entry that is equal to it,
+/// - an old entry between the origins of its neighbours, if neither entry has a name or only the
+///   names differ.
+///
+/// The time is n log n for n entries.
 pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     let mut free = Free::of(old);
     let mut from = vec![None; new.len()];
@@ -32,14 +38,15 @@ pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     from
 }
 
-/// Entries of the old list without a match so far, by name and by contents.
+/// Entries of the old list that are not yet the origin of a new entry. They can be found by name
+/// and by contents.
 struct Free<'a> {
     entries: &'a [Value],
     named: HashMap<&'a str, BTreeSet<usize>>,
     nameless: BTreeSet<usize>,
-    /// Indices by the hash of the whole entry.
+    /// Indices of the unmatched old entries, by the hash of the whole entry.
     equal: HashMap<u64, BTreeSet<usize>>,
-    /// Indices by the hash of the entry without its name.
+    /// Indices of the unmatched old entries, by the hash of the entry without its name.
     equal_but_name: HashMap<u64, BTreeSet<usize>>,
 }
 
@@ -63,20 +70,24 @@ impl<'a> Free<'a> {
         free
     }
 
-    /// Takes the first entry with the name of `entry`.
+    /// Takes the first unmatched old entry with the name of `entry`. Returns its index; `None` if
+    /// there is no such entry.
     fn take_named(&mut self, entry: &Value) -> Option<usize> {
         let first = *self.named.get(name(entry)?)?.first()?;
         Some(self.take(first))
     }
 
-    /// Takes the first entry that is equal to `entry`.
+    /// Takes the first unmatched old entry that is equal to `entry`. Returns its index; `None` if
+    /// there is no such entry.
     fn take_equal(&mut self, entry: &Value) -> Option<usize> {
         let alike = self.equal.get(&hash(entry, true))?;
         let first = alike.iter().copied().find(|i| self.entries[*i] == *entry)?;
         Some(self.take(first))
     }
 
-    /// Takes the first of the entries `after..before` that `entry` may be an edit of.
+    /// Takes the first unmatched old entry with an index in `after..before` that equals `entry`
+    /// except for its name, or that has no name if `entry` has none. Returns its index; `None` if
+    /// there is no such entry.
     fn take_edited(&mut self, entry: &Value, after: usize, before: usize) -> Option<usize> {
         let renamed = self.equal_but_name.get(&hash(entry, false)).and_then(|alike| {
             let mut between = alike.range(after..before).copied();
@@ -116,7 +127,7 @@ fn is_equal_but_name(a: &Value, b: &Value) -> bool {
     without_name(a) == without_name(b)
 }
 
-/// Returns the hash of an entry, with or without its name. Equal entries have the same hash.
+/// Returns the hash of a list entry, with or without its name. Equal entries have the same hash.
 fn hash(entry: &Value, with_name: bool) -> u64 {
     let mut hasher = DefaultHasher::new();
     let name = if with_name { name(entry) } else { None };
@@ -151,7 +162,8 @@ mod tests {
     use super::*;
     use std::ops::Range;
 
-    /// Parses entries of the form `name/value`.
+    /// Returns a list of tables, one for each word of `text`. A word is `name/value`; the name may
+    /// be empty.
     fn list(text: &str) -> Vec<Value> {
         let entry = |word: &str| {
             let (name, value) = word.split_once('/').unwrap();
@@ -187,7 +199,8 @@ mod tests {
         }
     }
 
-    /// Returns the result of [`align`] by the literal rule, in quadratic time.
+    /// Returns, for each entry of `new`, the index of its origin in `old`, by the rule of
+    /// [`align`]. Searches the list of old entries for each new one, in quadratic time.
     fn align_by_search(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
         let mut from = vec![None; new.len()];
         let find =

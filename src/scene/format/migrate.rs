@@ -1,5 +1,6 @@
-//! Migration of scene files: keys and values that were renamed since earlier versions. Reading
-//! accepts a former word as the present one; saving writes the present word.
+//! Migration of scene files. Keys and values that were renamed since earlier versions of the format
+//! are called former words. Reading accepts a former word as the present one; saving writes the
+//! present word.
 
 use crate::primitive::Acceleration;
 use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics};
@@ -8,9 +9,9 @@ use crate::scene::format::source_map::{line_column, subject_in};
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use toml_edit::{DocumentMut, InlineTable, Item, Key, Table};
+use toml_edit::{DocumentMut, Item, Key};
 
-/// A former word and the current word that replaces it.
+/// Key or value that was renamed: `(former name, current name)`.
 type Pair = (&'static str, &'static str);
 
 const SCENE: &[Pair] = &[("views", "cameras")];
@@ -23,7 +24,8 @@ const TRACE: &[Pair] = &[
 const MATERIAL: &[Pair] = &[("index", "ior"), ("reflectance", "f0")];
 const SHAPE: &[Pair] = &[("unit_cylinder", "unit_frustum")];
 
-/// Returns the renamed keys of the table at `path`.
+/// Returns the renamed keys of the table at `path` in a scene file, each as `(former name, current
+/// name)`.
 fn keys_at(path: &[String]) -> &'static [Pair] {
     match path {
         [] => SCENE,
@@ -34,8 +36,9 @@ fn keys_at(path: &[String]) -> &'static [Pair] {
     }
 }
 
-/// Returns a key and its renamed values, in the table at `path`. Returns `None` if no values were
-/// renamed in the table.
+/// Returns `(key, pairs)` for the table at `path` in a scene file. `key` is the key of this table
+/// whose values were renamed. Each pair is `(former value, current value)`. Returns `None` if no
+/// values in this table were renamed.
 fn values_at(path: &[String]) -> Option<(&'static str, Vec<Pair>)> {
     match path {
         [film] if film == "film" => Some(("filter", vec![("center", "point")])),
@@ -47,29 +50,31 @@ fn values_at(path: &[String]) -> Option<(&'static str, Vec<Pair>)> {
     }
 }
 
-/// A former word that was found in a scene file.
+/// Use of a former name of a key or value in a scene file.
 #[derive(Clone, Debug)]
 pub(crate) struct FormerWord {
-    /// Byte offset of the word in the file.
+    /// Byte offset of the former name in the file.
     start: usize,
-    /// Path of keys to the table that contains the word, in current words.
+    /// Path of keys to the table that contains the former name. All keys of the path are current
+    /// names.
     table: Vec<String>,
-    /// Key with the word as its value; `None` if the word is itself a key.
+    /// Key that has the former name as its value; `None` if the former name is itself a key.
     key: Option<&'static str>,
     former: &'static str,
     present: &'static str,
 }
 
-/// Table with a key under both its former and its current name.
+/// Table of a scene file with a key under both its former and its current name.
 struct Conflict {
     table: Vec<String>,
     former: (&'static str, Range<usize>),
     present: (&'static str, Range<usize>),
 }
 
-/// Replaces the former words in `root` by the current ones. The spans of keys and values are kept.
-/// `root` is the parsed `part` of the file with this name and text. Returns the replaced words, and
-/// adds an error for each table with a key under both names.
+/// Replaces the former words in `root` by the current ones and returns them. A former word is a key
+/// or value that was renamed since an earlier version of the scene format. Its byte range is kept.
+/// `root` is the parsed `part` of the file with the name `file` and the text `text`. Adds an error
+/// to `errors` for each table that has a key under both names.
 pub(crate) fn migrate(
     (file, text): (&str, &str),
     root: &mut DeTable,
@@ -170,9 +175,10 @@ impl Migration<'_> {
     }
 }
 
-/// Returns the former word of `words` that comes first in the file, its offset, and the name of its
-/// table for diagnostics. `root` is the parsed `part` that contains the words. Returns `None` if
-/// there are no words.
+/// Returns the former word (obsolete name of a key or value) among `words` that comes first in the
+/// file, as `(byte offset in the file, word, name of its table in diagnostics)`. The name of a
+/// table is, for example, `object "queen"`. `root` is the parsed `part` that contains the words.
+/// Returns `None` if `words` is empty.
 pub(crate) fn first_word(
     root: &DeTable,
     part: &Part,
@@ -182,8 +188,9 @@ pub(crate) fn first_word(
     Some((first.start, first.clone(), subject_in(root, &first.table, part.first_object)))
 }
 
-/// Returns the warning about the `count` former words of a file. It quotes the first of them, which
-/// is in the table `subject`.
+/// Returns the warning that a file has `count` former words (obsolete names of keys or values). It
+/// quotes the first of them, which is given as `(byte offset in the file, word, name of its table
+/// in diagnostics)`. `file` and `text` are name and text of the file.
 pub(crate) fn warning(
     (file, text): (&str, &str),
     (start, first, subject): &(usize, FormerWord, String),
@@ -207,8 +214,8 @@ pub(crate) fn warning(
     }
 }
 
-/// Replaces the former `words` in `document` by the current ones. Order, layout and comments are
-/// kept.
+/// Replaces the former names `words` in `document` by the current ones. Order, layout and comments
+/// are kept.
 pub(crate) fn write_present(document: &mut DocumentMut, words: &[FormerWord]) {
     for word in words {
         let table = word.table.iter().try_fold(document.as_item_mut(), |item, key| {
@@ -241,22 +248,12 @@ fn rename_key(table: &mut Item, former: &str, present: &str) {
         let decor = (key.leaf_decor().clone(), key.dotted_decor().clone());
         Key::new(present).with_leaf_decor(decor.0).with_dotted_decor(decor.1)
     };
-    fn names<'a, T>(entries: impl Iterator<Item = (&'a str, T)>) -> Vec<String> {
-        entries.map(|(name, _)| name.to_string()).collect()
-    }
-    if let Some(table) = table.as_table_mut() {
-        let table: &mut Table = table;
-        for name in names(table.iter()) {
-            if let Some((key, value)) = table.remove_entry(&name) {
-                table.insert_formatted(&renamed(key), value);
-            }
-        }
-    } else if let Some(table) = table.as_inline_table_mut() {
-        let table: &mut InlineTable = table;
-        for name in names(table.iter()) {
-            if let Some((key, value)) = table.remove_entry(&name) {
-                table.insert_formatted(&renamed(key), value);
-            }
+    let Some(table) = table.as_table_like_mut() else { return };
+    let names: Vec<String> = table.iter().map(|(name, _)| name.to_string()).collect();
+    for name in names {
+        let key = table.key(&name).cloned();
+        if let (Some(key), Some(value)) = (key, table.remove(&name)) {
+            table.entry_format(&renamed(key)).or_insert(value);
         }
     }
 }
@@ -265,7 +262,8 @@ fn rename_key(table: &mut Item, former: &str, present: &str) {
 mod tests {
     use crate::scene::{Document, Scene};
 
-    /// Scene file with every word that was renamed, in every layout.
+    /// Scene file of an earlier version with every key and value that was renamed since. The keys
+    /// are written as table headers, as dotted keys and in inline tables.
     const FORMER: &str = r##"# A scene of an earlier version.
 film = { filter = "center", size = [64, 48] } # small
 ambient.color = [0.5, 0.5, 0.5]

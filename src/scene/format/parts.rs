@@ -1,36 +1,36 @@
-//! Parts of a scene file, each a TOML document of its own: the parsed form of a document takes some
-//! hundred times the memory of its text, and only one part is parsed at a time.
+//! Parts of a scene file. Only one part is parsed at a time, as a TOML document of its own, because
+//! a parsed document takes some hundred times the memory of its text.
 //!
 //! A part consists of whole `[[object]]` sections, or of everything else in the file.
 
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Length \[bytes\] after which a part ends before the next `[[object]]`. Files up to this length
-/// have one part.
+/// Length in bytes from which a part of a scene file ends before the next `[[object]]`. Files up to
+/// this length have one part.
 pub(crate) const PART_BYTES: usize = 256 << 10;
 
-/// Part of a scene file.
+/// Part of a scene file that is parsed as a TOML document of its own.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Part {
-    /// Ranges of the file's text, in ascending order.
+    /// Ranges of the file's bytes that make up this part of the scene file, in ascending order.
     ranges: Vec<Range<usize>>,
-    /// Index in the file of the part's first object.
+    /// Number of objects in the file before this part of it.
     pub first_object: usize,
 }
 
-/// Beginning of a section of a TOML document, by its header.
+/// Header with which a section of a TOML document begins.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Header {
-    /// `[[object]]`.
+    /// Header of an object: `[[object]]`.
     Object,
-    /// A table inside of the previous object, such as `[object.shape]`.
+    /// Header of a table inside of the previous object, such as `[object.shape]`.
     InObject,
     Other,
 }
 
 impl Part {
-    /// Returns the part that consists of all of `text`.
+    /// Creates a part that consists of the whole `text` of a scene file.
     pub fn whole(text: &str) -> Self {
         let everything = 0..text.len();
         Self { ranges: vec![everything], first_object: 0 }
@@ -44,7 +44,8 @@ impl Part {
         }
     }
 
-    /// Returns the index in the file of the first entry of the list at `path` in this part.
+    /// Returns the index, in the whole file, of the first entry of the list at `path` that is in
+    /// this part. Only the list of objects is divided among parts; for all other lists it is 0.
     pub fn first_index(&self, path: &[String]) -> usize {
         match path {
             [list] if list == "object" => self.first_object,
@@ -64,9 +65,10 @@ impl Part {
     }
 }
 
-/// Divides a file into parts: first all tables except for the objects, then the objects in parts of
-/// at least `part_bytes`, except for the last one. Returns a single part if the file is shorter,
-/// has no objects, or continues an object after another section.
+/// Divides a file into parts. The first part has everything except the objects; each other part has
+/// consecutive objects. A part of objects has at least `part_bytes` bytes, unless the file ends or
+/// a section follows that is no object. Returns a single part if the file has at most `part_bytes`
+/// bytes, has no objects, or continues an object after another section.
 pub(crate) fn split(text: &str, part_bytes: usize) -> Vec<Part> {
     let sections = sections(text);
     let objects = sections.iter().filter(|(_, header)| *header == Header::Object).count();
@@ -102,8 +104,8 @@ pub(crate) fn split(text: &str, part_bytes: usize) -> Vec<Part> {
     parts
 }
 
-/// Returns the sections of a TOML document, each with the offset of its first line. The first one
-/// begins at 0.
+/// Returns the sections of a TOML document, each as `(byte offset of its first line, kind of its
+/// header)`. A section is the text from one header to the next. The first one begins at 0.
 fn sections(text: &str) -> Vec<(usize, Header)> {
     let bytes = text.as_bytes();
     let mut sections = vec![(0, Header::Other)];
@@ -140,7 +142,7 @@ fn sections(text: &str) -> Vec<(usize, Header)> {
     sections
 }
 
-/// Returns the kind of the header that `text` begins with.
+/// Returns the kind of the TOML header that `text` begins with.
 fn header(text: &str) -> Header {
     let is_list = text.starts_with("[[");
     let name = text.trim_start_matches('[').trim_start_matches([' ', '\t']);
@@ -152,13 +154,13 @@ fn header(text: &str) -> Header {
     }
 }
 
-/// Returns the offset of the line end at or after `at`.
+/// Returns the byte offset of the line end at or after `at`.
 fn end_of_line(bytes: &[u8], at: usize) -> usize {
     bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |length| at + length)
 }
 
-/// Returns the offset after the string that begins with the quotation mark at `at`. A single-line
-/// string without an end is taken to end with the line.
+/// Returns the byte offset after the TOML string that begins with the quotation mark at `at`. A
+/// single-line string without an end is taken to end with the line.
 fn end_of_string(bytes: &[u8], at: usize) -> usize {
     let quote = bytes[at];
     let is_quoted = |at: usize, marks: usize| {

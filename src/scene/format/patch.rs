@@ -1,10 +1,11 @@
-//! Patches the text of a scene file by the difference between two scenes.
+//! Patches of the text of a scene file by the difference between two scenes.
 //!
 //! Scenes are compared as trees of TOML values; text of equal values is not touched. A key that is
 //! not in the text has its default; it is written only when its value differs from that.
 //!
-//! Patching by the key path of an edit would need no comparison, but saving has no such path: undo,
-//! redo and recovered edits restore whole scenes, and one save covers any number of them.
+//! An edit knows the path of the key that it changes, which would need no comparison. But saving
+//! has no such path: undo, redo and recovered edits restore whole scenes, and one save covers any
+//! number of them.
 
 use crate::scene::format::comments::CommentKeeper;
 use crate::scene::format::emit::{color, fresh, fresh_entry, leaf};
@@ -29,7 +30,7 @@ pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml:
     }
 }
 
-/// Returns `true` if nothing is written for `item`: it is missing, an empty list of tables, or a
+/// Returns `true` if `item` adds nothing to the text: it is missing, an empty list of tables, or a
 /// table without header and values.
 fn is_nothing(item: &Item) -> bool {
     match item {
@@ -40,17 +41,19 @@ fn is_nothing(item: &Item) -> bool {
     }
 }
 
-/// Keys of a table, with the types of their values.
+/// Keys that a table in a scene file may have, with the types of their values: fixed keys, or names
+/// that the user chooses.
 enum Keys {
-    /// Keys of these fields.
+    /// Keys of a table that permits only these fields, each with a type of its own.
     Fixed(&'static [Field]),
-    /// Any keys; the value of each key is a table with these fields.
+    /// Keys that are names chosen by the user. The value of each is a table with these fields.
     Named(&'static [Field]),
 }
 
 impl Keys {
-    /// Returns the keys of `old` and `new` with the types of their values, in the order in which
-    /// new keys are written.
+    /// Returns the keys whose values are compared between the tables `old` and `new`, each with the
+    /// type of its value: all fixed keys, or the names that occur in either table. Keys that only
+    /// `new` has are added to the file in this order.
     fn of(&self, old: &toml::Table, new: &toml::Table) -> Vec<(String, ValueType)> {
         match self {
             Self::Fixed(fields) => fields.iter().map(|f| (f.name.to_string(), f.takes)).collect(),
@@ -67,8 +70,8 @@ struct Rewriter {
 }
 
 impl Rewriter {
-    /// Changes `table`, which describes `old`, to describe `new`. Inner tables may have `[headers]`
-    /// if `headers` is `true`.
+    /// Changes `table`, which describes `old`, to describe `new`. `keys` are the keys that it may
+    /// have. Inner tables may have `[headers]` if `headers` is `true`.
     fn table(
         &mut self,
         table: &mut dyn TableLike,
@@ -222,8 +225,9 @@ impl Rewriter {
     }
 }
 
-/// Renames named tables in place and keeps their comments. A removed table and an added one are a
-/// renamed table if their values are equal. Returns `old` with the new names.
+/// Finds the inner tables of `table` that were renamed between `old` and `new`, renames them in
+/// place and keeps their comments. A name that only `old` has was changed to a name that only `new`
+/// has if both have the same values. Returns `old` with the new names.
 fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
     let mut renamed = old.clone();
     for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {
@@ -244,8 +248,9 @@ fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> to
     renamed
 }
 
-/// Removes and returns the comment after the last entry of `list`, if `followed` is `true` because
-/// another entry will follow. Otherwise returns an empty string.
+/// Removes the comment after the last entry of `list` and its comma, and returns it. Callers set
+/// `followed` to `true` if they append another entry, before which they write the comment. If
+/// `followed` is `false` or there is no such comment, returns an empty string and changes nothing.
 fn comment_of_the_last(list: &mut toml_edit::Array, followed: bool) -> String {
     let trailing = list.trailing().as_str().unwrap_or_default();
     match trailing.rfind('\n') {

@@ -1,12 +1,12 @@
-//! Reading of scene files: text to validated scene.
+//! Reading of scene files: from text to a validated scene.
 
+use crate::process_memory::missing_memory;
 use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics, SceneErrors};
 use crate::scene::format::migrate::{self, FormerWord, migrate};
 use crate::scene::format::parts::{PART_BYTES, Part, split};
 use crate::scene::format::schema;
 use crate::scene::format::source_map::{line_column, locate};
 use crate::scene::{AssetResolver, Scene};
-use crate::value::missing_memory;
 use serde::Deserialize;
 use std::fs::File;
 use std::io::{self, Read};
@@ -19,9 +19,9 @@ use toml::de::{DeTable, Deserializer};
 /// objects.
 pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
-/// Peak memory per byte of a scene file, while it is read and while its world is compiled
-/// \[bytes\]. A million spheres in 53 MB take 768 MB. Files with shorter objects take more per
-/// byte.
+/// Estimated peak memory per byte of a scene file, in bytes. The peak occurs while the file is read
+/// and its objects are converted for rendering. A million spheres in 53 MB take 768 MB. Files with
+/// shorter objects take more per byte.
 const SCENE_BYTES: u64 = 20;
 
 impl Scene {
@@ -56,12 +56,13 @@ impl Scene {
     }
 }
 
-/// A valid scene and the text that describes it. The text has been parsed once, part by part, and
-/// the scene has been validated once.
+/// Valid scene and the text that describes it. The text has been parsed once, part by part, and the
+/// scene has been validated once.
 pub(crate) struct SourceScene<'a> {
     pub scene: Scene,
     pub former_words: Vec<FormerWord>,
-    /// The first of `former_words` in the file.
+    /// First of the `former_words` in the file, as `(byte offset in the file, word, name of its
+    /// table in diagnostics)`. `None` if there are no former words.
     first_word: Option<(usize, FormerWord, String)>,
     name: &'a str,
     text: &'a str,
@@ -115,7 +116,8 @@ impl<'a> SourceScene<'a> {
         Err(SceneErrors::new(errors.located(text)))
     }
 
-    /// Reads the scene from the parts, without semantic validation.
+    /// Reads the scene from the parts of the text and checks keys and types. Values are validated
+    /// later.
     fn read_parts(&mut self) -> Result<Reading, SceneErrors> {
         let (name, text) = (self.name, self.text);
         let mut errors = FirstDiagnostics::default();
@@ -178,7 +180,8 @@ impl<'a> SourceScene<'a> {
         Ok(Reading::Done)
     }
 
-    /// Returns the lints of the scene and the warning about former words, sorted by location.
+    /// Returns the warnings about doubtful values and about former names of keys and values, sorted
+    /// by location.
     pub(crate) fn warnings(&self) -> Vec<Diagnostic> {
         let mut found = FirstDiagnostics::default();
         locate((self.name, self.text), &self.parts, self.scene.warnings(), &mut found);
@@ -188,17 +191,17 @@ impl<'a> SourceScene<'a> {
         warnings
     }
 
-    /// Returns the warning about former words; `None` if the file has none.
+    /// Returns the warning about former names of keys and values; `None` if the file has none.
     pub(crate) fn migration_warning(&self) -> Option<Diagnostic> {
         let first = self.first_word.as_ref()?;
         Some(migrate::warning((self.name, self.text), first, self.former_words.len()))
     }
 }
 
-/// Result of reading the parts of a file separately.
+/// Result of reading a scene file part by part, if no error was found.
 enum Reading {
     Done,
-    /// The parts do not describe the scene that the whole file describes.
+    /// The file has objects outside of `[[object]]` sections, so that it must be read as a whole.
     NotInParts,
 }
 
@@ -208,7 +211,7 @@ pub(crate) fn read_text(
     open: impl Fn(&Path) -> io::Result<File>,
 ) -> Result<String, SceneErrors> {
     let name = path.display().to_string();
-    let fail = |found: &str, help: &str| SceneErrors::of_file(&name, found.to_string(), help);
+    let fail = |found: &str, help: &str| SceneErrors::at(&name, None, found.to_string(), help);
     let io = |error: std::io::Error| match error.kind() {
         std::io::ErrorKind::NotFound => {
             fail("there is no such file", "`zerkalo new FILE` writes a scene to start from.")
@@ -260,7 +263,8 @@ mod tests {
     use crate::scene::Object;
     use std::fs;
 
-    /// Parses `text` twice: in parts of single objects, and as a whole.
+    /// Parses the scene `text` twice: in parts of one object each, and as a whole. Returns the two
+    /// results in this order.
     fn both(text: &str, name: &str) -> [Result<Scene, SceneErrors>; 2] {
         // Meshes are equal only if they were read once.
         let assets = Arc::default();
@@ -338,8 +342,9 @@ mod tests {
         }
     }
 
-    /// Checks that twice the objects, with one error each, take twice the time. Further errors are
-    /// only counted.
+    /// Checks that errors are found in linear time. The scene file has one error in each object. A
+    /// file with twice the number of objects takes about twice the time. Errors beyond the reported
+    /// ones are only counted.
     #[test]
     fn errors_of_large_files_are_found_in_one_pass() {
         // Each lookup of a line from the beginning of this file would read 2 MB; 20,000 of them

@@ -1,13 +1,12 @@
 //! Schema validation of a scene file against the field tables: unknown keys, values of a wrong
 //! type, missing keys. One pass finds all errors.
 
-use crate::scene::OBJECT_FIELDS;
 use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics};
 use crate::scene::format::parts::Part;
 use crate::scene::format::source_map::subject_in;
 use crate::scene::format::suggest::nearest;
-use crate::scene::settings::{AMBIENT_FIELDS, BACKGROUND_FIELDS, FILM_FIELDS, TRACE_FIELDS};
-use crate::value::{Color, DefaultValue, Field, NumberRange, ValueType, truncated};
+use crate::scene::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
+use crate::value::{Color, DefaultValue, Description, Field, NumberRange, ValueType, truncated};
 use crate::{camera, light, material};
 use std::ops;
 use toml::Spanned;
@@ -15,8 +14,12 @@ use toml::de::{DeInteger, DeTable, DeValue};
 
 /// Top-level keys of a scene file.
 pub const FIELDS: &[Field] = &[
-    table("film", FILM_FIELDS, "Film: size of the picture, pixel filter, sample limit."),
-    table("trace", TRACE_FIELDS, "Integrator: kinds of rays, depth, acceleration structure."),
+    table("film", FilmSettings::FIELDS, "Film: size of the picture, pixel filter, sample limit."),
+    table(
+        "trace",
+        IntegratorSettings::FIELDS,
+        "Integrator: kinds of rays, depth, acceleration structure.",
+    ),
     Field::optional(
         "camera",
         ValueType::Table(camera::FIELDS),
@@ -31,8 +34,8 @@ pub const FIELDS: &[Field] = &[
         "there are none",
         "Stored cameras by name. The picture is taken from `[camera]`.",
     ),
-    table("background", BACKGROUND_FIELDS, "Radiance of rays that hit no surface."),
-    table("ambient", AMBIENT_FIELDS, "Ambient light: uniform, without shadows."),
+    table("background", Background::FIELDS, "Radiance of rays that hit no surface."),
+    table("ambient", Ambient::FIELDS, "Ambient light: uniform, without shadows."),
     Field::optional("light", ValueType::Tables(light::FIELDS), "", "there are none", "The lights."),
     Field::optional(
         "materials",
@@ -43,7 +46,7 @@ pub const FIELDS: &[Field] = &[
     ),
     Field::optional(
         "object",
-        ValueType::Tables(OBJECT_FIELDS),
+        ValueType::Tables(Object::FIELDS),
         "",
         "there are none",
         "The objects.",
@@ -54,7 +57,8 @@ const fn table(name: &'static str, fields: &'static [Field], doc: &'static str) 
     Field::optional(name, ValueType::Table(fields), "", "its keys have their defaults", doc)
 }
 
-/// Adds the schema errors in `root`, which is the parsed `part` of the scene file `file`.
+/// Adds the schema errors (unknown keys, wrong types, missing keys) in `root` to `errors`. `root`
+/// is the parsed `part` of the scene file `file`.
 pub(crate) fn check(
     file: &str,
     root: &Spanned<DeTable>,
@@ -65,8 +69,8 @@ pub(crate) fn check(
     walk.table(root.get_ref(), 0..0, FIELDS);
 }
 
-/// Returns a path as a phrase: `shape.sphere`, `step 2 of transform`, `shape.cube of part 1 of
-/// shape.union`.
+/// Formats a path of keys as a phrase: `shape.sphere`, `step 2 of transform`,
+/// `shape.cube of part 1 of shape.union`.
 fn phrase(keys: &[String]) -> String {
     let number = |position: &String| position.parse().map_or(0, |i: usize| i + 1);
     if let Some(of) = keys.iter().rposition(|key| key == "of")
@@ -104,8 +108,9 @@ impl SchemaChecker<'_> {
         });
     }
 
-    /// Returns the part of the current path inside of the table that is the subject of diagnostics:
-    /// `shape.sphere`.
+    /// Returns the keys of the current path below the table that diagnostics name (an object,
+    /// light, material, camera or another table): `shape.sphere` for the path
+    /// `object.3.shape.sphere`.
     fn inner(&self) -> String {
         let above = match self.path.first().map(String::as_str) {
             Some("object" | "light" | "materials" | "cameras") => 2,
@@ -114,7 +119,8 @@ impl SchemaChecker<'_> {
         phrase(self.path.get(above..).unwrap_or_default())
     }
 
-    /// Adds an error about a value of the wrong type.
+    /// Adds an error about `value`, which has the wrong type. `span` is its byte range in this part
+    /// of the file. `expected` describes valid values.
     fn wrong(&mut self, span: ops::Range<usize>, value: &DeValue, expected: &str) {
         if self.errors.skips(self.part.in_file(span.start)) {
             return;
@@ -126,8 +132,9 @@ impl SchemaChecker<'_> {
         self.add(span, format!("{name} is {}", describe(value)), format!("Expected {expected}."));
     }
 
-    /// Adds an error about an unknown key. Returns the most similar valid key; `None` if no key is
-    /// similar, or if there are enough errors.
+    /// Adds an error about the unknown key `key`. The error suggests the most similar name in
+    /// `fields`. Returns this name. Returns `None` if no name is similar, or if enough errors that
+    /// come earlier in the file are stored already.
     fn unknown(
         &mut self,
         key: &Spanned<toml::de::DeString>,
@@ -205,7 +212,9 @@ impl SchemaChecker<'_> {
         self.path.pop();
     }
 
-    /// Validates each entry of a list with `each`. The path contains the entry's index meanwhile.
+    /// Validates a list of tables. Calls `each` for every entry that is a table; during the call,
+    /// the current path ends with the index of the entry. Adds an error for any other entry;
+    /// `expected` describes valid ones.
     fn entries(
         &mut self,
         list: &[Spanned<DeValue>],
@@ -266,9 +275,9 @@ impl SchemaChecker<'_> {
     }
 }
 
-/// Returns `true` if a value that is not a table has the right type. Ranges of whole numbers are
-/// checked here, because the unsigned integers of descriptions cannot hold values outside of them.
-/// Other ranges are checked in [`Scene::faults`](crate::scene::Scene::faults).
+/// Returns `true` if a value that is not a table has the type `takes`. A whole number must also be
+/// within its range, because unsigned integers of the scene cannot store other numbers. Other
+/// ranges are checked in [`Scene::faults`](crate::scene::Scene::faults).
 fn fits(takes: ValueType, value: &DeValue) -> bool {
     let list = |n: usize, each: &dyn Fn(&DeValue) -> bool| match value {
         DeValue::Array(list) => list.len() == n && list.iter().all(|v| each(v.get_ref())),
@@ -310,7 +319,7 @@ fn is_number(value: &DeValue) -> bool {
     value.is_float() || value.as_integer().and_then(integer).is_some()
 }
 
-/// Describes a value: `the string "abc"`, `the number -2`, `a list of 2`.
+/// Describes a TOML value in words: `the string "abc"`, `the number -2`, `a list of 2`.
 fn describe(value: &DeValue) -> String {
     match value {
         DeValue::String(text) => format!("the string \"{}\"", truncated(text)),

@@ -1,4 +1,4 @@
-//! Source map: lines and columns of keys and values.
+//! Source map of a scene file: lines and columns of keys and values.
 
 use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics};
 use crate::scene::format::migrate::migrate;
@@ -15,10 +15,10 @@ pub(crate) fn line_column(text: &str, at: usize) -> (usize, usize) {
     LineCounter::new(text).line_column(at)
 }
 
-/// Lines and columns of ascending byte offsets, found in one pass over the text.
+/// Converter of ascending byte offsets of a text to lines and columns, in one pass over the text.
 pub(crate) struct LineCounter<'a> {
     text: &'a str,
-    /// Offset up to which line endings have been counted in `lines`.
+    /// Byte offset up to which line endings have been counted in `lines`.
     counted: usize,
     lines: usize,
 }
@@ -45,8 +45,8 @@ impl<'a> LineCounter<'a> {
     }
 }
 
-/// Returns the span of the value at `path`. If the file does not have this value, returns the span
-/// of its nearest ancestor.
+/// Returns the byte range of the value at `path` in a scene file. If the file does not have this
+/// value, returns the range of its nearest ancestor.
 fn span(root: &DeTable, path: &[String]) -> Range<usize> {
     let Some((first, rest)) = path.split_first() else { return 0..0 };
     match root.get(first.as_str()) {
@@ -70,8 +70,8 @@ fn deepest_span(value: &Spanned<DeValue>, path: &[String]) -> Range<usize> {
     }
 }
 
-/// Adds diagnostics for `problems` of the scene. The file has this name and text and consists of
-/// `parts`. The parts that contain the problems are parsed again.
+/// Adds diagnostics for `problems` of the scene to `found`. `file` and `text` are name and text of
+/// the scene file, which consists of `parts`. The parts that contain the problems are parsed again.
 pub(crate) fn locate(
     (file, text): (&str, &str),
     parts: &[Part],
@@ -113,8 +113,8 @@ pub(crate) fn locate(
     }
 }
 
-/// Returns the name that diagnostics use for the table at `path`: `object "queen"`. `root` has the
-/// objects of the file from `first_object` on.
+/// Returns the name that diagnostics use for the table at `path` in the file: `object "queen"`.
+/// `root` is a part of the file, in which the first object has the index `first_object`.
 pub(crate) fn subject_in(root: &DeTable, path: &[String], first_object: usize) -> String {
     subject(path, |list, index| {
         let index = if list == "object" { index.checked_sub(first_object)? } else { index };

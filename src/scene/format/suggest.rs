@@ -1,4 +1,4 @@
-//! Suggestions ("Did you mean"): the nearest known word.
+//! Suggestions for mistyped words ("Did you mean"): the nearest known word.
 
 /// Returns the word of `words` most similar to `given`. Returns `None` if `given` is not likely to
 /// be a typing error of it.

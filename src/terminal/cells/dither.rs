@@ -6,18 +6,22 @@
 
 use crate::terminal::cells::Raster;
 use crate::terminal::cells::oklab::{code, linear};
-use crate::terminal::cells::palette256;
+use crate::terminal::cells::palette_quantisation::{nearest_xterm, xterm_lightness, xterm_rgb};
 
-/// Number of table colours that are mixed for a pixel, one per cell of the pattern.
+/// Number of palette colours that are mixed for a pixel, one per position of the dither pattern.
 const MIXED: usize = 4;
-/// Bayer's ordered pattern of 2 x 2 pixels.
+/// Bayer's ordered pattern of 2 x 2 pixels. Each number is an index in the list of colours mixed
+/// for the pixel, sorted from dark to light: the pixel shows the colour with this index.
 const PATTERN: [[usize; 2]; 2] = [[0, 2], [3, 1]];
-/// Share of the accumulated error that the choice of the next colour compensates. A share of 1
+/// Share, from 0 to 1, of the accumulated error that is added to the target colour before a palette
+/// colour is chosen. The palette colours of a pixel are chosen one after the other. The error is
+/// the sum of the differences between the target and each colour already chosen. A share of 1
 /// reproduces the mean best, but mixes distant colours, which looks coarse in pixels as large as
 /// half a cell.
 const STRENGTH: f32 = 0.5;
 
-/// Returns the index of a table colour for each pixel of `raster`, by ordered dithering.
+/// Returns the index of one of xterm's 256 colours for each pixel of the image `raster`, by ordered
+/// dithering.
 pub fn dithered(raster: &Raster) -> Vec<u8> {
     let mut last = None;
     let mut mixed = [0; MIXED];
@@ -33,18 +37,19 @@ pub fn dithered(raster: &Raster) -> Vec<u8> {
     indices
 }
 
-/// Returns the table colours to mix for `rgb`, from dark to light. Their mean approximates `rgb`.
+/// Returns the indices of xterm's colours to mix for `rgb`, from dark to light. Their mean
+/// approximates `rgb`.
 fn mixture(rgb: [u8; 3]) -> [u8; MIXED] {
     let target = linear(rgb);
     let mut missing = [0.0f32; 3];
     let mut mixed = [0; MIXED];
     for index in &mut mixed {
         let goal = [0, 1, 2].map(|c| code(target[c] + STRENGTH * missing[c]));
-        *index = palette256::nearest(goal);
-        let chosen = linear(palette256::rgb(*index));
+        *index = nearest_xterm(goal);
+        let chosen = linear(xterm_rgb(*index));
         (0..3).for_each(|c| missing[c] += target[c] - chosen[c]);
     }
-    mixed.sort_by(|a, b| palette256::lightness(*a).total_cmp(&palette256::lightness(*b)));
+    mixed.sort_by(|a, b| xterm_lightness(*a).total_cmp(&xterm_lightness(*b)));
     mixed
 }
 
@@ -53,8 +58,8 @@ mod tests {
     use super::*;
     use crate::terminal::cells::Oklab;
 
-    /// Checks that the mean over the pattern is closer to the target than the nearest single table
-    /// colour.
+    /// Checks that the mean colour of a dithered area is closer to its target than any single
+    /// colour of the palette.
     #[test]
     fn dithered_mean_is_closer_than_nearest_color() {
         let (mut plain, mut mixed) = (0.0, 0.0);
@@ -64,11 +69,11 @@ mod tests {
             let raster = Raster::from_fn(8, 8, |_| rgb);
             let mut mean = [0.0f32; 3];
             for index in dithered(&raster) {
-                let color = linear(palette256::rgb(index));
+                let color = linear(xterm_rgb(index));
                 (0..3).for_each(|c| mean[c] += color[c] / 64.0);
             }
             mixed += Oklab::of_linear(mean).distance(target);
-            plain += Oklab::of(palette256::rgb(palette256::nearest(rgb))).distance(target);
+            plain += Oklab::of(xterm_rgb(nearest_xterm(rgb))).distance(target);
         }
         assert!(mixed < 0.6 * plain, "{mixed} after {plain}");
     }
@@ -76,7 +81,7 @@ mod tests {
     #[test]
     fn table_colors_are_not_dithered() {
         for index in 16..=255 {
-            assert_eq!(mixture(palette256::rgb(index)), [index; MIXED]);
+            assert_eq!(mixture(xterm_rgb(index)), [index; MIXED]);
         }
     }
 }

@@ -3,27 +3,18 @@
 //! Magnitudes use the colour map *inferno* (Stéfan van der Walt and Nathaniel Smith, 2015). The
 //! lightness of this map rises evenly, so that equal steps look equal, even without colour vision.
 
-use crate::terminal::cells::Raster;
-
-/// Mapping of a range of numbers to a colour map.
+/// Logarithmic mapping of a range of positive numbers to the colours of a colour map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// Lower end of the range, which is dark unless the scale is reversed.
+    /// Lower end of the range of numbers, which is dark unless the scale is reversed.
     pub low: f64,
-    /// Upper end of the range, which is bright unless the scale is reversed.
+    /// Upper end of the range of numbers, which is bright unless the scale is reversed.
     pub high: f64,
-    /// `true` for a logarithmic scale, which requires `low` > 0. `false` for a linear one.
-    pub logarithmic: bool,
     /// `true` if the scale is reversed: `low` is then bright.
     pub reversed: bool,
 }
 
 impl Scale {
-    /// Creates a linear scale from `low` to `high`.
-    pub fn linear(low: f64, high: f64) -> Self {
-        Self { low, high, logarithmic: false, reversed: false }
-    }
-
     /// Creates a logarithmic scale from the smallest to the largest positive finite number of
     /// `values`. The scale is from 1 to 10 if there are no such numbers.
     pub fn logarithmic(values: impl IntoIterator<Item = f64>) -> Self {
@@ -35,28 +26,23 @@ impl Scale {
         if low > high {
             (low, high) = (1.0, 10.0);
         }
-        Self { low, high, logarithmic: true, reversed: false }
+        Self { low, high, reversed: false }
     }
 
-    /// Returns the position of `value` in the colour map, from 0 (dark) to 1 (bright). NaN is shown
-    /// like `low`.
+    /// Returns the relative position of `value` in the colour map, from 0 (dark) to 1 (bright). NaN
+    /// is shown like `low`.
     pub fn part(&self, value: f64) -> f64 {
-        let [low, high, value] =
-            [self.low, self.high, value].map(|v| if self.logarithmic { v.ln() } else { v });
+        let [low, high, value] = [self.low, self.high, value].map(f64::ln);
         let part = if high > low { (value - low) / (high - low) } else { 1.0 };
         let part = if part.is_nan() { 0.0 } else { part.clamp(0.0, 1.0) };
         if self.reversed { 1.0 - part } else { part }
     }
 
-    /// Returns the number at position `part` of the colour map. `part` is from 0 (dark) to 1
-    /// (bright).
+    /// Returns the number at the relative position `part` of the colour map. `part` is from 0
+    /// (dark) to 1 (bright).
     pub fn value(&self, part: f64) -> f64 {
         let part = if self.reversed { 1.0 - part } else { part };
-        if self.logarithmic {
-            self.low * (self.high / self.low).powf(part)
-        } else {
-            self.low + (self.high - self.low) * part
-        }
+        self.low * (self.high / self.low).powf(part)
     }
 
     /// Returns the colour of `value` on this scale.
@@ -65,18 +51,18 @@ impl Scale {
     }
 }
 
-/// Returns the colour at position `part` of the colour map, from 0 (dark) to 1 (bright). Other
-/// values are clamped.
+/// Returns the colour at the relative position `part` of the colour map, from 0 (dark) to 1
+/// (bright). Other values are clamped.
 pub fn magnitude(part: f64) -> [u8; 3] {
     let color = colorous::INFERNO.eval_continuous(part.clamp(0.0, 1.0));
     [color.r, color.g, color.b]
 }
 
-/// Colour of a difference of 0.
+/// False colour of a difference of 0.
 const DIFFERENCE_MIDDLE: [u8; 3] = [24, 24, 27];
 
-/// Returns the colour of a signed difference: blue for -1 (darker), nearly black for 0, orange for
-/// 1 (brighter).
+/// Returns the false colour of `part`, a signed difference: blue for -1 (darker), nearly black for
+/// 0, orange for 1 (brighter). Other values are clamped.
 pub fn difference(part: f64) -> [u8; 3] {
     const LESS: [u8; 3] = [96, 178, 255];
     const MORE: [u8; 3] = [255, 152, 64];
@@ -88,7 +74,7 @@ pub fn difference(part: f64) -> [u8; 3] {
     })
 }
 
-/// Returns the colour of the object with number `id`. Consecutive numbers have distant hues.
+/// Returns the false colour of the object with number `id`. Consecutive numbers have distant hues.
 pub fn object_color(id: u32) -> [u8; 3] {
     // The hue advances by the golden angle, so that no hue is repeated. Lightness and chroma take
     // turns, so that colours of similar hue differ as well.
@@ -125,33 +111,12 @@ fn linear_from_oklab(l: f64, a: f64, b: f64) -> [f64; 3] {
     ]
 }
 
-/// Colour of a pixel whose camera ray hits no object.
-const NO_HIT: [u8; 3] = [14, 14, 16];
+/// False colour of a pixel whose camera ray hits no object.
+pub const NO_HIT: [u8; 3] = [14, 14, 16];
 
-/// Returns an image of object numbers. `None` means that the camera ray hits no object.
-pub fn objects(width: usize, height: usize, ids: &[Option<u32>]) -> Raster {
-    Raster::from_fn(width, height, |i| ids.get(i).copied().flatten().map_or(NO_HIT, object_color))
-}
-
-/// Returns an image of unit normals. Each component is mapped from -1..=1 to 0..=255. `None` means
-/// that the camera ray hits no object.
-pub fn normals(width: usize, height: usize, normals: &[Option<[f32; 3]>]) -> Raster {
-    Raster::from_fn(width, height, |i| {
-        normals.get(i).copied().flatten().map_or(NO_HIT, |normal| {
-            normal.map(|n| (255.0 * (0.5 * n + 0.5)).round().clamp(0.0, 255.0) as u8)
-        })
-    })
-}
-
-/// Returns an image of distances, and its scale. The scale is logarithmic, from the nearest
-/// distance (bright) to the farthest (dark). `None` means that the camera ray hits no object.
-pub fn depth(width: usize, height: usize, distances: &[Option<f32>]) -> (Raster, Scale) {
-    let known = distances.iter().flatten().map(|d| f64::from(*d));
-    let scale = Scale { reversed: true, ..Scale::logarithmic(known) };
-    let raster = Raster::from_fn(width, height, |i| {
-        distances.get(i).copied().flatten().map_or(NO_HIT, |d| scale.color(f64::from(d)))
-    });
-    (raster, scale)
+/// Returns the false colour of a unit normal. Each component is mapped from -1..=1 to 0..=255.
+pub fn normal_color(normal: [f32; 3]) -> [u8; 3] {
+    normal.map(|n| (255.0 * (0.5 * n + 0.5)).round().clamp(0.0, 255.0) as u8)
 }
 
 #[cfg(test)]
@@ -163,7 +128,7 @@ mod tests {
     fn scale_and_its_inverse_agree() {
         let log = Scale::logarithmic([0.0, 8.0, f64::INFINITY, 0.5, f64::NAN]);
         assert_eq!((log.low, log.high), (0.5, 8.0));
-        for scale in [log, Scale::linear(-3.0, 9.0), Scale { reversed: true, ..log }] {
+        for scale in [log, Scale { reversed: true, ..log }] {
             for step in 0..=10 {
                 let part = f64::from(step) / 10.0;
                 assert!((scale.part(scale.value(part)) - part).abs() < 1e-12, "{scale:?}");
@@ -212,12 +177,9 @@ mod tests {
     }
 
     #[test]
-    fn normals_depth_and_objects_map_to_colors() {
-        let raster = normals(2, 1, &[Some([1.0, 0.0, -1.0]), None]);
-        assert_eq!(raster.pixels, [[255, 128, 0], NO_HIT]);
-        let (raster, scale) = depth(3, 1, &[Some(1.0), Some(4.0), None]);
-        assert_eq!((scale.low, scale.high), (1.0, 4.0));
-        assert_eq!(raster.pixels, [magnitude(1.0), magnitude(0.0), NO_HIT]);
-        assert_eq!(objects(1, 1, &[None]).pixels, [NO_HIT]);
+    fn normals_and_distances_map_to_colors() {
+        assert_eq!(normal_color([1.0, 0.0, -1.0]), [255, 128, 0]);
+        let scale = Scale { reversed: true, ..Scale::logarithmic([1.0, 4.0]) };
+        assert_eq!([1.0, 4.0].map(|d| scale.color(d)), [1.0, 0.0].map(magnitude));
     }
 }

@@ -5,36 +5,38 @@
 
 mod dither;
 mod false_color;
+mod glyph_shading;
 mod mosaic;
 mod oklab;
-mod palette16;
-mod palette256;
-mod palette_cache;
+mod palette_quantisation;
 
-pub use false_color::{Scale, depth, difference, magnitude, normals, object_color, objects};
+pub use false_color::{NO_HIT, Scale, difference, magnitude, normal_color, object_color};
 pub use mosaic::blocks;
 pub use oklab::Oklab;
 pub(crate) use oklab::{code, linear};
-pub use palette256::nearest as nearest_indexed;
+pub use palette_quantisation::nearest_xterm;
+use palette_quantisation::xterm_rgb;
+use ratatui::style::Color;
 
-/// Set of colours that a terminal can show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// Set of colours that a terminal shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Colors {
-    /// 24-bit sRGB.
+    /// Colours in 24-bit sRGB.
+    #[default]
     True,
-    /// The 256-colour table of xterm.
+    /// The 256 colours of xterm's table.
     Indexed,
-    /// The 16 ANSI colours.
+    /// The 16 ANSI colours, which users configure.
     Sixteen,
-    /// No colours.
+    /// No colours: glyphs alone make the picture.
     Mono,
 }
 
 impl Colors {
-    /// All variants, in the order in which the colour key cycles through them.
+    /// All sets of colours, in the order in which the colour key cycles through them.
     pub const ALL: [Self; 4] = [Self::True, Self::Indexed, Self::Sixteen, Self::Mono];
 
-    /// Returns the name that users see.
+    /// Returns the name of the set of colours that users see.
     pub fn name(self) -> &'static str {
         match self {
             Self::True => "24-bit colour",
@@ -45,20 +47,21 @@ impl Colors {
     }
 }
 
-/// An image of square pixels. A cell shows two pixels, one above the other.
+/// Raster: an image of square pixels for terminal cells. A cell shows two pixels, one above the
+/// other.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct Raster {
     /// Number of pixels in a row: one per cell.
     pub width: usize,
     /// Number of rows of pixels: two per row of cells.
     pub height: usize,
-    /// `width * height` pixels in 8-bit sRGB, row by row.
+    /// Pixels in 8-bit sRGB, row by row: `width * height`.
     pub pixels: Vec<[u8; 3]>,
 }
 
 impl Raster {
-    /// Creates an image of `width` x `height` pixels. `pixel(index)` returns the colour of the
-    /// pixel with an index; pixels are numbered row by row.
+    /// Creates an image of `width` x `height` pixels. `pixel(i)` returns the colour of pixel i;
+    /// pixels are numbered row by row.
     pub fn from_fn(width: usize, height: usize, pixel: impl FnMut(usize) -> [u8; 3]) -> Self {
         Self { width, height, pixels: (0..width * height).map(pixel).collect() }
     }
@@ -68,27 +71,15 @@ impl Raster {
     }
 }
 
-/// Foreground or background colour of a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub enum CellColor {
-    /// Default colour of the terminal.
-    #[default]
-    Plain,
-    /// 24-bit sRGB.
-    Rgb([u8; 3]),
-    /// Index into the terminal's table of 256 colours.
-    Indexed(u8),
-}
-
 /// Terminal cell of the picture: its glyph and its colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PictureCell {
-    /// Character of the cell, one column wide.
+    /// Character that the cell shows, one column wide.
     pub glyph: char,
-    /// Colour of the glyph.
-    pub fg: CellColor,
-    /// Colour behind the glyph.
-    pub bg: CellColor,
+    /// Foreground colour, in which the glyph is drawn: the terminal's default, 24-bit or indexed.
+    pub fg: Color,
+    /// Background colour, behind the glyph: the terminal's default, 24-bit or indexed.
+    pub bg: Color,
 }
 
 impl PictureCell {
@@ -96,22 +87,20 @@ impl PictureCell {
     /// with a dark background and xterm's colours.
     pub fn halves(&self) -> [Oklab; 2] {
         let rgb = |color, plain| match color {
-            CellColor::Plain => plain,
-            CellColor::Rgb(rgb) => rgb,
-            CellColor::Indexed(index) => palette256::rgb(index),
+            Color::Rgb(r, g, b) => [r, g, b],
+            Color::Indexed(index) => xterm_rgb(index),
+            _ => plain,
         };
         let (fg, bg) = (rgb(self.fg, PLAIN_FG), rgb(self.bg, PLAIN_BG));
         match self.glyph {
             '▀' => [Oklab::of(fg), Oklab::of(bg)],
             '▄' => [Oklab::of(bg), Oklab::of(fg)],
-            glyph => [palette16::mixture(fg, bg, palette16::coverage(glyph)); 2],
+            glyph => [glyph_shading::mixture(fg, bg, glyph_shading::coverage(glyph)); 2],
         }
     }
-}
 
-impl PictureCell {
-    /// Returns the 24-bit colours of the upper and the lower half. Returns `None` if a half has
-    /// several colours, or one that is not 24-bit.
+    /// Returns the 24-bit colours of the upper and the lower half of the cell. Returns `None` if a
+    /// half has several colours, or one that is not 24-bit.
     pub fn colors(&self) -> Option<[[u8; 3]; 2]> {
         let halves = match self.glyph {
             '▀' => [self.fg, self.bg],
@@ -121,7 +110,7 @@ impl PictureCell {
             _ => return None,
         };
         match halves {
-            [CellColor::Rgb(upper), CellColor::Rgb(lower)] => Some([upper, lower]),
+            [Color::Rgb(r, g, b), Color::Rgb(r2, g2, b2)] => Some([[r, g, b], [r2, g2, b2]]),
             _ => None,
         }
     }
@@ -129,7 +118,7 @@ impl PictureCell {
 
 impl Default for PictureCell {
     fn default() -> Self {
-        Self { glyph: ' ', fg: CellColor::Plain, bg: CellColor::Plain }
+        Self { glyph: ' ', fg: Color::Reset, bg: Color::Reset }
     }
 }
 
@@ -141,11 +130,11 @@ const PLAIN_BG: [u8; 3] = [0; 3];
 /// Image converted to terminal cells.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct PictureCells {
-    /// Number of cells in a row.
+    /// Number of cells in a row of the image.
     pub columns: u16,
     /// Number of rows of cells.
     pub rows: u16,
-    /// `columns * rows` cells, row by row.
+    /// Cells of the image, row by row: `columns * rows`.
     pub cells: Vec<PictureCell>,
 }
 
@@ -173,8 +162,8 @@ impl PictureCells {
                     Some(indices) => {
                         let index = |y: usize| indices[y * raster.width + x];
                         two_halves(
-                            CellColor::Indexed(index(2 * y)),
-                            lower.map(|_| CellColor::Indexed(index(2 * y + 1))),
+                            Color::Indexed(index(2 * y)),
+                            lower.map(|_| Color::Indexed(index(2 * y + 1))),
                         )
                     }
                 });
@@ -183,7 +172,7 @@ impl PictureCells {
         Self { columns: raster.width as u16, rows: rows as u16, cells }
     }
 
-    /// Returns the cell at `column` and `row`. Returns `None` outside the image.
+    /// Returns the cell at `column` and `row` of the image. Returns `None` outside of the image.
     pub fn cell(&self, column: u16, row: u16) -> Option<&PictureCell> {
         let inside = column < self.columns && row < self.rows;
         inside.then(|| {
@@ -194,37 +183,35 @@ impl PictureCells {
 
 /// Creates a cell from the colours of its upper and lower half. `lower` is `None` below the last
 /// row of pixels. The glyph of equal halves is a space.
-fn two_halves(upper: CellColor, lower: Option<CellColor>) -> PictureCell {
+fn two_halves(upper: Color, lower: Option<Color>) -> PictureCell {
     match lower {
-        Some(lower) if lower == upper => {
-            PictureCell { glyph: ' ', fg: CellColor::Plain, bg: upper }
-        }
+        Some(lower) if lower == upper => PictureCell { glyph: ' ', fg: Color::Reset, bg: upper },
         Some(lower) => PictureCell { glyph: '▀', fg: upper, bg: lower },
-        None => PictureCell { glyph: '▀', fg: upper, bg: CellColor::Plain },
+        None => PictureCell { glyph: '▀', fg: upper, bg: Color::Reset },
     }
 }
 
 fn pair(upper: [u8; 3], lower: [u8; 3], colors: Colors) -> PictureCell {
     match colors {
-        Colors::True => two_halves(CellColor::Rgb(upper), Some(CellColor::Rgb(lower))),
+        Colors::True => two_halves(Color::from(upper), Some(Color::from(lower))),
         Colors::Indexed => {
-            let index = |rgb| CellColor::Indexed(palette256::nearest(rgb));
+            let index = |rgb| Color::Indexed(nearest_xterm(rgb));
             two_halves(index(upper), Some(index(lower)))
         }
-        Colors::Sixteen => palette16::pair(upper, lower),
-        Colors::Mono => palette16::pair_mono(upper, lower),
+        Colors::Sixteen => glyph_shading::pair(upper, lower),
+        Colors::Mono => glyph_shading::pair_mono(upper, lower),
     }
 }
 
 fn half(glyph: char, rgb: [u8; 3], colors: Colors) -> PictureCell {
     let fg = match colors {
-        Colors::True => CellColor::Rgb(rgb),
-        Colors::Indexed => CellColor::Indexed(palette256::nearest(rgb)),
-        Colors::Sixteen => CellColor::Indexed(palette16::nearest(rgb)),
+        Colors::True => Color::from(rgb),
+        Colors::Indexed => Color::Indexed(nearest_xterm(rgb)),
+        Colors::Sixteen => Color::Indexed(glyph_shading::nearest(rgb)),
         Colors::Mono if Oklab::of(rgb).l < 0.5 => return PictureCell::default(),
-        Colors::Mono => CellColor::Plain,
+        Colors::Mono => Color::Reset,
     };
-    PictureCell { glyph, fg, bg: CellColor::Plain }
+    PictureCell { glyph, fg, bg: Color::Reset }
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@
 use crate::value::linear_from_srgb;
 use std::sync::LazyLock;
 
-/// Colour in OKLab.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Colour in the OKLab colour space.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Oklab {
     /// Lightness, from 0 (black) to 1 (white).
     pub l: f32,
@@ -75,8 +75,8 @@ mod tests {
         assert!(worst < tolerance, "{got:?}, not {:?}", [l, a, b]);
     }
 
-    /// Checks the pairs of XYZ and OKLab from the publication, which are rounded to three places
-    /// there.
+    /// Checks the conversion from XYZ to OKLab against the pairs in its publication, which are
+    /// rounded to three places there.
     #[test]
     fn oklab_matches_published_pairs() {
         // Linear sRGB from CIE XYZ at D65 (IEC 61966-2-1).
@@ -97,7 +97,7 @@ mod tests {
         }
     }
 
-    /// Checks the primaries against values of CSS Color 4 and its test suite.
+    /// Checks the OKLab values of the sRGB primaries against CSS Color 4 and its test suite.
     #[test]
     fn oklab_of_primaries_matches_css() {
         near(Oklab::of([255, 255, 255]), [1.0, 0.0, 0.0], 1e-4);

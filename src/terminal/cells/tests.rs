@@ -13,7 +13,7 @@ fn checker(width: usize, height: usize) -> Raster {
 fn cell_shows_two_pixels() {
     let cells = PictureCells::new(&checker(3, 4), Colors::True, false);
     assert_eq!((cells.columns, cells.rows, cells.cells.len()), (3, 2, 6));
-    let [red, sky] = [CellColor::Rgb(RED), CellColor::Rgb(SKY)];
+    let [red, sky] = [Color::from(RED), Color::from(SKY)];
     assert_eq!(cells.cell(0, 0), Some(&PictureCell { glyph: '▀', fg: red, bg: sky }));
     assert_eq!(cells.cell(1, 0), Some(&PictureCell { glyph: '▀', fg: sky, bg: red }));
     assert_eq!([cells.cell(3, 0), cells.cell(0, 2)], [None, None]);
@@ -22,10 +22,7 @@ fn cell_shows_two_pixels() {
 #[test]
 fn equal_halves_are_a_space() {
     let cells = PictureCells::new(&Raster::from_fn(1, 2, |_| SKY), Colors::True, false);
-    assert_eq!(
-        cells.cells,
-        [PictureCell { glyph: ' ', fg: CellColor::Plain, bg: CellColor::Rgb(SKY) }]
-    );
+    assert_eq!(cells.cells, [PictureCell { glyph: ' ', fg: Color::Reset, bg: Color::from(SKY) }]);
 }
 
 #[test]
@@ -35,7 +32,7 @@ fn odd_last_row_leaves_lower_half_plain() {
             let cells = PictureCells::new(&checker(2, 3), colors, settled);
             assert_eq!((cells.columns, cells.rows, cells.cells.len()), (2, 2, 4));
             for cell in &cells.cells[2..] {
-                assert_eq!(cell.bg, CellColor::Plain, "{colors:?}");
+                assert_eq!(cell.bg, Color::Reset, "{colors:?}");
                 assert!(cell.glyph == '▀' || cell.glyph == ' ', "{colors:?}");
             }
         }
@@ -52,7 +49,8 @@ fn any_size_is_converted() {
     }
 }
 
-/// Returns the mean OKLab distance between an image with gradients and its cells.
+/// Returns the mean OKLab distance between the pixels of an image with gradients and the terminal
+/// cells that show it. `settled` is passed to [`PictureCells::new`].
 fn mean_error(colors: Colors, settled: bool) -> f32 {
     let (width, height) = (64, 64);
     let raster = Raster::from_fn(width, height, |i| {
@@ -81,7 +79,8 @@ fn error_of_fewer_colors_is_bounded() {
     }
 }
 
-/// Run by `cargo test --release --lib conversion_time -- --ignored --nocapture`.
+/// Measures the time of the conversion of a picture to terminal cells:
+/// `cargo test --release --lib conversion_time -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn picture_conversion_time() {

@@ -1,13 +1,13 @@
-//! Encoding of cells in few bytes. Colours are sent only when they change. Among glyphs that look
-//! the same, the one with the fewest colour changes is chosen. The cursor moves by the shortest
-//! sequence.
+//! Encoding of terminal cells in few bytes. Colours are sent only when they change. Among glyphs
+//! that look the same, the one with the fewest colour changes is chosen. The cursor moves by the
+//! shortest sequence.
 
 use ratatui::buffer::Cell;
 use ratatui::style::{Color, Modifier};
 use std::io::Write;
 use unicode_width::UnicodeWidthStr;
 
-/// Attributes, each with the SGR parameter that sets it and the SGR parameter that resets it.
+/// Text attributes, each with the SGR parameter that sets it and the SGR parameter that resets it.
 const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
     (Modifier::BOLD, 1, 22),
     (Modifier::DIM, 2, 22),
@@ -20,22 +20,23 @@ const ATTRIBUTES: [(Modifier, u8, u8); 9] = [
     (Modifier::CROSSED_OUT, 9, 29),
 ];
 
-/// Attributes that are visible on a space character.
+/// Text attributes that are visible on a space character.
 const LINES: Modifier = Modifier::REVERSED.union(Modifier::UNDERLINED).union(Modifier::CROSSED_OUT);
 
-/// Colours and attributes that the terminal uses for the next character.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Pen: colours and text attributes that the terminal uses for the next character.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Pen {
     fg: Color,
     bg: Color,
     modifier: Modifier,
 }
 
-/// Encoder of cells. It tracks the current pen and the cursor of the terminal.
-#[derive(Clone, Debug)]
+/// Encoder of terminal cells as bytes. It tracks the colours, attributes and cursor position of the
+/// terminal.
+#[derive(Clone, Debug, Default)]
 pub struct Encoder {
     pen: Pen,
-    /// Column and row of the cursor. `None` if unknown.
+    /// Column and row of the terminal's cursor. `None` if unknown.
     cursor: Option<(u16, u16)>,
     columns: u16,
 }
@@ -44,11 +45,10 @@ impl Encoder {
     /// Creates an encoder for a terminal with default colours, without attributes, and with unknown
     /// cursor position.
     pub fn new(columns: u16) -> Self {
-        let pen = Pen { fg: Color::Reset, bg: Color::Reset, modifier: Modifier::empty() };
-        Self { pen, cursor: None, columns }
+        Self { columns, ..Self::default() }
     }
 
-    /// Writes the sequence that clears the terminal and resets the pen.
+    /// Writes the sequence that clears the terminal and resets colours and attributes.
     pub fn clear(&mut self, out: &mut Vec<u8>) {
         *self = Self::new(self.columns);
         out.extend(b"\x1b[m\x1b[2J");
@@ -71,7 +71,7 @@ impl Encoder {
         self.cursor = None;
     }
 
-    /// Moves the cursor to column `x` and row `y`.
+    /// Writes the sequence that moves the cursor to column `x` and row `y`.
     pub fn go(&mut self, out: &mut Vec<u8>, x: u16, y: u16) {
         let before = self.cursor.replace((x, y));
         let counted = |n: u16, letter: char| match n {
@@ -96,7 +96,8 @@ impl Encoder {
         out.extend(shortest.as_bytes());
     }
 
-    /// Returns the symbol and the pen that show `cell` with the fewest bytes.
+    /// Returns `(symbol, pen)` that show `cell` with the fewest bytes. The pen consists of the
+    /// colours and the text attributes.
     fn cheapest<'a>(&self, cell: &'a Cell) -> (&'a str, Pen) {
         let Cell { fg, bg, modifier, .. } = *cell;
         let symbol = cell.symbol();
@@ -135,9 +136,8 @@ impl Encoder {
         if pen == self.pen {
             return;
         }
-        let plain = Pen { fg: Color::Reset, bg: Color::Reset, modifier: Modifier::empty() };
         let mut codes = Vec::new();
-        if pen != plain {
+        if pen != Pen::default() {
             let removed = self.pen.modifier - pen.modifier;
             let mut reset_too = Modifier::empty();
             for (attribute, _, reset) in ATTRIBUTES {
@@ -166,8 +166,8 @@ impl Encoder {
     }
 }
 
-/// Returns the SGR parameters of a colour. `base` is 30 for foreground and 40 for background. RGB
-/// and indexed colours follow ISO 8613-6.
+/// Returns the SGR parameters that set the colour `color`. `base` is 30 for foreground and 40 for
+/// background. RGB and indexed colours follow ISO 8613-6.
 fn color_code(color: Color, base: u8) -> String {
     let dark = |n: u8| (base + n).to_string();
     let bright = |n: u8| (base + 60 + n).to_string();
@@ -272,7 +272,8 @@ mod tests {
         })
     }
 
-    /// Returns the visible colours and attributes of a cell.
+    /// Returns `(contents, attributes)` of a cell of an emulated terminal. `contents` is the
+    /// visible glyph with its colours. Cells that look the same have equal pairs.
     fn look(cell: &vt100::Cell) -> (String, String) {
         let [fg, bg] = [cell.fgcolor(), cell.bgcolor()].map(|color| format!("{color:?}"));
         let attributes =
@@ -289,8 +290,8 @@ mod tests {
     }
 
     proptest! {
-        /// Checks that an emulator shows the encoded cells, sent in any order and over any previous
-        /// contents.
+        /// Checks that an emulated terminal shows the encoded cells, sent in any order and over any
+        /// previous contents.
         #[test]
         fn emulator_shows_encoded_cells(
             cells in prop::collection::vec((0..SIZE[0], 0..SIZE[1], any_cell()), 1..120),

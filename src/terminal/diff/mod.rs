@@ -2,9 +2,9 @@
 //!
 //! Text is sent first, row by row. Cells of the picture with a visible difference follow, the
 //! largest difference first, within the byte budget of the frame. A new picture that does not fit
-//! is sent as a mosaic of coarse blocks first. While samples accumulate, cells are compared again
-//! only after the number of samples has grown by a factor of 2^(1/4), or 2^(1/2) from 64 samples
-//! on. Invisible differences are sent when the connection is otherwise idle.
+//! is sent as a mosaic of coarse blocks first. While samples accumulate, all cells are compared
+//! again only after the number of samples per pixel has grown by a factor of 2^(1/4), or 2^(1/2)
+//! from 64 samples on. Invisible differences are sent when the connection is otherwise idle.
 
 mod encode;
 mod perceptual;
@@ -18,105 +18,97 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::{Position, Rect};
 use std::time::Duration;
 
-/// Number of bytes of a frame in addition to its cells: cursor, synchronised update,
-/// acknowledgement request.
+/// Number of bytes that are reserved in each frame for everything except cells: cursor,
+/// synchronised update, acknowledgement request.
 const FRAME_OVERHEAD: usize = 64;
-/// Time without a change of the picture before invisible differences are sent.
+/// Time without a change of the picture after which differences below the threshold of visibility
+/// are sent.
 const IDLE: Duration = Duration::from_secs(2);
 
 /// Contents that the terminal should show.
 #[derive(Clone, Copy, Debug)]
 pub struct TargetFrame<'a> {
-    /// All cells.
+    /// All cells of the screen.
     pub cells: &'a Buffer,
     /// Position of the text cursor. `None` hides the cursor.
     pub cursor: Option<Position>,
-    /// Area of the picture; may be empty.
+    /// Area of the picture on the screen; may be empty.
     pub picture: Rect,
     /// For each cell of the picture's area, row by row, `true` if the cell shows the picture, and
     /// `false` if text covers it.
     pub uncovered: &'a [bool],
-    /// Number that increases when the picture changes for another reason than additional samples,
-    /// such as an edit or a camera movement.
+    /// Number of the shown picture. It increases when the picture changes for another reason than
+    /// additional samples, such as an edit or a camera movement.
     pub subject: u64,
-    /// Number that increases when the picture may have changed.
+    /// Number that increases when the picture may have changed for any reason, such as additional
+    /// samples.
     pub version: u64,
-    /// Number of samples per pixel.
+    /// Number of samples per pixel of the picture in this frame.
     pub samples: f64,
-    /// `true` if the picture will not change without input.
+    /// `true` if the picture will not change without user input.
     pub settled: bool,
 }
 
-/// Summary of a frame.
+/// Summary of an encoded frame. The encoded bytes are in a buffer of the caller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Frame {
     /// `true` if the frame contains cells of the picture.
     pub picture: bool,
-    /// Number of bytes of the cells with invisible differences.
+    /// Number of bytes of the frame that encode cells whose differences are below the threshold of
+    /// visibility.
     pub flushed: usize,
 }
 
-/// Differences that remain to be sent.
+/// Differences between terminal and target frame that remain to be sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pending {
-    /// `true` if text remains.
+    /// `true` if some text of the target frame remains to be sent.
     pub text: bool,
-    /// `true` if visible differences of the picture remain.
+    /// `true` if visible differences of the picture remain to be sent.
     pub visible: bool,
-    /// Earliest time at which invisible differences are sent. `None` if there are none.
+    /// Earliest time at which differences of the picture below the threshold of visibility are
+    /// sent. `None` if there are none.
     pub hidden: Option<Duration>,
 }
 
-/// Difference between the contents of the terminal and a target frame.
-#[derive(Debug)]
+/// Difference between the contents of the terminal and a target frame. The default value is for a
+/// terminal with unknown contents.
+#[derive(Debug, Default)]
 pub struct FrameDiff {
+    /// Contents of the terminal. An empty buffer means that they are unknown and the terminal must
+    /// be cleared.
     shown: Buffer,
-    /// `true` if the contents of the terminal are unknown, so that it must be cleared.
-    unknown: bool,
     cursor: Option<Position>,
     encoder: Encoder,
     picture_diff: PerceptualDiff,
     subject: Option<u64>,
-    /// `true` until cells of the current subject, exact or as a mosaic, have been sent.
+    /// `true` until cells of a new picture have been sent, exactly or as a mosaic (large blocks of
+    /// one colour). A picture is new after an edit or a camera movement.
     fresh: bool,
-    /// Number of samples per pixel at which the cells are compared next.
+    /// Number of samples per pixel at which the next full comparison of the picture is due. A full
+    /// comparison considers all cells; the others consider only cells that still differ visibly.
     next_samples: f64,
     version: u64,
-    /// Time of the last change of the version.
+    /// Time at which the version of the target frame's picture last changed.
     version_at: Duration,
     pending: Pending,
 }
 
 impl FrameDiff {
-    /// Creates the frame difference for a terminal with unknown contents.
-    pub fn new() -> Self {
-        Self {
-            shown: Buffer::empty(Rect::ZERO),
-            unknown: true,
-            cursor: None,
-            encoder: Encoder::new(0),
-            picture_diff: PerceptualDiff::default(),
-            subject: None,
-            fresh: true,
-            next_samples: 0.0,
-            version: 0,
-            version_at: Duration::ZERO,
-            pending: Pending::default(),
-        }
-    }
-
-    /// Returns the differences that remain after the last frame.
+    /// Returns the differences that remain to be sent after the last frame.
     pub fn pending(&self) -> Pending {
         self.pending
     }
 
-    /// Records that other output has moved the cursor.
+    /// Records that other output has moved the terminal's cursor, so that its position is unknown.
     pub fn moved(&mut self) {
         self.encoder.moved();
     }
 
-    /// Appends the next frame, within the limits of `allowance`, to `out`. Appends nothing if there
-    /// are no differences. OKLab differences up to `threshold` are treated as invisible.
+    /// Appends the bytes of the next frame, within the limits of `allowance`, to `out` and returns
+    /// a summary of the frame. Appends nothing if there are no differences. OKLab differences up to
+    /// `threshold` are treated as invisible: they are sent only when the connection is otherwise
+    /// idle.
     pub fn frame(
         &mut self,
         target: &TargetFrame,
@@ -125,12 +117,11 @@ impl FrameDiff {
         threshold: f32,
         out: &mut Vec<u8>,
     ) -> Frame {
-        if self.unknown || target.cells.area != self.shown.area {
+        if target.cells.area != self.shown.area {
             self.shown = Buffer::empty(target.cells.area);
             self.encoder = Encoder::new(target.cells.area.width);
             self.encoder.clear(out);
             self.picture_diff.forget();
-            self.unknown = false;
         }
         if self.cursor.is_some() {
             out.extend(b"\x1b[?25l");
@@ -159,7 +150,8 @@ impl FrameDiff {
         frame
     }
 
-    /// Appends every cell that differs.
+    /// Appends the bytes of every cell that differs from the terminal's contents to `out`, without
+    /// limit.
     fn send_all(&mut self, target: &TargetFrame, out: &mut Vec<u8>) {
         for (x, y, cell) in self.shown.diff_iter(target.cells) {
             self.encoder.cell(out, x, y, cell);
@@ -168,8 +160,8 @@ impl FrameDiff {
         self.pending = Pending::default();
     }
 
-    /// Appends rows of text that differ: as many as fit into `room` bytes, but at least one.
-    /// Returns `true` if none remain.
+    /// Appends rows of text that differ from the terminal's contents to `out`: as many as fit into
+    /// `room` bytes, but at least one. Returns `true` if no such rows remain.
     fn send_text(&mut self, target: &TargetFrame, room: usize, out: &mut Vec<u8>) -> bool {
         let differences = self.shown.diff(target.cells);
         let text = differences.into_iter().filter(|(x, y, _)| !target.shows_picture(*x, *y));
@@ -200,7 +192,8 @@ impl FrameDiff {
         true
     }
 
-    /// Compares the picture with the contents of the terminal.
+    /// Compares the picture of the target frame with the contents of the terminal. OKLab
+    /// differences up to `threshold` are treated as invisible.
     fn compare(&mut self, target: &TargetFrame, now: Duration, threshold: f32) {
         if self.version != target.version {
             (self.version, self.version_at) = (target.version, now);
@@ -219,7 +212,8 @@ impl FrameDiff {
         self.picture_diff.compare(target, &self.shown, is_due, threshold);
     }
 
-    /// Appends as many cells of the picture as fit into `allowance`.
+    /// Appends as many cells of the picture to `out` as fit into the byte budget `allowance`. Cells
+    /// with the largest difference from the terminal come first.
     fn send_picture(
         &mut self,
         target: &TargetFrame,
@@ -272,8 +266,8 @@ impl FrameDiff {
     }
 
     /// Encodes as many cells of `order` as fit into `room` bytes, the largest differences first.
-    /// `order` lists the difference and the index of each cell; `cell` returns the cell with an
-    /// index.
+    /// `order` lists the difference and the index of each cell of the rectangle `area`; `cell(i)`
+    /// returns the cell with index i.
     fn fitting<'a>(
         &self,
         area: Rect,
@@ -329,17 +323,17 @@ impl FrameDiff {
     }
 }
 
-/// Encoded cells of the picture that fit into a frame.
+/// Part of the picture that fits into a frame, as encoded cells.
 struct Part {
     bytes: Vec<u8>,
-    /// State of the encoder after these bytes.
+    /// State of the cell encoder after the bytes of this part.
     encoder: Encoder,
     cells: Vec<(usize, Cell)>,
 }
 
 impl TargetFrame<'_> {
-    /// Returns the index of a cell within the area of the picture. Returns `None` for a cell
-    /// outside this area.
+    /// Returns the index of the cell at column `x` and row `y` within the area of the picture.
+    /// Returns `None` for a cell outside of this area.
     fn index(&self, x: u16, y: u16) -> Option<usize> {
         let area = self.picture;
         let inside = area.contains(Position { x, y });
@@ -355,10 +349,4 @@ impl TargetFrame<'_> {
 fn position(area: Rect, index: usize) -> Position {
     let width = usize::from(area.width).max(1);
     Position { x: area.x + (index % width) as u16, y: area.y + (index / width) as u16 }
-}
-
-impl Default for FrameDiff {
-    fn default() -> Self {
-        Self::new()
-    }
 }

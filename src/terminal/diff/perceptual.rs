@@ -1,31 +1,33 @@
 //! Perceptual difference between the cells of the picture that the terminal shows and those of the
 //! target frame.
 
-use crate::terminal::cells::{CellColor, Oklab, PictureCell, blocks};
+use crate::terminal::cells::{Oklab, PictureCell, blocks};
 use crate::terminal::diff::{TargetFrame, position};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 
-/// Difference of a cell with unknown contents. It is larger than that between black and white, so
-/// that such cells are sent first.
+/// Perceptual difference of a cell with unknown contents. It is larger than that between black and
+/// white, so that such cells are sent first.
 const UNKNOWN: f32 = 2.0;
 
 /// Target and shown colours of one cell of the picture.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct CellColors {
     /// Cell of the target frame. `None` where text covers the picture.
     target: Option<PictureCell>,
-    /// Colours of the halves of the target cell.
+    /// OKLab colours of the upper and the lower half of the target cell.
     look: [Oklab; 2],
-    /// Colours of the halves of the cell on the terminal. `None` if unknown.
+    /// Colours of the upper and the lower half of the cell that the terminal shows. `None` if
+    /// unknown.
     shown: Option<[Oklab; 2]>,
-    /// `true` if a difference of this cell may be visible. After the cell has been sent exactly,
-    /// its differences are ignored until the next full comparison.
+    /// `true` if this cell is included in the comparison of visible differences. It becomes `false`
+    /// when the cell is sent exactly or its difference becomes invisible, and `true` again at the
+    /// next full comparison.
     counts: bool,
-    /// Difference between target and shown cell; 0 if they are equal.
+    /// OKLab difference between target and shown cell; 0 if they are equal.
     error: f32,
-    /// `true` if the difference is visible.
+    /// `true` if the difference between target and shown cell is visible.
     visible: bool,
 }
 
@@ -33,37 +35,32 @@ struct CellColors {
 #[derive(Debug, Default)]
 pub struct PerceptualDiff {
     area: Rect,
-    /// Cells, row by row.
+    /// Colours of the cells in the picture's area, row by row.
     cells: Vec<CellColors>,
 }
 
 impl PerceptualDiff {
-    /// Marks the contents of the terminal as unknown.
+    /// Marks the contents of the terminal in the picture's area as unknown, so that all cells are
+    /// sent again.
     pub fn forget(&mut self) {
         self.area = Rect::ZERO;
         self.cells.clear();
     }
 
-    /// Sets the area of the picture. A new area has unknown contents.
+    /// Sets the rectangle of the screen in which the picture is. A new rectangle has unknown
+    /// contents.
     pub fn fit(&mut self, area: Rect) {
         if self.area != area {
             self.area = area;
-            let black = Oklab { l: 0.0, a: 0.0, b: 0.0 };
-            let unknown = CellColors {
-                target: None,
-                look: [black; 2],
-                shown: None,
-                counts: true,
-                error: 0.0,
-                visible: false,
-            };
+            let unknown = CellColors { counts: true, ..CellColors::default() };
             let count = usize::from(area.width) * usize::from(area.height);
             self.cells = vec![unknown; count];
         }
     }
 
-    /// Compares the shown cells with the target. In a full comparison (`is_due`) every difference
-    /// above `threshold` is visible, otherwise only those of cells with `counts`.
+    /// Compares the shown cells with the target, and marks the visible differences: those above
+    /// `threshold`. `is_due` is `true` for a full comparison, which considers all cells. Otherwise
+    /// the difference of a cell is marked only if `counts` of this cell is `true`.
     pub fn compare(&mut self, target: &TargetFrame, shown: &Buffer, is_due: bool, threshold: f32) {
         for (index, cell_colors) in self.cells.iter_mut().enumerate() {
             let cell_position = position(self.area, index);
@@ -93,15 +90,15 @@ impl PerceptualDiff {
         }
     }
 
-    /// Records that text now covers cell `index`.
+    /// Records that text now covers cell `index` of the picture's area.
     pub fn covered(&mut self, index: usize) {
         if let Some(cell_colors) = self.cells.get_mut(index) {
             (cell_colors.shown, cell_colors.counts) = (None, true);
         }
     }
 
-    /// Records that the terminal shows `cell` at `index`. `exact` is `true` if `cell` equals the
-    /// target.
+    /// Records that the terminal now shows `cell` at position `index` of the picture's area.
+    /// `exact` is `true` if `cell` equals the target.
     pub fn sent(&mut self, index: usize, cell: &Cell, exact: bool) {
         let cell_colors = &mut self.cells[index];
         let shown = picture_cell(cell).halves();
@@ -111,29 +108,35 @@ impl PerceptualDiff {
             if exact { 0.0 } else { difference(shown, cell_colors.look).max(f32::MIN_POSITIVE) };
     }
 
-    /// Returns the difference and the index of each cell with a visible difference.
+    /// Returns `(OKLab difference, index)` of each cell whose difference between target and
+    /// terminal is visible.
     pub fn visible(&self) -> Vec<(f32, usize)> {
         self.select(|cell_colors| cell_colors.visible)
     }
 
-    /// Returns the difference and the index of each cell with an invisible difference.
+    /// Returns `(OKLab difference, index)` of each cell whose difference between target and
+    /// terminal is invisible, but not 0.
     pub fn hidden(&self) -> Vec<(f32, usize)> {
         self.select(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
 
-    /// Returns `true` if there are visible differences.
+    /// Returns `true` if some cell of the picture on the terminal differs visibly from the target
+    /// frame.
     pub fn has_visible(&self) -> bool {
         self.cells.iter().any(|cell_colors| cell_colors.visible)
     }
 
-    /// Returns `true` if there are invisible differences.
+    /// Returns `true` if some cell of the picture on the terminal differs from the target frame by
+    /// an invisible amount.
     pub fn has_hidden(&self) -> bool {
         self.cells.iter().any(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
 
-    /// Creates a mosaic of the target with blocks of `side` x `side` half cells. Returns all its
-    /// cells, and a list of the cells that it improves: the gain (how much closer to the target
-    /// than the shown cell, in OKLab distance) and the index.
+    /// Creates a mosaic of the target: an image of blocks of `side` x `side` half cells, each block
+    /// of one colour. A half cell is the upper or lower half of a cell. Returns `(cells,
+    /// improved)`. `cells` are all cells of the mosaic; cells without a visible difference are
+    /// those of the target. `improved` has `(gain, index)` for each cell that is closer to the
+    /// target than the shown cell. The gain is the decrease in OKLab distance from the target.
     pub fn coarse(&self, target: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
         let rows = usize::from(self.area.height);
@@ -173,19 +176,14 @@ impl PerceptualDiff {
     }
 }
 
-/// Returns the larger of two OKLab distances: between the upper halves and between the lower
-/// halves.
+/// Returns the perceptual difference of two cells: the larger of the OKLab distances between their
+/// upper halves and between their lower halves.
 fn difference(a: [Oklab; 2], b: [Oklab; 2]) -> f32 {
     a[0].distance(b[0]).max(a[1].distance(b[1]))
 }
 
 /// Converts a cell of a ratatui buffer to a [`PictureCell`].
 fn picture_cell(cell: &Cell) -> PictureCell {
-    let cell_color = |color| match color {
-        Color::Rgb(r, g, b) => CellColor::Rgb([r, g, b]),
-        Color::Indexed(index) => CellColor::Indexed(index),
-        _ => CellColor::Plain,
-    };
     let glyph = cell.symbol().chars().next().unwrap_or(' ');
-    PictureCell { glyph, fg: cell_color(cell.fg), bg: cell_color(cell.bg) }
+    PictureCell { glyph, fg: cell.fg, bg: cell.bg }
 }

@@ -17,7 +17,8 @@ fn within(bytes: usize) -> FrameBudget {
     FrameBudget { bytes, picture: true, refinement: bytes / 2 }
 }
 
-/// Target screen with a picture, its frame difference and an emulated terminal.
+/// Screen with a picture, the frame difference that sends it in parts, and an emulated terminal
+/// that receives the parts.
 struct Fixture {
     diff: FrameDiff,
     cells: Buffer,
@@ -34,7 +35,7 @@ impl Fixture {
     fn new() -> Self {
         let [rows, columns] = [AREA.height, AREA.width].map(|n| NonZeroU16::new(n).unwrap());
         let mut fixture = Self {
-            diff: FrameDiff::new(),
+            diff: FrameDiff::default(),
             cells: Buffer::empty(AREA),
             uncovered: vec![true; 240],
             cursor: None,
@@ -85,7 +86,7 @@ impl Fixture {
         PICTURE.positions().filter(|at| self.is_exact(at.x, at.y)).count()
     }
 
-    /// Sends all remaining differences.
+    /// Sends all remaining differences between the screen and the terminal.
     fn finish(&mut self) {
         self.settled = true;
         for i in 0..100 {

@@ -1,4 +1,4 @@
-//! Frames in flight: frames that were sent and are not acknowledged yet.
+//! Frames in flight: frames that were sent to the terminal and are not acknowledged yet.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -10,63 +10,61 @@ pub struct InFlight {
     pub bytes: usize,
     /// `true` if the frame contains cells of the picture.
     pub picture: bool,
-}
-
-/// Frame that the terminal has acknowledged.
-#[derive(Clone, Copy, Debug)]
-pub struct Acked {
-    pub sent: Duration,
-    pub bytes: usize,
     /// `true` if no other frame was in flight when this one was sent.
     pub alone: bool,
-    /// Times at which the previously acknowledged frame was sent and acknowledged.
-    pub previous: Option<[Duration; 2]>,
 }
 
 /// Queue of frames in flight, oldest first.
 #[derive(Debug, Default)]
 pub struct FramesInFlight {
-    queue: VecDeque<(InFlight, bool)>,
-    /// Times at which the last acknowledged frame was sent and acknowledged.
+    queue: VecDeque<InFlight>,
+    /// `[time of sending, time of acknowledgement]` of the last acknowledged frame. `None` before
+    /// the first acknowledgement.
     last_acked: Option<[Duration; 2]>,
 }
 
 impl FramesInFlight {
-    pub fn add(&mut self, frame: InFlight) {
+    /// Adds a frame of `bytes` bytes that was sent at the time `sent`. `picture` is `true` if it
+    /// contains cells of the picture.
+    pub fn add(&mut self, sent: Duration, bytes: usize, picture: bool) {
         let alone = self.queue.is_empty();
-        self.queue.push_back((frame, alone));
+        self.queue.push_back(InFlight { sent, bytes, picture, alone });
     }
 
-    /// Records an acknowledgement and removes the oldest frame, to which it belongs. Returns `None`
-    /// if no frame is in flight.
-    pub fn on_ack(&mut self, at: Duration) -> Option<Acked> {
-        let (InFlight { sent, bytes, .. }, alone) = self.queue.pop_front()?;
-        let previous = self.last_acked.replace([sent, at]);
-        Some(Acked { sent, bytes, alone, previous })
+    /// Records an acknowledgement by the terminal at the time `at`. Removes the oldest frame in
+    /// flight, to which it belongs. Returns `(frame, times)`: the removed frame, and `[time of
+    /// sending, time of acknowledgement]` of the frame acknowledged before it. `times` is `None`
+    /// for the first frame. Returns `None` if no frame is in flight.
+    pub fn on_ack(&mut self, at: Duration) -> Option<(InFlight, Option<[Duration; 2]>)> {
+        let frame = self.queue.pop_front()?;
+        Some((frame, self.last_acked.replace([frame.sent, at])))
     }
 
     pub fn is_empty(&self) -> bool {
         self.queue.is_empty()
     }
 
-    /// Returns the send time of the oldest frame.
+    /// Returns the time at which the oldest frame in flight was sent; `None` if no frame is in
+    /// flight.
     pub fn oldest(&self) -> Option<Duration> {
-        self.queue.front().map(|(frame, _)| frame.sent)
+        self.queue.front().map(|frame| frame.sent)
     }
 
-    /// Returns the send time of the newest frame.
+    /// Returns the time at which the newest frame in flight was sent; `None` if no frame is in
+    /// flight.
     pub fn newest(&self) -> Option<Duration> {
-        self.queue.back().map(|(frame, _)| frame.sent)
+        self.queue.back().map(|frame| frame.sent)
     }
 
-    /// Returns the number of frames with cells of the picture.
+    /// Returns the number of frames in flight (sent, not acknowledged) that contain cells of the
+    /// picture.
     pub fn pictures(&self) -> usize {
-        self.queue.iter().filter(|(frame, _)| frame.picture).count()
+        self.queue.iter().filter(|frame| frame.picture).count()
     }
 
-    /// Returns the number of bytes of the frames that contain only text.
+    /// Returns the number of bytes, summed over the frames in flight that contain only text.
     pub fn text_bytes(&self) -> usize {
-        let texts = self.queue.iter().filter(|(frame, _)| !frame.picture);
-        texts.map(|(frame, _)| frame.bytes).sum()
+        let texts = self.queue.iter().filter(|frame| !frame.picture);
+        texts.map(|frame| frame.bytes).sum()
     }
 }

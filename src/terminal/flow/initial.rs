@@ -1,30 +1,30 @@
-//! State of the connection before the first frame.
+//! State of the connection to the terminal before the first frame.
 
 use crate::terminal::Capabilities;
 use crate::terminal::flow::{DEFAULT_RATE, PacingMode};
 use std::time::Duration;
 
-/// Shortest plausible round trip over SSH. A faster reply comes from a program on this side of the
-/// connection, not from the terminal.
+/// Shortest plausible round trip over SSH. A reply that comes sooner is from a program on this side
+/// of the connection, such as a multiplexer, and not from the terminal.
 const TOO_SOON: Duration = Duration::from_millis(3);
 
-/// State of the connection before the first frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// State of the connection to the terminal before the first frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InitialLink {
-    /// Method by which frames are paced.
+    /// Method that limits the rate of frames.
     pub mode: PacingMode,
-    /// Round trip of the terminal, if it was measured.
+    /// Round-trip time to the terminal: from a request to its reply. `None` if it was not measured.
     pub round_trip: Option<Duration>,
-    /// `true` if the kernel reports the length of its TCP send queue.
+    /// `true` if the kernel reports the length of the connection's TCP send queue.
     pub queue: bool,
     /// Rate at which frames are sent in [`PacingMode::FixedRate`], in bytes per second.
     pub fixed_rate: f64,
 }
 
 impl InitialLink {
-    /// Derives the state from the replies of `terminal`. `queue` is `true` if the kernel reports
-    /// the length of its TCP send queue. `rate` is a fixed rate from the user, in bytes per second,
-    /// in place of a measured one.
+    /// Derives the state from `terminal`, the capabilities of the terminal. `queue` is `true` if
+    /// the kernel reports the length of the connection's TCP send queue. `rate` is a fixed rate
+    /// from the user, in bytes per second, in place of a measured one.
     pub fn of(terminal: &Capabilities, queue: bool, rate: Option<f64>) -> Self {
         let fallback = if queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
         let multiplexer = terminal.environment.multiplexer;

@@ -18,168 +18,169 @@ mod tcp_send_queue;
 mod tests;
 
 use crate::terminal::Multiplexer;
-use in_flight::{FramesInFlight, InFlight};
+use in_flight::FramesInFlight;
 pub use initial::InitialLink;
 use send_queue_estimate::SendQueueEstimate;
 use std::time::Duration;
 pub use tcp_send_queue::TcpSendQueue;
 
-/// Shortest interval between frames.
+/// Shortest interval between frames that are sent to the terminal.
 pub const FRAME_INTERVAL: Duration = Duration::from_millis(33);
 /// Shortest interval between frames with text only, over an SSH connection and without user input.
 pub const TEXT_INTERVAL: Duration = Duration::from_millis(500);
-/// Duration of the transmission of a full frame at the current rate.
+/// Target duration of the transmission of a frame: at the current rate, it determines the frame's
+/// byte budget.
 const FRAME_SPAN: Duration = Duration::from_millis(100);
-/// Smallest, initial and largest byte budget of a frame.
+/// Byte budgets of a frame that is sent to the terminal: `[smallest, initial, largest]`. The
+/// initial one applies before the first measurement of the rate.
 const BUDGET: [f64; 3] = [2e3, 8e3, 200e3];
 /// Largest number of frames in flight. A frame is in flight until it is acknowledged.
 const MAX_IN_FLIGHT: usize = 6;
-/// Largest number of bytes of frames in flight with text only, in addition to frames with cells of
-/// the picture.
+/// Largest sum of bytes of the frames in flight that contain only text. Frames with cells of the
+/// picture do not count.
 const MAX_TEXT: usize = 1500;
 /// Size of a frame in bytes below which its acknowledgement may raise the measured rate, but not
 /// lower it: the time of a small frame is mostly latency.
 const SMALL: usize = 1000;
-/// Time after which an acknowledgement is treated as lost.
+/// Time after which the acknowledgement of a frame is treated as lost.
 const LOST_AFTER: Duration = Duration::from_secs(3);
-/// Number of consecutive losses after which no more acknowledgements are requested.
+/// Number of consecutive lost acknowledgements after which the program requests no more of them.
 const MAX_LOSSES: u32 = 3;
-/// Interval at which the shortest round trip is measured again.
-const PROBE_INTERVAL: Duration = Duration::from_secs(30);
-/// Weight of a new measurement in the rate, which is an exponential moving average.
+/// Interval at which the shortest round trip to the terminal is measured again, because the
+/// connection may have changed.
+const ROUND_TRIP_INTERVAL: Duration = Duration::from_secs(30);
+/// Weight of a new measurement in the connection's rate, which is an exponential moving average.
 const NEW_WEIGHT: f64 = 0.3;
 /// Time after user input in which the user is treated as active.
 const ACTIVE_TIME: Duration = Duration::from_millis(500);
-/// Interval at which the kernel's send queue is measured.
+/// Interval at which the length of the kernel's TCP send queue is measured.
 const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
-/// Interval at which the queue is measured after no byte has left it for [`LOST_AFTER`].
+/// Interval at which the kernel's TCP send queue is measured after no byte has left it for
+/// [`LOST_AFTER`].
 const STALLED_INTERVAL: Duration = Duration::from_millis(500);
-/// Assumed round trip before the first measurement.
+/// Assumed round trip to the terminal before the first measurement.
 const DEFAULT_ROUND_TRIP: Duration = Duration::from_millis(100);
 /// Time without input from the terminal after which the connection is treated as silent.
 const SILENT_AFTER: Duration = Duration::from_secs(30);
-/// Acknowledgements that arrive within this time are measured together, because the connection may
-/// have delayed the first ones.
+/// Longest interval between two acknowledgements that belong to the same measurement of the rate.
+/// The connection may have delayed the first one, so that it alone would give a wrong rate.
 const ACKS_TOGETHER: Duration = Duration::from_millis(20);
-/// Rate of a connection that cannot be measured, in bytes per second.
+/// Assumed rate of a connection that cannot be measured, in bytes per second.
 pub const DEFAULT_RATE: f64 = 30e3;
-/// Share of the rate for refinement, which sends differences below the threshold of visibility.
+/// Share of the connection's rate that refinement may use, from 0 to 1. Refinement is the sending
+/// of picture differences below the threshold of visibility.
 const REFINEMENT_SHARE: f64 = 0.25;
 
-/// Method of pacing frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Method that limits the rate of frames to the terminal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PacingMode {
-    /// The terminal is local and needs no acknowledgements.
+    /// Frames are not limited: the terminal is local.
+    #[default]
     Unlimited,
-    /// The terminal acknowledges each frame by a reply. The request passes through the multiplexer,
-    /// if there is one.
+    /// Frames are limited by acknowledgements: the terminal replies to a request after each frame.
+    /// The value is the multiplexer through which the request passes; `None` without a multiplexer.
     AckClocked(Option<Multiplexer>),
-    /// The kernel reports the length of its TCP send queue.
+    /// Frames are limited by the length of the connection's TCP send queue, which the kernel
+    /// reports.
     SendQueue,
     /// Frames are sent at a fixed rate, without acknowledgements.
     FixedRate,
 }
 
-/// Limits of a frame.
+/// Limits of a frame to be sent: its size and its contents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameBudget {
-    /// Largest number of bytes in total. `usize::MAX` means no limit.
+    /// Largest number of bytes of the frame. `usize::MAX` means no limit.
     pub bytes: usize,
-    /// `true` if cells of the picture may be sent.
+    /// `true` if the frame may contain cells of the picture.
     pub picture: bool,
-    /// Largest number of bytes for refinement: differences below the threshold of visibility.
+    /// Largest number of bytes of the frame for refinement, that is, for picture differences below
+    /// the threshold of visibility.
     pub refinement: usize,
 }
 
-/// State of the connection as displayed to the user.
+/// State of the connection to the terminal as displayed to the user.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkStatus {
-    /// Rate in bytes per second, measured or fixed.
+    /// Rate of the connection in bytes per second, measured or fixed.
     pub rate: f64,
-    /// Method of pacing frames.
+    /// Method that limits the rate of frames.
     pub mode: PacingMode,
 }
 
-/// Flow control of the connection to the terminal.
-#[derive(Debug)]
+/// Flow control of the connection to the terminal: how many bytes may be sent, and when.
+#[derive(Debug, Default)]
 pub struct FlowControl {
     mode: PacingMode,
-    /// Mode to resume when a reply arrives. `None` if no mode is suspended.
+    /// Method of limiting frames that was suspended because the terminal did not reply. It resumes
+    /// when a reply arrives. `None` if no method is suspended.
     suspended_mode: Option<PacingMode>,
     start: InitialLink,
-    /// Measured or fixed rate in bytes per second.
+    /// Rate of the connection in bytes per second, measured or fixed.
     rate: f64,
     round_trip: Option<Duration>,
     round_trip_at: Duration,
-    /// Rate below which the round trip is measured again: half of the rate at the last measurement.
-    /// A longer round trip also lowers the measured rate, because the frames in flight no longer
-    /// fill it.
+    /// Half of the connection's rate at the last measurement of the round trip, in bytes per
+    /// second. With [`PacingMode::SendQueue`], a rate below this value causes a new measurement of
+    /// the round trip. The round trip may have become longer: too few frames in flight then reduce
+    /// the rate.
     doubtful_rate: f64,
     in_flight: FramesInFlight,
     losses: u32,
-    /// Start of the last period of user activity.
+    /// Time at which the last period of user activity began.
     active_since: Duration,
-    /// End of the last period of user activity.
+    /// Time at which the last period of user activity ends.
     active_until: Duration,
     last_frame: Option<Duration>,
-    /// Estimated time at which the bytes without an acknowledgement request will have been
-    /// transmitted.
+    /// Estimated time at which the connection will have transmitted the bytes that were sent
+    /// without an acknowledgement request.
     free_at: Duration,
-    /// Estimated time at which all frames with an acknowledgement request will have been
-    /// transmitted, so that the connection is idle.
+    /// Estimated time at which the connection will have transmitted all frames with an
+    /// acknowledgement request, so that it is idle.
     clear_at: Duration,
-    /// Earliest time at which a frame may contain refinement again.
-    refine_at: Duration,
+    /// Earliest time at which a frame may again contain refinement: cells whose differences are
+    /// below the threshold of visibility. Refinement is delayed so that it uses only a quarter of
+    /// the connection's rate.
+    pub(crate) refine_at: Duration,
     send_queue: SendQueueEstimate,
-    /// Last measurement of the rate by acknowledgements.
+    /// Last measurement of the connection's rate by acknowledgements; `None` before the first one.
     ack_sample: Option<AckSample>,
 }
 
-/// Bytes whose transmission began between two times, counted until their acknowledgement.
+/// Measurement of the connection's rate: a number of bytes, the time of their last acknowledgement,
+/// and bounds of the time at which their transmission began.
 #[derive(Clone, Copy, Debug)]
 struct AckSample {
     earliest_start: Duration,
     latest_start: Duration,
-    /// Time at which the frame before these bytes was sent. `None` if their transmission began
-    /// before its acknowledgement.
+    /// Time at which the frame before these bytes was sent. `None` if there is no such frame, or if
+    /// it was acknowledged before the transmission of these bytes can have begun.
     sent_from: Option<Duration>,
     at: Duration,
     bytes: usize,
 }
 
 impl FlowControl {
-    /// Creates the flow control of a connection in state `start`.
+    /// Creates the flow control of a connection in the state `start`.
     pub fn new(start: InitialLink) -> Self {
-        let span = FRAME_SPAN.as_secs_f64();
+        let assumed_rate = BUDGET[1] / FRAME_SPAN.as_secs_f64();
         Self {
             mode: start.mode,
-            suspended_mode: None,
-            rate: if start.mode == PacingMode::FixedRate {
-                start.fixed_rate
-            } else {
-                BUDGET[1] / span
+            rate: match start.mode {
+                PacingMode::FixedRate => start.fixed_rate,
+                _ => assumed_rate,
             },
             round_trip: start.round_trip,
-            round_trip_at: Duration::ZERO,
-            doubtful_rate: BUDGET[1] / span / 2.0,
+            doubtful_rate: assumed_rate / 2.0,
             start,
-            in_flight: FramesInFlight::default(),
-            losses: 0,
-            active_since: Duration::ZERO,
-            active_until: Duration::ZERO,
-            last_frame: None,
-            free_at: Duration::ZERO,
-            clear_at: Duration::ZERO,
-            refine_at: Duration::ZERO,
-            send_queue: SendQueueEstimate::default(),
-            ack_sample: None,
+            ..Self::default()
         }
     }
 
     /// Returns the state of the connection for display. Returns `None` for a local terminal.
     pub fn reading(&self) -> Option<LinkStatus> {
-        (self.mode != PacingMode::Unlimited)
-            .then_some(LinkStatus { rate: self.rate, mode: self.mode })
+        let status = LinkStatus { rate: self.rate, mode: self.mode };
+        (self.mode != PacingMode::Unlimited).then_some(status)
     }
 
     /// Returns the OKLab distance above which a difference counts as visible. It is larger for
@@ -194,16 +195,20 @@ impl FlowControl {
         }
     }
 
-    /// Records user input.
-    pub fn act(&mut self, now: Duration) {
+    /// Records the time `now` of a user input, such as a key press. For the next 500 ms
+    /// (`ACTIVE_TIME`) the user counts as active. During this time the round trip is measured only
+    /// if the rate, measured by the TCP send queue, has fallen by half since the last measurement
+    /// of the round trip.
+    pub fn record_input(&mut self, now: Duration) {
         if now >= self.active_until {
             self.active_since = now;
         }
         self.active_until = now + ACTIVE_TIME;
     }
 
-    /// Returns the multiplexer through which the acknowledgement request after a frame must pass;
-    /// the inner `None` means no multiplexer. Returns `None` if no request should be sent.
+    /// Returns the multiplexer through which the acknowledgement request after a frame must pass.
+    /// The inner `None` means that there is no multiplexer. The outer `None` means that no request
+    /// should be sent.
     pub fn ack_request(&self) -> Option<Option<Multiplexer>> {
         match self.mode {
             PacingMode::AckClocked(multiplexer) => Some(multiplexer),
@@ -218,7 +223,7 @@ impl FlowControl {
     }
 
     /// Returns the time of the next measurement of the kernel's send queue. Returns `None` if none
-    /// is needed, because the queue is empty or does not pace the frames.
+    /// is needed, because the queue is empty or its length does not limit the frames.
     pub fn measures_at(&self, now: Duration) -> Option<Duration> {
         if self.mode != PacingMode::SendQueue {
             return None;
@@ -237,12 +242,13 @@ impl FlowControl {
         Some(since.max(self.active_until) + SILENT_AFTER)
     }
 
-    /// Returns the limits of a frame that may be sent now. Returns `None` if no frame may be sent.
-    /// `answers` is `true` if the frame shows the effect of user input.
+    /// Returns the limits of a frame that may be sent at the time `now`. Returns `None` if no frame
+    /// may be sent yet. `answers` is `true` if the frame shows the effect of user input; it may
+    /// then be sent before the usual interval between frames is over.
     pub fn allowance(&self, now: Duration, answers: bool) -> Option<FrameBudget> {
         // While the round trip is measured, a frame is small, so that its transmission adds little
         // time.
-        let bytes = if self.is_probing(now) { SMALL } else { self.budget() };
+        let bytes = if self.needs_round_trip(now) { SMALL } else { self.budget() };
         let due = |interval| self.last_frame.is_none_or(|last| answers || last + interval <= now);
         if due(FRAME_INTERVAL) && self.has_room(now, answers) {
             let refinement = if self.refine_at <= now { bytes / 2 } else { 0 };
@@ -279,14 +285,9 @@ impl FlowControl {
         if at > now { at } else { now + QUEUE_INTERVAL }
     }
 
-    /// Returns the earliest time at which a frame may contain refinement again.
-    pub fn refine_at(&self) -> Duration {
-        self.refine_at
-    }
-
     /// Records that a frame of `bytes` bytes was sent. `picture` is `true` if the frame contains
-    /// cells of the picture. `flushed` is the number of its bytes that encode invisible
-    /// differences.
+    /// cells of the picture. `flushed` is the number of those bytes that encode differences below
+    /// the threshold of visibility.
     pub fn sent(&mut self, now: Duration, bytes: usize, picture: bool, flushed: usize) {
         let seconds = |bytes: usize, rate: f64| Duration::from_secs_f64(bytes as f64 / rate);
         self.last_frame = Some(now);
@@ -297,7 +298,7 @@ impl FlowControl {
             PacingMode::Unlimited => {}
             PacingMode::AckClocked(_) => {
                 self.clear_at = self.clear_at.max(now) + seconds(bytes, self.rate);
-                self.in_flight.add(InFlight { sent: now, bytes, picture });
+                self.in_flight.add(now, bytes, picture);
             }
             PacingMode::SendQueue => self.send_queue.sent(now, bytes, self.max_queue()),
             PacingMode::FixedRate => {
@@ -307,7 +308,8 @@ impl FlowControl {
     }
 
     /// Records that `bytes` bytes were sent without an acknowledgement request, because they end
-    /// inside of an escape sequence. Their transmission is estimated by the rate.
+    /// inside of an escape sequence. The time of their transmission is estimated by the rate of the
+    /// connection.
     pub fn sent_unasked(&mut self, now: Duration, bytes: usize) {
         if let PacingMode::AckClocked(_) = self.mode {
             self.last_frame = Some(now);
@@ -319,7 +321,7 @@ impl FlowControl {
     }
 
     /// Records a reply of the terminal, which acknowledges the oldest frame in flight. Returns
-    /// `true` if another frame may now be permitted.
+    /// `true` if another frame may now be permitted, and `false` if no reply was awaited.
     pub fn on_ack(&mut self, at: Duration) -> bool {
         if let Some(mode) = self.suspended_mode.take() {
             // Replies come again after an interruption, such as a train in a tunnel.
@@ -329,13 +331,13 @@ impl FlowControl {
             self.losses = 0;
             return true;
         }
-        let Some(frame) = self.in_flight.on_ack(at) else { return false };
+        let Some((frame, last_acked)) = self.in_flight.on_ack(at) else { return false };
         self.losses = 0;
         if self.in_flight.is_empty() {
             self.clear_at = self.clear_at.min(at);
         }
         let elapsed = at.saturating_sub(frame.sent);
-        if frame.alone && frame.bytes <= SMALL && self.is_probing(at) {
+        if frame.alone && frame.bytes <= SMALL && self.needs_round_trip(at) {
             self.round_trip = Some(elapsed);
             self.round_trip_at = at;
         }
@@ -346,7 +348,7 @@ impl FlowControl {
         // than a round trip shows only that the round trip was measured too long.
         let idle_start =
             |round_trips: f64| frame.sent + known.unwrap_or_default().mul_f64(round_trips);
-        let previous = frame.previous.filter(|[_, acked_at]| *acked_at > idle_start(0.9));
+        let previous = last_acked.filter(|[_, acked_at]| *acked_at > idle_start(0.9));
         let start = |round_trips: f64| {
             let start = idle_start(round_trips);
             previous.map_or(start, |[_, acked_at]| start.max(acked_at))
@@ -394,7 +396,7 @@ impl FlowControl {
         let (limit, round_trip) = (self.max_queue(), self.round_trip);
         let sample = self.send_queue.measured(now, bytes, limit, round_trip);
         if let Some((elapsed, bytes)) = sample.round_trip {
-            if bytes <= SMALL && self.is_probing(now) {
+            if bytes <= SMALL && self.needs_round_trip(now) {
                 self.round_trip = Some(elapsed);
                 self.round_trip_at = now;
                 self.doubtful_rate = self.rate / 2.0;
@@ -409,7 +411,8 @@ impl FlowControl {
         }
     }
 
-    /// Treats all frames in flight as lost if the oldest one is overdue at `now`.
+    /// Treats all frames in flight as lost if the acknowledgement of the oldest one is overdue at
+    /// `now`.
     pub fn expire(&mut self, now: Duration) {
         if self.lost_at().is_none_or(|at| at > now) {
             return;
@@ -424,19 +427,20 @@ impl FlowControl {
         }
     }
 
-    /// Returns the longest time to wait for outstanding replies before the program ends. Returns
-    /// `None` if no replies are outstanding.
+    /// Returns the longest time that the program, before it exits, waits for outstanding replies of
+    /// the terminal. Returns `None` if no replies are outstanding.
     pub fn awaits(&self) -> Option<Duration> {
         let is_waiting = !self.in_flight.is_empty() || self.suspended_mode.is_some();
         is_waiting.then(|| 2 * self.round_trip.unwrap_or_default() + 2 * FRAME_SPAN)
     }
 
-    /// Returns `true` if acknowledgements are outstanding.
+    /// Returns `true` if acknowledgements of frames are outstanding.
     pub fn is_waiting(&self) -> bool {
         !self.in_flight.is_empty()
     }
 
-    /// Returns the largest number of bytes of a frame.
+    /// Returns the largest number of bytes of the next frame: what the connection transmits in
+    /// [`FRAME_SPAN`] at the measured rate, within the limits of [`BUDGET`].
     fn budget(&self) -> usize {
         match self.mode {
             PacingMode::Unlimited => usize::MAX,
@@ -449,7 +453,7 @@ impl FlowControl {
             PacingMode::Unlimited => true,
             PacingMode::AckClocked(_) if self.free_at > now => false,
             PacingMode::AckClocked(_) => {
-                if self.is_probing(now) {
+                if self.needs_round_trip(now) {
                     return self.in_flight.is_empty();
                 }
                 let is_active = now < self.active_until;
@@ -467,7 +471,7 @@ impl FlowControl {
                     is_active && answers && newest_sent.is_some_and(|at| at < self.active_since);
                 is_first || self.in_flight.pictures() < limit
             }
-            PacingMode::SendQueue if self.is_probing(now) => self.send_queue.bytes == 0.0,
+            PacingMode::SendQueue if self.needs_round_trip(now) => self.send_queue.bytes == 0.0,
             PacingMode::SendQueue => {
                 // The first frame that shows the effect of input does not wait for frames sent
                 // before the input.
@@ -486,8 +490,9 @@ impl FlowControl {
         }
     }
 
-    /// Returns the number of bytes in the kernel's send queue above which no frame is sent: the
-    /// bytes of one round trip, which keep the connection busy, and of one frame.
+    /// Returns the number of bytes in the kernel's send queue above which no frame is sent. The
+    /// connection transmits this number in one round trip plus the time of one frame
+    /// ([`FRAME_SPAN`]).
     fn max_queue(&self) -> f64 {
         let time = self.round_trip.unwrap_or(DEFAULT_ROUND_TRIP) + FRAME_SPAN;
         (self.rate * time.as_secs_f64()).max(BUDGET[0])
@@ -501,10 +506,11 @@ impl FlowControl {
         (1 + round_trips.round() as usize).clamp(2, MAX_IN_FLIGHT)
     }
 
-    /// Returns `true` if the next frame should measure the round trip. While the user is active,
-    /// this happens only if the rate has fallen by half.
-    fn is_probing(&self, now: Duration) -> bool {
-        let is_known = self.round_trip.is_some() && now < self.round_trip_at + PROBE_INTERVAL;
+    /// Returns `true` if the next frame should measure the round trip. There are two cases. The
+    /// rate, measured by the TCP send queue, has fallen by half since the last measurement of the
+    /// round trip. Or this measurement is too old or missing, and the user is not active.
+    fn needs_round_trip(&self, now: Duration) -> bool {
+        let is_known = self.round_trip.is_some() && now < self.round_trip_at + ROUND_TRIP_INTERVAL;
         let is_measurable = matches!(self.mode, PacingMode::AckClocked(_) | PacingMode::SendQueue);
         let is_doubtful = self.mode == PacingMode::SendQueue && self.rate < self.doubtful_rate;
         is_measurable && (is_doubtful || !is_known && now >= self.active_until)

@@ -1,67 +1,74 @@
-//! Estimates from the bytes in the kernel's TCP send queue: round trip and rate.
+//! Estimates of round trip and rate of an SSH connection from the bytes in the kernel's TCP send
+//! queue.
 
 use std::time::Duration;
 
-/// Time after sending a frame in which the queue is not measured. Another process, such as `sshd`,
-/// passes the bytes on, so that they may not have reached the queue.
+/// Time after sending a frame in which the TCP send queue is not measured. Another process, such as
+/// `sshd`, passes the bytes on, so that they may not have reached the queue.
 const SETTLING: Duration = Duration::from_millis(10);
-/// Shortest busy period that is measured while the round trip is unknown. A queue that is empty
-/// earlier may not have received the bytes yet.
+/// Time after sending bytes at which the TCP send queue is first measured, if the round trip is
+/// unknown. A queue that is empty sooner may not have received the bytes yet.
 const BELIEVED_AFTER: Duration = Duration::from_millis(50);
-/// Duration over which bytes are counted for a rate. The queue is measured every 20 ms.
+/// Shortest time over which the rate is measured, from the number of bytes that leave the TCP send
+/// queue in this time.
 const SAMPLE: Duration = Duration::from_millis(100);
 
-/// Estimate of the send queue's length and of the rate at which bytes leave it.
+/// Estimate of the TCP send queue's length and of the rate at which bytes leave it.
 #[derive(Debug, Default)]
 pub struct SendQueueEstimate {
-    /// Number of bytes in the queue: the last measurement plus the bytes sent since.
+    /// Number of bytes in the send queue: the last measurement plus the bytes sent since.
     pub bytes: f64,
-    /// Time of the last measurement.
+    /// Time of the last measurement of the send queue; `None` before the first one.
     pub measured_at: Option<Duration>,
-    /// Number of bytes sent in total.
+    /// Number of bytes sent to the terminal in total.
     sent: f64,
-    /// Time of the last frame.
+    /// Time at which the last frame was sent.
     sent_at: Duration,
     busy: Option<Busy>,
-    /// Start of a rate sample that was too short when the queue became empty, and the number of
-    /// bytes that had left the queue before. The next frames may continue it.
+    /// Last measurement of the rate, if the queue became empty before the measurement was long
+    /// enough. The next frames may continue it. The pair is `(time at which the measurement began,
+    /// total number of bytes that had left the queue until then)`.
     short_sample: Option<(Duration, f64)>,
 }
 
-/// Period in which the queue is not empty.
+/// Busy period: time in which the TCP send queue is not empty.
 #[derive(Debug)]
 struct Busy {
     since: Duration,
-    /// Start of the rate sample that ends with the period, and the number of bytes that had left
-    /// the queue before. It may begin in an earlier period.
+    /// Beginning of the measurement of the rate over the whole busy period. It may be in an earlier
+    /// busy period. The pair is `(time, total number of bytes that had left the queue until then)`.
     whole: (Duration, f64),
-    /// Size in bytes of the period's only frame; `None` for several frames.
+    /// Size in bytes of the only frame that was sent in the busy period; `None` for several frames.
     alone: Option<usize>,
-    /// Start of the current rate sample, and the number of bytes that had left the queue before.
+    /// Beginning of the current measurement of the rate; `None` if none has begun. The pair is
+    /// `(time, total number of bytes that had left the queue until then)`.
     sample: Option<(Duration, f64)>,
-    /// `true` if the queue was full at some time in the sample, so that the sample's rate is that
-    /// of the connection.
+    /// `true` if the send queue was full at some time during the current measurement of the rate.
+    /// Bytes then left it at the rate of the connection.
     is_full: bool,
-    /// Time at which bytes last left the queue; initially the start of the period.
+    /// Time at which bytes last left the send queue; initially the start of the busy period.
     progress: Duration,
-    /// Largest number of bytes that had left the queue, over all measurements.
+    /// Total number of bytes that have left the send queue: the largest value of all measurements
+    /// so far.
     most_drained: f64,
 }
 
-/// Result of a measurement of the queue.
+/// Result of a measurement of the TCP send queue.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct QueueSample {
-    /// Time to the acknowledgement of a frame without other frames in flight, and the size of this
-    /// frame.
+    /// Round trip of a frame that was the only one sent in a busy period of the queue. The pair is
+    /// `(time from sending it until the queue was empty, its size in bytes)`. `None` if no round
+    /// trip was measured.
     pub round_trip: Option<(Duration, usize)>,
-    /// Bytes per second that left the queue.
+    /// Rate at which bytes left the send queue, in bytes per second; `None` if it was not measured.
     pub rate: Option<f64>,
     /// `true` if `rate` is the rate of the connection; `false` if the connection may be faster.
     pub is_full: bool,
 }
 
 impl SendQueueEstimate {
-    /// Records a frame of `bytes` bytes. `limit` is the number of bytes at which the queue is full.
+    /// Records that a frame of `bytes` bytes was sent. `limit` is the number of bytes at which the
+    /// send queue is full.
     pub fn sent(&mut self, now: Duration, bytes: usize, limit: f64) {
         match &mut self.busy {
             Some(busy) => busy.alone = None,
@@ -88,21 +95,23 @@ impl SendQueueEstimate {
         }
     }
 
-    /// Returns the earliest time of the next measurement, `interval` after the last one. Returns
-    /// `None` if the queue is empty.
+    /// Returns the earliest time of the next measurement of the send queue, `interval` after the
+    /// last one. Returns `None` if the queue is empty.
     pub fn next_at(&self, interval: Duration) -> Option<Duration> {
         self.busy.as_ref()?;
         let settled = self.sent_at + SETTLING;
         Some(self.measured_at.map_or(settled, |at| settled.max(at + interval)))
     }
 
-    /// Returns the time since which no bytes have left a queue that is not empty.
+    /// Returns the time since which no bytes have left the send queue; `None` if the queue is
+    /// empty.
     pub fn stalled_since(&self) -> Option<Duration> {
         self.busy.as_ref().map(|busy| busy.progress)
     }
 
-    /// Records the measured number of `bytes` in the queue. `limit` is the number of bytes at which
-    /// the queue is full, and `round_trip` is the shortest known round trip.
+    /// Records that `bytes` bytes were measured in the send queue. `limit` is the number of bytes
+    /// at which the queue is full, and `round_trip` is the shortest known round trip. Returns the
+    /// round trip and the rate that follow from the measurement.
     pub fn measured(
         &mut self,
         now: Duration,

@@ -1,4 +1,4 @@
-//! Number of bytes of the SSH connection in the kernel's send queue, which the other host has not
+//! TCP send queue of the SSH connection: number of bytes in the kernel that the other host has not
 //! acknowledged (proc(5), `/proc/net/tcp`). It describes only the path to the host at the other end
 //! of the TCP connection, such as a jump host.
 
@@ -20,21 +20,23 @@ impl TcpSendQueue {
         queue.bytes().is_some().then_some(queue)
     }
 
-    /// Returns the number of unacknowledged bytes. Returns `None` if the kernel does not list the
-    /// connection.
+    /// Returns the number of bytes in the send queue that the other host has not acknowledged.
+    /// Returns `None` if the kernel does not list the connection.
     pub fn bytes(&self) -> Option<usize> {
         let tables = ["/proc/net/tcp", "/proc/net/tcp6"];
         tables.into_iter().find_map(|path| self.bytes_in(&fs::read_to_string(path).ok()?))
     }
 
-    /// Parses `client-address client-port server-address server-port`.
+    /// Parses the value of `SSH_CONNECTION`, which is
+    /// `client-address client-port server-address server-port`. Returns `None` if `text` has
+    /// another form.
     fn parse(text: &str) -> Option<Self> {
         let fields: Vec<_> = text.split_whitespace().collect();
         let [client, client_port, server, server_port] = fields[..] else { return None };
         let address = |ip: &str, port: &str| {
             // Addresses in the table have no scope such as `%eth0`.
-            let ip = ip.split('%').next()?.parse().ok()?;
-            Some(SocketAddr::new(unmapped(ip), port.parse().ok()?))
+            let ip: IpAddr = ip.split('%').next()?.parse().ok()?;
+            Some(SocketAddr::new(ip.to_canonical(), port.parse().ok()?))
         };
         Some(Self { local: address(server, server_port)?, remote: address(client, client_port)? })
     }
@@ -50,8 +52,9 @@ impl TcpSendQueue {
     }
 }
 
-/// Parses an address of the table, such as `0100007F:0016`: the IP address as hexadecimal 32-bit
-/// words in native byte order, and the hexadecimal port.
+/// Parses an address of the kernel's table of TCP connections, such as `0100007F:0016`: the IP
+/// address as hexadecimal 32-bit words in native byte order, and the hexadecimal port. Returns
+/// `None` if `text` has another form.
 fn address(text: &str) -> Option<SocketAddr> {
     let (words, port) = text.split_once(':')?;
     let mut bytes = Vec::with_capacity(16);
@@ -63,15 +66,7 @@ fn address(text: &str) -> Option<SocketAddr> {
         Ok(v4) => IpAddr::V4(Ipv4Addr::from(v4)),
         Err(_) => IpAddr::V6(Ipv6Addr::from(<[u8; 16]>::try_from(&*bytes).ok()?)),
     };
-    Some(SocketAddr::new(unmapped(ip), u16::from_str_radix(port, 16).ok()?))
-}
-
-/// Converts an IPv4-mapped IPv6 address to IPv4.
-fn unmapped(ip: IpAddr) -> IpAddr {
-    match ip {
-        IpAddr::V6(v6) => v6.to_ipv4_mapped().map_or(ip, IpAddr::V4),
-        IpAddr::V4(_) => ip,
-    }
+    Some(SocketAddr::new(ip.to_canonical(), u16::from_str_radix(port, 16).ok()?))
 }
 
 #[cfg(test)]
@@ -103,7 +98,8 @@ mod tests {
         );
     }
 
-    /// Checks that unread bytes stay in the queue. The other end of the connection does not read.
+    /// Checks that the kernel reports the bytes that the other end of a TCP connection has not
+    /// read.
     #[test]
     #[cfg(target_os = "linux")]
     fn kernel_reports_unread_bytes() {

@@ -9,7 +9,8 @@ fn start(mode: PacingMode) -> InitialLink {
     InitialLink { mode, round_trip: Some(ms(100)), queue: false, fixed_rate: DEFAULT_RATE }
 }
 
-/// Simulated connection of `rate` bytes per second to a terminal that replies after `round_trip`.
+/// Simulated connection of `rate` bytes per second to a terminal. The terminal's reply arrives
+/// `round_trip` after the end of the transmission.
 struct Wire {
     rate: f64,
     round_trip: Duration,
@@ -17,16 +18,18 @@ struct Wire {
 }
 
 impl Wire {
-    /// Sends bytes. Returns the time at which the reply comes.
+    /// Sends `bytes` bytes at the time `now`. Returns the time at which the terminal's reply
+    /// arrives.
     fn send(&mut self, now: Duration, bytes: usize) -> Duration {
         self.free_at = self.free_at.max(now) + Duration::from_secs_f64(bytes as f64 / self.rate);
         self.free_at + self.round_trip
     }
 }
 
-/// Sends frames of the permitted size for `seconds`. Returns two results for the second half of
-/// this time: the share of the connection's rate that was used, and the longest time that bytes
-/// waited in the connection.
+/// Sends frames of the size that flow control permits, for `seconds`. If `is_active` is `true`,
+/// user input is recorded every 50 ms. Returns two results for the second half of this time: the
+/// share of the connection's rate that was used, and the longest time for which bytes waited to be
+/// transmitted.
 fn saturate(
     flow: &mut FlowControl,
     wire: &mut Wire,
@@ -42,7 +45,7 @@ fn saturate(
         }
         flow.expire(now);
         if is_active && at % 50 == 0 {
-            flow.act(now);
+            flow.record_input(now);
         }
         if let Some(allowance) = flow.allowance(now, false) {
             let bytes = allowance.bytes;
@@ -84,7 +87,7 @@ fn input_waits_for_one_frame_only() {
     let (busy, waited) = saturate(&mut flow, &mut wire, 20, true);
     assert!(waited < ms(160) && busy > 0.8, "{waited:?}, busy {busy:.2}");
     let now = ms(20_000);
-    flow.act(now);
+    flow.record_input(now);
     flow.in_flight = FramesInFlight::default();
     flow.sent(now, 9000, true, 0);
     // The effect of one key may be sent while that frame is in flight, but not the effect of the
@@ -105,11 +108,11 @@ fn first_effect_of_input_does_not_wait_for_earlier_frames() {
     (0..2).for_each(|i| flow.sent(ms(40 * i), 8000, true, 0));
     let now = ms(80);
     assert_eq!(flow.allowance(now, false), None);
-    flow.act(now);
+    flow.record_input(now);
     assert!(flow.allowance(now, true).unwrap().picture);
     flow.sent(now, 8000, true, 0);
     // The effect of the next input waits.
-    flow.act(ms(110));
+    flow.record_input(ms(110));
     assert!(!flow.allowance(ms(110), true).is_some_and(|allowance| allowance.picture));
 }
 
@@ -177,7 +180,8 @@ fn send_queue_replaces_lost_replies() {
 /// leave it when the other end acknowledges them.
 struct MeasuredWire {
     wire: Wire,
-    /// Frames: time of arrival in the queue, start and end of transmission, and size.
+    /// Frames that were sent: time of arrival in the send queue, start and end of transmission, and
+    /// size in bytes.
     frames: std::collections::VecDeque<(Duration, Duration, Duration, f64)>,
 }
 
@@ -196,7 +200,7 @@ impl MeasuredWire {
         self.frames.push_back((queued_at, start, end, bytes as f64));
     }
 
-    /// Returns the number of bytes in the queue.
+    /// Returns the number of bytes in the send queue at the time `now`.
     fn queue(&mut self, now: Duration) -> usize {
         let acked_at = now.saturating_sub(self.wire.round_trip);
         while self.frames.front().is_some_and(|(_, _, end, _)| *end <= acked_at) {
@@ -210,8 +214,10 @@ impl MeasuredWire {
         self.frames.iter().map(in_queue).sum::<f64>().ceil() as usize
     }
 
-    /// Simulates `seconds`. `wants(time, limit)` returns the number of bytes to send. Returns the
-    /// longest time that bytes waited in the last quarter.
+    /// Simulates a dashboard that sends frames for `seconds`, beginning at the second `from`.
+    /// `wants(time, limit)` returns the number of bytes that the dashboard sends; `time` is in
+    /// milliseconds, and `limit` is the permitted number of bytes. Returns the longest time for
+    /// which bytes waited to be transmitted, in the last quarter of the simulated time.
     fn run(
         &mut self,
         flow: &mut FlowControl,
@@ -290,8 +296,9 @@ fn rate_stays_true_after_convergence() {
     assert!((0.7..1.2).contains(&(found / 125e3)), "{found:.0}");
 }
 
-/// Checks that late replies do not lower the rate. The terminal is slow at times, when the round
-/// trip is measured and when a frame is acknowledged.
+/// Checks that late replies do not lower the estimated rate of the connection. Some replies of the
+/// simulated terminal are late: those that measure the round trip, and the acknowledgement of the
+/// first of two frames.
 #[test]
 fn late_replies_prove_no_rate() {
     for (rate, round_trip) in [(125e3, 100), (32e3, 300)] {
@@ -329,8 +336,8 @@ fn late_replies_prove_no_rate() {
     }
 }
 
-/// Checks the measured rate behind a relay that accepts bytes at once, up to its buffer, and sends
-/// them at the rate of the connection.
+/// Checks the estimated rate of the connection behind a relay that accepts bytes at once, up to its
+/// buffer, and sends them at the rate of the connection.
 #[test]
 fn rate_is_true_behind_a_relay_that_buffers() {
     const RELAYED: f64 = 8e3;
@@ -394,7 +401,7 @@ fn connection_without_acknowledgements_becomes_silent() {
         Some(flow.send_queue.measured_at.unwrap() + STALLED_INTERVAL)
     );
     // Input and acknowledgements are signs of life.
-    flow.act(now);
+    flow.record_input(now);
     assert!(flow.silent_at(None).unwrap() > now);
     flow.held_back(now, Some(0));
     assert_eq!(flow.silent_at(None), None);
@@ -427,7 +434,7 @@ fn threshold_depends_on_rate() {
 }
 
 #[test]
-fn acknowledgement_source_follows_probe() {
+fn acknowledgement_source_follows_capabilities() {
     let ssh = |multiplexer, round_trip, passthrough| {
         let environment = Environment {
             ssh: Some("10.0.0.1 5000 10.0.0.2 22".into()),

@@ -1,21 +1,22 @@
 //! Kitty's graphics protocol (sw.kovidgoyal.net/kitty/graphics-protocol): an image is sent as a PNG
 //! file in chunks.
 
-use crate::terminal::Area;
 use crate::terminal::image::transfer::Transfer;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use crossterm::cursor::MoveTo;
+use ratatui::layout::Rect;
 
-/// Number of base64 characters of a chunk, a multiple of 4. The protocol allows 4096. A chunk of
-/// 1024 fits into the smallest byte budget of a frame.
+/// Number of base64 characters in a chunk of kitty's graphics protocol, a multiple of 4. The
+/// protocol allows 4096. A chunk of 1024 fits into the smallest byte budget of a frame.
 const CHUNK: usize = 1024;
 
-/// Image number. It is below 256, because placeholders encode the number as an indexed foreground
-/// colour.
+/// Number of the image in kitty's graphics protocol. It is below 256, because placeholders encode
+/// the number as an indexed foreground colour.
 pub const IMAGE: u8 = 163;
 
-/// Unicode placeholder: character of a cell that shows a part of an image.
+/// Unicode placeholder of kitty's graphics protocol: character of a cell that shows a part of an
+/// image.
 const PLACEHOLDER: char = '\u{10eeee}';
 
 /// Combining marks that encode the row of a placeholder. Each item is the first and the last code
@@ -64,10 +65,11 @@ pub fn placeholder(row: u16) -> String {
     [Some(PLACEHOLDER), mark.and_then(char::from_u32)].into_iter().flatten().collect()
 }
 
-/// Returns the bytes that show the image file `png` at `place`. If `stretched` is `true`, the
-/// terminal scales the image to these cells. If `through_tmux` is `true`, the bytes are wrapped for
-/// the terminal outside of tmux, which shows the image in the cells with placeholders.
-pub fn transfer(png: &[u8], place: Area, stretched: bool, through_tmux: bool) -> Transfer {
+/// Returns the bytes that show the image file `png` in the cells `place`. If `stretched` or
+/// `through_tmux` is `true`, the terminal scales the image to the size of these cells. If
+/// `through_tmux` is `true`, tmux passes the bytes on to the terminal outside of it, which shows
+/// the image in the cells that contain placeholders.
+pub fn transfer(png: &[u8], place: Rect, stretched: bool, through_tmux: bool) -> Transfer {
     let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
     let letters = STANDARD.encode(png);
     let remove = format!("\x1b_Ga=d,d=I,i={IMAGE},q=2\x1b\\");
@@ -76,7 +78,7 @@ pub fn transfer(png: &[u8], place: Area, stretched: bool, through_tmux: bool) ->
     let give_up = "\x1b_Gm=0,q=2;\x1b\\".to_string();
     let remove = [give_up, remove].map(wrap).concat().into_bytes();
     let mut transfer = Transfer { remove, ..Transfer::default() };
-    let Area { x, y, width, height } = place;
+    let Rect { x, y, width, height } = place;
     // The image appears at the cursor when the terminal has received its last chunk.
     let cursor = match through_tmux {
         true => String::new(),
@@ -101,7 +103,7 @@ pub fn transfer(png: &[u8], place: Area, stretched: bool, through_tmux: bool) ->
     transfer
 }
 
-/// Wraps a sequence so that tmux passes it to the terminal outside of tmux.
+/// Wraps an escape sequence so that tmux passes it to the terminal outside of tmux.
 fn wrapped(sequence: &str) -> String {
     format!("\x1bPtmux;{}\x1b\\", sequence.replace('\x1b', "\x1b\x1b"))
 }
@@ -112,7 +114,7 @@ mod tests {
     use crate::terminal::Decoder;
     use std::time::Duration;
 
-    const PLACE: Area = Area { x: 3, y: 1, width: 40, height: 12 };
+    const PLACE: Rect = Rect { x: 3, y: 1, width: 40, height: 12 };
 
     #[test]
     fn chunks_carry_the_whole_file() {

@@ -11,9 +11,9 @@ mod sixel;
 mod transfer;
 
 use crate::film::{Display, png_of_rgb, read_exr, read_png};
-use crate::terminal::Area;
 use crate::terminal::cells::Raster;
 use crate::terminal::{Capabilities, Multiplexer};
+use ratatui::layout::Rect;
 use shrink::shrunk;
 use std::path::Path;
 pub use transfer::Transfer;
@@ -23,35 +23,38 @@ pub use transfer::Transfer;
 const SIXEL_PX: usize = 1000;
 /// Assumed width and height of a cell in pixels if the terminal does not report them.
 const CELL_PX: [u16; 2] = [8, 16];
-/// Estimated number of bytes per pixel of an encoded image.
+/// Estimated number of bytes per pixel of an encoded image. It limits the size of an image before
+/// the image is encoded.
 const BYTES_PER_PIXEL: f64 = 1.6;
 
-/// Protocol by which images are shown.
+/// Protocol by which images are shown in the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Protocol {
-    /// Kitty's protocol, without a multiplexer.
+    /// Kitty's graphics protocol, without a multiplexer.
     Kitty,
-    /// Kitty's protocol with Unicode placeholders, sent through tmux to the terminal outside of it.
+    /// Kitty's graphics protocol with Unicode placeholders, sent through tmux to the terminal
+    /// outside of it.
     KittyThroughTmux,
-    /// Sixel with this number of colours.
+    /// Sixel images with this number of colours.
     Sixel(u16),
     /// Half blocks in place of an image protocol.
     Blocks,
 }
 
-/// Size of the terminal and protocol for which an image is encoded.
+/// Viewport of an image: size of the terminal and protocol for which the image is encoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageViewport {
     /// Image protocol, or half blocks.
     pub protocol: Protocol,
-    /// Columns and rows of the screen. The last row shows the caption.
+    /// Columns and rows of the screen. The last row shows the image's caption.
     pub screen: [u16; 2],
-    /// Width and height of a cell in pixels.
+    /// Width and height of a terminal cell in pixels. `None` if the terminal does not report them.
     pub cell_px: Option<[u16; 2]>,
     /// Largest width and height of a sixel image in pixels. `None` if the terminal reports no
     /// limit.
     pub sixel_px: Option<[u16; 2]>,
-    /// Approximate limit of the encoded size in bytes. `None` means no limit.
+    /// Approximate largest size of the encoded image in bytes, so that it is sent in a few seconds.
+    /// A larger image is scaled down. `None` means no limit.
     pub max_bytes: Option<f64>,
 }
 
@@ -64,10 +67,10 @@ pub struct ViewerImage {
     pub size: [usize; 2],
     /// Width and height of the displayed image, in pixels.
     pub shown: [usize; 2],
-    /// Protocol.
+    /// Protocol by which the image is shown.
     pub protocol: Protocol,
     /// Cells that the image covers, fully or in part.
-    pub place: Area,
+    pub place: Rect,
     /// Half blocks that show the image. With an image protocol they fill only the cells that the
     /// image covers fully.
     pub raster: Raster,
@@ -76,7 +79,7 @@ pub struct ViewerImage {
 }
 
 impl Protocol {
-    /// Chooses the best protocol of the terminal.
+    /// Chooses the best image protocol of the terminal.
     pub fn of(terminal: &Capabilities) -> Self {
         match terminal.environment.multiplexer {
             None if terminal.kitty_graphics => Self::Kitty,
@@ -91,7 +94,7 @@ impl Protocol {
         }
     }
 
-    /// Returns the name that users see.
+    /// Returns the name of the protocol for display to users.
     pub fn name(self) -> &'static str {
         match self {
             Self::Kitty => "kitty's protocol",
@@ -103,8 +106,8 @@ impl Protocol {
 }
 
 impl ImageViewport {
-    /// Returns the size of the largest image and the size of a cell, in pixels. With half blocks, a
-    /// pixel is one half block.
+    /// Returns two sizes in pixels, each as width and height: that of the largest image that fits
+    /// on the screen, and that of a cell. With half blocks, a pixel is one half of a cell.
     fn px(&self) -> ([usize; 2], [usize; 2]) {
         let cell = match self.protocol {
             Protocol::Blocks => [1, 2],
@@ -122,7 +125,8 @@ impl ImageViewport {
         (largest, cell)
     }
 
-    /// Returns the displayed size of an image of `size`. Images are never enlarged.
+    /// Returns the displayed size in pixels of an image of `size` pixels, scaled down to fit on the
+    /// screen. Images are never enlarged.
     fn fitting(&self, size: [usize; 2]) -> [usize; 2] {
         let (largest, _) = self.px();
         let [width, height] = size.map(|n| n as f64);
@@ -150,7 +154,7 @@ impl ViewerImage {
         Self::of(size, &pixels, viewport)
     }
 
-    /// Prepares an image of size `size` for `viewport`. Pixels are row by row.
+    /// Prepares an image of `size` (width, height) pixels for `viewport`. `pixels` are row by row.
     fn of(size: [usize; 2], pixels: &[[u8; 3]], viewport: &ImageViewport) -> Result<Self, String> {
         if size.contains(&0) || viewport.screen[1] < 2 {
             return Err("the screen is too small for a picture".to_string());
@@ -161,7 +165,7 @@ impl ViewerImage {
         let [width, height] = [0, 1].map(|i| shown[i].div_ceil(cell[i]) as u16);
         let x = viewport.screen[0].saturating_sub(width) / 2;
         let y = (viewport.screen[1] - 1).saturating_sub(height) / 2;
-        let place = Area { x, y, width, height };
+        let place = Rect { x, y, width, height };
         let transfer = match viewport.protocol {
             Protocol::Blocks => Transfer::default(),
             Protocol::Sixel(colors) => sixel::transfer(&small, shown[0], place, cell[1], colors)?,
@@ -187,8 +191,9 @@ impl ViewerImage {
         Ok(Self { screen, size, shown, protocol, place, raster, transfer })
     }
 
-    /// Returns the text and the indexed colour of the cells in row `row` of `place` after the
-    /// transfer. Returns `None` if the protocol draws the image without placeholders.
+    /// Returns two values for the cells in row `row` of `place`: their text, and the index of their
+    /// foreground colour. These placeholders make the terminal draw the image that was sent to it.
+    /// Returns `None` if the protocol draws the image without placeholders.
     pub fn placeholder(&self, row: u16) -> Option<(String, u8)> {
         let has_placeholders = self.protocol == Protocol::KittyThroughTmux;
         has_placeholders.then(|| (kitty::placeholder(row), kitty::IMAGE))
@@ -235,7 +240,7 @@ mod tests {
                 let viewport = ImageViewport { protocol, ..WINDOW };
                 let pixels = vec![[9, 8, 7]; size[0] * size[1]];
                 let image = ViewerImage::of(size, &pixels, &viewport).unwrap();
-                let Area { x, y, width, height } = image.place;
+                let Rect { x, y, width, height } = image.place;
                 assert!(x + width <= 100 && y + height <= 30, "{:?}", image.place);
                 assert!((100 - width).abs_diff(2 * x) <= 1 && (30 - height).abs_diff(2 * y) <= 1);
                 assert!(image.raster.width <= width.into());

@@ -1,24 +1,24 @@
 //! Sixel: an image is sent in horizontal strips, each with its own palette.
 
-use crate::terminal::Area;
 use crate::terminal::image::transfer::Transfer;
 use crossterm::cursor::MoveTo;
 use icy_sixel::{EncodeOptions, sixel_encode};
+use ratatui::layout::Rect;
 
-/// Largest number of strips of an image. The terminal treats each strip as an image, and xterm
-/// keeps at most 16 images.
+/// Largest number of horizontal strips of an image. The terminal treats each strip as an image of
+/// its own, and xterm keeps at most 16 images.
 const MAX_STRIPS: u16 = 16;
 
-/// Returns the bytes that show `pixels`, in rows of `width` pixels, at `place`. `cell_height` is
-/// the height of a cell in pixels. `colors` is the largest number of colours of a strip. Other
-/// output can be sent between strips.
+/// Returns the bytes that show the image `pixels` at `place`, in rows of `width` pixels.
+/// `cell_height` is the height of a cell in pixels. `colors` is the largest number of colours of a
+/// strip (one or more rows of cells). Other output can be sent between strips.
 ///
 /// # Errors
 /// Fails if the image is empty.
 pub fn transfer(
     pixels: &[[u8; 3]],
     width: usize,
-    place: Area,
+    place: Rect,
     cell_height: usize,
     colors: u16,
 ) -> Result<Transfer, String> {
@@ -45,7 +45,7 @@ mod tests {
         let (width, height) = (50, 100);
         let pixel = |i: usize| [(5 * (i % width)) as u8, (2 * (i / width)) as u8, 90];
         let pixels: Vec<_> = (0..width * height).map(pixel).collect();
-        let place = Area { x: 2, y: 3, width: 7, height: 7 };
+        let place = Rect { x: 2, y: 3, width: 7, height: 7 };
         let transfer = transfer(&pixels, width, place, 16, 256).unwrap();
         let text = String::from_utf8(transfer.bytes.clone()).unwrap();
         let strips: Vec<_> = text.split("\x1b[").skip(1).collect();
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn number_of_strips_is_bounded() {
         for rows in 1..70 {
-            let place = Area { x: 0, y: 0, width: 1, height: rows };
+            let place = Rect { x: 0, y: 0, width: 1, height: rows };
             let pixels = vec![[1, 2, 3]; 6 * 6 * usize::from(rows)];
             let transfer = transfer(&pixels, 6, place, 6, 16).unwrap();
             assert!(transfer.stops.len() <= usize::from(MAX_STRIPS), "{rows}");

@@ -1,19 +1,20 @@
-//! Bytes of an image and the positions at which they may be divided.
+//! Encoded image on its way to the terminal: its bytes, and the positions at which they may be
+//! divided.
 
 use std::ops::Range;
 
-/// Bytes that make a terminal show a picture.
+/// Bytes that make a terminal show an image.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Transfer {
-    /// All bytes.
+    /// All bytes of the encoded image: escape sequences, one after another.
     pub bytes: Vec<u8>,
-    /// Offsets between sequences, in ascending order, at which other output may be sent. The last
-    /// offset is the length of `bytes`.
+    /// Offsets between escape sequences, in ascending order, at which other output may be sent. The
+    /// last offset is the length of `bytes`.
     pub stops: Vec<usize>,
-    /// `true` if a sequence may be divided at any byte, and terminated early by ST (string
-    /// terminator).
+    /// `true` if the image's escape sequence may be divided at any byte, and ended early by ST
+    /// (string terminator).
     pub divisible: bool,
-    /// Bytes that remove the image, even if only a part of it was sent.
+    /// Bytes that remove the image from the screen, even if only a part of it was sent.
     pub remove: Vec<u8>,
     /// `true` if the image overwrites the cells that it covers. They must be drawn again after the
     /// image is removed.
@@ -21,9 +22,14 @@ pub struct Transfer {
 }
 
 impl Transfer {
-    /// Returns the range of bytes to send next. `sent` is the number of bytes sent before. The
-    /// range has at most `room` bytes, except that an indivisible sequence is never divided. The
-    /// second value is `true` if the range ends inside a sequence.
+    /// Returns two values: the range of the image's bytes to send next, and `true` if it ends
+    /// inside of an escape sequence. The caller must then send the remainder of the sequence before
+    /// any other output. `sent` is the number of bytes sent before. `room` is the number of bytes
+    /// that may be sent now.
+    ///
+    /// The range holds as many complete sequences as fit into `room`. If not even one fits, the
+    /// result depends on [`Self::divisible`]: a divisible sequence is cut after `room` bytes (at
+    /// least 1); an indivisible one is returned whole and exceeds `room`.
     pub fn slice(&self, sent: usize, room: usize) -> (Range<usize>, bool) {
         let room = room.max(usize::from(self.divisible));
         let later_stops = &self.stops[self.stops.partition_point(|stop| *stop <= sent)..];
@@ -36,7 +42,7 @@ impl Transfer {
         }
     }
 
-    /// Appends a complete sequence.
+    /// Appends a complete escape sequence of the image.
     pub fn add(&mut self, sequence: &[u8]) {
         self.bytes.extend(sequence);
         self.stops.push(self.bytes.len());
@@ -47,7 +53,8 @@ impl Transfer {
 mod tests {
     use super::*;
 
-    /// Checks that the slices cover all bytes, and that only divisible sequences are divided.
+    /// Checks that the slices of an image transfer cover all bytes in order, and that only
+    /// divisible escape sequences are divided.
     #[test]
     fn slices_are_contiguous_and_complete() {
         for divisible in [false, true] {

@@ -1,5 +1,5 @@
-//! Light buffer: for each direction from a light, a list of the primitives that can occlude it.
-//! Shadow rays test the few primitives of a list instead of traversing the BVH (Haines and
+//! Light buffer: for each direction from a light, a list of the primitives that can occlude the
+//! light. Shadow rays test the few primitives of a list instead of traversing the BVH (Haines and
 //! Greenberg 1986, *The Light Buffer: A Shadow-Testing Accelerator*).
 
 use crate::bvh::Ray;
@@ -7,35 +7,43 @@ use crate::lanes::{Float, Mask, SimdFloat, next_distinct};
 use crate::primitive::{Aggregate, BoundingSphere, F32_RAY_ERROR, LightTarget, PrimitiveSet};
 use crate::world::culling::light_projection::{LightProjection, ProjectedBounds};
 
-/// Largest number of entries in a cell. The primitives closest to the light are kept.
+/// Largest number of possible occluders in the list of a cell, which is a range of directions from
+/// the light. If more primitives overlap the cell, those closest to the light are kept.
 const MAX_PER_CELL: usize = 16;
 
-/// Value of [`Entry::exempt_item`] for primitives that are not exempt: they may occlude rays that
-/// start on their own outside.
+/// Value of [`Entry::exempt_item`] for a primitive that can occlude shadow rays from its own
+/// outside. Rays are tested against such a primitive in any case.
 const NO_ITEM: u32 = u32::MAX;
 
-/// Possible occluders of one light, in a grid of cells over the projection from the light.
+/// Light buffer: lists of the primitives that can occlude one light. Each list belongs to a cell: a
+/// square of a grid over the projection from the light, that is, a range of directions from the
+/// light.
 pub(crate) struct LightBuffer<S> {
     projection: LightProjection<S>,
-    /// Number of rows of cells on a face of the projection; the number of columns is the same.
+    /// Number of rows of cells on a face of the light's projection; the number of columns is the
+    /// same.
     side: usize,
-    /// Largest coordinate of the occluders and the light. Rays with an origin beyond it traverse
-    /// the BVH, because their rounding errors exceed the bounds.
+    /// Largest coordinate of the occluders and the light. Rays that start at a larger coordinate
+    /// traverse the BVH, because their rounding errors exceed the margin of the occluders' bounds.
     max_coordinate: S,
-    /// Cells of all faces, face by face and row by row.
+    /// Cells (ranges of directions from the light) of all faces of the light's projection, face by
+    /// face and row by row.
     cells: Vec<Cell<S>>,
-    /// Entries of all cells. The entries of a cell are sorted by their distance from the light,
-    /// nearest first.
+    /// Possible occluders of all cells, cell after cell. The entries of a cell are sorted by their
+    /// distance from the light, nearest first.
     entries: Vec<Entry<S>>,
 }
 
 #[derive(Clone, Copy)]
 struct Cell<S> {
-    /// Range of the cell in `entries`, from `first` up to `end`.
+    /// Position of the first occluder of the cell (a range of directions from the light) in the
+    /// light buffer's list of entries.
     first: u32,
+    /// Position after the last occluder of the cell (a range of directions from the light) in the
+    /// light buffer's list of entries.
     end: u32,
-    /// Depth up to which the list of entries is complete. Rays from greater depths traverse the
-    /// BVH.
+    /// Distance from the light up to which the cell's list of possible occluders is complete.
+    /// Shadow rays from greater distances traverse the BVH.
     complete_to: S,
 }
 
@@ -51,19 +59,21 @@ pub(crate) struct Occluder {
 
 #[derive(Clone, Copy)]
 struct Entry<S> {
-    /// Index of the primitive in the geometry's BVH.
+    /// Index of the occluding primitive among those in the scene's BVH.
     number: u32,
-    /// [`Occluder::exempt_item`], or [`NO_ITEM`].
+    /// Id of the primitive if it cannot occlude shadow rays that start on its own outside;
+    /// [`NO_ITEM`] if it can.
     exempt_item: u32,
-    /// Smallest depth of the primitive: its distance from a point light. For a directional light it
-    /// is the distance from the plane through the origin, measured against the direction of the
-    /// light.
+    /// Smallest depth of the primitive. The depth of a point is its distance from a point light.
+    /// For a directional light it is the coordinate of the point along the direction in which the
+    /// light travels, with 0 at the origin.
     near: S,
 }
 
 impl<S: Float> LightBuffer<S> {
-    /// Creates the buffer of a light. Returns `None` if the buffer would be incomplete: at least
-    /// half of the occluders do not fit in most of their cells.
+    /// Creates the light buffer of a light. Returns `None` if at least half of the occluders
+    /// overlap more full cells than cells with room. Such a buffer would be too incomplete to be
+    /// useful.
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
         let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match target {
@@ -132,12 +142,13 @@ impl<S: Float> LightBuffer<S> {
         Some(Self { projection, side, max_coordinate: S::from_f64(max_coordinate), cells, entries })
     }
 
-    /// Returns the lanes of `active` whose ray hits a primitive nearer than `t_max`. The result
-    /// equals that of [`Aggregate::occluded`] for `candidates`, the possible occluders. The rays
-    /// start on the primitives `start_item`, in the lanes `starts_outside` on their outside.
+    /// Returns the lanes of `active` whose ray is occluded: it hits a primitive nearer than
+    /// `t_max`. The result equals that of [`Aggregate::occluded`] for `candidates`, the possible
+    /// occluders. The rays start on the primitives with the ids `start_item`. In the lanes
+    /// `starts_outside` they start on the outside of these primitives.
     ///
-    /// The rays are passed by reference, because a copied struct of them costs 7 % on the
-    /// reflecting tracks.
+    /// The rays are passed by reference, because a copy of them makes the scene `reflecting-tracks`
+    /// 7 % slower.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
@@ -213,8 +224,8 @@ mod tests {
         (0..).zip(balls).map(|(i, ball)| Occluder { ball: *ball, exempt_item: Some(i) }).collect()
     }
 
-    /// Checks that the buffer and the BVH find the same shadows for rays from many points. Returns
-    /// the number of occluded rays.
+    /// Checks that the light buffer of `target` and the BVH find the same shadows for rays from
+    /// many points. Returns the number of occluded rays.
     fn compare<L: SimdFloat>(
         target: &LightTarget,
         balls: &[BoundingSphere],
@@ -292,7 +303,7 @@ mod tests {
         }
     }
 
-    /// Checks that rays behind full cells traverse the BVH.
+    /// Checks that rays through cells of the light buffer whose lists are full traverse the BVH.
     #[test]
     fn light_buffer_falls_back_to_bvh_behind_full_cells() {
         let mut random = Random(4);
@@ -311,7 +322,7 @@ mod tests {
         }
     }
 
-    /// Checks that the far side of a ball occludes lights from its inside.
+    /// Checks that the far side of a ball occludes light from points inside of the ball.
     #[test]
     fn shadow_ray_from_inside_is_occluded_by_its_own_primitive() {
         let balls = [

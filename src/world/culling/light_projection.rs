@@ -8,30 +8,33 @@ use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
-/// Largest tangent of the angle between a direction and the view direction of a perspective
+/// Largest tangent of the angle between a direction and the view direction of a light's perspective
 /// projection. Wider views use a cube map.
 const MAX_TANGENT: f64 = 3.0;
 
-/// Projection of points from a light to a face and two coordinates on that face, each from 0 to 1.
+/// Projection of points, as seen from a light, onto one or more faces. A projected point has two
+/// coordinates on its face, each from 0 to 1.
 pub(crate) enum LightProjection<S> {
     /// Projection from a point light among the primitives onto the six faces of a cube around it.
     CubeMap,
     /// Projection from a point light that has all primitives on one side. The third axis is the
-    /// view direction.
+    /// view direction. `low` and `scale` map coordinates on the face to 0..=1.
     Perspective { axes: [[S; 3]; 3], low: [S; 2], scale: [S; 2] },
-    /// Projection along the direction of a directional light. The two axes are perpendicular to it.
+    /// Projection along the direction of a directional light. The two axes are perpendicular to the
+    /// direction. `low` and `scale` map coordinates along them to 0..=1.
     Orthographic { axes: [[S; 3]; 2], low: [S; 2], scale: [S; 2] },
 }
 
 impl<S: Float> LightProjection<S> {
-    /// Number of faces of the projection: 6 for a cube map, otherwise 1.
+    /// Returns the number of faces of the projection: 6 for a cube map, otherwise 1.
     pub fn faces(&self) -> usize {
         if matches!(self, Self::CubeMap) { 6 } else { 1 }
     }
 
-    /// Returns the cell of each ray's origin as seen from the light, and the depth of the origin.
-    /// Points outside of the projection get an arbitrary cell. `limit` is the distance between
-    /// origin and light. `side` is the number of cells along a side of a face.
+    /// Returns two values for each ray: the index of the light buffer's cell that contains the
+    /// ray's origin as seen from the light, and the depth of the origin (see `near` of the buffer's
+    /// entries). Points outside of the projection get an arbitrary cell. `limit` is the distance
+    /// between origin and light. `side` is the number of cells along a side of a face.
     #[inline(always)]
     pub fn lookup<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
         let side = L::from_f64(side as f64);
@@ -78,7 +81,8 @@ impl<S: Float> LightProjection<S> {
     }
 }
 
-/// Bounding rectangle of a projected ball on a face: two corners with coordinates from 0 to 1.
+/// Bounding rectangle of a projected sphere on a face of a light's projection. Its two corners have
+/// coordinates from 0 to 1.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FaceRect {
     face: usize,
@@ -87,7 +91,8 @@ pub(crate) struct FaceRect {
 }
 
 impl FaceRect {
-    /// Indices of the cells that the rectangle overlaps.
+    /// Returns the indices of the grid cells that the rectangle overlaps, on a face of `side` x
+    /// `side` cells.
     pub fn cells(&self, side: usize) -> impl Iterator<Item = usize> + use<> {
         // The conversion to integers saturates.
         let cell = |x: f64| ((x * side as f64) as usize).min(side - 1);
@@ -98,18 +103,19 @@ impl FaceRect {
     }
 }
 
-/// A projection and the bounding rectangles of all projected balls.
+/// Projection from a light, and the bounding rectangles of all projected spheres.
 pub(crate) struct ProjectedBounds<S> {
-    /// The projection.
+    /// Projection of points from the light onto faces, which are divided into cells.
     pub projection: LightProjection<S>,
-    /// Rectangles of each ball, one for each face that it overlaps.
+    /// Bounding rectangles of each sphere, one for each face that it overlaps.
     pub rects: Vec<Vec<FaceRect>>,
-    /// Recommended number of cells along a side of a face.
+    /// Recommended number of cells along a side of a face of the projection.
     pub side: usize,
 }
 
 impl<S: Float> ProjectedBounds<S> {
-    /// Projects the balls. For a point light, `balls` have centres relative to the light.
+    /// Chooses a projection for a light and projects the spheres `balls`. For a point light, their
+    /// centres are relative to the light.
     pub fn new(target: &LightTarget, balls: &[BoundingSphere]) -> Self {
         let (projection, rects) = match target {
             LightTarget::Direction(direction) => orthographic(*direction, balls),
@@ -121,8 +127,8 @@ impl<S: Float> ProjectedBounds<S> {
     }
 }
 
-/// Returns the smallest and the largest x / z over the points of a ball with z > 0. `x` and `z` are
-/// the coordinates of its centre. Returns `None` if the ball has no such points.
+/// Returns the smallest and the largest x / z over the points of a sphere with z > 0. `x` and `z`
+/// are the coordinates of its centre. Returns `None` if the sphere has no such points.
 fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     let distance = x.hypot(z);
     if distance <= radius {
@@ -136,7 +142,8 @@ fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     (low < FRAC_PI_2 && high > -FRAC_PI_2).then(|| (slope(low), slope(high)))
 }
 
-/// Projects balls to a cube map around the light.
+/// Projects spheres to a cube map around the light. Returns two values: the projection, and the
+/// bounding rectangles of each sphere on the faces of the cube.
 fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<FaceRect>>) {
     let rect_on = |ball: &BoundingSphere, face: usize| {
         let axis = |i: usize| ball.center[(face / 2 + i) % 3];
@@ -152,8 +159,9 @@ fn cube_map<S: Float>(balls: &[BoundingSphere]) -> (LightProjection<S>, Vec<Vec<
     (LightProjection::CubeMap, balls.iter().map(rects).collect())
 }
 
-/// Projects balls by a perspective projection. Returns `None` if they are not on one side of the
-/// light.
+/// Projects spheres by a perspective projection from the light. Returns two values: the projection,
+/// and the bounding rectangle of each sphere. Returns `None` if the spheres are not on one side of
+/// the light, or if the view would be wider than [`MAX_TANGENT`].
 fn perspective<S: Float>(
     balls: &[BoundingSphere],
 ) -> Option<(LightProjection<S>, Vec<Vec<FaceRect>>)> {
@@ -173,7 +181,8 @@ fn perspective<S: Float>(
     Some((LightProjection::Perspective { axes, low, scale }, rects))
 }
 
-/// Projects balls along `direction`, which points to the light.
+/// Projects spheres along `direction`, which points to the light. Returns two values: the
+/// projection, and the bounding rectangle of each sphere.
 fn orthographic<S: Float>(
     direction: DVec3,
     balls: &[BoundingSphere],
@@ -189,8 +198,10 @@ fn orthographic<S: Float>(
     (LightProjection::Orthographic { axes, low, scale }, rects)
 }
 
-/// Maps all rectangles, given by their corners, to [0, 1]. Returns the offset and the factor of the
-/// map, and the mapped rectangles.
+/// Maps all rectangles into the unit square by one linear map, so that together they fill it. Each
+/// of `corners` holds the lowest and the highest corner of a rectangle. Returns three values: the
+/// lowest corner of all rectangles, which becomes the origin; the scale factor along each axis; and
+/// the mapped rectangles.
 fn normalized<S: Float>(corners: &[(DVec2, DVec2)]) -> ([S; 2], [S; 2], Vec<Vec<FaceRect>>) {
     let low = corners.iter().map(|s| s.0).fold(DVec2::INFINITY, DVec2::min);
     let high = corners.iter().map(|s| s.1).fold(DVec2::NEG_INFINITY, DVec2::max);
@@ -219,7 +230,9 @@ pub(crate) mod tests {
         }
     }
 
-    /// Checks that the cell of every point of a ball is among the cells of the ball's bounds.
+    /// Checks that the cell of a point of a ball is among the cells that the ball's bounding
+    /// rectangle overlaps. The random points are below the surface of the ball, by the fraction
+    /// `slack` of its radius, so that rounding does not matter.
     fn check_points_of_ball<L: SimdFloat>(slack: f64) {
         let mut random = Random(2);
         let side = 64;

@@ -1,10 +1,11 @@
-//! Screen-space culling: bounds of the projected primitives, and a grid of candidate lists.
+//! Screen-space culling of camera rays: bounds of the projected primitives, and a grid of candidate
+//! lists.
 
 use crate::camera::PerspectiveCamera;
 use crate::primitive::{F32_RAY_ERROR, Form};
 use glam::DVec3;
 
-/// Bounding rectangle of a projected primitive on the raster \[pixels\]: smallest and largest
+/// Bounding rectangle of a projected primitive in the picture \[pixels\]: smallest and largest
 /// coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScreenBounds {
@@ -12,17 +13,18 @@ pub(crate) struct ScreenBounds {
     high: [f64; 2],
 }
 
-/// Margin for rounding errors of raster positions in single precision \[pixels\].
+/// Margin of projected bounds for rounding errors of raster positions in single precision
+/// \[pixels\].
 const MARGIN_PX: f64 = 0.25;
 
-/// Relative error of a ray's position on the picture plane at unit distance: eight rounding errors
-/// in single precision.
+/// Largest error of a ray's position on the picture plane at unit distance, relative to the
+/// distance from the centre of the plane: eight rounding errors in single precision.
 const MAX_SLANT_ERROR: f64 = 5e-7;
 
 impl ScreenBounds {
-    /// Projects the corners of the bounding box of `form` to the raster. The result is infinite if
-    /// a corner is not in front of the eye. A lens widens the bounds by the largest blur of a point
-    /// in the box.
+    /// Returns the bounds, in the picture \[pixels\], of the projected corners of an object's
+    /// bounding box. They are infinite if the object has no bounding box, or if a corner is not in
+    /// front of the eye. With a lens, they are wider by the largest blur of a point in the box.
     pub fn project(form: &Form, camera: &PerspectiveCamera) -> Self {
         let infinite = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
         let Some((low, high)) = form.bounds() else { return infinite };
@@ -64,8 +66,8 @@ impl ScreenBounds {
         out
     }
 
-    /// Returns `true` if the bounds overlap the rectangle of the raster with corner `origin` and
-    /// size `extent` \[pixels\].
+    /// Returns `true` if the projected bounds overlap the rectangle of the raster with corner
+    /// `origin` and size `extent` \[pixels\].
     pub fn overlaps(&self, origin: [usize; 2], extent: [usize; 2]) -> bool {
         (0..2).all(|axis| {
             let begin = origin[axis] as f64;
@@ -74,25 +76,27 @@ impl ScreenBounds {
     }
 }
 
-/// Side of a cell \[pixels\].
+/// Side of a cell of the screen grid \[pixels\]. A cell is a square of pixels with one list of
+/// candidate primitives.
 const CELL_PX: usize = 16;
 
-/// Largest number of candidates in a list. Rays through cells with more candidates traverse the
-/// BVH.
+/// Largest number of candidate primitives in a cell (a square of pixels) of the screen grid. Camera
+/// rays through cells with more candidates traverse the BVH.
 const MAX_PER_CELL: usize = 16;
 
-/// Candidate list of each cell of the raster.
+/// Screen grid: for each cell of the picture (a square of 16 x 16 pixels), the list of the
+/// primitives that camera rays can hit.
 pub(crate) struct ScreenGrid {
     columns: usize,
     rows: usize,
-    /// Lists of primitive ids in ascending order, cells row by row. `None` for cells with more than
-    /// [`MAX_PER_CELL`] candidates.
+    /// Ids of the candidate primitives of each cell (a square of pixels), in ascending order. The
+    /// cells are listed row by row. `None` for cells with more than [`MAX_PER_CELL`] candidates.
     candidates: Vec<Option<Vec<u32>>>,
 }
 
 impl ScreenGrid {
-    /// Creates the grid of a raster of `size` pixels. `primitives` are ids in ascending order, with
-    /// the bounds of the primitives.
+    /// Creates the screen grid of a raster of `size` pixels. `primitives` holds the id and the
+    /// projected bounds of each primitive, in ascending order of ids.
     pub fn new(
         size: [usize; 2],
         primitives: impl IntoIterator<Item = (u32, ScreenBounds)>,
@@ -119,8 +123,9 @@ impl ScreenGrid {
         Self { columns, rows, candidates }
     }
 
-    /// Returns the candidates of the rectangle with corner `origin` and size `extent` \[pixels\],
-    /// in ascending order. Returns `None` if there are more than [`MAX_PER_CELL`].
+    /// Returns the ids of the primitives that camera rays through the rectangle with corner
+    /// `origin` and size `extent` \[pixels\] can hit, in ascending order. Returns `None` if they, or
+    /// those of one cell, are more than [`MAX_PER_CELL`].
     pub fn candidates(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Vec<u32>> {
         let span = |axis: usize, count: usize| {
             let end = (origin[axis] + extent[axis]).div_ceil(CELL_PX);

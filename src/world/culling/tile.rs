@@ -16,36 +16,41 @@ use crate::world::culling::screen_grid::{ScreenBounds, ScreenGrid};
 pub struct TileCandidates {
     /// Primitives that the camera rays can hit.
     pub(crate) primary: PrimitiveSet,
-    /// Possible occluders for each light of the world: first the lights without a size, then the
-    /// emitters.
+    /// Possible occluders of the light sources: first of each light without a size, then of each
+    /// light with a size, each emissive object from which light is sampled, and each stratum
+    /// (spatial group) of the lights among which paths choose.
     pub(crate) occluders: Vec<PrimitiveSet>,
 }
 
 impl TileCandidates {
-    /// Returns the candidates without culling: all primitives, for camera rays and for each of
-    /// `lights` lights.
+    /// Returns all primitives as candidates, without culling: for camera rays, and for each of
+    /// `lights` light sources (see the field `occluders`).
     pub(crate) fn all<L: SimdFloat>(geometry: &Aggregate<L>, lights: usize) -> Self {
         Self { primary: geometry.all().clone(), occluders: vec![geometry.all().clone(); lights] }
     }
 }
 
-/// Method that finds the candidates of a tile.
+/// Method that finds the candidate primitives of a tile: those that rays of the tile are tested
+/// against.
 pub(crate) enum CullingMode {
     /// Tests bounding volumes against the tile's view frustum, and against the space between the
     /// frustum and the lights.
     Frusta(FrustumCuller),
     /// Tests the bounding rectangles of the projected primitives against the tile.
     ScreenBounds(Vec<ScreenBounds>),
-    /// Stores candidate lists per screen cell; the primitives are in a BVH.
+    /// Looks up the candidate lists of the screen cells that the tile overlaps. The primitives are
+    /// in a BVH.
     ScreenGrid(ScreenGrid),
-    /// No culling. The geometry may have bounding boxes or a BVH.
+    /// No culling: all primitives are candidates. Rays may still find their hits by bounding boxes
+    /// or a BVH.
     Off,
 }
 
 impl CullingMode {
-    /// Returns the candidates of the camera rays through a rectangle of the raster, and of the
-    /// shadow rays from their hit points to `lights` lights. Returns `None` if no primitive can be
-    /// excluded.
+    /// Returns the primitives that the camera rays through a rectangle of the picture can hit, and
+    /// those that can occlude shadow rays from their hit points to `lights` light sources. The
+    /// rectangle has the corner `origin` and the size `extent` \[pixels\]. Returns `None` if rays
+    /// must be tested against all primitives.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
@@ -81,10 +86,10 @@ impl CullingMode {
     }
 }
 
-/// Returns one value for each of `forms`: `true` for a convex solid that rays hit only from
-/// outside. Paths are inside of a solid only if they start there or are transmitted. `start`
-/// contains the origins of all camera rays; `None` if they start on a near plane. `entered` is
-/// `true` for each form whose surface transmits.
+/// Returns one value for each of the objects `forms`: `true` for a convex solid that rays hit only
+/// from outside. Paths are inside of a solid only if they start there or are transmitted. `start`
+/// is a sphere that contains the origins of all camera rays; `None` if they start on a near plane,
+/// which no sphere bounds. `entered` is `true` for each object whose surface transmits.
 pub(crate) fn outside_only<'a>(
     forms: impl Iterator<Item = &'a Form>,
     start: Option<BoundingSphere>,
@@ -100,7 +105,7 @@ pub(crate) fn outside_only<'a>(
     forms.zip(entered).map(is_outside).collect()
 }
 
-/// Culling by view frusta and by the space between visible surfaces and the lights.
+/// Culling of primitives by view frusta and by the space between visible surfaces and the lights.
 pub(crate) struct FrustumCuller {
     /// Bounding volume of each primitive.
     bounds: Vec<BoundingVolume>,
@@ -109,14 +114,18 @@ pub(crate) struct FrustumCuller {
     self_shadowing: Vec<bool>,
     /// Position or direction of each light without a size.
     lights: Vec<LightTarget>,
-    /// Bounding sphere of each emitter.
+    /// Bounding sphere of each light with a size, each emissive object, and each stratum (spatial
+    /// group) of the lights among which paths choose.
     emitters: Vec<BoundingSphere>,
 }
 
 impl FrustumCuller {
-    /// Creates the culler of `forms`, one for each primitive. `outside_only` is the result of
-    /// [`outside_only`]. `max_end_offset` is the largest distance between a light and the end point
-    /// of its shadow rays. `emitters` are the bounding spheres of the emitters.
+    /// Creates the culler of the primitives `forms`. `outside_only` is `true` for each convex solid
+    /// that rays hit only from outside. `lights` are the positions or directions of the lights
+    /// without a size. `max_end_offset` is the largest distance between such a light and the end
+    /// point of its shadow rays. `emitters` are the bounding spheres of the lights with a size, of
+    /// the emissive objects, and of the strata (spatial groups) of the lights among which paths
+    /// choose.
     pub fn new(
         forms: Vec<&Form>,
         outside_only: &[bool],
@@ -133,22 +142,23 @@ impl FrustumCuller {
         Self { lights, emitters, self_shadowing, bounds }
     }
 
-    /// Creates the light buffer of each light, over the primitives in the geometry's BVH. An entry
-    /// is `None` if a light buffer would not help.
+    /// Creates the light buffer of each light without a size, over the primitives in the BVH of
+    /// `geometry`. An entry is `None` if the list of occluders would be too incomplete to be
+    /// useful; see [`LightBuffer::new`].
     pub fn light_buffers<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
     ) -> Vec<Option<LightBuffer<L::Scalar>>> {
         let occluder = |item: u32| Occluder {
-            ball: self.bounds[item as usize].ball(),
+            ball: self.bounds[item as usize].ball,
             exempt_item: (!self.self_shadowing[item as usize]).then_some(item),
         };
         let occluders: Vec<Occluder> = geometry.in_tree().into_iter().map(occluder).collect();
         self.lights.iter().map(|light| LightBuffer::new(light, &occluders)).collect()
     }
 
-    /// Returns the candidates of camera rays inside `frustum`, or of all rays if `frustum` is
-    /// `None`.
+    /// Returns the candidate primitives of the camera rays inside `frustum`, and of the shadow rays
+    /// from their hit points. If `frustum` is `None`, camera rays are not restricted.
     pub fn candidates<L: SimdFloat>(
         &self,
         geometry: &Aggregate<L>,
@@ -156,7 +166,7 @@ impl FrustumCuller {
     ) -> TileCandidates {
         let visible_part = |bound: &BoundingVolume| match frustum {
             Some(frustum) => bound.clip_to(frustum),
-            None => Some(bound.ball()),
+            None => Some(bound.ball),
         };
         let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(visible_part).collect();
         let primary = geometry.select(|item| parts[item as usize].is_some());

@@ -1,7 +1,7 @@
-//! Direct lighting by a few lights out of many, which each lane chooses at each hit.
+//! Direct lighting by a few lights out of many. Each lane chooses its lights at each hit.
 
 use crate::bvh::Ray;
-use crate::lanes::{Mask, SimdFloat, next_distinct};
+use crate::lanes::{Mask, SimdFloat};
 use crate::primitive::PrimitiveSet;
 use crate::sampling::PacketSampler;
 use crate::world::integrator::interaction::SurfaceInteraction;
@@ -11,10 +11,10 @@ use crate::world::light_choice::LightChoice;
 use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
-/// Adds an estimate of the light of all lights in `choice` that the surfaces reflect. `bounce` is
-/// the number of earlier surfaces of the path; `occluders` holds, for each stratum of lights, the
-/// primitives that may occlude it. `media` are the media of the paths; `None` in worlds without
-/// transmission.
+/// Adds an estimate of the light that surfaces reflect from all lights in `choice` to `out`.
+/// `bounce` is the number of earlier surfaces of the path. `occluders` holds, for each stratum of
+/// lights (spatial group of lights), the primitives that may occlude it. `media` are the media of
+/// the paths; `None` in worlds without transmission.
 #[inline(never)]
 pub(crate) fn chosen_lights<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -70,10 +70,6 @@ pub(crate) fn chosen_lights<L: SimdFloat, const SIMPLE: bool>(
             value = value.component_mul(left);
         }
         value = value.component_mul(lights.emission(stratum));
-        let groups: L = lights.groups(stratum);
-        while let Some((group, lanes)) = next_distinct(groups, lit) {
-            lit = lit.and_not(lanes);
-            out.groups[group as usize] += value.masked(lanes);
-        }
+        out.groups[choice.group] += value.masked(lit);
     }
 }

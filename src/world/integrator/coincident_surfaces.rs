@@ -21,40 +21,44 @@ use crate::primitive::{Aggregate, Form, PrimitiveId, SphereForm};
 use crate::world::integrator::nested_dielectrics::MediumStack;
 use glam::DVec3;
 
-/// Tie distance: the largest distance along the normal between a hit point and a surface that
-/// coincides with it, in rounding errors of the largest coordinate. The parts of compounds use the
-/// same value.
+/// Tie distance: the largest distance along the normal at which a surface counts as coincident with
+/// the surface of a hit point. The unit is the rounding error of the largest coordinate. The module
+/// `primitive::csg` uses the same value for surfaces of parts of a compound.
 const TIE: f64 = 16.0;
 
-/// Offset of rays that leave coincident surfaces, in tie distances.
+/// Height above coincident surfaces at which rays that leave them start, in tie distances. Surfaces
+/// within one tie distance of each other count as coincident.
 const OFFSET_TIES: f64 = 1.5;
 
-/// Smallest cosine between the normals of two coincident surfaces. At larger angles they only
-/// intersect.
+/// Smallest cosine between the normals of two surfaces that count as coincident. Surfaces at larger
+/// angles intersect in a line, and rays cross them in the order of distance.
 const MIN_COSINE: f64 = 0.5;
 
 /// Kind of a surface, which determines the order in which rays cross coincident surfaces.
 #[derive(Clone, Copy, Debug)]
 enum SurfaceKind {
-    /// Boundary of a transparent solid with this priority (see [`MediumStack`]).
+    /// Boundary of a transparent solid. The value is its priority (see [`MediumStack`]).
     Transparent(u32),
-    /// Boundary of an opaque solid.
+    /// Boundary of an opaque solid, which no ray enters.
     Opaque,
-    /// Flat transparent primitive.
+    /// Flat transparent primitive without inside, such as a window pane.
     Pane,
-    /// Flat opaque primitive.
+    /// Flat opaque primitive without inside, such as a sheet of paper.
     Sheet,
 }
 
-/// Contact of a primitive with another one, which may touch it.
+/// Entry in the list of contacts of a primitive: another primitive that may touch it.
 #[derive(Clone, Copy, Debug)]
 struct Contact<S> {
-    /// Id of the other primitive. For a compound, the id of its first part.
+    /// Id of the touching primitive. For a compound, the id of its first part.
     item: u32,
-    /// Smallest tie distance (see [`TIE`]) at this contact, in scene units.
+    /// Distance \[scene units\] within which surfaces of the two primitives count as coincident. It
+    /// is larger at points with larger rounding errors; see [`Contact::tie`].
     tie: S,
-    /// Corners of the other primitive's bounding box; infinite along axes on which it is unbounded.
+    /// Lowest corner of the touching primitive's bounding box; infinite along axes on which it is
+    /// unbounded.
     low: [S; 3],
+    /// Highest corner of the touching primitive's bounding box.
     high: [S; 3],
 }
 
@@ -65,16 +69,18 @@ impl<S: Float> Contact<S> {
         Self { item, tie: S::from_f64(tie), low, high }
     }
 
-    /// Returns the tie distance at points whose coordinates have the rounding error `rounding`; see
-    /// [`rounding`].
+    /// Returns the distance within which surfaces of the two primitives count as coincident: the
+    /// larger of the field `tie` and `rounding`, the result of the function [`rounding`] for the
+    /// points.
     #[inline(always)]
     fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
         rounding.max(L::splat(self.tie))
     }
 
-    /// Returns the lanes whose point may be on the other primitive: its distance from the bounding
-    /// box is at most two ties. One tie is the range of the search for coincident surfaces; the
-    /// other covers the rounding error of the search.
+    /// Returns the lanes whose point may be on the touching primitive: its distance from the
+    /// bounding box is at most twice the distance within which surfaces count as coincident. One
+    /// half of this is the range of the search for coincident surfaces; the other half covers the
+    /// rounding error of the search.
     #[inline(always)]
     fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
         let distance =
@@ -85,57 +91,62 @@ impl<S: Float> Contact<S> {
     }
 }
 
-/// Returns [`TIE`] times the rounding error of each point's largest coordinate.
+/// Returns the largest rounding error of each point's coordinates, multiplied by [`TIE`]. Surfaces
+/// within this distance count as coincident.
 #[inline(always)]
 fn rounding<L: SimdFloat>(point: Vec3<L>) -> L {
     point.max_abs() * L::from_f64(TIE * L::EPSILON)
 }
 
-/// Contacts of all primitives. In each pair that touches, at least one primitive transmits.
+/// Pairs of primitives that may touch each other. In each pair at least one primitive transmits.
 pub(crate) struct Contacts<S> {
-    /// Contacts of each primitive.
+    /// For each primitive, the primitives that may touch it.
     contacts: Vec<Vec<Contact<S>>>,
-    /// Kind of each primitive's surface, and the magnitude of its layer (its position in the order
-    /// of coincident surfaces).
+    /// Two values for each primitive: the kind of its surface, and the magnitude of its layer. A
+    /// layer is the position of a surface in the order in which a ray crosses coincident surfaces;
+    /// its sign depends on the direction of the ray.
     kinds: Vec<(SurfaceKind, S)>,
 }
 
 /// State of rays that start on a surface that may coincide with other surfaces.
 #[derive(Clone, Copy)]
 pub(crate) struct CoincidentState<L: SimdFloat> {
-    /// Lanes whose rays start on such a surface.
+    /// Lanes whose rays start on a surface that may coincide with others.
     pub lanes: L::Mask,
     /// Ids of the primitives on which the rays start, by lane.
     pub item: L,
-    /// Start points on the primitives.
+    /// Points on the primitives at which the rays start.
     pub point: Vec3<L>,
-    /// Unit normals of the primitives, on the side to which the rays leave.
+    /// Unit normals of the start surfaces, on the side to which the rays leave.
     pub axis: Vec3<L>,
-    /// Layers of the surfaces on which the rays start.
+    /// Layer of each start surface: its position in the order in which a ray crosses coincident
+    /// surfaces.
     pub layer: L,
 }
 
 /// Result of a search for the next coincident surface along the rays.
 pub(crate) struct CoincidentQuery<L: SimdFloat> {
-    /// Lanes in which a next surface was found.
+    /// Lanes in which a next coincident surface was found.
     pub lanes: L::Mask,
-    /// Lanes whose current surface coincides with another one.
+    /// Lanes whose start surface coincides with another one.
     pub touching: L::Mask,
     pub item: L,
     pub triangle: L,
     pub layer: L,
-    /// Distance above the surface at which rays that leave it start.
+    /// Distance from the surface at which leaving rays start, so that they start beyond all
+    /// coincident surfaces.
     pub offset: L,
 }
 
 impl<L: SimdFloat> CoincidentState<L> {
-    /// Returns the state for the opposite directions.
+    /// Returns the state of rays that start at the same points on coincident surfaces in the
+    /// opposite directions.
     pub fn reversed(&self) -> Self {
         Self { axis: -self.axis, layer: -self.layer, ..*self }
     }
 
-    /// Returns the state `yes` in lanes where `mask` is true and `no` elsewhere, except for the
-    /// field `lanes`, which is that of `no`.
+    /// Returns the state `yes` in lanes where `mask` is true, and `no` elsewhere. The field `lanes`
+    /// is always that of `no`.
     pub fn select(mask: L::Mask, yes: &Self, no: &Self) -> Self {
         Self {
             lanes: no.lanes,
@@ -148,12 +159,13 @@ impl<L: SimdFloat> CoincidentState<L> {
 }
 
 impl<S: Float> Contacts<S> {
-    /// Finds the contacts of `forms`. Returns `None` if no transmissive primitive touches another
-    /// one.
+    /// Finds the primitives that may touch each other. Returns `None` if no primitive that
+    /// transmits touches another one.
     ///
-    /// Coordinates are rounded to `epsilon`, and have the error `input_error` in the scene file.
-    /// `transparent` holds `true` for each primitive that transmits. `priority_of` holds the
-    /// priority of the transparent solid that each primitive bounds.
+    /// `epsilon` is the relative rounding error of coordinates. `input_error` is the absolute
+    /// rounding error of the coordinates in the scene file. `transparent` holds `true` for each
+    /// primitive that transmits. `priority_of` holds the priority of the transparent solid that
+    /// each primitive bounds.
     pub fn new(
         forms: &[Form],
         primitives: &[PrimitiveId],
@@ -200,9 +212,9 @@ impl<S: Float> Contacts<S> {
         Some(Self { contacts, kinds })
     }
 
-    /// Returns the lanes whose `point`, on the primitive `items`, may touch another primitive. Most
-    /// primitives touch others only in small regions. Points outside of the others' bounding boxes
-    /// are excluded.
+    /// Returns the lanes whose `point`, on the primitive `items`, may be on a second primitive as
+    /// well. Points outside of the bounding boxes of all other primitives are excluded, because
+    /// most primitives touch others only in small regions.
     #[inline(always)]
     pub fn near<L: SimdFloat<Scalar = S>>(
         &self,
@@ -221,8 +233,9 @@ impl<S: Float> Contacts<S> {
         near
     }
 
-    /// Returns the layer of primitive `item` for rays that come from a surface with the layer
-    /// `before`. `leaves` selects rays that leave the primitive, along its outward normal.
+    /// Returns the layer of primitive `item`: its position in the order in which a ray crosses
+    /// coincident surfaces. `before` is the layer of the surface from which the rays come. `leaves`
+    /// selects rays that leave the primitive, along its outward normal.
     fn layer<L: SimdFloat<Scalar = S>>(&self, item: u32, leaves: L::Mask, before: L) -> L {
         let (kind, layer) = &self.kinds[item as usize];
         let layer = L::splat(*layer);
@@ -234,8 +247,9 @@ impl<S: Float> Contacts<S> {
         L::select(is_negative, -layer, layer)
     }
 
-    /// Finds the next surface along the rays among those that coincide with their start points.
-    /// `coincident` is the state of the rays, and `media` are their media.
+    /// Finds the surface that the rays cross next among those that coincide with their start
+    /// points. `coincident` is the state of the rays: point, normal and position in the order of
+    /// crossing. `media` are the media of the rays.
     pub fn next<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
@@ -254,9 +268,10 @@ impl<S: Float> Contacts<S> {
         out
     }
 
-    /// Finds the first surface that the rays cross among their start surface, given in
-    /// `coincident`, and the surfaces that coincide with it. The layer in `coincident` is ignored.
-    /// `leaves` selects rays that run in the direction of the outward normal of the start surface.
+    /// Finds the surface that the rays cross first: their start surface, given in `coincident`, or
+    /// one that coincides with it. The layer (position in the order of crossing) in `coincident` is
+    /// ignored. `leaves` selects rays that run in the direction of the outward normal of the start
+    /// surface. `media` are the media of the rays.
     pub fn first<L: SimdFloat<Scalar = S>>(
         &self,
         geometry: &Aggregate<L>,
@@ -283,8 +298,11 @@ impl<S: Float> Contacts<S> {
         out
     }
 
-    /// Replaces `out` by the coincident surface with the smallest layer above that of `coincident`,
-    /// in lanes in which this layer is below that of `out`.
+    /// Searches the surfaces that coincide with the start points of the rays in `coincident`. A
+    /// *layer* is the position of a surface in the fixed order in which a ray crosses coincident
+    /// surfaces. In each lane `out` holds the best candidate so far. It is replaced by every
+    /// surface found whose layer is above that of `coincident` and below that of `out`. At the end
+    /// `out` therefore holds the surface that the ray crosses next.
     #[inline(never)]
     fn search<L: SimdFloat<Scalar = S>>(
         &self,
@@ -340,8 +358,8 @@ impl<S: Float> Contacts<S> {
     }
 }
 
-/// Returns the bounding box of a form; infinite if the form is unbounded. Planes perpendicular to
-/// an axis are bounded along that axis.
+/// Returns the lowest and the highest corner of an object's bounding box, with infinite coordinates
+/// if the object is unbounded. Planes perpendicular to an axis are bounded along that axis.
 fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
     let (low, high) = (DVec3::NEG_INFINITY, DVec3::INFINITY);
     form.bounds().unwrap_or_else(|| {
@@ -354,8 +372,9 @@ fn unbounded_box(form: &Form) -> (DVec3, DVec3) {
     })
 }
 
-/// Returns all pairs of forms for which `wanted` is true and whose bounding boxes overlap or nearly
-/// overlap. The pairs are sorted.
+/// Returns the indices of all pairs of objects for which `wanted` is true and whose bounding boxes
+/// overlap. Each box is enlarged by 1e-5 of its largest coordinate. The smaller index of a pair
+/// comes first, and the pairs are sorted.
 pub(crate) fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
     let mut out = Vec::new();
     let infinite = (DVec3::NEG_INFINITY, DVec3::INFINITY);
@@ -383,8 +402,8 @@ pub(crate) fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Ve
     out
 }
 
-/// Returns all pairs of forms for which `wanted` is true and whose surfaces may come within `slack`
-/// of each other.
+/// Returns the indices of all pairs of objects for which `wanted` is true and whose surfaces may
+/// come within `slack` of each other.
 pub(crate) fn touching_pairs(
     forms: &[Form],
     wanted: impl Fn(usize, usize) -> bool,
@@ -393,7 +412,7 @@ pub(crate) fn touching_pairs(
     pairs(forms, wanted).into_iter().filter(move |(a, b)| may_touch(&forms[*a], &forms[*b], slack))
 }
 
-/// Returns `true` if the surfaces of two forms may come within `slack` of each other.
+/// Returns `true` if the surfaces of two objects may come within `slack` of each other.
 fn may_touch(a: &Form, b: &Form, slack: f64) -> bool {
     let normal = |form: &Form| form.plane().map(|plane| plane.normal);
     let separated = |axis: DVec3| match (a.extent_along(axis), b.extent_along(axis)) {

@@ -11,8 +11,9 @@ use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
 /// Adds reflected ambient light and reflected light of all sources to the radiance in `out`. Lanes
-/// in `bouncing` get no ambient light, which stands for the indirect light that a diffuse bounce
-/// computes there. `media` are the media of the paths; `None` in worlds without transmission.
+/// in `bouncing` get no ambient light, which approximates indirect light: their diffuse bounces
+/// compute indirect light. `media` are the media of the paths; `None` in worlds without
+/// transmission.
 #[inline(always)]
 pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -49,7 +50,7 @@ pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(
         if !SIMPLE && world.smooth {
             lit = lit & interaction.geometric.dot(light.wi).gt(L::zero());
         }
-        if let DeltaLight::Spot { .. } = target.light {
+        if let DeltaLight::Point { cone: Some(_), .. } = target.light {
             lit = lit & light.irradiance.gt(L::zero());
         }
         if lit.none() {

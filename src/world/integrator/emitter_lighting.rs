@@ -1,13 +1,15 @@
 //! Light of emitters with a size, by multiple importance sampling (Veach and Guibas 1995,
 //! *Optimally Combining Sampling Techniques for Monte Carlo Rendering*).
 //!
-//! Two samples find the light that a glossy lobe reflects: a point of the emitter, and the
-//! direction of the reflected ray. Each is weighted by the power heuristic with exponent 2. Matt
-//! surfaces and highlights of lights use the point alone, mirrors and the camera the ray alone.
+//! Two strategies find the light that a glossy lobe reflects. The first one samples a point of the
+//! emitter and traces a shadow ray to it. The second one samples the direction of the reflected
+//! ray, which may hit the emitter. Both samples are weighted by the power heuristic (exponent 2).
+//! Matt surfaces and highlights of lights use only the first strategy. Mirrors and the camera use
+//! only the second one.
 //!
-//! Objects that emit light are emitters, too. Rays find the emission of an object where they hit
-//! it, so that its shape may be any; where no points of the shape can be sampled, the rays find all
-//! of it.
+//! Objects that emit light are emitters, too. They may have any shape, because rays find the
+//! emission of an object where they hit it. If no points of a shape can be sampled, only these rays
+//! find its emission.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3, next_distinct};
@@ -22,16 +24,18 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::{LightSource, World};
 use std::f64::consts::FRAC_1_PI;
 
-/// Weight of a sample by the power heuristic: p^2 / (p^2 + q^2) for its density `p` and the density
-/// `q` of the other technique. It is 1 for the largest finite `p`.
+/// Returns the weight of a sample by the power heuristic: p^2 / (p^2 + q^2) for its density `p` and
+/// the density `q` with which the other strategy draws the same direction. It is 1 if `p` is the
+/// largest finite number, which means that no other strategy is used.
 #[inline(always)]
 pub(crate) fn power_heuristic<L: SimdFloat>(p: L, q: L) -> L {
     let ratio = q / p;
     L::one() / (ratio * ratio + L::one())
 }
 
-/// Adds the radiance of the visible emitters that the rays of `lanes` reach before the distance
-/// `t_max`. `media` are the media of the paths; `None` in worlds without transmission.
+/// Adds the radiance of the visible lights with a size that the rays of `lanes` reach before the
+/// distance `t_max` to `out`. `media` are the media of the paths; `None` in worlds without
+/// transmission.
 #[inline(never)]
 pub(crate) fn visible_emitters<L: SimdFloat>(
     world: &World<L>,
@@ -48,7 +52,7 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
         if seen.none() {
             continue;
         }
-        let mut radiance = path.throughput * L::splat(source.light.radiance());
+        let mut radiance = path.throughput * L::splat(source.light.radiance);
         if path.lobe_density.lt(L::from_f64(L::MAX)).any() {
             let density = source.light.density(origin, t);
             radiance = radiance * power_heuristic(path.lobe_density, density);
@@ -65,7 +69,7 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
     }
 }
 
-/// Adds the radiance that surfaces at the hit points emit. `hit` is the hits of `path`.
+/// Adds the radiance that emissive surfaces emit at the hit points of `path` to `out`.
 #[inline(never)]
 pub(crate) fn surface_emission<L: SimdFloat>(
     world: &World<L>,
@@ -89,7 +93,7 @@ pub(crate) fn surface_emission<L: SimdFloat>(
     }
 }
 
-/// State of the reflection lobes at the hit points, for multiple importance sampling of emitters.
+/// Reflected rays at the hit points of a packet, for multiple importance sampling of emitters.
 pub(crate) struct ReflectingLobes<L: SimdFloat> {
     /// Lanes whose reflected rays the integrator follows.
     pub lanes: L::Mask,
@@ -97,8 +101,9 @@ pub(crate) struct ReflectingLobes<L: SimdFloat> {
     pub share: L,
 }
 
-/// Adds the reflected light of all emitters. `bounce` is the number of earlier surfaces of the
-/// path. `media` are the media of the paths; `None` in worlds without transmission.
+/// Adds the light of all emitters (lights with a size, emissive objects) that surfaces reflect.
+/// `bounce` is the number of earlier surfaces of the path. `media` are the media of the paths;
+/// `None` in worlds without transmission.
 #[inline(never)]
 pub(crate) fn emitter_lighting<L: SimdFloat>(
     world: &World<L>,
@@ -181,8 +186,10 @@ pub(crate) fn emitter_lighting<L: SimdFloat>(
     }
 }
 
-/// Samples a point of emitter `index`: a light with a size or, after these, an emissive object.
-/// Returns `None` if there is no such emitter. `numbers` are uniform in [0, 1).
+/// Samples a point of the emitter with the number `index`. Emitters are the lights with a size,
+/// followed by the emissive objects. `origin` are the hit points to be lit. `numbers` are two
+/// random numbers for each lane, uniform in [0, 1). Returns the sample with the emitter's light
+/// group, or `None` if there is no such emitter.
 #[inline(always)]
 pub(crate) fn sample_emitter<L: SimdFloat>(
     world: &World<L>,
@@ -199,9 +206,9 @@ pub(crate) fn sample_emitter<L: SimdFloat>(
     }
 }
 
-/// Returns the value of the reflection lobe of BSDF `index` in the given direction, times the
-/// cosine of the light, and the density \[1/sr\] of the reflected ray in this direction. `incident`
-/// are the directions of the incoming rays.
+/// Returns two values for the reflection lobe of BSDF `index`: its value \[1/sr\] for light from
+/// `direction` times the cosine of this direction, and the density \[1/sr\] with which the
+/// reflected ray is sampled in it. `incident` are the directions of the incoming rays.
 #[inline(never)]
 pub(crate) fn lobe_value<L: SimdFloat>(
     world: &World<L>,
@@ -229,8 +236,8 @@ pub(crate) fn lobe_value<L: SimdFloat>(
     (value + mirrored_value, density + mirrored_density)
 }
 
-/// Returns the density \[1/sr\] of reflected rays of BSDF `index` in their directions; the largest
-/// finite number for a mirror. `incident` are the directions of the incoming rays.
+/// Returns the density \[1/sr\] with which BSDF `index` samples the `direction` of the reflected
+/// ray for the incoming rays in direction `incident`. A mirror returns the largest finite number.
 #[inline(always)]
 pub(crate) fn reflected_density<L: SimdFloat>(
     world: &World<L>,

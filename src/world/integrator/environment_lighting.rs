@@ -1,9 +1,11 @@
 //! Light of environments, by multiple importance sampling.
 //!
-//! Three techniques find the light of an environment: a direction sampled by luminance, the
-//! direction of the reflected ray for glossy lobes, and a cosine-weighted direction for matt
-//! surfaces. Glossy lobes and matt surfaces combine two techniques with the power heuristic.
-//! Highlights of lights use the sampled luminance alone. Mirrors and the camera use the ray alone.
+//! Three strategies find the light of an environment. The first samples a direction in proportion
+//! to the luminance. The second is the reflected ray of a glossy lobe. The third samples a
+//! cosine-weighted direction at a matt surface. Glossy lobes combine the first and the second by
+//! the power heuristic, matt surfaces the first and the third. Highlights of lights use only the
+//! first. Mirrors and the camera use only the light at the end of their ray.
+//!
 //! A ray that starts at a diffuse bounce adds nothing where it escapes, because the surface that it
 //! left has the light of all environments already.
 
@@ -17,10 +19,11 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::{EnvironmentSource, World};
 use std::f64::consts::FRAC_1_PI;
 
-/// Index of the first environment's random numbers. Emitters have smaller indices.
+/// Salt of the random numbers for the first environment. Each environment and each emitter has a
+/// salt of its own, so that its random numbers are independent. The salts of emitters are smaller.
 pub(crate) const ENVIRONMENT_SALT: u32 = 1 << 30;
 
-/// Adds the radiance of the visible environments to the rays of `lanes`, which hit no surface.
+/// Adds the radiance of the visible environments to `out`, in `lanes`, whose rays hit no surface.
 /// `transmittance` is the fraction of light that the medium around the rays lets through; `None`
 /// means all.
 pub(crate) fn visible_environments<L: SimdFloat>(
@@ -45,8 +48,9 @@ pub(crate) fn visible_environments<L: SimdFloat>(
     }
 }
 
-/// Adds the reflected light of all environments. `bounce` is the number of earlier surfaces of the
-/// path. `glossy` selects lanes with a glossy lobe, whose directions have a finite density.
+/// Adds the light of all environments that surfaces reflect. `bounce` is the number of earlier
+/// surfaces of the path. `glossy` selects lanes with a glossy lobe, whose directions have a finite
+/// density.
 #[inline(never)]
 pub(crate) fn environment_lighting<L: SimdFloat>(
     world: &World<L>,
@@ -104,8 +108,9 @@ pub(crate) fn environment_lighting<L: SimdFloat>(
     }
 }
 
-/// Adds the reflected radiance `value` of light from the directions `wi` to `out`, in lanes whose
-/// shadow ray reaches the environment.
+/// Adds reflected light of the environment to `out`, in lanes whose shadow ray reaches the
+/// environment. `value` is the radiance reflected if nothing occludes the directions `wi`, from
+/// which the light arrives.
 #[inline(always)]
 fn add<L: SimdFloat>(
     world: &World<L>,

@@ -7,7 +7,7 @@ use crate::world::world::World;
 /// Object, distance and normal at the first hit of a camera ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstHit {
-    /// Index in the scene's list of objects; `None` for the background.
+    /// Index of the object in the scene's list of objects; `None` for the background.
     pub object: Option<u32>,
     /// Distance from the eye to the hit point in scene units; infinite for the background.
     pub depth: f32,
@@ -19,13 +19,13 @@ pub struct FirstHit {
 }
 
 impl FirstHit {
-    /// First hit of a ray that hits no primitive.
+    /// First hit of a ray that hits no object.
     pub const MISS: Self =
         Self { object: None, depth: f32::INFINITY, normal: [0.0; 3], reflects: false };
 }
 
 /// Writes the first hit of the camera ray through each of `points` into `hits`, a slice of the same
-/// length. A point is a column and a row of the raster in pixels, with fractions.
+/// length. A point is a position in the picture: a column and a row in pixels, with fractions.
 #[inline(never)]
 pub(crate) fn trace_first_hits<L: SimdFloat>(
     world: &World<L>,
@@ -37,7 +37,8 @@ pub(crate) fn trace_first_hits<L: SimdFloat>(
     }
 }
 
-/// Writes the first hits of at most `WIDTH` camera rays.
+/// Writes the first hits of at most `WIDTH` camera rays into `hits`. The rays go through `points`,
+/// positions in the picture in pixels.
 fn trace_packet<L: SimdFloat>(world: &World<L>, points: &[[f64; 2]], hits: &mut [FirstHit]) {
     let point = |lane: usize| points[lane.min(points.len() - 1)];
     let corner_directions = Vec3::from_fn(|lane| {

@@ -5,8 +5,8 @@
 //! chosen for the diffuse bounce, with a probability in proportion to the light that it can pass on
 //! (weighted reservoir sampling, Chao 1982, *A General Purpose Unequal Probability Sampling Plan*).
 //! The next generation starts there, in a direction whose density is the cosine to the normal,
-//! divided by pi. Mirrors have no more noise than without diffuse bounces, and a path has at most
-//! one start per generation.
+//! divided by pi. Mirrors thereby have no more noise than without diffuse bounces, and a path
+//! bounces at most once per generation.
 //!
 //! Emitters and environments are sampled at every hit. A ray that starts at a diffuse bounce
 //! therefore adds nothing where it reaches an emitter or escapes to an environment.
@@ -29,7 +29,8 @@ use crate::world::world::World;
 /// this density.
 pub(crate) const NO_DENSITY: f64 = 1e-30;
 
-/// Limits of the diffuse bounces of a world.
+/// Limits of indirect diffuse light in a scene: the largest number of bounces, and whether caustics
+/// are included.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DiffuseLimits {
     /// Largest number of diffuse bounces of a path, greater than 0.
@@ -38,18 +39,21 @@ pub(crate) struct DiffuseLimits {
     pub caustics: bool,
 }
 
-/// Reservoir of weighted reservoir sampling, which keeps one hit per lane of all hits of a
-/// generation. The diffuse bounce starts at this hit.
+/// Reservoir of weighted reservoir sampling for indirect diffuse light. It keeps one hit per lane,
+/// chosen from all hits of a path between two diffuse bounces. The next diffuse bounce starts at
+/// this hit.
 pub(crate) struct DiffuseReservoir<L: SimdFloat> {
-    /// Number of packets of hits that were offered so far.
+    /// Number of packets of hits that were offered to the reservoir so far. It selects the random
+    /// numbers of the next offer.
     offers: u32,
-    /// Lanes that have a hit.
+    /// Lanes whose reservoir holds a hit, at which the next diffuse bounce may start.
     lanes: L::Mask,
-    /// Sum of the weights of all hits that were offered.
+    /// Sum of the weights of all hits that were offered to the reservoir.
     sum: L,
-    /// Weight of the chosen hit: the largest channel of `throughput`.
+    /// Weight of the chosen hit, to which the probability of its choice is proportional: the
+    /// largest channel of `throughput`.
     weight: L,
-    /// Throughput up to the chosen hit, times its diffuse albedo.
+    /// Throughput of the path up to the chosen hit, times the hit's diffuse albedo.
     throughput: Vec3<L>,
     origin: Vec3<L>,
     normal: Vec3<L>,
@@ -74,9 +78,10 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         }
     }
 
-    /// Offers the hits of `path` to the reservoir. `media` and `coincident` are the state of a ray
-    /// that leaves on the side from which the path arrived. Returns the lanes that reflect
-    /// diffusely; they get indirect light from the bounce instead of ambient light.
+    /// Offers the hits of `path` to the reservoir. `media` and `coincident` describe a ray that
+    /// leaves a hit on the side from which the path arrived: its media, and the coincident surfaces
+    /// on which it starts. Returns the lanes that reflect diffusely. They get no ambient light,
+    /// because the diffuse bounce computes their indirect light.
     #[inline(never)]
     pub fn offer(
         &mut self,
@@ -127,8 +132,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
         lanes
     }
 
-    /// Returns the rays of the next generation. Their directions are sampled with `u` and `v`,
-    /// uniform in [0, 1).
+    /// Returns the rays that leave the chosen hits by a diffuse bounce. Their directions are
+    /// sampled with `u` and `v`, uniform in [0, 1).
     fn start(&self, world: &World<L>, (u, v): (L, L)) -> Branch<L> {
         let direction = Frame::around(self.normal).to_world(cosine_hemisphere(u, v));
         // The largest channel of the throughput becomes the sum of all weights.
@@ -145,7 +150,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
     }
 }
 
-/// Traces camera rays in a world with indirect diffuse light.
+/// Traces camera rays in a scene with indirect diffuse light, and adds the radiance to `out`.
+/// `limits` are the limits of diffuse bounces.
 #[inline(never)]
 pub(crate) fn trace_generations<L: SimdFloat>(
     world: &World<L>,

@@ -13,29 +13,32 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     /// on smooth meshes and bump-mapped surfaces. Light from the other side of the geometric
     /// surface does not reach the hit point.
     pub geometric: Vec3<L>,
-    /// Hit points.
+    /// Hit points of the packet's rays.
     pub point: Vec3<L>,
-    /// Distance from `point` along the geometric normal at which secondary rays start.
+    /// Distance from the hit point along the geometric normal at which secondary rays start.
     pub offset: L,
     /// Lanes whose rays hit the primitive from the side to which its own normal points.
     pub front: L::Mask,
-    /// Ids of the primitives.
+    /// Ids of the primitives that are hit.
     pub item: L,
-    /// Indices of the BSDFs in the world's list, stored as ids.
+    /// Index of each hit point's BSDF in the world's list, stored as an id (see
+    /// [`SimdFloat::from_id`]).
     bsdf: L,
     /// Factor by which textures and vertex colours multiply the albedo of the BSDF.
     pub albedo_factor: Vec3<L>,
-    /// Diffuse albedo.
+    /// Diffuse albedo at the hit points.
     pub diffuse: Vec3<L>,
-    /// Lanes with a BSDF. All hits have one, except for those on the back of a one-sided surface.
+    /// Lanes whose hit point has a BSDF. All have one, except for those on the back of a one-sided
+    /// surface.
     pub has_bsdf: L::Mask,
-    /// Lanes whose BSDF reflects direct light.
+    /// Lanes whose BSDF reflects light that arrives directly from lights.
     pub direct_mask: L::Mask,
-    /// Lanes whose BSDF has a highlight.
+    /// Lanes whose BSDF has highlights of lights.
     pub highlight_mask: L::Mask,
-    /// Lanes whose BSDF reflects rays.
+    /// Lanes whose BSDF has a reflection lobe.
     pub reflecting: L::Mask,
-    /// Lanes that a coincident surface shades from all lights; see [`Self::shade`].
+    /// Lanes whose hit point gets no light from any light, because a coincident surface is in front
+    /// of it; see [`Self::shade`].
     pub shaded: L::Mask,
 }
 
@@ -52,19 +55,19 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         })
     }
 
-    /// Origins of rays that leave on the side from which the incoming rays arrived.
+    /// Returns the origins of rays that leave on the side from which the incoming rays arrived.
     #[inline(always)]
     pub fn ray_origin(&self) -> Vec3<L> {
         self.geometric.mul_add(self.offset, self.point)
     }
 
-    /// Origins of rays that leave on the opposite side.
+    /// Returns the origins of rays that leave on the side opposite to that of the incoming rays.
     #[inline(always)]
     pub fn ray_origin_behind(&self) -> Vec3<L> {
         self.geometric.mul_add(-self.offset, self.point)
     }
 
-    /// Removes the BSDF from `lanes`.
+    /// Removes the BSDF from the hit points in `lanes`.
     #[inline(always)]
     pub fn mask_out(&mut self, lanes: L::Mask) {
         self.has_bsdf = self.has_bsdf.and_not(lanes);
@@ -73,22 +76,24 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.reflecting = self.reflecting.and_not(lanes);
     }
 
-    /// Excludes `lanes` from direct lighting, and from the sampling of points on emitters.
+    /// Excludes the hit points in `lanes` from direct lighting, and from the sampling of points on
+    /// emitters.
     #[inline(always)]
     pub fn shade(&mut self, lanes: L::Mask) {
         self.direct_mask = self.direct_mask.and_not(lanes);
         self.shaded = self.shaded | lanes;
     }
 
-    /// Returns `direction`, mirrored at the geometric tangent plane in lanes in which it points
-    /// into the surface.
+    /// Returns `direction`, mirrored at the tangent plane of the geometric surface in lanes in
+    /// which it points into the surface.
     #[inline(always)]
     pub fn reflect_into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
         let height = direction.dot(self.geometric).min(L::zero());
         self.geometric.mul_add(height * L::from_f64(-2.0), direction)
     }
 
-    /// Copies the interaction of `other` in `lanes`, in which no mask of `self` is set.
+    /// Replaces the hit points in `lanes` by those of `other`. All masks of `self` must be `false`
+    /// in these lanes.
     #[inline(always)]
     fn blend(&mut self, lanes: L::Mask, other: &Self) {
         self.normal = Vec3::select(lanes, other.normal, self.normal);
@@ -106,8 +111,9 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
     }
 }
 
-/// Creates the interactions of the active rays. `first` is the first result of [`next_distinct`]
-/// for the primitives that they hit.
+/// Computes the surface properties at the hits of the active rays. `first` holds the id of one of
+/// the primitives that they hit, and the lanes that hit it. This pair is the first result of
+/// [`next_distinct`].
 #[inline(always)]
 pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -125,8 +131,8 @@ pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     }
 }
 
-/// Creates the interactions of a packet whose rays hit several primitives. `first` is one of them,
-/// in the lanes `first_lanes`. The lanes `remaining` hit other primitives.
+/// Computes the surface properties at the hits of a packet whose rays hit several primitives.
+/// `first` is one of them, in the lanes `first_lanes`. The lanes `remaining` hit other primitives.
 #[inline(never)]
 fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -143,7 +149,7 @@ fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     interaction
 }
 
-/// Creates the interactions of `lanes`, which all hit the primitive `item`.
+/// Computes the surface properties at the hits of `lanes`, which all hit the primitive `item`.
 #[inline(always)]
 fn interact_one<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

@@ -1,10 +1,12 @@
 //! Light of emitters and environments that rough interfaces reflect and transmit, by multiple
 //! importance sampling.
 //!
-//! Two samples find this light: a point of the emitter, and the direction of the reflected or
-//! transmitted ray. Glass casts shadows: of rays that enter a solid, the far side of the solid
-//! occludes the emitter. Points are therefore sampled for the reflected rays, for rays that leave a
-//! solid, and for thin surfaces. Rays that enter a solid find emitters by themselves.
+//! Two strategies find this light. The first one samples a point of the emitter and traces a shadow
+//! ray to it. The second one samples the direction of the reflected or transmitted ray, which may
+//! hit the emitter. A shadow ray does not pass through glass: inside a solid, it ends at the far
+//! side. Rays that enter a solid therefore use the second strategy only, with full weight. Both
+//! strategies are used, and weighted, for reflected rays, for rays that leave a solid and at thin
+//! surfaces.
 
 use crate::bvh::Ray;
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -17,18 +19,21 @@ use crate::world::integrator::nested_dielectrics::{InterfaceHit, Media, NestedDi
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
-/// Hits on rough interfaces.
+/// Hits of a packet on rough interfaces between transparent media.
 pub(crate) struct RoughInterface<'a, L: SimdFloat> {
     pub hit: &'a InterfaceHit<L>,
-    /// Lanes whose reflected rays have a density.
+    /// Lanes whose reflected light is found by two strategies: samples of emitter points and
+    /// samples of ray directions, both with finite densities.
     pub reflecting: L::Mask,
-    /// Lanes whose transmitted rays have a density.
+    /// Lanes whose transmitted light is found by two strategies: samples of emitter points and
+    /// samples of ray directions, both with finite densities.
     pub transmitting: L::Mask,
 }
 
 impl<'a, L: SimdFloat> RoughInterface<'a, L> {
     /// Selects the rough interfaces out of `hit`. Surfaces that coincide with another one, in the
-    /// lanes of `coincident`, are left out: their transmitted rays start on the other surface.
+    /// lanes of `coincident`, are left out, because their transmitted rays start on the other
+    /// surface.
     pub fn new(
         world: &World<L>,
         interaction: &SurfaceInteraction<L>,
@@ -50,10 +55,11 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
         Self { hit, reflecting, transmitting: reflecting & (hit.thin | !hit.outer) }
     }
 
-    /// Returns the value [1/sr] of the interfaces in `direction`, times the cosine of the light,
-    /// and the density [1/sr] of the ray in this direction: of the transmitted ray if `behind` is
-    /// `true`, otherwise of the reflected one. In lanes whose rays have no density, the value is
-    /// zero and the density the largest finite number.
+    /// Returns two values for light from `direction`: the value [1/sr] of the interfaces times the
+    /// cosine of the direction, and the density [1/sr] with which a ray is sampled in it. The ray
+    /// is the transmitted one if `behind` is `true`, otherwise the reflected one. In lanes where no
+    /// emitter points are sampled for this ray, the value is zero, and the density is the largest
+    /// finite number.
     #[inline(never)]
     pub fn evaluate(
         &self,

@@ -15,8 +15,8 @@ use crate::world::integrator::coincident_surfaces::Contacts;
 use crate::world::integrator::interaction::SurfaceInteraction;
 use glam::DVec3;
 
-/// Largest number of nested solids that a medium stack holds. If a point is inside of more solids,
-/// the stack holds those listed last.
+/// Largest number of nested transparent solids that a ray's medium stack holds. If a point is
+/// inside of more solids, the stack holds those listed last in the scene file.
 const MAX_NESTING: usize = 4;
 
 /// Medium stack of each ray: priorities of the solids that the ray is inside of, in descending
@@ -27,24 +27,24 @@ pub(crate) struct MediumStack<L> {
 }
 
 impl<L: SimdFloat> MediumStack<L> {
-    /// The stack of rays outside of all solids.
+    /// Returns the stack of rays outside of all solids.
     #[inline(always)]
     pub fn vacuum() -> Self {
         Self { priorities: [L::zero(); MAX_NESTING] }
     }
 
-    /// Priority of the solid that fills the space; 0 for vacuum.
+    /// Returns the priority of the solid that fills the space at the ray; 0 for vacuum.
     #[inline(always)]
     fn top(&self) -> L {
         self.priorities[0]
     }
 
-    /// Mask of lanes whose stack contains `priority`.
+    /// Returns the mask of lanes whose ray is inside of the solid with `priority`.
     pub fn contains(&self, priority: L) -> L::Mask {
         self.priorities.iter().fold(L::mask(false), |found, entry| found | equal(*entry, priority))
     }
 
-    /// Returns the stack with `priority` removed.
+    /// Returns this stack after the rays have left the solid with `priority`.
     #[inline(always)]
     fn without(&self, priority: L) -> Self {
         let mut out = *self;
@@ -57,7 +57,7 @@ impl<L: SimdFloat> MediumStack<L> {
         out
     }
 
-    /// Returns the stack with `priority` added.
+    /// Returns this stack after the rays have entered the solid with `priority`.
     #[inline(always)]
     fn with(&self, priority: L) -> Self {
         let mut out = self.without(priority);
@@ -69,7 +69,8 @@ impl<L: SimdFloat> MediumStack<L> {
         out
     }
 
-    /// Adds `priority` in lanes whose ray first hits the boundary of `solid` from inside.
+    /// Adds `priority` to the stack in lanes whose ray first hits the boundary of `solid` from
+    /// inside.
     #[inline(never)]
     fn add_if_inside(&mut self, ray: &Ray<L>, priority: u32, solid: &Aggregate<L>) {
         let hit = solid.closest(ray, solid.all());
@@ -113,7 +114,7 @@ impl<L: SimdFloat> Media<'_, L> {
     }
 }
 
-/// Region in which camera rays start: a ball around the eye.
+/// Region in which camera rays start: a sphere around the eye.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StartRegion {
     pub eye: DVec3,
@@ -121,28 +122,28 @@ pub(crate) struct StartRegion {
 }
 
 impl StartRegion {
-    /// Returns `true` if the bounding box of `form` overlaps the region, or if the form has no
-    /// bounding box.
+    /// Returns `true` if the bounding box of an object overlaps this region, in which camera rays
+    /// start, or if the object has no bounding box.
     pub fn reaches(&self, form: &Form) -> bool {
         form.bounds()
             .is_none_or(|(low, high)| self.eye.clamp(low, high).distance(self.eye) <= self.radius)
     }
 }
 
-/// Transmissive surfaces of a world, and the media that they bound.
+/// Transmissive surfaces of a scene, and the media that they bound.
 pub(crate) struct NestedDielectrics<L: SimdFloat> {
     /// Priority of the transparent solid that each primitive bounds; 0 if it bounds none.
     priority_of: Vec<u32>,
-    /// Index of refraction of the solid with each priority; 1 for priority 0.
+    /// Indices of refraction of the transparent solids, by priority; 1 for priority 0 (vacuum).
     indices: Vec<L::Scalar>,
-    /// Absorption coefficients of the solid with each priority [1 / scene unit]; 0 for priority 0.
-    /// `None` if no solid absorbs light.
+    /// Absorption coefficients of the transparent solids, by priority [1 / scene unit]; 0 for
+    /// priority 0 (vacuum). `None` if no solid absorbs light.
     absorption: Option<Vec<[L::Scalar; 3]>>,
-    /// Solids that may contain the origins of camera rays: the priority of each, and its boundary
-    /// as geometry.
+    /// Transparent solids that may contain the origins of camera rays: the priority of each, and
+    /// its boundary as geometry.
     around_eye: Vec<(u32, Aggregate<L>)>,
-    /// Contacts between primitives. In each pair that touches, at least one primitive transmits.
-    /// `None` if there are none.
+    /// Pairs of primitives that may touch each other; at least one of each pair transmits. `None`
+    /// if there are none.
     pub contacts: Option<Contacts<L::Scalar>>,
 }
 
@@ -154,16 +155,16 @@ pub(crate) struct InterfaceHit<L: SimdFloat> {
     pub outer: L::Mask,
     /// Lanes whose ray hits a thin surface, which bounds no solid.
     pub thin: L::Mask,
-    /// Lanes whose ray hits a suppressed boundary: one inside of a solid with a higher priority,
-    /// where it has no effect.
+    /// Lanes whose ray hits a suppressed boundary. Such a boundary is inside of a solid with a
+    /// higher priority, and the ray passes it unchanged.
     pub suppressed: L::Mask,
     /// Index of refraction on the side from which the ray arrives.
     pub n_i: L,
     /// Index of refraction behind the surface. For thin surfaces, that of their material.
     pub n_t: L,
-    /// Media of the reflected rays.
+    /// Media that the reflected rays are inside of.
     pub medium_reflected: MediumStack<L>,
-    /// Media of the transmitted rays.
+    /// Media that the transmitted rays are inside of.
     pub medium_transmitted: MediumStack<L>,
 }
 
@@ -224,8 +225,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         self.priority_of.iter().map(|priority| *priority > 0).collect()
     }
 
-    /// Adds to `media` the solids in which camera rays start: those whose boundary each ray first
-    /// hits from inside.
+    /// Adds to `media` the transparent solids in which camera rays start: those whose boundary each
+    /// ray first hits from inside.
     #[inline(always)]
     pub fn add_at_start(&self, ray: &Ray<L>, media: &mut MediumStack<L>) {
         for (priority, solid) in &self.around_eye {
@@ -233,7 +234,7 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         }
     }
 
-    /// Returns the index of refraction of the solid with `priority`.
+    /// Returns the index of refraction of the transparent solid with `priority`.
     fn index(&self, priority: L) -> L {
         let index_of = |priority: L::Scalar| self.indices[priority.to_f64() as usize];
         let first = priority.lane(0);
@@ -286,8 +287,9 @@ impl<L: SimdFloat> NestedDielectrics<L> {
     }
 }
 
-/// Returns exp(-coefficient x distance). The coefficient in each lane is that of the solid with the
-/// lane's priority.
+/// Returns exp(-coefficient x distance) per channel: the fraction of light that is left.
+/// `absorption` has the absorption coefficients of the solids by priority. `priority` selects the
+/// solid of each lane.
 #[inline(never)]
 fn transmittance<L: SimdFloat>(absorption: &[[L::Scalar; 3]], priority: L, distance: L) -> Vec3<L> {
     let of = |lane| absorption[priority.lane(lane).to_f64() as usize];

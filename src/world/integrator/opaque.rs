@@ -16,12 +16,13 @@ use crate::world::integrator::nested_dielectrics::MediumStack;
 use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
-/// Traces paths in a world without transmissive surfaces, and overwrites them. The paths start in
-/// the given lanes and end after `depth` reflections. `reservoir` collects the hits from which
-/// indirect diffuse light may bounce.
+/// Traces paths in a world without transmissive surfaces, and adds their radiance to `out`. The
+/// paths start in the lanes `active`, end after `depth` reflections, and are overwritten.
+/// `reservoir` collects the hits from which indirect diffuse light may bounce.
 ///
-/// `EMITTERS` is `true` if the world has emitters or indirect diffuse light. `SIMPLE` is `true` if
-/// the world has neither and [`World::simple`] is `true`, here and in all called functions.
+/// `EMITTERS` is `true` if the world has emitters or indirect diffuse light. If `EMITTERS` is
+/// `true`, `SIMPLE` is `false`; otherwise it is the value of [`World::simple`]. `SIMPLE` has the
+/// same meaning in all called functions.
 #[inline(never)]
 pub(crate) fn trace_opaque<'a, L: SimdFloat, const SIMPLE: bool, const EMITTERS: bool>(
     world: &'a World<L>,

@@ -4,14 +4,15 @@ use crate::bvh::Ray;
 use crate::lanes::{SimdFloat, Vec3};
 use crate::world::light_groups::MAX_GROUPS;
 
-/// Radiance of a packet's samples, per light group, for lights of unit colour and intensity.
+/// Radiance of a packet's samples in each light group (part of the picture that the film stores
+/// separately). Lights with a group of their own have unit colour and intensity here.
 pub struct Radiance<L> {
     /// Radiance of each light group. Only the first [`World::groups`](crate::world::World::groups)
     /// entries are in use.
     pub groups: [Vec3<L>; MAX_GROUPS],
 }
 
-/// Number of traced rays, and a flag for random choices.
+/// Number of rays traced, and a flag that is `true` if a random choice was made.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     /// Number of rays: camera, shadow, reflected and transmitted.
@@ -21,10 +22,10 @@ pub struct Counts {
     pub glossy: bool,
 }
 
-/// A packet of paths at their current vertex.
+/// Packet of paths at their current vertex.
 #[derive(Clone, Copy)]
 pub struct Path<L> {
-    /// Rays from the vertices.
+    /// Rays from the current vertices of the paths.
     pub ray: Ray<L>,
     /// Factor by which radiance along the ray contributes to the radiance of the sample (beta).
     pub throughput: Vec3<L>,
@@ -34,18 +35,18 @@ pub struct Path<L> {
 }
 
 impl<L: SimdFloat> Path<L> {
-    /// Largest throughput of a path. A larger one would saturate the film, and infinity times 0
-    /// (black) is NaN.
+    /// Largest throughput of a path. A larger one would saturate the film; an infinite one,
+    /// multiplied by black, would be NaN.
     const MAX_THROUGHPUT: f64 = (1u64 << 60) as f64;
 
-    /// Creates the path of camera rays.
+    /// Creates the paths of the camera rays `ray`, with throughput 1.
     #[inline(always)]
     pub fn new(ray: Ray<L>) -> Self {
         Self { ray, throughput: Vec3::of([1.0; 3]), lobe_density: L::from_f64(L::MAX) }
     }
 
-    /// Returns `throughput`, limited to 2^60. Mirrors that amplify light would let it grow without
-    /// limit.
+    /// Returns `throughput`, limited to 2^60 in each channel. Mirrors that amplify light would let
+    /// it grow without limit.
     #[inline(always)]
     pub fn bounded(throughput: Vec3<L>) -> Vec3<L> {
         let max = L::from_f64(Self::MAX_THROUGHPUT);

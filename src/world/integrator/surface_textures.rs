@@ -27,7 +27,7 @@ pub(crate) struct SurfaceTextures<L: SimdFloat> {
 pub(crate) struct ShadingPoints<L: SimdFloat> {
     /// Id of the primitive.
     pub item: u32,
-    /// Ids of the triangles, if the primitive is a mesh.
+    /// Ids of the triangles that are hit, if the primitive is a mesh.
     pub triangle: L,
     /// Hit points, with outward normals.
     pub surface: SurfacePoint<L>,
@@ -35,7 +35,8 @@ pub(crate) struct ShadingPoints<L: SimdFloat> {
     pub lanes: L::Mask,
 }
 
-/// Returns the projection that `mapping` selects for a shape with the given texture space.
+/// Returns the texture projection that `mapping` selects for a shape with the texture space
+/// `space`.
 fn projection(mapping: Mapping, space: &TextureSpace) -> Projection {
     match (mapping, space.default_mapping) {
         (Mapping::Planar, _) | (Mapping::Uv | Mapping::Auto, DefaultMapping::Planar) => {
@@ -122,7 +123,7 @@ impl<L: SimdFloat> SurfaceTextures<L> {
         self.textures().any(|texture| texture.bump.is_some())
     }
 
-    /// Names of the texture features in use, for the inventory of the scene.
+    /// Returns the names of the texture features in use, for the inventory of the scene.
     pub fn features(&self) -> Vec<&'static str> {
         let albedos = || self.textures().filter_map(|texture| texture.albedo.as_ref());
         let is_image = |t: &CompiledTexture<_>| matches!(t, CompiledTexture::Image { .. });

@@ -26,13 +26,15 @@ use crate::world::world::World;
 /// refraction. At later interfaces one of the two is chosen at random.
 const SPLIT_DEPTH: usize = 2;
 
-/// Branches of the paths of a packet, all at the same depth.
+/// One branch of a packet of paths, which split into reflection and transmission at interfaces. All
+/// paths of the branch have hit the same number of surfaces.
 pub(crate) struct Branch<L: SimdFloat> {
     pub path: Path<L>,
     pub lanes: L::Mask,
     /// Media that the rays are inside of.
     pub media: MediumStack<L>,
-    /// Number of surfaces that the path has hit before this ray, since its generation started.
+    /// Number of surfaces that the paths have hit before, since the camera or the latest diffuse
+    /// bounce.
     pub bounce: u32,
     /// State of rays that start on one of several coincident surfaces. `None` if no ray does.
     pub coincident: Option<CoincidentState<L>>,
@@ -64,7 +66,8 @@ struct SplitDirections<L> {
     transmitted_density: L,
 }
 
-/// Integrator with the inputs that all branches of a packet share.
+/// Integrator of scenes with transmission, with the inputs that all branches of a packet's paths
+/// share.
 pub(crate) struct TransmissionIntegrator<'a, L: SimdFloat> {
     pub world: &'a World<L>,
     pub nested_dielectrics: &'a NestedDielectrics<L>,
@@ -74,8 +77,8 @@ pub(crate) struct TransmissionIntegrator<'a, L: SimdFloat> {
 impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     /// Traces the rays of `start`, over at most `depth` surfaces after the first, and overwrites
     /// `start`. In each lane, the transmitted branch of an interface is traced before the reflected
-    /// one, independent of the other lanes. `reservoir` collects the hits from which indirect
-    /// diffuse light may bounce.
+    /// one; this order does not depend on the other lanes. `reservoir` collects the hits from which
+    /// indirect diffuse light may bounce.
     #[inline(never)]
     pub fn trace(
         &self,
@@ -116,9 +119,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     }
 
     /// Traces the rays of `branch` and adds the radiance of their hit points to `out`. Replaces
-    /// `branch` by its continuation, of at most `depth` surfaces after the first. Returns `false`
-    /// if no path continues. Reflected branches of interfaces up to number [`SPLIT_DEPTH`] are
-    /// pushed to `waiting`.
+    /// `branch` by the paths that continue, and returns `false` if there are none. A path has at
+    /// most `depth` surfaces after the first. At the first [`SPLIT_DEPTH`] interfaces, the
+    /// reflected branch is pushed to `waiting`.
     fn advance(
         &self,
         branch: &mut Branch<L>,
@@ -229,7 +232,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             let coincident = coincident.as_ref().map_or(L::mask(false), |state| state.lanes);
             RoughInterface::new(world, &interaction, hit, coincident)
         });
-        if let Some(rough) = &rough {
+        if let Some(rough) = &rough
+            && rough.reflecting.any()
+        {
             let random = (self.sampler, bounce);
             let rough = (rough, self.nested_dielectrics);
             interface_lighting(world, path, &interaction, rough, random, (out, counts));
@@ -308,11 +313,11 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         branch.lanes.any()
     }
 
-    /// Resolves hits of `lanes` on coincident surfaces. It replaces `hit` and `interaction` by
-    /// those of the surface with the lowest layer, which the path crosses first (see [`Contacts`]).
-    /// `contact_lanes` are the lanes whose hit point may touch another primitive. `behind` is the
-    /// coincident surface behind the start points of the rays, if one was found. Returns the state
-    /// of rays that pass the surface, or `None` if no surfaces coincide.
+    /// Resolves hits of `lanes` on coincident surfaces: replaces `hit` and `interaction` by those
+    /// of the surface that the path crosses first (see [`Contacts`]). `contact_lanes` are the lanes
+    /// whose hit point may be on a second primitive as well. `behind` is the coincident surface
+    /// behind the start points of the rays, if one was found. Returns the state of rays that pass
+    /// the surface, or `None` if no surfaces coincide.
     #[inline(never)]
     fn coincident(
         &self,
@@ -384,8 +389,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         self.nested_dielectrics.cross(interaction, transmissive, media, index)
     }
 
-    /// Returns the lanes whose reflected rays are followed, and the fraction of the light that the
-    /// surfaces reflect. Rough interfaces are excluded; see [`interface_lighting`].
+    /// Returns two values: the lanes whose reflected rays are followed, and in each lane the
+    /// fraction of the light that the surface reflects. Rough interfaces are excluded; see
+    /// [`interface_lighting`].
     fn reflecting_lobes(
         &self,
         path: &Path<L>,
@@ -410,8 +416,9 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         ReflectingLobes { lanes: followed.and_not(interface_hit.suppressed), share }
     }
 
-    /// Samples the reflected and transmitted directions at surfaces, at least one of which
-    /// transmits. `bounce` is the number of surfaces that the path has hit before.
+    /// Samples the reflected and transmitted directions at the hit points of `path`. In at least
+    /// one lane the surface transmits. `bounce` is the number of surfaces that the path has hit
+    /// before.
     fn split_directions(
         &self,
         path: &Path<L>,
@@ -509,7 +516,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     }
 
     /// Samples the reflected and transmitted directions of `lanes`, whose surfaces are rough, with
-    /// the numbers `uv`, and stores them in `directions`.
+    /// the random numbers `uv`, and stores them in `directions`.
     #[inline(never)]
     fn sample_rough(
         &self,
@@ -542,7 +549,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
     }
 }
 
-/// Returns the refraction of rays with the direction `incident` at clear surfaces.
+/// Returns the refraction of rays with the direction `incident` at the surfaces of `hit`, as if
+/// they had no roughness.
 #[inline(always)]
 fn smooth_interface<L: SimdFloat>(
     incident: Vec3<L>,

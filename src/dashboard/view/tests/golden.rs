@@ -40,7 +40,8 @@ fn screens_match_golden_files() {
     assert!(different.is_empty(), "{}\nZERKALO_BLESS=1 takes them over", different.join("\n"));
 }
 
-/// Checks that every file in `tests/screens` belongs to a state.
+/// Checks that every file in `tests/screens` belongs to one of `STATES`, the states of the model
+/// that the golden test draws.
 #[test]
 fn every_screen_has_its_state() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/screens");

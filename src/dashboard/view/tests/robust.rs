@@ -25,7 +25,8 @@ proptest! {
     }
 }
 
-/// Draws every state at screen sizes around each threshold of the layout.
+/// Checks that every state of the model can be drawn at screen sizes around each threshold of the
+/// layout.
 #[test]
 fn every_state_draws_at_threshold_sizes() {
     for (_, make) in STATES {

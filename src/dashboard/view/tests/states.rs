@@ -1,19 +1,17 @@
-//! Models in every state that looks different on the screen.
+//! Models of the dashboard in every state that looks different on the screen.
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::message::{DisplayChannel, Format, Message, OrphanedEdits};
-use crate::dashboard::model::{
-    Colors, CompareView, Inspector, Mode, Model, Notice, RunningExport, Start, Tone,
-};
+use crate::dashboard::model::{CompareView, FieldList, Mode, Model, Notice, RunningExport, Tone};
 use crate::dashboard::overlay::{
-    Answer, Form, Overlay, Palette, Pick, PickFor, Prompt, PromptFor, Question,
+    Answer, CommandPalette, Form, Overlay, Pick, PickFor, Prompt, PromptFor, Question,
 };
 use crate::dashboard::panel_lines::{PanelLine, scrolled};
 use crate::dashboard::testing::report;
 use crate::dashboard::update::commands::COMMANDS;
 use crate::dashboard::update::update;
-use crate::film::{Display, LightWeights, Probe};
+use crate::film::{Display, LightWeights, PixelProbe};
 use crate::render::schedule::{Spp, Stop, StoppedBy};
 use crate::render::session::{
     Report, Snapshot, State, TileMaps, WatchReport, WatchedShards, WatchedState,
@@ -23,21 +21,16 @@ use crate::scene::{Scene, built_in};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Name of a state, and the function that changes a model with a running render into this state.
+/// Name of a state, and a function that brings a dashboard with a running render into this state.
 pub type Named = (&'static str, fn(&mut Model));
 
-/// Creates a model of the built-in scene after 212 samples.
+/// Creates the model of a dashboard of `screen` columns and rows that has rendered 212 samples per
+/// pixel of the built-in scene.
 pub fn tracing(screen: [u16; 2]) -> Model {
-    let mut model = Model::new(Start {
-        path: Some("scenes/mirror-room.toml".into()),
-        name: String::new(),
-        scene: Ok(Arc::new(built_in())),
-        screen,
-        colors: Colors::True,
-        stop: Stop { noise_codes: Some(0.5), ..Stop::default() },
-        threads: 2,
-        max_threads: 2,
-    });
+    let path = Some("scenes/mirror-room.toml".into());
+    let stop = Stop { noise_codes: Some(0.5), ..Stop::default() };
+    let mut model = Model::new(path, "", Ok(Arc::new(built_in())), stop, 2);
+    model.screen = screen;
     model.first_time = false;
     for spp in [2, 4, 8, 16, 32, 64, 96, 128, 160, 212] {
         let noise = 0.9 * (212.0 / spp as f64).powf(0.6);
@@ -91,21 +84,21 @@ fn select(model: &mut Model, object: &str) {
     model.selection = found.unwrap_or_else(|| panic!("{object} in the built-in scene"));
 }
 
-/// Selects the first object that is not a mirror.
+/// Selects the first object of the scene that is not a mirror.
 fn select_first(model: &mut Model) {
     let name = Target::Object(0).label(model.scene());
     select(model, &name);
 }
 
 fn field(model: &Model, key: &str) -> usize {
-    let is = |line: &PanelLine| line.field().is_some_and(|field| field.key == key);
+    let is = |line: &PanelLine| line.field().is_some_and(|field| field.property.key == key);
     model.field_lines().iter().position(is).unwrap_or_else(|| panic!("a field {key}"))
 }
 
 fn inspecting(model: &mut Model, key: &str) {
     select_first(model);
     model.focus = Focus::Inspector;
-    model.inspector = Inspector { cursor: field(model, key), ..Inspector::default() };
+    model.inspector = FieldList { cursor: field(model, key), ..FieldList::default() };
 }
 
 fn typing(model: &mut Model, text: &str, problem: Option<&str>) {
@@ -138,9 +131,7 @@ fn adding(model: &mut Model, problem: Option<&str>) {
         subject: edit.subject,
         label: edit.label,
         before: model.selection.clone(),
-        cursor: 2,
-        scroll: 0,
-        editor: None,
+        fields: FieldList { cursor: 2, ..FieldList::default() },
         problem: problem.map(str::to_string),
     };
     model.overlay = Some(Overlay::Form(form));
@@ -156,7 +147,7 @@ fn prompt(model: &mut Model, purpose: PromptFor, words: [&str; 3], problem: Opti
 fn probing(model: &mut Model) {
     model.mode = Mode::Probe;
     model.probe = Some([320, 240]);
-    model.snapshot.as_mut().unwrap().probe = Some(Probe {
+    model.snapshot.as_mut().unwrap().probe = Some(PixelProbe {
         pixel: [320, 240],
         samples: [106, 106],
         radiance: [0.2123, 0.18, 0.0904],
@@ -178,7 +169,8 @@ fn watched(
     WatchedShards { shards: shards.to_string(), path, state, samples, total: Some(total), age }
 }
 
-/// Returns a report on a plan of eight shards, with one shard for each kind of problem.
+/// Returns a report on a render in nine shards (parts of the render). Some are refused, missing or
+/// late.
 fn watched_plan() -> WatchReport {
     let reason = "cannot use parts/job-6.zk: it ends in the middle of the part TILE: it was not \
                   copied as a whole; copy it again, or use an older one";
@@ -220,7 +212,7 @@ fn broken(model: &mut Model) {
     model.file.broken = Some(Scene::parse(text, "mirror-room.toml").unwrap_err());
 }
 
-/// Every state, by name.
+/// States of the dashboard that look different on the screen, each with its name.
 pub const STATES: &[Named] = &[
     ("first-time", |m| {
         m.first_time = true;
@@ -331,11 +323,17 @@ pub const STATES: &[Named] = &[
     ("palette", |m| {
         let found = (0..COMMANDS.len()).filter(|i| COMMANDS[*i].label.contains("light")).collect();
         let editor = Editor::new("light");
-        m.overlay = Some(Overlay::Palette(Palette { editor, found, cursor: 1, scroll: 0 }));
+        m.overlay =
+            Some(Overlay::CommandPalette(CommandPalette { editor, found, cursor: 1, scroll: 0 }));
     }),
     ("palette-empty", |m| {
         let editor = Editor::new("teapot");
-        m.overlay = Some(Overlay::Palette(Palette { editor, found: vec![], cursor: 0, scroll: 0 }));
+        m.overlay = Some(Overlay::CommandPalette(CommandPalette {
+            editor,
+            found: vec![],
+            cursor: 0,
+            scroll: 0,
+        }));
     }),
     ("kinds", |m| {
         let kinds = edit::object_kinds();
@@ -361,9 +359,9 @@ pub const STATES: &[Named] = &[
     ("quit", |m| {
         let text = "There are edits that are not saved.".to_string();
         let answers = vec![
-            ('s', "save and quit".to_string(), Answer::SaveAndQuit),
-            ('d', "discard them and quit".to_string(), Answer::Quit),
-            ('c', "cancel".to_string(), Answer::Nothing),
+            ('s', "save and quit", Answer::SaveAndQuit),
+            ('d', "discard them and quit", Answer::Quit),
+            ('c', "cancel", Answer::Nothing),
         ];
         m.overlay = Some(Overlay::Question(Question { text, answers, cursor: 0 }));
     }),

@@ -4,8 +4,8 @@ use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{Colors, Model};
 use crate::dashboard::view::tests::states::{STATES, tracing};
 use crate::dashboard::view::tests::{drawn, row_text};
-use crate::terminal::Area;
 use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier};
 
 fn state(name: &str, screen: [u16; 2]) -> Model {
@@ -14,7 +14,7 @@ fn state(name: &str, screen: [u16; 2]) -> Model {
     model
 }
 
-fn corner(buffer: &Buffer, area: Area) -> (String, Color, Modifier) {
+fn corner(buffer: &Buffer, area: Rect) -> (String, Color, Modifier) {
     let cell = &buffer[(area.x, area.y)];
     (cell.symbol().to_string(), cell.fg, cell.modifier)
 }
@@ -119,7 +119,7 @@ fn defaults_are_dimmed_and_problems_red() {
         let row: Vec<_> = (list.x..list.x + list.width).map(|x| buffer[(x, y)].symbol()).collect();
         let at = row.concat().rfind(&field.value).map(|byte| row.concat()[..byte].chars().count());
         if let Some(at) = at {
-            looks[usize::from(field.is_default)].push(buffer[(list.x + at as u16, y)].fg);
+            looks[usize::from(field.property.is_default)].push(buffer[(list.x + at as u16, y)].fg);
         }
     }
     let [given, defaults] = looks;

@@ -1,9 +1,11 @@
-//! Changes during a render: stop criteria, estimates, lengths of pieces.
+//! Tests of changes during a render: other stop criteria, other noise estimates, and waves (sets of
+//! concurrent jobs) of which only a part is traced.
 
 use crate::render::schedule::tests::*;
 
-/// Traces to the end. Every wave is cut to pieces of at most `tiles` jobs with at most `longest`
-/// samples.
+/// Renders the simulated picture to the end. Before each wave (set of concurrent jobs) is traced,
+/// [`Wave::cut`] shortens it to jobs of at most `longest` samples per pixel, together about as many
+/// samples as `tiles` jobs of this length. The schedule repeats the rest in later waves.
 fn finish_in_pieces(
     model: &mut Model,
     schedule: &mut Schedule,
@@ -28,7 +30,7 @@ fn mixed() -> Vec<Truth> {
 }
 
 #[test]
-fn pieces_do_not_change_decisions() {
+fn pieces_do_not_change_rounds() {
     for adaptive in [false, true] {
         let settings = until(noise(0.6), adaptive);
         let (whole, reason) = Model::exact(mixed()).finish(settings);
@@ -71,7 +73,7 @@ fn higher_target_resumes_after_the_lower_one() {
                 let report = model.run(&wave);
                 schedule.complete(&wave, &report);
             }
-            // A and B are even after all decisions but the last, which adds the remaining samples.
+            // A and B are even after all rounds but the last, which adds the remaining samples.
             assert!(ends[..ends.len() - 2].iter().all(|even| *even), "after {low} {adaptive}");
             assert_eq!(schedule.spp().mean, 2000.0);
             // The lower target is reached at once.

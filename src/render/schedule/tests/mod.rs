@@ -1,4 +1,4 @@
-//! Tests of the schedule with simulated pictures.
+//! Tests of the schedule of samples, with simulated pictures in place of a film.
 
 mod adaptive;
 mod changes;
@@ -10,14 +10,18 @@ use crate::film::{Mse, TileNoise};
 use crate::render::schedule::*;
 use crate::render::wave::JobReport;
 
-/// [`TileNoise::squares`] of an error that is spread over many pixels.
+/// Sum of e^2 over the pixels of a tile, where e is the squared error of a pixel, in all simulated
+/// estimates ([`TileNoise::squares`]). It is nearly 0, as for an error that is spread over very
+/// many pixels.
 const SPREAD_OUT: Mse = Mse { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
-/// Samples per replicate from which on [`Model::periodic`] tiles have no error.
+/// Light period of the simulated pictures, in samples per replicate (half of the samples). From
+/// this count on, the tiles in [`Model::periodic`] have no error.
 const PERIOD: f64 = 16.0;
-/// Number of pixels of a whole tile.
+/// Number of pixels of each simulated tile.
 const PIXELS: u32 = 256;
 
-/// Simulated tile: the RMSE of one replicate after n samples is `sigma * n^-slope`.
+/// Simulated tile. After n samples in a replicate (half of the samples), the RMSE of the replicate
+/// is `sigma * n^-slope`.
 #[derive(Clone, Copy)]
 struct Truth {
     sigma: f64,
@@ -29,24 +33,30 @@ struct Truth {
 const CALM: Truth = Truth { sigma: 0.0, slope: 0.5, glossy: false, rays_per_sample: 2 };
 const NOISY: Truth = Truth { sigma: 40.0, slope: 0.5, glossy: true, rays_per_sample: 3 };
 
-/// Simulated picture that reports on waves as a film does.
+/// Simulated picture. After each wave (set of concurrent tracing jobs) it reports the estimated
+/// errors of tiles, as a film does.
 struct Model {
     truth: Vec<Truth>,
     pixels: Vec<u32>,
-    /// Samples per replicate of each tile.
+    /// Samples per pixel of each simulated tile: `[replicate (half of the samples)][tile]`.
     counts: [Vec<u32>; 2],
-    /// Sums of the errors of each effective pixel, as random walks:
-    /// `[replicate][tile][effective pixel]`. Empty if the errors are exact.
+    /// Independent errors of each simulated tile: `[replicate][tile][error]`. Each is a random
+    /// walk, the sum of the errors of all samples so far. The innermost lists are empty if the
+    /// picture has exact errors instead of random ones.
     walks: [Vec<Vec<f64>>; 2],
     rng: Rng,
     waves: usize,
-    /// `true` if blocks of samples must start at packet boundaries.
+    /// `true` if each job must start at a sample index that is a multiple of [`SAMPLE_ALIGNMENT`],
+    /// or a power of two below it.
     aligned: bool,
-    /// Tiles with an error that only validation pixels contain.
+    /// Numbers of the tiles with errors only in their validation pixels, which do not select tiles
+    /// for samples. The allocation estimate of these tiles is 0.
     hidden: Vec<usize>,
-    /// Tiles without error from [`PERIOD`] samples per replicate on.
+    /// Numbers of the tiles that have no error from [`PERIOD`] samples per replicate (half of the
+    /// samples) on.
     periodic: Vec<usize>,
-    /// See [`Schedule::with_light_period`].
+    /// Number of samples that together trace a shadow ray to each light once; see
+    /// [`Schedule::with_light_period`].
     light_period: u32,
 }
 
@@ -67,15 +77,16 @@ impl Model {
         }
     }
 
-    /// Creates a picture with random errors of slope 0.5. The error of each tile consists of
-    /// `effective` independent values.
+    /// Creates a simulated picture with random errors, RMSE ~ n^-0.5 for n samples. The error of
+    /// each tile is the root mean square of `effective` independent values.
     fn random(truth: Vec<Truth>, effective: usize, seed: u64) -> Self {
         let tiles = truth.len();
         let walks = vec![vec![0.0; effective]; tiles];
         Self { walks: [walks.clone(), walks], rng: Rng(seed), ..Self::exact(truth) }
     }
 
-    /// Returns the estimate from A - B. The film must hold equally many samples of both.
+    /// Returns the noise estimate of a tile from the difference of its replicates A and B. Both
+    /// must have equally many samples.
     fn estimate(&self, tile: usize) -> TileNoise {
         let n = f64::from(self.counts[0][tile]);
         let [a, b] = [&self.walks[0][tile], &self.walks[1][tile]];
@@ -95,7 +106,8 @@ impl Model {
         TileNoise { reported, allocation, squares: SPREAD_OUT, pixels: PIXELS, samples }
     }
 
-    /// True squared error of the picture (A + B) / 2.
+    /// Returns the true mean squared error of the mean of both replicates (halves of the samples)
+    /// in a tile.
     fn true_mse(&self, tile: usize) -> f64 {
         let t = self.truth[tile];
         let n = f64::from(self.counts[0][tile]);
@@ -145,7 +157,8 @@ impl Model {
         Schedule::new(&self.pixels, settings).with_light_period(self.light_period)
     }
 
-    /// Renders to the end, at one nanosecond per ray. Panics if the render does not end.
+    /// Renders the simulated picture to the end, at one nanosecond per ray. Returns the schedule
+    /// and the reason for the end. Panics if the render does not end.
     fn finish(&mut self, settings: Settings) -> (Schedule, StoppedBy) {
         let mut schedule = self.schedule(settings);
         for _ in 0..100_000 {
@@ -173,8 +186,8 @@ fn spp(spp: u32) -> Stop {
     Stop { spp: Some(spp), ..Stop::default() }
 }
 
-/// Returns `tiles` tiles in a square. The first `share` of them, row by row, are noisy, because
-/// noise in pictures is clustered.
+/// Returns `tiles` simulated tiles. The fraction `share` of them is noisy: the first ones of the
+/// list, because noisy tiles of real pictures are neighbours too.
 fn clustered(tiles: usize, share: f64) -> Vec<Truth> {
     (0..tiles).map(|i| if (i as f64) < share * tiles as f64 { NOISY } else { CALM }).collect()
 }

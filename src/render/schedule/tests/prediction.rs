@@ -1,15 +1,16 @@
-//! Prediction of the sample counts that meet a target.
+//! Tests of the prediction of the sample counts that meet a noise target.
 
 use crate::render::schedule::tests::*;
 
-/// Renders `model` to the noise `pilot`, and returns the prediction for the noise `target`.
+/// Renders `model` until its noise is `pilot`, and returns the prediction for the noise `target`.
+/// Both are RMSE in 8-bit levels.
 fn predicted(model: &mut Model, pilot: f64, target: f64) -> Prediction {
     let (mut schedule, _) = model.finish(until(noise(pilot), true));
     schedule.set_stop(noise(target));
     schedule.predict([USUAL_SLOPE; 2]).unwrap()
 }
 
-/// Gives each tile the predicted samples and returns the RMSE.
+/// Traces the predicted samples of each tile and returns the true RMSE of the whole picture.
 fn rmse_at(model: &mut Model, prediction: &Prediction) -> f64 {
     for replicate in [0, 1] {
         let jobs = prediction.tiles.iter().zip(0..).map(|(t, tile)| Job {

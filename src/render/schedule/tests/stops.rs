@@ -1,4 +1,5 @@
-//! Sizes of waves, stop criteria and estimated times.
+//! Tests of the numbers of samples in a wave (a set of concurrent jobs), of stop criteria and of
+//! estimated remaining times.
 
 use crate::render::schedule::tests::*;
 

@@ -1,17 +1,22 @@
-//! Commands that change the material of the scene's mirror.
+//! Edits of the scene's mirror, a material that reflects: its roughness, reflection coefficient and
+//! lobe. [`mirror`] chooses the material. These edits do not mirror objects.
 
 use crate::primitive::Form;
 use crate::scene::Scene;
 use crate::scene::edit::target::mirror_of;
 use crate::scene::edit::{Edit, EditError, Target, step, toggle};
 
-/// Returns the name of the material that the mirror commands change. Candidates are, in this order:
-/// the selected material or that of the selected object, materials of parts of the selected object,
-/// that of the first reflecting rectangle, the most reflecting material of all objects and parts.
-/// The first candidate that reflects is chosen; selected glass is accepted if it only transmits.
+/// Returns the name of the material that the mirror commands change: the first of the following
+/// that reflects.
 ///
-/// If no material reflects, the selected material is chosen, or that of the first rectangle, so
-/// that the reflection can be increased from 0 again. Returns `None` if there is neither.
+/// - The material that is selected, or that of the selected object. Glass counts even if it only
+///   transmits.
+/// - The material with the largest reflection coefficient in the selected object and its parts.
+/// - The material with the largest reflection coefficient in the first rectangle that reflects.
+/// - The material with the largest reflection coefficient in all objects and parts.
+///
+/// If none reflects, returns the selected material, or else that of the first rectangle, so that
+/// the reflection can be increased from 0 again. Returns `None` if there is neither.
 pub fn mirror(scene: &Scene, selected: Option<&Target>) -> Option<String> {
     let reflecting = |i: usize| mirror_of(scene, i).map(|(name, _)| name.to_string());
     let chosen = selected.and_then(|subject| match subject.material(scene) {
@@ -54,7 +59,8 @@ fn find_mirror(scene: &Scene, selected: Option<&Target>) -> Result<Target, EditE
     })
 }
 
-/// Changes the mirror's roughness by `steps` as [`step`] does.
+/// Changes the roughness of the material that [`mirror`] finds for `selected`, by `steps` presses
+/// of an arrow key, as [`step`] does.
 ///
 /// # Errors
 /// Fails if no material in the scene reflects.
@@ -66,7 +72,7 @@ pub fn adjust_roughness(
     step(scene, &find_mirror(scene, selected)?, "roughness", None, steps)
 }
 
-/// Changes the mirror's reflection coefficient by `steps` as [`step`] does.
+/// Changes the mirror's reflection coefficient by `steps` arrow steps, as [`step`] does.
 ///
 /// # Errors
 /// Fails if no material can be the mirror.
@@ -74,7 +80,8 @@ pub fn reflect(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<E
     step(scene, &find_mirror(scene, selected)?, "reflection", None, steps)
 }
 
-/// Changes the mirror's lobe to the next (or previous) one, cyclically.
+/// Changes the mirror's lobe to the next one, or to the previous one if `forward` is `false`,
+/// cyclically.
 ///
 /// # Errors
 /// Fails if no material in the scene reflects.

@@ -1,4 +1,4 @@
-//! Probe: samples, value and error of one pixel, for display in the viewer.
+//! Pixel probe: samples, value and error of one pixel, for display in the dashboard.
 
 use crate::film::TILE;
 use crate::film::display::Display;
@@ -8,30 +8,30 @@ use crate::film::store::Film;
 
 /// Samples, value and error of one pixel under given light weights and display transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Probe {
+pub struct PixelProbe {
     /// Column and row of the pixel in the film.
     pub pixel: [usize; 2],
-    /// Number of samples in the replicates A and B.
+    /// Number of samples of the pixel in each of the replicates A and B (halves of the samples).
     pub samples: [u32; 2],
     /// Linear radiance of the pixel; black without samples.
     pub radiance: [f64; 3],
     /// Value of the pixel on the display in 8-bit levels, 0..=255, not rounded.
     pub codes: [f64; 3],
-    /// Half the difference of A and B in radiance, an estimate of the pixel's error. A single
-    /// pixel's estimate is correct only within a factor of two or three. `None` if A or B has no
-    /// samples.
+    /// Half the difference of the replicates A and B (halves of the samples) in radiance, an
+    /// estimate of the pixel's error. A single pixel's estimate is correct only within a factor of
+    /// two or three. `None` if one of the replicates has no samples.
     pub difference: Option<[f64; 3]>,
-    /// Estimated RMSE of the tile that contains the pixel, in linear radiance. `None` if A or B has
-    /// no samples.
+    /// Estimated RMSE of the tile that contains the pixel, in linear radiance. `None` if one of the
+    /// replicates (halves of the samples) has no samples.
     pub tile_rmse_linear: Option<f64>,
     /// Estimated RMSE of the tile that contains the pixel, on the display in 8-bit levels. `None`
-    /// if A or B has no samples.
+    /// if one of the replicates (halves of the samples) has no samples.
     pub tile_rmse_codes: Option<f64>,
 }
 
-impl Probe {
-    /// Probes the pixel in column `x` and row `y` of `film`. Returns `None` if the pixel is outside
-    /// of the film.
+impl PixelProbe {
+    /// Reads samples, value and error of the pixel in column `x` and row `y` of `film`. Returns
+    /// `None` if the pixel is outside of the film.
     pub fn of_film(
         film: &Film,
         [x, y]: [usize; 2],
@@ -82,7 +82,7 @@ mod tests {
         let mut film = film(20, 18, &[8.0, 4.0]);
         let mix = LightWeights { weights: vec![[1.0, 2.0, 0.0], [0.0, 0.0, 3.0]] };
         let display = Display { exposure_ev: -3.0, ..Display::default() };
-        let probe = |film: &Film, pixel| Probe::of_film(film, pixel, &mix, &display);
+        let probe = |film: &Film, pixel| PixelProbe::of_film(film, pixel, &mix, &display);
         let empty = probe(&film, [19, 17]).unwrap();
         assert_eq!((empty.samples, empty.radiance, empty.difference), ([0; 2], [0.0; 3], None));
         assert_eq!(empty.tile_rmse_codes, None);

@@ -1,12 +1,13 @@
-//! Random scenes for the honesty survey: sparse pictures, whose noise is concentrated in few pixels, and dense ones.
+//! Random scenes for the survey of error estimates. Sparse pictures have noise in few pixels, dense
+//! ones everywhere.
 
 use crate::common::Numbers;
-use crate::honesty::coverage::Balls;
+use crate::error_estimates::coverage::Balls;
 use crate::support::{parsed, shipped, sized};
 use std::fmt::Write;
 use zerkalo::scene::Scene;
 
-/// The kinds of generated scenes, by name.
+/// Names of the kinds of generated scenes.
 pub const KINDS: [&str; 10] = [
     "one ball",
     "balls of a pixel",
@@ -20,15 +21,15 @@ pub const KINDS: [&str; 10] = [
     "glass",
 ];
 
-/// A scene with its name.
+/// Generated scene with its name.
 pub struct Sample {
     pub name: String,
     pub scene: Scene,
-    /// Closed form of the picture, for unshaded balls.
+    /// Unshaded balls of the scene, which have a closed form; `None` for other scenes.
     pub balls: Option<Balls>,
 }
 
-/// Uniform integer from `low` to `high`.
+/// Returns a uniform random integer from `low` to `high`.
 fn whole(n: &mut Numbers, low: u32, high: u32) -> u32 {
     low + n.below((high - low + 1) as usize) as u32
 }
@@ -37,10 +38,11 @@ fn random_color(n: &mut Numbers) -> String {
     format!("{:.3?}", [0; 3].map(|_| n.between(0.05, 0.95)))
 }
 
-/// Half of the visible height at z = 0 for the camera at (0, 0, 10) with a vertical view angle of 40 degrees.
+/// Half of the visible height at z = 0 for the camera at (0, 0, 10), whose vertical view angle is
+/// 40 degrees.
 const HALF_HEIGHT: f64 = 3.64;
 
-/// Scene number `seed`; kinds take turns.
+/// Returns the scene with the number `seed`. Successive scenes have successive kinds.
 pub fn scene(seed: u64) -> Sample {
     let kind = (seed % KINDS.len() as u64) as usize;
     let mut n = Numbers::new(seed.wrapping_mul(0x9e37_79b9) ^ 0x5eed);
@@ -91,7 +93,7 @@ fn head(size: [u32; 2], background: &str, ambient: f64) -> String {
     )
 }
 
-/// Even balls of about a pixel, or smaller and brighter than white.
+/// Returns unshaded balls: about as large as a pixel, or smaller and brighter than white.
 fn balls(n: &mut Numbers, size: [u32; 2], count: u32, radiance: f64) -> Balls {
     let pixel = 2.0 * HALF_HEIGHT / f64::from(size[1]);
     let across = HALF_HEIGHT * f64::from(size[0]) / f64::from(size[1]);
@@ -117,7 +119,7 @@ fn balls_text(balls: &Balls, size: [u32; 2]) -> String {
     text
 }
 
-/// Long boxes thinner than a pixel.
+/// Returns a scene of long boxes that are thinner than a pixel.
 fn hairlines(n: &mut Numbers, size: [u32; 2]) -> Scene {
     let pixel = 2.0 * HALF_HEIGHT / f64::from(size[1]);
     let mut text = head(size, "[0.02, 0.03, 0.05]", 1.0);
@@ -136,7 +138,7 @@ fn hairlines(n: &mut Numbers, size: [u32; 2]) -> Scene {
     parsed(&text)
 }
 
-/// A checkered plane up to its horizon.
+/// Returns the scene of a plane with a checker texture, up to its horizon.
 fn checkerboard(n: &mut Numbers, size: [u32; 2]) -> Scene {
     let (height, scale) = (n.between(0.3, 3.0), n.log_uniform(0.2, 3.0));
     let mut text = head(size, "[0.2, 0.3, 0.5]", 1.0);
@@ -150,7 +152,7 @@ fn checkerboard(n: &mut Numbers, size: [u32; 2]) -> Scene {
     parsed(&text)
 }
 
-/// Lit balls, in a small part of the picture or all over it.
+/// Returns a scene of lit balls, in a small part of the picture or all over it.
 fn crowd(n: &mut Numbers, size: [u32; 2], mirrors: bool) -> Scene {
     let mut text = head(size, "[0.0, 0.0, 0.0]", 0.05);
     text += "[[light]]\npoint = { position = [3.0, 5.0, 8.0] }\nintensity = 1.0\n";
@@ -177,7 +179,7 @@ fn crowd(n: &mut Numbers, size: [u32; 2], mirrors: bool) -> Scene {
     parsed(&text)
 }
 
-/// A room of glossy walls around the eye.
+/// Returns the scene of a room of glossy walls around the eye.
 fn room(n: &mut Numbers, size: [u32; 2]) -> Scene {
     let mut text = head(size, "[0.0, 0.0, 0.0]", 0.03).replace("10.0]\ntarget", "2.5]\ntarget");
     text += "[[light]]\npoint = { position = [0.5, 2.0, 1.0] }\nintensity = 6.0\nfalloff = \"inverse-square\"\n";

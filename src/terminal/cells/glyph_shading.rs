@@ -1,8 +1,9 @@
-//! Cells in 16 colours, or without colours, with shading glyphs of different density.
+//! Picture cells in 16 colours, or without colours, with shading glyphs of different density.
 
 use crate::terminal::cells::oklab::{Oklab, code, linear};
-use crate::terminal::cells::palette_cache::PaletteCache;
-use crate::terminal::cells::{CellColor, PLAIN_BG, PLAIN_FG, PictureCell, palette256};
+use crate::terminal::cells::palette_quantisation::{QuantisedPalette, xterm_rgb};
+use crate::terminal::cells::{PLAIN_BG, PLAIN_FG, PictureCell};
+use ratatui::style::Color;
 use std::sync::LazyLock;
 
 /// Glyphs, each with the share of the cell that it covers. The shares of the shades ░▒▓ are nominal
@@ -18,13 +19,13 @@ const COVERAGE: [(char, f32); 9] = [
     ('▓', 0.75),
     ('█', 1.0),
 ];
-/// Glyphs for mixtures of two colours.
+/// Shading glyphs for mixtures of two colours in a cell.
 const SHADES: [char; 3] = ['░', '▒', '▓'];
-/// Background colours of mixtures: black, two greys and white. They leave the hue of the foreground
-/// unchanged.
+/// Background colours of cells that mix two colours: black, two greys and white. They leave the hue
+/// of the foreground unchanged.
 const NEUTRAL: [u8; 4] = [0, 7, 8, 15];
-/// Smallest gain for which half blocks are preferred to a shade: the sum of the OKLab errors of
-/// both halves must be smaller by this distance. Without this limit, a changing picture would
+/// Smallest gain for which a half block is preferred to a shading glyph. The gain is the decrease
+/// of the sum of the OKLab errors of both halves. Without this limit, a changing picture would
 /// flicker between half blocks and shades.
 const HALVES_GAIN: f32 = 0.05;
 
@@ -41,47 +42,44 @@ pub fn mixture(fg: [u8; 3], bg: [u8; 3], coverage: f32) -> Oklab {
     Oklab::of_linear([0, 1, 2].map(|c| coverage * fg[c] + (1.0 - coverage) * bg[c]))
 }
 
-/// Candidate cells: the 16 colours alone, and shades of one colour on a neutral one.
+/// Candidate cells of a picture in 16 colours: each colour alone, and each shading glyph in one
+/// colour on a neutral background (black, grey or white).
 static CELLS: LazyLock<Vec<PictureCell>> = LazyLock::new(|| {
     let mixed = NEUTRAL.into_iter().flat_map(|bg| (0..16).map(move |fg| (fg, bg)));
     let mixed = mixed.filter(|(fg, bg)| fg != bg).flat_map(|(fg, bg)| {
-        SHADES.map(|glyph| PictureCell {
-            glyph,
-            fg: CellColor::Indexed(fg),
-            bg: CellColor::Indexed(bg),
-        })
+        SHADES.map(|glyph| PictureCell { glyph, fg: Color::Indexed(fg), bg: Color::Indexed(bg) })
     });
     (0..16).map(flat).chain(mixed).collect()
 });
 
-/// Mean colours of [`CELLS`].
-static SHADED: LazyLock<PaletteCache> = LazyLock::new(|| {
+/// Palette of the mean colours of the terminal cells in [`CELLS`], in OKLab.
+static SHADED: LazyLock<QuantisedPalette> = LazyLock::new(|| {
     let look = |cell: &PictureCell| match (cell.fg, cell.bg) {
-        (CellColor::Indexed(fg), CellColor::Indexed(bg)) => {
-            mixture(palette256::rgb(fg), palette256::rgb(bg), coverage(cell.glyph))
+        (Color::Indexed(fg), Color::Indexed(bg)) => {
+            mixture(xterm_rgb(fg), xterm_rgb(bg), coverage(cell.glyph))
         }
-        (_, CellColor::Indexed(bg)) => Oklab::of(palette256::rgb(bg)),
+        (_, Color::Indexed(bg)) => Oklab::of(xterm_rgb(bg)),
         _ => Oklab::of(PLAIN_BG),
     };
-    PaletteCache::new(CELLS.iter().map(look).collect())
+    QuantisedPalette::new(CELLS.iter().map(look).collect())
 });
 
-/// The 16 colours, without shades.
-static BARE: LazyLock<PaletteCache> = LazyLock::new(|| {
-    PaletteCache::new((0..16).map(|index| Oklab::of(palette256::rgb(index))).collect())
+/// Palette of the 16 ANSI colours alone, without shading glyphs.
+static BARE: LazyLock<QuantisedPalette> = LazyLock::new(|| {
+    QuantisedPalette::new((0..16).map(|index| Oklab::of(xterm_rgb(index))).collect())
 });
 
 fn flat(index: u8) -> PictureCell {
-    PictureCell { glyph: ' ', fg: CellColor::Plain, bg: CellColor::Indexed(index) }
+    PictureCell { glyph: ' ', fg: Color::Reset, bg: Color::Indexed(index) }
 }
 
-/// Returns the index of the nearest of the 16 colours.
+/// Returns the index of the ANSI colour, 0 to 15, nearest to `rgb`.
 pub fn nearest(rgb: [u8; 3]) -> u8 {
     BARE.nearest(rgb) as u8
 }
 
-/// Returns the cell in 16 colours that approximates the colours `upper` and `lower` of its halves:
-/// a shade or a half block.
+/// Returns the cell in 16 colours that approximates the colours `upper` and `lower` of its halves.
+/// Its glyph is a shading glyph, a half block or a space.
 pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     let target = [upper, lower].map(Oklab::of);
     let [a, b] = [upper, lower].map(linear);
@@ -94,11 +92,7 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     let error = |looks: [Oklab; 2]| target[0].distance(looks[0]) + target[1].distance(looks[1]);
     let halves_error = error([top, bottom].map(|index| BARE.color(index.into())));
     if top != bottom && halves_error + HALVES_GAIN < error([SHADED.color(shade); 2]) {
-        return PictureCell {
-            glyph: '▀',
-            fg: CellColor::Indexed(top),
-            bg: CellColor::Indexed(bottom),
-        };
+        return PictureCell { glyph: '▀', fg: Color::Indexed(top), bg: Color::Indexed(bottom) };
     }
     CELLS[shade]
 }
@@ -124,7 +118,7 @@ pub fn pair_mono(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     };
     let glyph = if top > bottom { halves('▀', top, bottom) } else { halves('▄', bottom, top) }
         .unwrap_or(glyph);
-    PictureCell { glyph, fg: CellColor::Plain, bg: CellColor::Plain }
+    PictureCell { glyph, fg: Color::Reset, bg: Color::Reset }
 }
 
 #[cfg(test)]
@@ -136,7 +130,7 @@ mod tests {
         let mut last = 0.0;
         for level in 0..=255u8 {
             let cell = pair_mono([level; 3], [level; 3]);
-            assert_eq!((cell.fg, cell.bg), (CellColor::Plain, CellColor::Plain));
+            assert_eq!((cell.fg, cell.bg), (Color::Reset, Color::Reset));
             assert!(coverage(cell.glyph) >= last, "{level}: {}", cell.glyph);
             last = coverage(cell.glyph);
         }
@@ -154,8 +148,7 @@ mod tests {
         assert_eq!(flat([0, 0, 0]), super::flat(0));
         // Dark red is a shade of red on black; light red is a shade of red on white.
         for (rgb, neutral) in [([110, 0, 0], 0), ([255, 150, 140], 15)] {
-            let PictureCell { glyph, fg: CellColor::Indexed(fg), bg: CellColor::Indexed(bg) } =
-                flat(rgb)
+            let PictureCell { glyph, fg: Color::Indexed(fg), bg: Color::Indexed(bg) } = flat(rgb)
             else {
                 panic!("{rgb:?}");
             };
@@ -163,10 +156,7 @@ mod tests {
             assert!(bg == neutral || bg == 7, "{rgb:?} {bg}");
         }
         let edge = pair([255, 255, 255], [0, 0, 238]);
-        assert_eq!(
-            edge,
-            PictureCell { glyph: '▀', fg: CellColor::Indexed(15), bg: CellColor::Indexed(4) }
-        );
+        assert_eq!(edge, PictureCell { glyph: '▀', fg: Color::Indexed(15), bg: Color::Indexed(4) });
     }
 
     #[test]
@@ -175,7 +165,7 @@ mod tests {
         for i in 0..512usize {
             let rgb = [i / 64, i / 8 % 8, i % 8].map(|c| (c * 36) as u8);
             let target = Oklab::of(rgb);
-            bare += Oklab::of(palette256::rgb(nearest(rgb))).distance(target);
+            bare += Oklab::of(xterm_rgb(nearest(rgb))).distance(target);
             shaded += pair(rgb, rgb).halves()[0].distance(target);
         }
         assert!(shaded < 0.6 * bare, "{shaded} of {bare}");

@@ -1,4 +1,5 @@
-//! Number of the allocator's arenas under a limit on address space.
+//! Restart of the program with one memory arena of glibc's allocator if `ulimit -v` limits its
+//! address space.
 //!
 //! The allocator of glibc reserves an arena of 64 MB of address space for each thread. Under
 //! `ulimit -v` the arenas of a few threads take all of it, and allocations of a few bytes fail
@@ -8,14 +9,14 @@
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const VARIABLE: &str = "MALLOC_ARENA_MAX";
 
-/// Restarts the program in the same process with one arena of the memory allocator, if the address
-/// space is limited and the environment does not set the number of arenas. Returns if no restart is
-/// needed or the restart fails.
+/// Limits the allocator of glibc to one memory arena if the address space of the process is limited
+/// (`ulimit -v`) and the environment does not set the number of arenas. For this purpose the
+/// program restarts in the same process. Returns if no restart is needed or the restart fails.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 pub fn limit() {
     use std::os::unix::process::CommandExt;
     use std::process::Command;
-    if !crate::value::address_space_is_limited() || std::env::var_os(VARIABLE).is_some() {
+    if !crate::process_memory::address_space_is_limited() || std::env::var_os(VARIABLE).is_some() {
         return;
     }
     let mut arguments = std::env::args_os();
@@ -24,6 +25,6 @@ pub fn limit() {
     let _ = Command::new(program).arg0(name).args(arguments).env(VARIABLE, "1").exec();
 }
 
-/// Does nothing: allocators of other systems have no arenas per thread.
+/// Does nothing on systems other than Linux with glibc. Their allocators have no arenas per thread.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub fn limit() {}

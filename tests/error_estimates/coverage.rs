@@ -1,17 +1,17 @@
-//! Closed form of pictures of balls of one colour that no light shades.
+//! Closed form of pictures of unshaded balls of one colour.
 //!
-//! The rays of one scanline that hit a ball form an interval: its ends are the roots of a quadratic. The value of a
-//! pixel is the covered share of many scanlines through it.
+//! The rays of one scanline that hit a ball form an interval, whose ends are the roots of a
+//! quadratic. The value of a pixel is the covered share of many scanlines through it.
 
-/// Scanlines in a pixel.
+/// Number of scanlines in a row of pixels.
 const LINES: usize = 4096;
 
-/// Distance of the eye from the origin, on the z axis.
+/// Distance of the eye from the origin; the eye is on the z axis.
 const EYE_Z: f64 = 10.0;
-/// Vertical view angle in degrees.
+/// Vertical view angle of the camera, in degrees.
 const VIEW_ANGLE: f64 = 40.0;
 
-/// Balls of one colour before a background. The eye looks along -z; +y is up.
+/// Balls of one colour in front of a background. The eye looks along -z; +y is up.
 pub struct Balls {
     /// Centre and radius of each ball.
     pub balls: Vec<([f64; 3], f64)>,
@@ -22,7 +22,8 @@ pub struct Balls {
 }
 
 impl Balls {
-    /// Mean radiance of every pixel of a picture of `width` x `height` pixels, `[row][column]`.
+    /// Returns the mean radiance of every pixel of a picture of `width` x `height` pixels, row by
+    /// row.
     pub fn pixels(&self, [width, height]: [usize; 2]) -> Vec<f64> {
         let [w, h] = [width, height].map(|n| n as f64);
         // Direction of the ray through the point (x, y) of the raster: (u, v, -1).
@@ -68,8 +69,9 @@ impl Balls {
     }
 }
 
-/// Values u between which the rays of directions (u, v, -1) from the eye hit a ball. With c the vector from the eye to
-/// its centre, it is hit if (c.d)^2 >= |d|^2 (c.c - r^2).
+/// Returns the interval of u in which the rays from the eye with the directions (u, v, -1) hit a
+/// ball. Let c be the vector from the eye to the ball's centre. A ray d hits if (c.d)^2 >= |d|^2
+/// (c.c - r^2).
 fn hit_interval([x, y, z]: [f64; 3], radius: f64, v: f64) -> Option<[f64; 2]> {
     let z = z - EYE_Z;
     let along = y * v - z;

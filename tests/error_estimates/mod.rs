@@ -1,7 +1,8 @@
-//! Estimated errors against true errors, and unbiasedness of the picture, on a scene with a closed form for
-//! every pixel and on the mirror room.
+//! Noise estimates: estimated errors are compared with true errors. A scene with a closed form for
+//! every pixel, and the mirror room, also show that pictures are unbiased.
 
 mod coverage;
+mod rays;
 mod scenes;
 mod survey;
 
@@ -17,19 +18,20 @@ use zerkalo::world::Precision;
 
 const SIZE: [usize; 2] = [64, 48];
 const SEEDS: u64 = 20;
-/// Radius of the cone lobe at distance 1.
+/// Roughness of the mirror: radius of its cone lobe at distance 1.
 const ROUGHNESS: f64 = 0.35;
-/// Distance of the bright sheet's plane from the mirror; it is behind the eye.
+/// Distance between the mirror and the plane of the bright sheet, which is behind the eye.
 const SHEET_Z: f64 = 2.0;
-/// Angle between the sheet's edge and the vertical, in degrees: no two rows or columns of pixels are equal.
+/// Angle in degrees between the edge of the bright sheet and the vertical. It makes all rows and
+/// columns of pixels different.
 const TILT: f64 = 20.0;
-/// Position at which the edge intersects the axis of the picture.
+/// Coordinate x at which the edge of the bright sheet crosses the axis of the picture.
 const EDGE_X: f64 = 0.15;
 const SHEET: [f64; 3] = [0.9, 0.55, 0.2];
 const SKY: [f64; 3] = [0.08, 0.2, 0.45];
 
-/// Scene of a glossy mirror in z = 0 that fills the picture and reflects, blurred, the edge of a bright sheet
-/// behind the eye against a sky.
+/// Returns the scene of a glossy mirror in the plane z = 0 that fills the picture. Blurred, it
+/// reflects the edge of a bright sheet behind the eye, in front of a sky.
 fn closed_form(filter: Filter) -> Scene {
     let [width, height] = SIZE;
     let (s, c) = TILT.to_radians().sin_cos();
@@ -82,8 +84,8 @@ fn unit(a: [f64; 3]) -> [f64; 3] {
     a.map(|x| x / dot(a, a).sqrt())
 }
 
-/// Share of a uniform cone of half-angle theta in a half-space through its apex; delta is the angle of
-/// the axis above the half-space's plane.
+/// Returns the share of a uniform cone of half-angle `theta` that is inside of a half-space through
+/// its apex. `delta` is the angle of the axis above the half-space's plane.
 fn cone_share(theta: f64, delta: f64) -> f64 {
     if delta >= theta {
         1.0
@@ -96,7 +98,8 @@ fn cone_share(theta: f64, delta: f64) -> f64 {
     }
 }
 
-/// Share of the lobe that hits the sheet, at the point (x, y) of the raster, in pixels.
+/// Returns the share of the mirror's lobe that hits the bright sheet, at the point (x, y) of the
+/// picture in pixels.
 fn sheet_share(x: f64, y: f64) -> f64 {
     let eye = [0.1, 0.05, 1.5];
     let w = unit([-0.1, -0.05, -1.5]);
@@ -118,8 +121,8 @@ fn sheet_share(x: f64, y: f64) -> f64 {
     cone_share(ROUGHNESS.atan(), dot(normal, axis).asin())
 }
 
-/// True radiance of every pixel. For the box filter it is the mean over the pixel, by Gaussian quadrature
-/// with 4 points in each of 4 x 4 parts.
+/// Returns the true radiance of every pixel. For the box filter it is the mean over the pixel, by
+/// Gaussian quadrature with 4 points in each of 4 x 4 parts.
 fn truth(filter: Filter) -> Vec<[f64; 3]> {
     const PARTS: usize = 4;
     const GAUSS: [(f64, f64); 4] = [
@@ -151,7 +154,8 @@ fn truth(filter: Filter) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// A render of many samples agrees with the closed form, and the picture has all shares from none to all.
+/// Checks that a render of many samples agrees with the closed form, and that all shares from none
+/// to all occur in the picture.
 #[test]
 fn closed_form_describes_the_scene() {
     for filter in [Filter::Point, Filter::Box] {
@@ -170,8 +174,9 @@ fn closed_form_describes_the_scene() {
     }
 }
 
-/// Number of pixels of each tile whose lobe contains the sheet's edge. A lobe of which the edge cuts off less
-/// than one part in a thousand is hardly distinguishable from an uncut one.
+/// Returns, for each tile, the number of pixels whose lobe contains the edge of the bright sheet.
+/// Lobes of which the edge cuts off less than a thousandth do not count, because they are hardly
+/// distinguishable from uncut ones.
 fn blurred_pixels(truth: &[[f64; 3]]) -> Vec<usize> {
     let columns = SIZE[0] / TILE;
     let mut tiles = vec![0; columns * SIZE[1] / TILE];
@@ -183,17 +188,17 @@ fn blurred_pixels(truth: &[[f64; 3]]) -> Vec<usize> {
     tiles
 }
 
-/// True and estimated error of one render.
+/// True and estimated errors of one render.
 struct Outcome {
-    /// True over estimated RMSE of the picture as displayed.
+    /// True RMSE of the displayed picture, divided by the estimated one.
     codes_ratio: f64,
-    /// True over estimated RMSE of the picture in linear radiance.
+    /// True RMSE of the picture in linear radiance, divided by the estimated one.
     linear_ratio: f64,
-    /// True RMSE in 8-bit levels.
+    /// True RMSE of the displayed picture, in 8-bit levels.
     codes: f64,
     /// Estimated and true mean squared error of each tile, in squared 8-bit levels.
     tiles: Vec<(f64, f64)>,
-    /// Mean signed error of the linear picture, per channel.
+    /// Mean signed error of the picture in linear radiance, for each channel.
     mean_error: [f64; 3],
 }
 
@@ -235,7 +240,7 @@ fn mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
     values.clone().sum::<f64>() / values.count() as f64
 }
 
-/// Mean and standard deviation.
+/// Returns the mean and the standard deviation of `values`.
 fn spread(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let mean = mean(values.clone());
     let n = values.clone().count() as f64;
@@ -254,7 +259,8 @@ fn outcomes(filter: Filter, adaptive: bool, stop: Stop, expected: StoppedBy) -> 
         .collect()
 }
 
-/// Checks the estimates for one kind of render. Returns true over estimated RMSE as displayed.
+/// Checks the estimated errors of one kind of render. Returns the true RMSE of the displayed
+/// picture, divided by the estimated one.
 fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
     let stop = Stop { spp: Some(spp), ..Stop::default() };
     let outcomes = outcomes(filter, adaptive, stop, StoppedBy::Spp);
@@ -294,7 +300,7 @@ fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
     mean(outcomes.iter().map(|o| o.codes_ratio))
 }
 
-/// Checks the estimates for both filters and few and many samples.
+/// Checks the estimated errors for both pixel filters and for few and many samples.
 fn assert_always_honest(adaptive: bool) {
     let filters = [Filter::Point, Filter::Box].into_iter();
     let cases = filters.flat_map(|filter| [32, 128, 1024].map(|spp| (filter, spp)));
@@ -305,7 +311,7 @@ fn assert_always_honest(adaptive: bool) {
 }
 
 #[test]
-fn extreme_30_estimator_honesty() {
+fn extreme_30_estimated_error_is_the_true_error() {
     assert_always_honest(false);
 }
 
@@ -325,9 +331,9 @@ fn extreme_30_noise_target_is_reached() {
     }
 }
 
-/// `--noise 0.5` gives an RMSE of at most 0.55 8-bit levels, unrounded, against a reference of another seed.
-/// The estimate of a picture of a few dozen tiles is uncertain by some 6 % (96 x 72, 24 seeds: 0.40 to 0.56
-/// levels); this one has 300.
+/// Checks that `--noise 0.5` gives an RMSE of at most 0.55 8-bit levels, unrounded, against a
+/// reference of another seed. The estimate of a picture of a few dozen tiles is uncertain by some 6
+/// % (96 x 72 pixels, 24 seeds: 0.40 to 0.56 levels); this picture has 300 tiles.
 #[test]
 fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
     let scene = sized(shipped("mirror-room.toml"), [320, 240]);
@@ -358,8 +364,8 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
     }
 }
 
-/// Checks that a linear target on the physical mirror room, adaptive by linear error, gives that true RMSE
-/// against a reference of another seed.
+/// Checks that a render of the physical mirror room to a noise target in linear radiance has this
+/// true RMSE, against a reference of another seed.
 fn assert_linear_target_is_met(size: [u32; 2], seeds: u64) {
     let scene = sized(shipped("mirror-room-physical.toml"), size);
     let pool = pool(2);
@@ -393,9 +399,10 @@ fn linear_target_is_met() {
     assert_linear_target_is_met([96, 72], 4);
 }
 
-/// The picture of the speed figures.
+/// Checks a linear noise target on a picture of 640x480 pixels, the size of the measurements of
+/// speed.
 #[test]
-#[ignore = "half a minute: cargo test --test engine honesty:: -- --ignored --nocapture"]
+#[ignore = "half a minute: cargo test --test engine error_estimates:: -- --ignored --nocapture"]
 fn linear_target_is_met_at_full_size() {
     assert_linear_target_is_met([640, 480], 3);
 }

@@ -1,4 +1,5 @@
-//! Reuse of samples: decides if the samples of one scene are valid for an edited scene.
+//! Reuse of film samples after an edit: decides if the samples traced for one scene are valid for
+//! the edited scene.
 //!
 //! Descriptions of scenes are compared as a whole, by `==`. The few fields that may differ are set
 //! to equal values before the comparison, or are named in a pattern without `..`. A field that is
@@ -13,10 +14,10 @@ use crate::world::light_groups::{LightGroupSource, LightGroups, contributes};
 use std::borrow::Cow;
 
 impl LightGroups {
-    /// Returns `true` if the samples of the scene `compiled` are valid for `scene`, after a change
-    /// of group weights alone. `self` has the groups of `compiled`. The scenes may differ in names,
-    /// in unused materials, in the cap on rays per pixel, and in the emission of sources that have
-    /// a group of their own.
+    /// Returns `true` if the samples of the scene `compiled` are valid for `scene`: only the
+    /// weights of the light groups have to change. `self` are the light groups of `compiled`. The
+    /// scenes may differ in names, in unused materials, in the largest number of samples per pixel
+    /// of glossy tiles, and in the emission of sources that have a group of their own.
     pub fn can_reuse(&self, compiled: &Scene, scene: &Scene) -> bool {
         let Scene {
             film,
@@ -46,8 +47,9 @@ impl LightGroups {
             && self.can_relight(compiled, scene)
     }
 
-    /// Returns `true` if the lights of `scene` allow reuse. Lights that do not emit are not
-    /// compared.
+    /// Returns `true` if the lights of `scene` allow the samples of `compiled` to be reused: they
+    /// differ at most in names, and in the emission of lights that have a group of their own.
+    /// Lights that do not emit are not compared.
     fn can_relight(&self, compiled: &Scene, scene: &Scene) -> bool {
         let is_compiled = |i: usize| {
             let contains = |source: &LightGroupSource| match source {
@@ -71,8 +73,9 @@ impl LightGroups {
             && self.members.iter().all(same_emission_if_shared)
     }
 
-    /// Returns `true` if two objects of two scenes are equal except for their names, the names of
-    /// their materials, and the emission of materials that have a group.
+    /// Returns `true` if the object `a` of the scene `compiled` and the object `b` of `scene` are
+    /// equal except for their names, the names of their materials, and the emission of materials
+    /// that have a light group of their own.
     fn same_object(&self, (compiled, a): (&Scene, &Object), (scene, b): (&Scene, &Object)) -> bool {
         let Object { name: _, material: _, shape, transform } = b;
         let names = a.materials().into_iter().zip(b.materials());
@@ -82,8 +85,9 @@ impl LightGroups {
             && names.into_iter().all(|(a, b)| self.same_material((compiled, a), (scene, b)))
     }
 
-    /// Returns `true` if two materials are equal except for their emission. The emission may differ
-    /// only if the material has a light group, which scales it.
+    /// Returns `true` if the material `name_a` of the scene `compiled` and the material `name_b` of
+    /// `scene` are equal except for their emission. If the first one is in a light group, their
+    /// names must be equal, too. Otherwise the second one must not emit.
     fn same_material(
         &self,
         (compiled, name_a): (&Scene, &str),
@@ -107,13 +111,13 @@ fn without_emission(material: &Material) -> Material {
     Material { emission: 0.0, emission_color: Color::WHITE, ..material.clone() }
 }
 
-/// Returns a copy of the settings without a cap on rays per pixel.
+/// Returns a copy of the film settings without a limit on the samples per pixel of glossy tiles.
 fn uncapped(film: &FilmSettings) -> FilmSettings {
     FilmSettings { rays_per_pixel: 0, ..film.clone() }
 }
 
-/// Returns a nameless copy of the light, white and with intensity 1. The samples of a light in a
-/// group of its own contain this emission.
+/// Returns a copy of the light without its name, switched on, white, and of intensity 1. The
+/// samples of a light in a group of its own are computed with this emission.
 fn with_unit_emission(light: &Light) -> Light {
     Light { name: String::new(), color: Color::WHITE, intensity: 1.0, on: true, ..light.clone() }
 }
@@ -128,7 +132,7 @@ fn unnamed(shape: &Shape) -> Cow<'_, Shape> {
     Cow::Owned(shape)
 }
 
-/// Returns the material `name` of a scene.
+/// Returns the material `name` of a scene; the default material if the scene does not define it.
 fn material<'a>(scene: &'a Scene, name: &str) -> Cow<'a, Material> {
     match scene.materials.get(name) {
         Some(material) => Cow::Borrowed(material),

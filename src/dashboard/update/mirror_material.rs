@@ -1,4 +1,5 @@
-//! Commands on the mirror: the reflecting material of the selection, otherwise of the scene.
+//! Dashboard commands that change the roughness, reflection or lobe of a material. This is the
+//! material of the selection, otherwise a reflecting material of the scene, called the mirror.
 
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::edit::{self, Edit, EditError, Target};
@@ -20,7 +21,9 @@ impl UpdateContext<'_> {
         self.commit_mirror(edit, Coalesce::Single);
     }
 
-    /// Commits an edit of a mirror and reports the new values of its material.
+    /// Makes the result of an edit of the mirror (the reflecting material) the current scene, and
+    /// reports the material's new values in a notice. `coalesce` decides if the edit joins the
+    /// previous undo step.
     fn commit_mirror(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         self.commit(edit, coalesce);

@@ -1,19 +1,22 @@
-//! Reported against true errors over random sparse and dense scenes, and rays of adaptive pictures against those of
-//! uniform ones with the same true error.
+//! Survey over random sparse and dense scenes: reported against true errors, and rays of adaptive
+//! pictures against those of uniform pictures with the same true error.
 //!
-//! The short form runs with all tests. The long form prints a table of 200 scenes:
-//! `cargo test --test engine honesty::survey -- --ignored --nocapture`.
+//! The short form runs with all tests. The long form prints a table of 200 scenes: `cargo test
+//! --test engine error_estimates::survey -- --ignored --nocapture`.
 
-use crate::honesty::scenes::{Sample, scene};
+use crate::error_estimates::rays::{Point, ray_ratio};
+use crate::error_estimates::scenes::{Sample, scene};
 use crate::support::{begin, picture, pool, rendered, settings, trace};
 use zerkalo::film::{Display, Replicates};
 use zerkalo::render::RenderState;
 use zerkalo::render::schedule::{Schedule, Step, Stop, StoppedBy};
 use zerkalo::world::Precision;
 
-/// Samples per pixel at which the survey ends a picture that has not reached its target.
-const LIMIT_SPP: u32 = 1024;
-/// Effective pixels of a scene's pictures after which their error over the estimate is known to 1 / sqrt(1600) or 2.5 %.
+/// Number of samples per pixel at which the survey ends a picture that has not reached its noise
+/// target.
+pub const LIMIT_SPP: u32 = 1024;
+/// Number of effective pixels (pixels that carry the noise) of a scene's pictures that suffices.
+/// The ratio of true to estimated error is then known to 1 / sqrt(1600), that is 2.5 %.
 const ENOUGH: f64 = 1600.0;
 
 fn codes(radiance: &[[f64; 3]]) -> Vec<f64> {
@@ -21,15 +24,17 @@ fn codes(radiance: &[[f64; 3]]) -> Vec<f64> {
     radiance.iter().flat_map(|rgb| display.codes(*rgb)).collect()
 }
 
-/// The closed form of a picture, or a uniform picture of another seed with its own estimated error.
-struct Reference {
+/// Reference for the true error of a picture: its closed form, or a uniform picture of another seed
+/// with its own estimated error.
+pub struct Reference {
     codes: Vec<f64>,
-    own: f64,
+    pub own: f64,
 }
 
 impl Reference {
-    /// `count` is the number of samples of each replicate of a picture without a closed form.
-    fn new(sample: &Sample, count: u32) -> Self {
+    /// Creates the reference of a scene. `count` is the number of samples of each replicate (half
+    /// of the samples) if the scene has no closed form.
+    pub fn new(sample: &Sample, count: u32) -> Self {
         if let Some(balls) = &sample.balls {
             let radiance = balls.pixels(sample.scene.film.size.map(|n| n as usize));
             let gray: Vec<[f64; 3]> = radiance.into_iter().map(|value| [value; 3]).collect();
@@ -40,16 +45,18 @@ impl Reference {
         Self { codes: codes(&picture(&rendering, Replicates::Both)), own }
     }
 
-    /// True mean squared error of a picture in 8-bit levels, without the error of the reference; below 0 by chance.
-    fn square(&self, rendering: &RenderState) -> f64 {
+    /// Returns the true mean squared error of a picture in squared 8-bit levels, without the error
+    /// of the reference. By chance it may be below 0.
+    pub fn square(&self, rendering: &RenderState) -> f64 {
         let got = codes(&picture(rendering, Replicates::Both));
         let sum: f64 = got.iter().zip(&self.codes).map(|(g, r)| (g - r).powi(2)).sum();
         sum / got.len() as f64 - self.own * self.own
     }
 }
 
-/// Follows a schedule. `each` receives the state after every decision and returns `true` to end.
-fn run(
+/// Renders a scene by a schedule. `each` receives the state after every allocation round, and
+/// returns `true` to end the render.
+pub fn run(
     sample: &Sample,
     seed: u64,
     adaptive: bool,
@@ -73,60 +80,31 @@ fn run(
     }
 }
 
-/// One scene of the survey.
+/// Result of the survey for one scene.
 struct Outcome {
     name: String,
-    /// True over reported RMSE of the adaptive pictures of all seeds.
+    /// True RMSE of the adaptive pictures of all seeds, divided by the reported one.
     ratio: f64,
-    /// Effective pixels of their errors.
+    /// Number of effective pixels (pixels that carry the noise) of the adaptive pictures.
     pixels: f64,
-    /// Rays over those of uniform pictures with the same true error.
+    /// Number of rays of the adaptive pictures, divided by that of uniform pictures with the same
+    /// true error.
     rays: f64,
 }
 
-/// Number of rays at which uniform pictures of `seeds` have the mean squared error `target`, interpolated between their
-/// waves; that of the last wave if they do not reach `target`.
-fn uniform_rays(sample: &Sample, seeds: &[u64], reference: &Reference, target: f64) -> f64 {
-    // The counts of a picture that is far from its target double: all seeds have the same waves.
-    let stop = Stop { spp: Some(2 * LIMIT_SPP), noise_codes: Some(1e-9), ..Stop::default() };
-    let curves: Vec<Vec<(f64, f64)>> = seeds
-        .iter()
-        .map(|seed| {
-            let mut curve = Vec::new();
-            run(sample, *seed, false, stop, |rendering, schedule| {
-                let square = reference.square(rendering);
-                curve.push((schedule.rays() as f64, square));
-                square <= 0.25 * target
-            });
-            curve
-        })
-        .collect();
-    let mean = |wave: usize| {
-        let points = curves.iter().map(|curve| curve[wave.min(curve.len() - 1)]);
-        let (rays, squares) =
-            points.fold((0.0, 0.0), |(r, s), (rays, square)| (r + rays, s + square));
-        (rays / seeds.len() as f64, squares / seeds.len() as f64)
-    };
-    let waves = curves.iter().map(Vec::len).max().expect("a seed");
-    let mut before = mean(0);
-    for wave in 1..waves {
-        let (rays, square) = mean(wave);
-        if square <= target && before.1 > square {
-            let share = (before.1 / target).ln() / (before.1 / square.max(1e-18)).ln();
-            return before.0 * (rays / before.0).powf(share.max(0.0));
-        }
-        before = (rays, square);
-    }
-    before.0
+/// Returns the noise target of scene `number`, in 8-bit levels.
+pub fn target_of(number: u64) -> f64 {
+    [1.0, 0.5, 0.25][(number / 10 % 3) as usize]
 }
 
-/// Compares reported and true error of adaptive pictures of a scene. Where k pixels carry the noise, the error of one
-/// picture scatters by 1 / sqrt(2 k) of its value, and so does any estimate of it. Seeds are added, at most `seeds`,
-/// until their pictures together have `ENOUGH` such pixels. The first eight seeds are compared with uniform pictures.
+/// Compares the reported and the true error of adaptive pictures of a scene. If k pixels carry the
+/// noise, the error of one picture scatters by 1 / sqrt(2 k) of its value, and so does any estimate
+/// of it. Seeds are therefore added until their pictures together have [`ENOUGH`] such pixels, but
+/// at most `seeds`. The first eight seeds are compared with uniform pictures.
 fn examine(number: u64, reference_count: u32, seeds: u64) -> Outcome {
     let sample = scene(number);
     let reference = Reference::new(&sample, reference_count);
-    let target = [1.0, 0.5, 0.25][(number / 10 % 3) as usize];
+    let target = target_of(number);
     let stop = Stop { noise_codes: Some(target), spp: Some(LIMIT_SPP), ..Stop::default() };
     let (mut truths, mut reports, mut rays, mut pixels) = (Vec::new(), Vec::new(), Vec::new(), 0.0);
     let mut used = Vec::new();
@@ -142,8 +120,12 @@ fn examine(number: u64, reference_count: u32, seeds: u64) -> Outcome {
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let first = used.len().min(8);
-    let uniform = uniform_rays(&sample, &used[..first], &reference, mean(&truths[..first]));
-    let rays = mean(&rays[..first]) / uniform;
+    let points: Vec<Point> = rays
+        .iter()
+        .zip(&truths)
+        .map(|(rays, square)| Point { rays: *rays, square: *square })
+        .collect();
+    let rays = ray_ratio(&sample, &used[..first], &reference, &points[..first]).ratio;
     let [truth, reported] = [&truths, &reports].map(|squares| mean(squares).max(0.0).sqrt());
     let ratio = truth / reported;
     println!(
@@ -156,8 +138,9 @@ fn examine(number: u64, reference_count: u32, seeds: u64) -> Outcome {
     Outcome { name: sample.name, ratio, pixels, rays }
 }
 
-/// Checks that the true error agrees with the reported one within their uncertainty (both are means of k squares, uncertain
-/// by 1 / sqrt(2 k)), and that adaptivity costs at most 1.5 times the rays of uniform sampling.
+/// Checks that the true error agrees with the reported one within their uncertainty. Both are means
+/// of k squares, uncertain by 1 / sqrt(2 k). Also checks that adaptive sampling takes at most 1.5
+/// times the rays of uniform sampling.
 fn assert_honest(outcomes: &[Outcome]) {
     let mut scores = Vec::new();
     for Outcome { name, ratio, pixels, rays, .. } in outcomes.iter().filter(|o| o.pixels >= 16.0) {
@@ -174,7 +157,7 @@ fn assert_honest(outcomes: &[Outcome]) {
     assert!(mean.abs() < 1.0, "the mean of {count} scores is {mean}");
 }
 
-/// One scene of every kind.
+/// Checks one scene of every kind.
 #[test]
 fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     let cheap = (0..40).filter(|number| number % 10 <= 5 || *number == 8 || *number == 9);
@@ -182,16 +165,18 @@ fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     assert_honest(&outcomes);
 }
 
-/// Repeated decisions do not give the fewest samples to tiles whose validation estimate is low by chance: stars whose
-/// error was 1.55 times the reported one.
+/// Checks pictures of stars, whose true error once was 1.55 times the reported one. Repeated
+/// allocation rounds must not give the fewest samples to tiles whose validation estimate is low by
+/// chance.
 #[test]
 fn reported_error_of_stars_is_not_selected() {
     let Outcome { ratio, .. } = examine(62, 0, 24);
     assert!((0.9..1.3).contains(&ratio), "true/reported {ratio}");
 }
 
-/// Uniform pictures report the error of all pixels, not the larger one of two estimates: single balls whose error was 0.77
-/// to 0.8 of the reported one. The ratio of each is uncertain by 6 %.
+/// Checks uniform pictures of single balls, whose true error once was 0.77 to 0.8 of the reported
+/// one. The reported error must be that of all pixels, not the larger one of two estimates. The
+/// ratio of each ball is uncertain by 6 %.
 #[test]
 fn reported_error_of_few_pixels_is_that_of_all() {
     let ratios = [60, 130, 180].map(|number| examine(number, 0, 96).ratio);
@@ -199,9 +184,9 @@ fn reported_error_of_few_pixels_is_that_of_all() {
     assert!((0.88..1.12).contains(&mean), "true/reported {ratios:?}");
 }
 
-/// 200 scenes, or `ZERKALO_SCENES` from `ZERKALO_FIRST` on.
+/// Prints the survey of 200 scenes, or of `ZERKALO_SCENES` scenes from number `ZERKALO_FIRST` on.
 #[test]
-#[ignore = "hours: cargo test --test engine honesty::survey_of_200 -- --ignored --nocapture"]
+#[ignore = "hours: cargo test --test engine error_estimates::survey_of_200 -- --ignored --nocapture"]
 fn survey_of_200_scenes() {
     let variable =
         |name: &str, default| std::env::var(name).map_or(default, |v| v.parse().unwrap());
@@ -218,7 +203,8 @@ fn survey_of_200_scenes() {
     assert!(100 * inside >= 95 * outcomes.len() && extreme <= 1.3 && highest <= 1.5);
 }
 
-/// White ball of about a pixel on a dark background: its tile is noisy in validation pixels only.
+/// Checks that the picture of a white ball as large as a pixel ends with few samples. Its tile is
+/// noisy only in pixels of the validation estimate.
 #[test]
 fn single_ball_ends_with_few_samples() {
     let text = "
@@ -245,8 +231,8 @@ fn single_ball_ends_with_few_samples() {
     }
 }
 
-/// The mean of a closed glossy room is the same with and without adaptivity: skewed noise in the allocation estimates
-/// biases no tile by more than its own noise.
+/// Checks that the mean of a closed glossy room is the same with and without adaptive sampling.
+/// Skewed noise in the allocation estimates must bias no tile by more than the tile's own noise.
 #[test]
 fn adaptive_mean_of_a_closed_room_is_unbiased() {
     let mut sample = scene(7);

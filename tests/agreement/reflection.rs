@@ -1,4 +1,5 @@
-//! Surface reflection of the reference tracer, formula by formula.
+//! Surface reflection of the reference tracer, an independent slow implementation, formula by
+//! formula. The program's reflection is compared with its results.
 
 use crate::agreement::tracer::Mutation;
 use crate::common::Numbers;
@@ -7,10 +8,11 @@ use std::f64::consts::{PI, TAU};
 use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Material};
 use zerkalo::scene::BelowHorizon;
 
-/// Slope below which surfaces are mirrors; smallest slope of highlights.
+/// Slope of microfacets below which surfaces are treated as mirrors. Highlights have at least this
+/// slope.
 const SMOOTHEST: f64 = 1e-3;
 
-/// Fresnel reflectance at cosine `c` between light and microfacet normal.
+/// Returns the Fresnel reflectance at cosine `c` between light and microfacet normal.
 pub fn fresnel(material: &Material, c: f64) -> DVec3 {
     let channel = |f0: f64| match material.fresnel_mode() {
         Fresnel::Constant => f0,
@@ -32,7 +34,8 @@ pub fn fresnel(material: &Material, c: f64) -> DVec3 {
     DVec3::from(material.f0().0.map(channel))
 }
 
-/// Density of microfacet normals at cosine `c` from the surface normal.
+/// Returns the density of microfacet normals at cosine `c` from the surface normal: GGX if `ggx` is
+/// `true`, otherwise Beckmann.
 fn facet_density(ggx: bool, alpha: f64, c: f64) -> f64 {
     let tan2 = (1.0 - c * c).max(0.0) / (c * c);
     let shape =
@@ -40,7 +43,7 @@ fn facet_density(ggx: bool, alpha: f64, c: f64) -> f64 {
     shape / (PI * alpha * alpha * c.powi(4))
 }
 
-/// Error function, by its series or continued fraction.
+/// Returns the error function of `x`, by its series or its continued fraction.
 fn erf(x: f64) -> f64 {
     if x > 3.0 {
         let tail = (1..60).rev().fold(0.0, |below, k| f64::from(k) / 2.0 / (x + below));
@@ -66,8 +69,8 @@ fn lambda(ggx: bool, alpha: f64, c: f64) -> f64 {
     0.5 * (erf(a) - 1.0) + (-a * a).exp() / (2.0 * a * PI.sqrt())
 }
 
-/// Fraction of the facets with normal `h` that are visible from `v`; both are on the same side of
-/// the surface.
+/// Returns the fraction of the microfacets with normal `h` that are visible from `v`. `h` and `v`
+/// are on the same side of the surface.
 fn visible(material: &Material, n: DVec3, h: DVec3, v: DVec3) -> f64 {
     let (ggx, alpha) = (material.lobe == Lobe::Ggx, material.microfacet_alpha());
     match material.masking {
@@ -85,7 +88,8 @@ fn masking(material: &Material, ggx: bool, alpha: f64, n: DVec3, v: DVec3, l: DV
     }
 }
 
-/// Smallest roughness from which the light of a lamp in a lobe is found at points of the lamp.
+/// Smallest roughness at which the light of a lamp that a lobe reflects is found by sampling points
+/// of the lamp.
 const WIDE: f64 = 0.12;
 
 /// Returns the value of the reflection lobe, with the cosine of the light. Returns `None` for lobes
@@ -121,7 +125,8 @@ pub fn wide_lobe(
     }
 }
 
-/// Highlight: radiance towards `v` per irradiance of a surface that faces the light.
+/// Returns the highlight of a light in direction `l`: radiance towards `v` per irradiance of a
+/// surface that faces the light.
 pub fn highlight(material: &Material, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
     let k = material.specular;
     if k == 0.0 {
@@ -147,8 +152,8 @@ pub fn highlight(material: &Material, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
     }
 }
 
-/// Frame around `w` of Duff et al. 2017, *Building an Orthonormal Basis, Revisited*. Its tangents
-/// are the sides of the square lobe.
+/// Returns the two tangents of an orthonormal frame around `w` (Duff et al. 2017, *Building an
+/// Orthonormal Basis, Revisited*). They are the sides of the square lobe.
 fn around(w: DVec3) -> (DVec3, DVec3) {
     let sign = 1f64.copysign(w.z);
     let a = -1.0 / (sign + w.z);
@@ -157,12 +162,13 @@ fn around(w: DVec3) -> (DVec3, DVec3) {
     (u, DVec3::new(b, sign + w.y * w.y * a, -w.y))
 }
 
-/// Assumed density of a lobe over its true density.
+/// Returns the assumed density of a lobe divided by its true density: 1 without a deliberate error.
 fn density_factor(mutation: Mutation) -> f64 {
     if mutation == Mutation::LobeDensity { 1.05 } else { 1.0 }
 }
 
-/// Samples a reflected ray. Returns its direction and throughput; `None` if it is absorbed.
+/// Samples a reflected ray. Returns its direction and throughput. Returns `None` if the ray is
+/// absorbed.
 pub fn reflect(
     material: &Material,
     n: DVec3,
@@ -197,7 +203,7 @@ pub fn has_facets(material: &Material) -> bool {
     matches!(material.lobe, Lobe::Beckmann | Lobe::Ggx)
 }
 
-/// Returns `true` if reflected and transmitted rays have one direction.
+/// Returns `true` if the material reflects and transmits each ray in a single direction.
 pub fn is_sharp(material: &Material) -> bool {
     match material.lobe {
         Lobe::Mirror => true,
@@ -206,7 +212,7 @@ pub fn is_sharp(material: &Material) -> bool {
     }
 }
 
-/// Samples a direction in the cone or square about `axis`.
+/// Samples a direction in the cone or the square lobe about `axis`.
 pub fn spread(material: &Material, axis: DVec3, radius: f64, numbers: &mut Numbers) -> DVec3 {
     let (a, b) = around(axis);
     let local = if material.lobe == Lobe::Cone {
@@ -222,7 +228,8 @@ pub fn spread(material: &Material, axis: DVec3, radius: f64, numbers: &mut Numbe
     a * local.x + b * local.y + axis * local.z
 }
 
-/// Samples a microfacet normal with density D cos.
+/// Samples a microfacet normal with a density of D cos: D is the distribution of microfacet
+/// normals.
 pub fn facet_normal(material: &Material, alpha: f64, n: DVec3, numbers: &mut Numbers) -> DVec3 {
     let u = numbers.unit();
     let ggx = material.lobe == Lobe::Ggx;
@@ -234,7 +241,7 @@ pub fn facet_normal(material: &Material, alpha: f64, n: DVec3, numbers: &mut Num
     a * (sin * c) + b * (sin * s) + n * cos
 }
 
-/// Indices of refraction before and behind a surface.
+/// Indices of refraction in front of and behind a surface.
 pub type Indices = (f64, f64);
 
 /// Samples light that is refracted at a microfacet, without Fresnel's factor. Returns its direction,
@@ -280,7 +287,8 @@ pub fn refracted_at_facet(
     Some((l, f_cos / density, h))
 }
 
-/// Samples a microfacet normal with density D cos and reflects at it.
+/// Samples a microfacet normal with a density of D cos (D is the distribution of normals), and
+/// reflects the ray at it.
 fn microfacet(
     material: &Material,
     n: DVec3,

@@ -1,20 +1,20 @@
-//! Drawing of the probe: a mark on the picture, and a box with the values of the probed pixel.
+//! Drawing of the pixel probe: a mark on the picture, and a box with the values of the probed pixel.
 
-use crate::dashboard::layout::Layout;
+use crate::dashboard::layout::{BORDER, Layout};
 use crate::dashboard::model::Model;
 use crate::dashboard::view::frame::overlay;
 use crate::dashboard::view::text::{Row, columns, number};
 use crate::dashboard::view::theme::Theme;
 use crate::film::quantised_8;
 use crate::scene::edit::Target;
-use crate::terminal::Area;
 use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
 
-/// Width in columns of the box with its border.
+/// Width in columns of the box with the values of the probed pixel, with its border.
 const WIDTH: u16 = 36;
 
-/// Draws the mark and the box with values. Draws nothing if no pixel is probed.
+/// Draws the pixel probe: a mark and a box with values. Draws nothing if no pixel is probed.
 pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some([x, y]) = model.probe else { return };
     let film = model.scene().film.size;
@@ -43,9 +43,9 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     let top = area.y + 1;
     let bottom = area.y + area.height - height - 1;
     let y_box = if row < area.y + area.height / 2 { bottom } else { top };
-    let frame = Area { x: x_box, y: y_box, width: WIDTH, height };
+    let frame = Rect { x: x_box, y: y_box, width: WIDTH, height };
     overlay(frame, &format!("pixel {x}, {y}"), theme, buffer);
-    let inner = frame.inner();
+    let inner = frame.inner(BORDER);
     for (i, (name, value)) in (0..).zip(&lines) {
         let mut row = Row::new(buffer, inner, i);
         row.skip(1).put_wide(name, 10, theme.dim());
@@ -59,7 +59,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     }
 }
 
-/// Returns the labels and values in the box.
+/// Returns the lines of the pixel probe's box, each as a label and a formatted value.
 fn readout(model: &Model) -> Vec<(&'static str, String)> {
     let Some(probe) = model.probed() else {
         return vec![("samples", "none yet".to_string())];
@@ -84,7 +84,7 @@ fn readout(model: &Model) -> Vec<(&'static str, String)> {
 }
 
 /// Returns the label of the object that is visible at a film pixel (column, row). Returns `None` if
-/// there is none, or if the snapshot has no object ids.
+/// there is none, or if the renderer has not reported the objects.
 fn seen(model: &Model, [x, y]: [usize; 2]) -> Option<String> {
     let hits = model.snapshot.as_ref()?.first_hits.as_deref()?;
     let [width, height] = model.scene().film.size.map(|n| n.max(1) as usize);

@@ -1,15 +1,16 @@
-//! A dashboard without terminal, renderer or disk: keys are given by name, and effects are answered
-//! at once by a simulated environment.
+//! Simulated environment of a dashboard for story tests, without terminal, renderer or disk. Keys
+//! are given by name, and effects are answered at once.
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+use zerkalo::dashboard::editor::Editor;
 use zerkalo::dashboard::message::{Effect, Exported, Message};
-use zerkalo::dashboard::model::{Colors, Model, Start};
+use zerkalo::dashboard::model::Model;
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::dashboard::update::commands::{COMMANDS, lookup};
-use zerkalo::dashboard::update::{begin, update};
+use zerkalo::dashboard::update::update;
 use zerkalo::film::{Film, Header, LightWeights, LinearImage};
 use zerkalo::render::schedule::Stop;
 use zerkalo::scene::edit::Target;
@@ -19,7 +20,7 @@ use zerkalo::terminal::event::{Button, Code, Key, Mouse, MouseKind};
 /// Path of the scene file.
 pub const FILE: &str = "room.toml";
 
-/// A room with a light, a mirror and three objects.
+/// Text of the scene of a room with a light, a mirror and three objects.
 pub const ROOM: &str = r#"# A room.
 [film]
 size = [64, 48]
@@ -60,19 +61,19 @@ material = "mirror"
 shape.rectangle = { center = [0.0, 1.0, -2.0], size = [3.0, 2.0], normal = [0.0, 0.0, 1.0] }
 "#;
 
-/// The dashboard and its simulated environment.
+/// Dashboard with its simulated environment.
 pub struct Desk {
     pub model: Model,
     pub now: Duration,
-    /// Effects since the last clearing.
+    /// Effects that the dashboard has requested since the list was last cleared.
     pub effects: Vec<Effect>,
-    /// Files and their texts.
+    /// Simulated files: path and text of each.
     pub disk: BTreeMap<PathBuf, String>,
-    /// Labels of the commands that keys or the palette have run.
+    /// Labels of the commands that were run by keys or from the command palette.
     pub fired: HashSet<&'static str>,
     pub document: Document,
     begun_with: Document,
-    /// Loads are answered; a load restarts the undo history.
+    /// `true` if requests to load the file are answered. A load restarts the undo history.
     pub reads: bool,
 }
 
@@ -81,20 +82,13 @@ fn parse(text: &str) -> Document {
 }
 
 impl Desk {
-    /// Opens a file with this text.
+    /// Opens the dashboard on a scene file with the text `text`.
     pub fn new(text: &str) -> Self {
         let document = parse(text);
         let scene = Arc::new(document.scene().clone());
-        let model = Model::new(Start {
-            path: Some(FILE.into()),
-            name: FILE.into(),
-            scene: Ok(scene),
-            screen: [120, 36],
-            colors: Colors::True,
-            stop: Stop { noise_codes: Some(0.5), ..Stop::default() },
-            threads: 2,
-            max_threads: 4,
-        });
+        let stop = Stop { noise_codes: Some(0.5), ..Stop::default() };
+        let mut model = Model::new(Some(FILE.into()), FILE, Ok(scene), stop, 2);
+        model.max_threads = 4;
         let disk = [(PathBuf::from(FILE), text.to_string())].into();
         let (effects, fired) = (Vec::new(), HashSet::new());
         let begun_with = document.clone();
@@ -108,18 +102,18 @@ impl Desk {
             begun_with,
             reads: true,
         };
-        desk.effects = begin(&mut desk.model);
+        desk.effects = update(&mut desk.model, Message::Resize([120, 36]), Duration::ZERO);
         desk
     }
 
-    /// Returns the text that a save would write.
+    /// Returns the text that a save would write to the scene file.
     pub fn text(&self) -> String {
         let mut document = self.document.clone();
         document.apply(self.model.history.scene());
         document.text().to_string()
     }
 
-    /// Returns the document as opened.
+    /// Returns the document of the scene file as it was opened.
     pub fn original(&self) -> Document {
         self.begun_with.clone()
     }
@@ -133,7 +127,7 @@ impl Desk {
         self.model.selection = subject;
     }
 
-    /// Sends a message and answers its effects.
+    /// Sends a message to the dashboard and answers the effects that it requests.
     pub fn send(&mut self, message: Message) {
         let effects = update(&mut self.model, message, self.now);
         for effect in effects {
@@ -196,9 +190,9 @@ impl Desk {
         self.send(Message::Key(key));
     }
 
-    /// Labels of the commands that a key would run in the current state.
+    /// Returns the labels of the commands that `key` would run in the current state.
     fn would_fire(&self, key: Key) -> Vec<&'static str> {
-        if self.model.editor().is_some_and(|editor| editor.clone().key(key)) {
+        if self.editor().is_some_and(|editor| editor.clone().key(key)) {
             return Vec::new();
         }
         let types = matches!(key, Key { code: Code::Char(_), ctrl: false, alt: false, .. });
@@ -207,13 +201,16 @@ impl Desk {
         }
         let command = lookup(self.model.context(), key);
         let mut fired: Vec<_> = command.map(|command| command.label).into_iter().collect();
-        if let (Some(Overlay::Palette(palette)), Code::Enter) = (&self.model.overlay, key.code) {
+        if let (Some(Overlay::CommandPalette(palette)), Code::Enter) =
+            (&self.model.overlay, key.code)
+        {
             fired.extend(palette.found.get(palette.cursor).map(|i| COMMANDS[*i].label));
         }
         fired
     }
 
-    /// Presses keys by name; text between backquotes is typed.
+    /// Presses the keys with the given names. Text between backquotes is typed character by
+    /// character.
     pub fn keys(&mut self, keys: &str) -> &mut Self {
         for (i, part) in keys.split('`').enumerate() {
             if i % 2 == 1 {
@@ -228,11 +225,13 @@ impl Desk {
         self
     }
 
-    /// Finds a command by its label in the palette and runs it.
+    /// Finds a command by its label in the command palette and runs it.
     pub fn palette(&mut self, label: &str) -> &mut Self {
         self.keys(": ").keys(&format!("`{label}`"));
         let index = COMMANDS.iter().position(|row| row.label == label);
-        let Some(Overlay::Palette(palette)) = &self.model.overlay else { panic!("no palette") };
+        let Some(Overlay::CommandPalette(palette)) = &self.model.overlay else {
+            panic!("no palette")
+        };
         let downs = palette.found.iter().position(|found| Some(*found) == index);
         let downs = downs.unwrap_or_else(|| panic!("{label} is not found by its own name"));
         assert!(downs < 10, "{label} is {downs} lines down");
@@ -253,7 +252,7 @@ impl Desk {
         self.mouse(MouseKind::Release(Button::Left), column, row)
     }
 
-    /// Presses, moves in steps of one cell, releases.
+    /// Drags the mouse from the cell `from` by `by` cells, in steps of one cell.
     pub fn drag(&mut self, button: Button, from: [u16; 2], by: [i16; 2]) -> &mut Self {
         self.mouse(MouseKind::Press(button), from[0], from[1]);
         let steps = by[0].abs().max(by[1].abs()).max(1);
@@ -269,7 +268,7 @@ impl Desk {
         self.mouse(MouseKind::Release(button), column, row)
     }
 
-    /// Undoes every edit.
+    /// Undoes all edits.
     pub fn undo_all(&mut self) {
         while self.model.history.undo().is_some() {}
     }
@@ -278,12 +277,22 @@ impl Desk {
         self.effects.iter().any(what)
     }
 
-    /// Text of the notice, or an empty string.
+    /// Returns the text of the notice on the screen, or an empty string.
     pub fn notice(&self) -> &str {
         self.model.notice.as_ref().map_or("", |notice| &notice.text)
     }
 
+    /// Text editor that receives the keys.
+    pub fn editor(&self) -> Option<&Editor> {
+        match &self.model.overlay {
+            Some(Overlay::CommandPalette(palette)) => Some(&palette.editor),
+            Some(Overlay::Prompt(prompt)) => Some(&prompt.editor),
+            None | Some(Overlay::Form(_)) => self.model.field_list().editor.as_ref(),
+            Some(_) => None,
+        }
+    }
+
     pub fn problem(&self) -> Option<&str> {
-        self.model.editor()?.problem.as_deref()
+        self.editor()?.problem.as_deref()
     }
 }

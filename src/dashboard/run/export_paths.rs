@@ -1,22 +1,26 @@
-//! Unused file names for exports, and paths for scp.
+//! File paths: unused names for exported files, and arguments of scp that copy them.
 
 use std::env;
+use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Largest counter in the name of an export. It limits the time of the search for a free name.
+/// Largest counter in the name of an exported file, such as 7 in `room-7.png`. It limits the time
+/// of the search for a free name.
 const MOST: u32 = 100_000;
 
-/// Writes to the first free path of `STEM-1.EXTENSION`, `STEM-2.EXTENSION` and so on in `folder`.
-/// `write` must create the file atomically and fail if the path exists, so that a name never refers
-/// to an incomplete file. Returns the path or the error of `write`. Returns `None` if no name is
-/// free.
-pub fn numbered<E>(
+/// Creates a file in `folder` by calling `write` with the first free path: `STEM-1.EXTENSION`,
+/// `STEM-2.EXTENSION` and so on. Returns this path. `write` must create the file atomically and
+/// fail if the path exists, so that a name never refers to an incomplete file.
+///
+/// # Errors
+/// Fails with the error of `write`, or with a message if no name is free.
+pub fn numbered<E: Display>(
     folder: &Path,
     stem: &str,
     extension: &str,
     write: impl Fn(&Path) -> Result<(), E>,
-) -> Option<Result<PathBuf, E>> {
+) -> Result<PathBuf, String> {
     // A dangling symbolic link counts as taken.
     let is_taken = |path: &Path| path.symlink_metadata().is_ok();
     for number in 1..=MOST {
@@ -25,13 +29,13 @@ pub fn numbered<E>(
             continue;
         }
         match write(&path) {
-            Ok(()) => return Some(Ok(path)),
+            Ok(()) => return Ok(path),
             // Another program has created a file of this name since the check.
             Err(_) if is_taken(&path) => {}
-            Err(error) => return Some(Err(error)),
+            Err(error) => return Err(error.to_string()),
         }
     }
-    None
+    Err(format!("all names for files of {stem} are in use"))
 }
 
 /// Returns `path` as an absolute path.
@@ -41,16 +45,17 @@ pub fn full(path: &Path) -> String {
 }
 
 /// Returns the argument of scp that copies `path` from this machine: `user@host:/absolute/path`. If
-/// the port is not 22, `-P PORT ` precedes the path. Path and port are quoted for a shell where
-/// necessary.
+/// the port of the SSH connection is not 22, the argument is preceded by `-P PORT `. Path and port
+/// are quoted for a shell where necessary.
 pub fn scp(path: &Path) -> String {
     let variable = |name| env::var(name).unwrap_or_default();
     let user = Some(variable("USER")).filter(|u| !u.is_empty()).unwrap_or(variable("LOGNAME"));
     scp_from(&variable("SSH_CONNECTION"), &user, &host_name(), &full(path))
 }
 
-/// Computes [`scp`] from values of the environment. `connection` is the variable `SSH_CONNECTION`
-/// of sshd, "client port server port", or empty.
+/// Returns the result of [`scp`] for values of the environment. `connection` is the variable
+/// `SSH_CONNECTION` of sshd: addresses and ports in the order `CLIENT PORT SERVER PORT`. It is
+/// empty without SSH.
 fn scp_from(connection: &str, user: &str, host_name: &str, path: &str) -> String {
     let fields: Vec<_> = connection.split_whitespace().collect();
     let (host, port) = match fields[..] {
@@ -91,12 +96,12 @@ mod tests {
         fs::write(folder.path().join("room-2.png"), "old").unwrap();
         let write = |path: &Path| fs::File::create_new(path).map(drop);
         let names: Vec<_> = (0..3)
-            .map(|_| numbered(folder.path(), "room", "png", write).unwrap().unwrap())
+            .map(|_| numbered(folder.path(), "room", "png", write).unwrap())
             .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
             .collect();
         assert_eq!(names, ["room-1.png", "room-3.png", "room-4.png"]);
         assert_eq!(fs::read(folder.path().join("room-2.png")).unwrap(), b"old");
-        assert!(numbered(&folder.path().join("nowhere"), "room", "png", write).unwrap().is_err());
+        assert!(numbered(&folder.path().join("nowhere"), "room", "png", write).is_err());
         // A name is skipped if another program creates a file of that name first.
         let late = |path: &Path| {
             let number = fs::read_dir(folder.path()).unwrap().count();
@@ -105,7 +110,7 @@ mod tests {
             }
             write(path)
         };
-        let path = numbered(folder.path(), "room", "png", late).unwrap().unwrap();
+        let path = numbered(folder.path(), "room", "png", late).unwrap();
         assert!(path.ends_with("room-7.png"), "{path:?}");
     }
 

@@ -1,4 +1,4 @@
-//! Transparent objects against closed forms: slabs, furnaces, cameras inside.
+//! Transparent objects against closed forms: slabs, white furnaces, cameras inside of glass.
 
 use crate::common::report::report;
 use crate::lobes::setup::*;
@@ -81,7 +81,7 @@ fn extreme_27_slab_displacement() {
     report(27, "single", &format!("{single:.0e} t off at most"));
 }
 
-/// A red wall behind a slab, a green one behind the camera.
+/// Returns the scene of a red wall behind a slab and a green wall behind the camera.
 fn between_walls(slab: &str) -> Scene {
     scene(&format!(
         "film = {{ size = [1, 1], filter = \"point\" }}
@@ -103,8 +103,8 @@ fn between_walls(slab: &str) -> Scene {
     ))
 }
 
-/// Closed form 11: with all orders a slab reflects 2 F / (1 + F) and transmits (1 - F) / (1 + F) at normal
-/// incidence; a thin pane has the same values.
+/// Checks a slab in which all orders of reflection are traced. At normal incidence it reflects 2 F
+/// / (1 + F) and transmits (1 - F) / (1 + F). A thin pane has the same values.
 #[test]
 fn closed_form_11_a_slab_with_all_orders() {
     for n in [1.0, 1.5, 4.0, 1e3] {
@@ -130,7 +130,8 @@ fn closed_form_11_a_slab_with_all_orders() {
     }
 }
 
-/// Radiance of a white background through an absorbing slab of the thickness 0.8, seen at an angle.
+/// Returns the radiance of a white background, seen at an angle through an absorbing slab of
+/// thickness 0.8.
 fn through_slab<L: SimdFloat>(degrees: f64, ior: f64, keys: &str) -> Vector {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let all = samples::<L>(
@@ -149,9 +150,9 @@ fn through_slab<L: SimdFloat>(degrees: f64, ior: f64, keys: &str) -> Vector {
     mean(&all)
 }
 
-/// Beer's law: a slab of the thickness t with the absorption coefficient s has the transmittance
-/// exp(-s t / cos), with the cosine of the refracted direction. The path through the slab is shorter by the
-/// ray's offset, 8 roundings of the slab's half width of 200.
+/// Checks Beer's law: a slab of thickness t with the absorption coefficient s has the transmittance
+/// exp(-s t / cos). cos is the cosine of the refracted direction. The path through the slab is
+/// shorter by the ray offset, 8 roundings of the slab's half width of 200.
 fn check_beer<L: SimdFloat>() {
     let (color, distance, thickness) = ([0.25f64, 0.9, 0.0], 0.5, 0.8);
     let keys = format!("attenuation_color = {color:?}\nattenuation_distance = {distance:?}");
@@ -186,9 +187,9 @@ fn closed_form_beers_law_through_a_slab() {
     check_beer::<Single>();
 }
 
-/// A glass slab with Fresnel's equations and the transmittance a reflects F + F (1 - F)^2 a^2 / (1 - F^2
-/// a^2) and transmits (1 - F)^2 a / (1 - F^2 a^2). The bound of 4.5 standard errors allows for twelve
-/// comparisons.
+/// Checks a glass slab with Fresnel's equations and the transmittance a. It reflects F + F (1 -
+/// F)^2 a^2 / (1 - F^2 a^2) and transmits (1 - F)^2 a / (1 - F^2 a^2). The bound of 4.5 standard
+/// errors allows for twelve comparisons.
 #[test]
 fn closed_form_an_absorbing_slab_with_all_orders() {
     for n in [1.5f64, 2.4, 4.0] {
@@ -218,7 +219,7 @@ fn closed_form_an_absorbing_slab_with_all_orders() {
     }
 }
 
-/// Scene with objects between camera and background; `inner` are keys of the material.
+/// Returns a scene with objects between camera and background. `inner` are keys of their material.
 fn ball_in_front(background: &str, depth: u32, inner: &str, objects: &str) -> Scene {
     scene(&format!(
         "film = {{ size = [24, 24] }}
@@ -239,7 +240,7 @@ const BALL: &str =
 const TILES: &str = "[[object]]\nmaterial = \"tile\"\n\
     shape.box = { center = [0.3, 0.2, -2.0], size = [1.0, 0.7, 0.5] }\n";
 
-/// A lossless ball is invisible in a white furnace, with any objects nested in it.
+/// Checks that a lossless ball is invisible in a white furnace, with any objects nested in it.
 #[test]
 fn glass_is_invisible_in_white_furnace() {
     let nested = "[[object]]\nmaterial = \"air\"\n\
@@ -261,8 +262,8 @@ fn glass_is_invisible_in_white_furnace() {
     }
 }
 
-/// The lobes `cone` and `square` lose nothing, so that rough glass is invisible, too; microfacets lose light
-/// but do not gain any.
+/// Checks rough glass in a white furnace. The lobes `cone` and `square` lose nothing, so that the
+/// glass is invisible. Microfacets lose light but do not gain any.
 #[test]
 fn rough_glass_in_white_furnace() {
     for lobe in [
@@ -289,7 +290,8 @@ fn rough_glass_in_white_furnace() {
     }
 }
 
-/// With a vanishing alpha the picture converges to that of clear glass, and below 0.001 it is the same.
+/// Checks that the picture of rough glass converges to that of clear glass as alpha vanishes. Below
+/// 0.001 it is the same.
 #[test]
 fn rough_glass_converges_to_clear_glass() {
     let mut scene = scene(
@@ -323,7 +325,7 @@ fn mean_by_pixel(samples: &[Vector], count: usize) -> Vec<Vector> {
     samples.chunks(count).map(mean).collect()
 }
 
-/// A material of index 1 neither refracts nor reflects.
+/// Checks that a material with the index of refraction 1 neither refracts nor reflects.
 #[test]
 fn index_1_is_invisible() {
     let inner = format!("{GLASS}ior = 1.0\n");
@@ -336,8 +338,8 @@ fn index_1_is_invisible() {
     assert!(without.iter().any(|s| s[0] > 0.4), "the box is not seen");
 }
 
-/// A camera inside glass sees the outside up to the critical angle, 41.8 degrees, and reflections beyond
-/// it, also with a near plane and from a bubble in the glass.
+/// Checks a camera inside of glass. It sees the outside up to the critical angle, 41.8 degrees, and
+/// reflections beyond it, also with a near plane and from a bubble in the glass.
 #[test]
 fn camera_inside_glass_starts_in_its_medium() {
     let look = |degrees: f64, near: f64, fresnel: &str, more: &str| {
@@ -374,8 +376,8 @@ fn camera_inside_glass_starts_in_its_medium() {
     assert_eq!(look(41.82, 0.0, "", bubble), 0.0);
 }
 
-/// C2: a material with fixed coefficients reflects on its outer side only, so that k_r = 1 gives no endless
-/// reflections between inner walls; its light leaves by k_t.
+/// Checks that a material with fixed coefficients reflects on its outer side only. Otherwise k_r =
+/// 1 would give endless reflections between inner walls; the light leaves by k_t.
 #[test]
 fn fixed_coefficients_reflect_outside_only() {
     let inner =
@@ -389,7 +391,7 @@ fn fixed_coefficients_reflect_outside_only() {
     assert!(on_ball > all.len() / 3);
 }
 
-/// Every sample of a packet equals the scalar sample.
+/// Checks that every sample of a packet equals the sample that is traced alone.
 #[test]
 fn glass_packets_equal_scalar_samples() {
     for file in ["glass", "transmission", "water-glass"] {

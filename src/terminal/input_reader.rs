@@ -1,5 +1,5 @@
-//! Reading and decoding of what the terminal sends: keys, mouse events and replies. A timeout ends
-//! a sequence of bytes that is not complete.
+//! Reader of all terminal input: keys, mouse events, pasted text and replies. A timeout ends an
+//! escape sequence that is not complete.
 
 use crate::terminal::decode::Decoder;
 use crate::terminal::{Environment, Event};
@@ -10,27 +10,28 @@ use std::time::{Duration, Instant};
 /// Longest pause between ESC and the next byte of its sequence. After a longer pause, ESC is the
 /// key Escape.
 const ESCAPE_WAIT: Duration = Duration::from_millis(40);
-/// The same pause over SSH, where a sequence can be split between packets.
+/// Longest pause between ESC and the next byte of its sequence over SSH, where a sequence can be
+/// split between packets.
 const ESCAPE_WAIT_OVER_SSH: Duration = Duration::from_millis(120);
 
-/// Event with the time at which it was read.
+/// Terminal event with the time at which it was read.
 #[derive(Debug)]
-pub struct Timed {
-    /// Time of reading.
+pub struct TimedEvent {
+    /// Time at which the event was read.
     pub at: Instant,
-    /// Event.
+    /// Key, mouse event, pasted text or reply.
     pub event: Event,
 }
 
-/// Reader of keys, mouse events and replies from stdin.
-pub struct Keyboard {
+/// Reader of keys, mouse events, pasted text and replies from stdin.
+pub struct InputReader {
     stdin: Stdin,
     decoder: Decoder,
     buffer: Vec<u8>,
-    early: Vec<Timed>,
+    early: Vec<TimedEvent>,
 }
 
-impl Keyboard {
+impl InputReader {
     /// Creates a reader of stdin. `environment` describes its terminal.
     pub fn new(environment: &Environment) -> Self {
         let wait = if environment.ssh.is_some() { ESCAPE_WAIT_OVER_SSH } else { ESCAPE_WAIT };
@@ -42,12 +43,12 @@ impl Keyboard {
         }
     }
 
-    /// Waits for events until `deadline`; `None` means without limit. Returns an empty list at the
-    /// deadline.
+    /// Waits for terminal events until `deadline`; `None` means without limit. Returns an empty
+    /// list at the deadline.
     ///
     /// # Errors
     /// Fails if the terminal is closed.
-    pub fn wait(&mut self, deadline: Option<Instant>) -> io::Result<Vec<Timed>> {
+    pub fn wait(&mut self, deadline: Option<Instant>) -> io::Result<Vec<TimedEvent>> {
         if !self.early.is_empty() {
             return Ok(std::mem::take(&mut self.early));
         }
@@ -73,23 +74,21 @@ impl Keyboard {
             };
             if !events.is_empty() {
                 let at = Instant::now();
-                return Ok(events.into_iter().map(|event| Timed { at, event }).collect());
+                return Ok(events.into_iter().map(|event| TimedEvent { at, event }).collect());
             }
         }
     }
 
-    /// Stores events that arrived early, which the next [`Keyboard::wait`] returns.
-    pub fn keep(&mut self, early: Vec<Timed>) {
+    /// Stores `early`, terminal events that were read during the query of the terminal. The next
+    /// [`InputReader::wait`] returns them first.
+    pub fn keep(&mut self, early: Vec<TimedEvent>) {
         self.early.extend(early);
     }
 
-    /// Returns `true` if input arrives within `wait`. Returns `None` if a signal interrupted the
-    /// wait.
+    /// Waits at most `wait` for input; `None` means without limit. Returns `Some(true)` if input
+    /// has arrived, `Some(false)` if the time is over, and `None` if a signal interrupted the wait.
     fn is_ready(&self, wait: Option<Duration>) -> io::Result<Option<bool>> {
-        let wait = wait.map(|wait| Timespec {
-            tv_sec: wait.as_secs() as _,
-            tv_nsec: wait.subsec_nanos() as _,
-        });
+        let wait = wait.and_then(|wait| Timespec::try_from(wait).ok());
         let mut stdin = [PollFd::new(&self.stdin, PollFlags::IN)];
         match poll(&mut stdin, wait.as_ref()) {
             Ok(ready) => Ok(Some(ready > 0)),

@@ -1,21 +1,26 @@
-//! Thread pool for tracing.
+//! Thread pool for tracing, with a lower priority if requested.
 
+use std::fmt::Display;
 use std::io;
 
 /// Creates a pool of `threads` threads. A `niceness` above 0 lowers their priority; with 19 they
 /// run only when the processor is idle otherwise. The priority is set for each thread, and only on
-/// Linux. It is ignored if the system refuses it, because a priority cannot be raised above that of
-/// the process.
+/// Linux. If the system refuses it, the threads run with the priority of the process.
 ///
 /// # Errors
-/// Returns the operating system's error if a thread cannot be started.
+/// Returns an error for the user if a thread cannot be started.
 pub(super) fn pool(threads: usize, niceness: i32) -> io::Result<rayon::ThreadPool> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|i| format!("tracer {i}"))
         .start_handler(move |_| lower_priority(niceness))
         .build()
-        .map_err(io::Error::other)
+        .map_err(|error| error_of(threads, error))
+}
+
+/// Returns the error for the user that `threads` threads cannot be started. `error` is the reason.
+pub(super) fn error_of(threads: usize, error: impl Display) -> io::Error {
+    io::Error::other(format!("cannot start {threads} threads: {error}; try fewer by --threads"))
 }
 
 #[cfg(target_os = "linux")]

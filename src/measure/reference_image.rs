@@ -2,8 +2,9 @@
 
 use crate::film::{Display, Film, LightWeights, Replicates};
 
-/// Number that is added to the squared reference in relative errors, so that those of dark pixels
-/// stay bounded: relMSE = mean((x - r)^2 / (r^2 + 0.01)).
+/// Number that is added to the squared reference value in the relative error, which stays bounded
+/// at dark pixels: relMSE = mean((x - r)^2 / (r^2 + 0.01)) with x the value of a pixel in a picture
+/// and r its value in the reference.
 const RELATIVE_FLOOR: f64 = 0.01;
 
 /// Reference picture, with an estimate of its own error.
@@ -11,17 +12,18 @@ pub struct Reference {
     size: [usize; 2],
     pixels: Vec<[f64; 3]>,
     codes: Vec<[f64; 3]>,
-    /// Half the difference of the two replicates of each pixel, in 8-bit levels. It has the
-    /// standard deviation of the reference's error and is independent of this error. Empty if the
-    /// reference counts as exact.
+    /// Half the difference between the reference's two replicates (halves of its samples) in each
+    /// pixel, in 8-bit levels. Its root mean square is an estimate of the error of the reference.
+    /// Empty if the reference counts as exact.
     halves: Vec<[f64; 3]>,
     own: Squares,
-    /// Variance of the mean over all pixels and channels of the reference.
+    /// Variance of the reference's mean brightness, which is the mean over all its pixels and
+    /// channels.
     mean_variance: f64,
     display: Display,
 }
 
-/// Mean squared errors over pixels and channels.
+/// Mean squared errors of a picture over its pixels and channels.
 #[derive(Clone, Copy, Debug, Default)]
 struct Squares {
     linear: f64,
@@ -29,45 +31,48 @@ struct Squares {
     relative: f64,
 }
 
-/// Errors of a picture against a reference.
+/// Errors of a picture against a reference picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
-    /// Root mean square error in linear radiance.
+    /// Root mean square error (RMSE) over pixels and channels, in linear radiance.
     pub rmse_linear: f64,
-    /// Root mean square error of the displayed picture, in unrounded 8-bit levels.
+    /// Root mean square error over the pixels and channels of the displayed picture, in unrounded
+    /// 8-bit levels.
     pub rmse_codes: f64,
-    /// Relative mean squared error: the mean of (x - r)^2 / (r^2 + 0.01) with pixel x and reference
-    /// r.
+    /// Relative mean squared error: the mean of (x - r)^2 / (r^2 + 0.01) over pixels and channels,
+    /// with x the value of a pixel in the picture and r its value in the reference.
     pub rel_mse: f64,
-    /// Relative standard deviation of `rmse_codes` over different references as noisy as this one,
-    /// at most 1. It is the uncertainty that remains after the reference's own error has been
-    /// subtracted.
+    /// Relative uncertainty of `rmse_codes`, from 0 to 1, that the error of the reference causes:
+    /// the standard deviation over different references as noisy as this one, divided by
+    /// `rmse_codes`.
     pub spread: f64,
 }
 
-/// Difference between the expectation of a picture and that of the reference.
+/// Bias of a picture: the difference between its expectation and that of the reference picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bias {
-    /// Difference between the mean brightness of picture and reference, in standard errors.
+    /// Difference between the mean brightness of the picture and that of the reference, divided by
+    /// the standard error of this difference.
     pub z: f64,
-    /// Root mean square of the differences of pixels, in 8-bit levels, after the part explained by
-    /// noise has been subtracted.
+    /// Root mean square of the differences between the pixels of the picture and those of the
+    /// reference, in 8-bit levels. The part that noise explains is subtracted.
     pub codes: f64,
-    /// Smallest value of `codes` that differs significantly from noise, by two standard errors.
+    /// Smallest value of [`Self::codes`] that is significant, in 8-bit levels: its square is two
+    /// standard errors of the mean squared difference.
     pub least_codes: f64,
 }
 
 impl Bias {
-    /// Returns `true` if the difference is larger than noise can explain.
+    /// Returns `true` if the picture differs from the reference by more than noise can explain.
     pub fn is_seen(&self) -> bool {
         self.codes > self.least_codes || self.z.abs() > 4.0
     }
 }
 
-/// Estimates the mean squared error of a picture that is the mean of two replicates, and the
-/// variance of its mean brightness. The linear error of a pixel is half the difference of its
-/// replicates. The displayed error is computed from the distances, in 8-bit levels, between the
-/// displayed mean and each displayed replicate.
+/// Returns two estimates for the picture that is the mean of two independent pictures `a` and `b`:
+/// its mean squared errors, and the variance of its mean brightness. The linear error of a pixel is
+/// half the difference of `a` and `b`. The squared error in 8-bit levels is the mean of the squared
+/// distances from the displayed mean to the displayed `a` and to the displayed `b`.
 fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64) {
     let mut squares = Squares::default();
     let mut mean_variance = 0.0;
@@ -93,7 +98,8 @@ fn own_error(a: &[[f64; 3]], b: &[[f64; 3]], display: &Display) -> (Squares, f64
     (own, mean_variance / (values * values))
 }
 
-/// Returns the pixels of both replicates, row by row.
+/// Returns the pixels of replicate A and those of replicate B (halves of the samples) of `film`,
+/// both row by row.
 fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
     [Replicates::A, Replicates::B].map(|replicates| {
         let mut all = Vec::with_capacity(film.width() * film.height());
@@ -107,15 +113,16 @@ fn replicates(film: &Film, mix: &LightWeights) -> [Vec<[f64; 3]>; 2] {
 }
 
 impl Reference {
-    /// Creates a reference from the picture of `film`. Its two replicates hold equal numbers of
-    /// samples, and its own error is estimated from their difference.
+    /// Creates a reference from the picture of `film`. The film's two replicates (halves of the
+    /// samples) hold equal numbers of samples; the error of the reference itself is estimated from
+    /// their difference.
     pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
         let [a, b] = replicates(film, mix);
         Self::of_replicates([film.width(), film.height()], &a, &b, display)
     }
 
     /// Creates a reference from the mean of two independent pictures `a` and `b`, whose pixels are
-    /// row by row.
+    /// stored row by row.
     pub fn of_replicates(
         size: [usize; 2],
         a: &[[f64; 3]],
@@ -145,28 +152,25 @@ impl Reference {
         Self { size, pixels, codes, halves: Vec::new(), own, mean_variance, display }
     }
 
-    /// Returns the width and height in pixels.
-    pub fn size(&self) -> [usize; 2] {
-        self.size
-    }
-
-    /// Returns the root mean square error of the reference itself, in 8-bit levels.
+    /// Returns the root mean square error of the reference picture itself over its pixels and
+    /// channels, in 8-bit levels.
     pub fn noise_codes(&self) -> f64 {
         self.own.codes.sqrt()
     }
 
-    /// Returns the root mean square error of the reference itself, in linear radiance.
+    /// Returns the root mean square error of the reference picture itself over its pixels and
+    /// channels, in linear radiance.
     pub fn noise_linear(&self) -> f64 {
         self.own.linear.sqrt()
     }
 
-    /// Returns the errors of `film`: mean squared distances from the reference, minus the squared
-    /// error of the reference itself.
+    /// Returns the errors of the picture of `film`. They are computed from its mean squared
+    /// differences from the reference, minus the mean squared error of the reference itself.
     pub fn errors(&self, film: &Film, mix: &LightWeights) -> Errors {
         self.errors_of(&mut |y, row| film.row(y, Replicates::Both, mix, row))
     }
 
-    /// Returns the errors of a picture. `fill` writes row `y` of the picture.
+    /// Returns the errors of a picture. `fill(y, row)` writes row `y` of the picture to `row`.
     fn errors_of(&self, fill: &mut dyn FnMut(usize, &mut Vec<[f64; 3]>)) -> Errors {
         let mut sum = Squares::default();
         let mut crossed = 0.0;
@@ -230,7 +234,8 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Returns half the difference of two replicates of a pixel as displayed, in 8-bit levels.
+/// Returns half the difference, in 8-bit levels, between the displayed colours of `a` and `b`, the
+/// same pixel in two independent pictures.
 fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
     let [a, b] = [*a, *b].map(|x| display.codes(x));
     std::array::from_fn(|c| 0.5 * (a[c] - b[c]))
@@ -241,8 +246,8 @@ mod tests {
     use super::*;
     use crate::measure::test_random::Rng;
 
-    /// Returns random pixels with mean 0.5. Grey noise has the standard deviation `s`; independent
-    /// noise of a third of that is added to each channel.
+    /// Returns random pixels with mean 0.5 and two kinds of noise: grey noise with the standard
+    /// deviation `s`, and independent noise in each channel with a third of that.
     fn noisy_pixels(rng: &mut Rng, count: usize, s: f64) -> Vec<[f64; 3]> {
         let pixel = |_| {
             let common = rng.normal();
@@ -251,8 +256,8 @@ mod tests {
         (0..count).map(pixel).collect()
     }
 
-    /// Checks the estimated error of a reference: the mean of two replicates with noise of standard
-    /// deviation s has the error s / sqrt 2.
+    /// Checks the estimated error of a reference. Its two replicates (halves of the samples) have
+    /// noise of standard deviation s, so that their mean has the error s / sqrt 2.
     #[test]
     fn own_error_is_that_of_the_mean() {
         let mut rng = Rng(1);
@@ -265,8 +270,8 @@ mod tests {
         assert!((reference.noise_codes() / (slope * expected) - 1.0).abs() < 0.02);
     }
 
-    /// Compares the predicted spread with the standard deviation of one picture's errors against
-    /// many references of equal noise.
+    /// Checks that the predicted uncertainty of a picture's error agrees with the standard
+    /// deviation of this error over many references of equal noise.
     #[test]
     fn spread_is_that_between_references() {
         let mut rng = Rng(2);

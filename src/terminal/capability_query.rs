@@ -1,47 +1,48 @@
-//! Probe of the terminal's capabilities, before the first frame.
+//! Query of the terminal's capabilities (colours, graphics protocols, sizes), before the first
+//! frame.
 //!
 //! All requests are sent in one write. Terminals reply in the order of the requests. The last
-//! request is for the device attributes, to which every terminal replies. The probe ends with this
+//! request is for the device attributes, to which every terminal replies. The query ends with this
 //! reply. Replies that come after the timeout are ignored by later readers.
 
 use crate::terminal::capabilities::{Capabilities, Environment, Multiplexer};
 use crate::terminal::cells::Colors;
-use crate::terminal::keyboard::{Keyboard, Timed};
+use crate::terminal::input_reader::{InputReader, TimedEvent};
 use crate::terminal::screen::Tty;
 use crate::terminal::{Event, Reply};
 use std::io;
 use std::time::{Duration, Instant};
 
-/// Longest wait for replies.
+/// Longest wait for the terminal's replies to capability requests.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Longest wait for replies over SSH.
+/// Longest wait for the terminal's replies to capability requests over SSH.
 const PATIENCE_OVER_SSH: Duration = Duration::from_secs(2);
 
-/// Interval at which the probe checks if it should stop.
+/// Interval at which the capability query checks if it should stop.
 const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Request of the device attributes (DA1), to which every terminal replies.
 const ATTRIBUTES: &str = "\x1b[c";
-/// Sequences and requests, in this order: set a 24-bit colour, request the current colour
-/// (DECRQSS), restore default colours; name and version; background colour; mode 2026; test of
-/// kitty's protocol by an image that is not shown; largest number of colours and largest size of
-/// sixel images; size of a cell.
+/// Requests of the capability query, separated here by semicolons: set a 24-bit colour, request the
+/// current colour (DECRQSS), and restore the default colours; name and version; background colour;
+/// support of mode 2026; test of kitty's protocol by an image that is not shown; largest number of
+/// colours of sixel images; their largest size; size of a cell.
 const REQUESTS: &str = "\x1b[48;2;1;2;3m\x1bP$qm\x1b\\\x1b[0m\x1b[>q\x1b]11;?\x1b\\\x1b[?2026$p\
                          \x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\\x1b[?1;1;0S\x1b[?2;1;0S\x1b[16t";
-/// Requests to the terminal outside of tmux: test of kitty's protocol by an image that is not
-/// shown; name and version.
+/// Requests that tmux passes through to the terminal outside of it: test of kitty's protocol by an
+/// image that is not shown; name and version.
 const REQUESTS_THROUGH_TMUX: &str = "\x1bPtmux;\x1b\x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\x1b\\\x1b\\\
                                       \x1bPtmux;\x1b\x1b[>q\x1b\\";
-/// First version of kitty that supports Unicode placeholders.
+/// First version of the terminal kitty that supports Unicode placeholders: `[major, minor]`.
 const PLACEHOLDERS_SINCE: [u32; 2] = [0, 28];
-/// RGB colour 1, 2, 3 in the DECRQSS replies of terminals with 24-bit colour.
+/// Colour with red 1, green 2, blue 3 in the DECRQSS replies of terminals with 24-bit colour.
 const TRUE_COLOR: [&str; 3] = ["2::1:2:3", "2:1:2:3", "2;1;2;3"];
-/// Private mode of synchronised updates.
+/// Number of the terminal's private mode for synchronised updates.
 const SYNCHRONISED: u16 = 2026;
 
 /// Returns the request of the cursor position. A terminal replies when it has processed all earlier
-/// bytes. For the multiplexer `through`, the request is wrapped so that the terminal outside of the
-/// multiplexer replies.
+/// bytes. Inside of the multiplexer `through`, the request is wrapped so that the terminal outside
+/// of the multiplexer replies.
 pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
     match through {
         None => "\x1b[6n",
@@ -50,18 +51,18 @@ pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
     }
 }
 
-/// Probes the terminal. This takes about one round trip, or two inside of a multiplexer over SSH.
-/// Keys that are pressed meanwhile are kept in `keyboard`. `is_ending` returns `true` if the probe
-/// should stop.
+/// Queries the capabilities of the terminal. This takes about one round trip, or two inside of a
+/// multiplexer over SSH. Keys that are pressed meanwhile are kept in `input`. `is_ending` returns
+/// `true` if the query should stop.
 ///
-/// Inside of a local tmux, the terminal outside may never reply. The probe does not wait for these
+/// Inside of a local tmux, the terminal outside may never reply. The query does not wait for these
 /// replies; the caller passes late ones to [`Capabilities::learn`].
 ///
 /// # Errors
 /// Fails if the terminal is closed.
-pub fn probe(
+pub fn query_capabilities(
     tty: &Tty,
-    keyboard: &mut Keyboard,
+    input: &mut InputReader,
     environment: Environment,
     is_ending: &dyn Fn() -> bool,
 ) -> io::Result<Capabilities> {
@@ -76,7 +77,7 @@ pub fn probe(
     };
     let requests = if is_minimal { "" } else { REQUESTS };
     tty.write([through, requests, ATTRIBUTES].concat().as_bytes())?;
-    listen(keyboard, sent_at + patience, is_ending, |at, reply| {
+    listen(input, sent_at + patience, is_ending, |at, reply| {
         capabilities.round_trip.get_or_insert(at.saturating_duration_since(sent_at));
         capabilities.learn(reply);
         matches!(reply, Reply::Attributes(_))
@@ -86,7 +87,7 @@ pub fn probe(
     {
         let sent_at = Instant::now();
         tty.write(cursor_request(Some(multiplexer)).as_bytes())?;
-        listen(keyboard, sent_at + PATIENCE, is_ending, |at, reply| {
+        listen(input, sent_at + PATIENCE, is_ending, |at, reply| {
             capabilities.learn(reply);
             let is_reply = matches!(reply, Reply::Cursor { .. });
             if is_reply {
@@ -98,10 +99,11 @@ pub fn probe(
     Ok(capabilities)
 }
 
-/// Passes replies to `take` until `take` returns `true`, `deadline` has passed, or `is_ending`
-/// returns `true`.
+/// Passes the terminal's replies to `take`, each with the time of its arrival. Ends when `take`
+/// returns `true`, at `deadline`, or when `is_ending` returns `true`. Events other than replies are
+/// kept in `input`.
 fn listen(
-    keyboard: &mut Keyboard,
+    input: &mut InputReader,
     deadline: Instant,
     is_ending: &dyn Fn() -> bool,
     mut take: impl FnMut(Instant, &Reply) -> bool,
@@ -109,20 +111,21 @@ fn listen(
     let mut others = Vec::new();
     let mut done = false;
     while !done && !is_ending() && Instant::now() < deadline {
-        let events = keyboard.wait(Some(deadline.min(Instant::now() + CHECK_INTERVAL)))?;
-        for Timed { at, event } in events {
+        let events = input.wait(Some(deadline.min(Instant::now() + CHECK_INTERVAL)))?;
+        for TimedEvent { at, event } in events {
             match event {
                 Event::Reply(reply) => done |= take(at, &reply),
-                event => others.push(Timed { at, event }),
+                event => others.push(TimedEvent { at, event }),
             }
         }
     }
-    keyboard.keep(others);
+    input.keep(others);
     Ok(())
 }
 
 impl Capabilities {
-    /// Updates the capabilities after a reply of the terminal.
+    /// Updates the capabilities according to `reply`, a reply of the terminal to one of the
+    /// requests for capabilities.
     pub fn learn(&mut self, reply: &Reply) {
         match reply {
             Reply::Attributes(attributes) => {
@@ -156,7 +159,8 @@ impl Capabilities {
     }
 }
 
-/// Returns `true` if a terminal of this name and version supports kitty's Unicode placeholders.
+/// Returns `true` if the terminal supports kitty's Unicode placeholders. `version` is its name and
+/// version, as it reports them.
 fn has_placeholders(version: &str) -> bool {
     let kitty = || {
         let numbers = version.strip_prefix("kitty(")?.split(['.', ')']);

@@ -1,9 +1,9 @@
-//! Reference of the scene format, generated from the field tables.
+//! Manual of the scene format (docs/scene-format.md), generated from the tables of keys.
 
-use crate::scene::format::schema::FIELDS;
-use crate::shape::{EXAMPLES, KINDS, TRANSFORM_OP_FIELDS};
-use crate::value::{DefaultValue, Field, ValueType};
 use std::fmt::Write as _;
+use zerkalo::scene::FIELDS;
+use zerkalo::shape::{EXAMPLES, KINDS, TRANSFORM_OP_FIELDS};
+use zerkalo::value::{DefaultValue, Field, ValueType};
 
 const INTRODUCTION: &str = "\
 # Scene files
@@ -73,6 +73,7 @@ and every key with a default may be left out. Unknown keys are errors.
   sides of a flat object emit, and the inside of a solid; otherwise the front alone. The materials have
   light groups as lights have: `emission` and `emission_color` of a scene in progress change without
   new samples, to 0 and back. Beyond eight lights and emissive materials the last ones share a group.
+  Sixteen point lights or more share one group.
 - Matt surfaces, highlights and rough mirrors get the light of emissive spheres, rectangles, platforms,
   boxes, cubes, prisms, pyramids and meshes of up to 65536 triangles from points sampled on them, as
   that of lights with a size. The emission of other shapes (torus, cylinder, cone, plane, compound,
@@ -120,8 +121,8 @@ and every key with a default may be left out. Unknown keys are errors.
 `zerkalo new FILE` writes a small scene with comments, `zerkalo check FILE` validates one.
 ";
 
-/// Returns the reference of the scene format, as Markdown.
-pub fn reference() -> String {
+/// Returns the manual of the scene format, as Markdown.
+pub fn format_manual() -> String {
     let mut out = INTRODUCTION.to_string();
     for field in FIELDS {
         let (title, fields): (String, &[Field]) = match field.takes {
@@ -209,7 +210,8 @@ fn steps(out: &mut String) {
     }
 }
 
-/// Appends mutually exclusive keys, of which one must be given. They have no defaults.
+/// Appends a table of mutually exclusive keys to the manual. One of them must be given; they have
+/// no defaults.
 fn kinds(out: &mut String, fields: &[Field]) {
     push(out, "| key | value | unit | meaning |\n|---|---|---|---|\n");
     for field in fields {
@@ -249,29 +251,25 @@ fn row(out: &mut String, cells: &[&str]) {
     push(out, &format!("| {} |\n", cells.join(" | ")));
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Checks that rows with "see below" refer to a later part of the same section.
-    #[test]
-    fn reference_rows_refer_to_later_sections() {
-        let text = reference();
-        let mut words = 0;
-        for section in text.split("\n## ").flat_map(|part| part.split("\n### ")) {
-            for (at, row) in section.match_indices("\n| `") {
-                let line = section[at + row.len()..].lines().next().unwrap();
-                let (name, rest) = line.split_once('`').unwrap();
-                if rest.starts_with(" | a word, see below |") {
-                    let below = &section[at..];
-                    let notations = [":\n\n- `\"", ": the same words as above.\n"];
-                    let found =
-                        notations.map(|notation| below.contains(&format!("\n`{name}`{notation}")));
-                    assert!(found.contains(&true), "{line}");
-                    words += 1;
-                }
+/// Checks that table rows of the format manual with the words "see below" refer to a later part
+/// of the same section.
+#[test]
+fn reference_rows_refer_to_later_sections() {
+    let text = format_manual();
+    let mut words = 0;
+    for section in text.split("\n## ").flat_map(|part| part.split("\n### ")) {
+        for (at, row) in section.match_indices("\n| `") {
+            let line = section[at + row.len()..].lines().next().unwrap();
+            let (name, rest) = line.split_once('`').unwrap();
+            if rest.starts_with(" | a word, see below |") {
+                let below = &section[at..];
+                let notations = [":\n\n- `\"", ": the same words as above.\n"];
+                let found =
+                    notations.map(|notation| below.contains(&format!("\n`{name}`{notation}")));
+                assert!(found.contains(&true), "{line}");
+                words += 1;
             }
         }
-        assert!(words > 15, "only {words} rows with words");
     }
+    assert!(words > 15, "only {words} rows with words");
 }

@@ -1,14 +1,16 @@
 //! Memory that a render needs, compared with the memory that is available.
 //!
 //! An allocation that fails ends the program without a picture, and with the edits of the dashboard
-//! lost. The sum is therefore compared with every known limit before a film is created.
+//! lost. The needed memory is therefore compared with every known limit before a film is created.
 
 use crate::film::{Film, TILE, TileNoise};
-use crate::value::{Available, ResidentMemory, available_memory, megabytes, resident_memory};
+use crate::process_memory::{
+    Available, ResidentMemory, available_memory, megabytes, resident_memory,
+};
 
-/// Memory for each pixel in addition to the film, for a linear copy of the picture \[bytes\].
+/// Memory for a linear copy of the picture, in addition to the film \[bytes per pixel\].
 const COPY_BYTES: u64 = 16;
-/// Memory for each tile in addition to its sums, for tile, schedule and noise estimate \[bytes\].
+/// Memory for tile, schedule and noise estimate, in addition to the film's sums \[bytes per tile\].
 const TILE_BYTES: u64 = 512;
 
 /// Returns the memory that a render of `size` pixels with `groups` light groups needs \[bytes\].
@@ -19,7 +21,7 @@ pub fn needed(size: [u32; 2], groups: usize) -> u64 {
 }
 
 /// Checks that a render of `size` pixels with `groups` light groups fits into the available memory.
-/// `reusable` is the memory \[bytes\] of the film that it replaces.
+/// `reusable` is the memory \[bytes\] of an earlier film, which the new film takes over.
 ///
 /// # Errors
 /// Returns a message with the needed and the available memory and a remedy.
@@ -55,8 +57,8 @@ fn compare(size: [u32; 2], groups: usize, available: Available) -> Result<(), St
     ))
 }
 
-/// Returns the message for a film whose allocation fails, although enough memory is available in
-/// total.
+/// Returns the error message for a film whose allocation fails, although enough memory is available
+/// in total.
 pub fn refused(size: [u32; 2], groups: usize) -> String {
     let [width, height] = size;
     format!(
@@ -66,38 +68,39 @@ pub fn refused(size: [u32; 2], groups: usize) -> String {
     )
 }
 
-/// Memory for each tile of a region in addition to its sums, for tile, schedule with the latest
+/// Memory for each tile of a picture region in addition to its sums: tile, schedule with the latest
 /// estimates, jobs and their reports \[bytes\].
 const REGION_TILE_BYTES: u64 = 1024;
-/// Memory for each tile of a picture in regions: its error, and a number to compute percentiles
-/// \[bytes\].
+/// Memory for each tile of a picture that is rendered in regions: its error, and a number in the
+/// list from which percentiles of the errors are computed \[bytes\].
 const PICTURE_TILE_BYTES: u64 = (size_of::<Option<TileNoise>>() + size_of::<f64>()) as u64;
-/// Memory for each column and light group while a row of OpenEXR tiles is encoded \[bytes\].
+/// Memory while a row of OpenEXR tiles is encoded \[bytes per pixel column and light group\].
 const ROW_BYTES: u64 = 256;
-/// Memory of the program in addition to scene and film, for buffers and the allocator \[bytes\].
+/// Memory of the program's buffers and allocator, in addition to scene and film \[bytes\].
 const PROGRAM_BYTES: u64 = 3 << 20;
-/// Memory of a tracing thread for its stack and its paths \[bytes\].
+/// Memory of one tracing thread for its stack and its paths \[bytes\].
 const THREAD_BYTES: u64 = 1 << 20;
-/// Assumed memory of program and scene on systems that do not report their memory \[bytes\].
+/// Assumed memory of program and scene on systems that do not report the memory of a process
+/// \[bytes\].
 const UNKNOWN_RESIDENT: ResidentMemory = ResidentMemory { now: 64 << 20, peak: 64 << 20 };
 
-/// Regions of a picture: bands of rows that are rendered one after another.
+/// Regions into which a picture is divided: bands of rows that are rendered one after another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Regions {
     /// Number of rows of each region except the last; a multiple of [`TILE`].
     pub rows: u32,
-    /// Number of regions.
+    /// Number of regions of the picture.
     pub count: u32,
     /// Expected peak of the memory of this process \[bytes\].
     pub bytes: u64,
 }
 
-/// Divides a picture of `size` pixels with `groups` light groups into the fewest regions that fit
-/// into `cap` bytes. The limit includes the memory of the program and of the scene, which is
-/// compiled already.
+/// Divides a picture of `size` pixels with `groups` light groups into the fewest regions for which
+/// the memory of this process is at most `cap` bytes. The process holds the program, the scene
+/// (which is compiled already) and one region at a time.
 ///
 /// # Errors
-/// Returns the least memory in bytes if even regions of one row of tiles do not fit.
+/// Returns the smallest possible `cap` in bytes if even regions of one row of tiles do not fit.
 pub fn divide(size: [u32; 2], groups: usize, threads: usize, cap: u64) -> Result<Regions, u64> {
     divide_from(resident_memory().unwrap_or(UNKNOWN_RESIDENT), size, groups, threads, cap)
 }
@@ -129,7 +132,8 @@ fn divide_from(
     })
 }
 
-/// Rounds down to a round number for messages.
+/// Rounds the width or height of a picture down to a multiple of 16, for messages. A number of 1024
+/// or more is rounded down to a multiple of 128. The result is at least 1.
 fn round_down(side: u32) -> u32 {
     match side {
         0..16 => 1,

@@ -1,10 +1,11 @@
-//! Transmission of the reference tracer. The media on both sides of a surface are found by point
-//! tests just in front of and just behind it.
+//! Light through surfaces in the reference tracer, an independent slow implementation: refraction
+//! and transmission. The media on both sides of a surface are found by point tests just in front of
+//! and just behind it.
 
-use crate::agreement::answers::{
+use crate::agreement::compounds::Body;
+use crate::agreement::reflection::{
     Indices, fresnel, has_facets, is_sharp, reflect, refracted_at_facet, spread,
 };
-use crate::agreement::compounds::Body;
 use crate::agreement::tracer::{Hit, Mutation, Tracer};
 use crate::common::Numbers;
 use glam::DVec3;
@@ -12,22 +13,23 @@ use zerkalo::material::{Fresnel, Material};
 use zerkalo::scene::{BelowHorizon, RayTypes, Scene};
 use zerkalo::value::Color;
 
-/// Distance of the tested points from the surface.
+/// Distance from a surface to the two tested points in front of it and behind it, in scene units.
 const ASIDE: f64 = 1e-6;
 
 /// Direction and throughput of a path's next ray.
 type Next = (DVec3, DVec3);
 
-/// Continuation of a path.
+/// Continuation of a path at a transmitting surface.
 pub enum Way {
-    /// Unchanged direction: another solid fills the space, so that the surface has no effect.
+    /// The path continues unchanged: another solid fills the space, so that the surface has no
+    /// effect.
     Straight,
-    /// Direction and throughput; `None` if the path ends.
+    /// The path continues with this direction and throughput; `None` if it ends.
     On(Option<(DVec3, DVec3)>),
 }
 
-/// Reflectance of both polarisations by the angles on both sides. The angle `t` is `None` for total
-/// internal reflection.
+/// Returns the reflectance of both polarisations. `i` and `t` are the angles of incidence and
+/// refraction; `t` is `None` for total internal reflection.
 fn polarised(i: f64, t: Option<f64>, n_i: f64, n_t: f64) -> [f64; 2] {
     let Some(t) = t else { return [1.0; 2] };
     if i < 1e-4 {
@@ -36,20 +38,21 @@ fn polarised(i: f64, t: Option<f64>, n_i: f64, n_t: f64) -> [f64; 2] {
     [((i - t).sin() / (i + t).sin()).powi(2), ((i - t).tan() / (i + t).tan()).powi(2)]
 }
 
-/// Transmitting material that fills `body`; `None` for an opaque body and for a surface without a volume.
+/// Returns the transmitting material that fills `body`. Returns `None` for an opaque body and for a
+/// surface without a volume.
 pub fn medium<'a>(scene: &'a Scene, body: &Body) -> Option<&'a Material> {
     let mut materials = body.leaves.iter().filter_map(|leaf| scene.materials.get(&leaf.material));
     if body.is_open() { None } else { materials.find(|m| m.transmission > 0.0) }
 }
 
 impl Tracer<'_> {
-    /// Index and index of refraction of the solid that fills the space at `point`: the one listed
-    /// last.
+    /// Returns the solid that fills the space at `point`, and its index of refraction. Of several
+    /// solids there, the one listed last in the scene fills the space.
     fn medium(&self, point: DVec3) -> (Option<usize>, f64) {
         self.filling(point).map_or((None, 1.0), |(i, material)| (Some(i), material.ior))
     }
 
-    /// Index and material of the solid that fills the space at `point`.
+    /// Returns the index and the material of the solid that fills the space at `point`.
     fn filling(&self, point: DVec3) -> Option<(usize, &Material)> {
         let bodies = self.bodies.iter().zip(&self.media).enumerate().rev();
         bodies
@@ -58,7 +61,8 @@ impl Tracer<'_> {
             .map(|(i, _, material)| (i, material))
     }
 
-    /// Share of light that is left on the way from `origin` to `end`, or without end in `direction`.
+    /// Returns the share of light that is left on the way from `origin` to `end`. Without `end`,
+    /// the way is infinite in `direction`.
     pub fn transmittance(&self, origin: DVec3, end: Option<DVec3>, direction: DVec3) -> DVec3 {
         let plain = |m: &Material| m.attenuation_color == Color::WHITE;
         if self.scene.trace.ray_types < RayTypes::Full || self.scene.materials.values().all(plain) {
@@ -75,7 +79,7 @@ impl Tracer<'_> {
         DVec3::from(material.attenuation_color.0.map(left))
     }
 
-    /// Chooses reflection or transmission at `hit`, whose material transmits, at random.
+    /// Chooses reflection or transmission at random, at the hit `hit` on a transmitting material.
     pub fn through(&self, hit: &Hit, direction: DVec3, numbers: &mut Numbers) -> Way {
         let (material, n) = (hit.material, hit.seen);
         let open = self.bodies[hit.body].is_open();
@@ -132,7 +136,8 @@ impl Tracer<'_> {
         self.one_of(hit, mirrored, passed, numbers)
     }
 
-    /// Chooses one of two ways in proportion to their weights.
+    /// Chooses at random between the reflected and the transmitted ray, in proportion to their
+    /// weights.
     fn one_of(
         &self,
         hit: &Hit,
@@ -153,7 +158,8 @@ impl Tracer<'_> {
         Way::On(way.map(|(d, k)| (d - 2.0 * d.dot(to).min(0.0) * to, k / chance)))
     }
 
-    /// Reflectance of a smooth or microscopic surface at the cosine `c`, and `true` for total reflection.
+    /// Returns the reflectance of a smooth surface or a microfacet at the cosine `c`, and `true`
+    /// for total reflection.
     fn reflectance(&self, hit: &Hit, c: f64, (n_i, n_t): Indices) -> (f64, bool) {
         let i = c.clamp(0.0, 1.0).acos();
         let sin_t = n_i / n_t * i.sin();
@@ -168,7 +174,8 @@ impl Tracer<'_> {
         (f, t.is_none() && !open)
     }
 
-    /// Samples the reflected and the transmitted ray at a rough surface, each by numbers of its own.
+    /// Samples the reflected and the transmitted ray at a rough surface, each with random numbers
+    /// of its own.
     fn rough(
         &self,
         hit: &Hit,
