@@ -5,14 +5,14 @@ use crate::render::session::Report;
 /// Point of the convergence plot: render time, and noise of the picture at this time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Seconds that the renderer has spent on tracing rays until this time.
+    /// Seconds that the renderer has spent on tracing rays until this point of the plot.
     pub seconds: f64,
     /// Estimated RMSE of the displayed picture in 8-bit levels, greater than 0.
     pub noise_codes: f64,
 }
 
-/// History of the noise of one picture, from the renderer's reports. If it has too many points,
-/// some are removed.
+/// History of the noise of one picture, from the renderer's reports. If the history exceeds a fixed
+/// number of points, some of them are removed.
 #[derive(Clone, Debug, Default)]
 pub struct Convergence {
     /// Points of the convergence plot in order of increasing time.
@@ -26,11 +26,12 @@ pub struct Convergence {
 const MOST: usize = 400;
 
 impl Convergence {
-    /// Returns the render time in seconds after which the noise fell to `codes` 8-bit levels,
-    /// interpolated between two reports by a power law. Returns `None` if the noise is still
-    /// higher, or if it was lower in the first report already.
+    /// Returns the render time in seconds at which the noise fell to `codes` 8-bit levels. The time
+    /// is interpolated between two reports by a power law. Returns `None` if the noise is still
+    /// higher than `codes`, or if no report has had a higher noise.
     pub fn seconds_at(&self, codes: f64) -> Option<f64> {
-        // The last crossing counts: lights may have been switched on since an earlier one.
+        // Only the last fall to `codes` counts, because switching on a light raises the noise
+        // again.
         let after = self.points.iter().rposition(|p| p.noise_codes > codes)? + 1;
         let (before, after) = (self.points[after - 1], self.points.get(after)?);
         let part =
@@ -53,8 +54,8 @@ impl Convergence {
         match self.points.last_mut() {
             // The error estimate has not been updated since the last report.
             Some(last) if last.noise_codes == point.noise_codes => {}
-            // Without new samples only the error changes, when a light is dimmed or the render
-            // finishes.
+            // The report has no new samples. The noise has changed because a light was dimmed or
+            // the render has finished, so the new point replaces the last one.
             Some(last) if last.seconds >= point.seconds => *last = point,
             _ => self.points.push(point),
         }
@@ -63,8 +64,9 @@ impl Convergence {
         }
     }
 
-    /// Removes every second point of the convergence plot after the first quarter of the points,
-    /// because these are the densest on the logarithmic time axis. The newest point stays.
+    /// Removes every second point of the convergence plot except in the first quarter of the
+    /// points. Late points lie closest together on the logarithmic time axis. The newest point
+    /// stays.
     fn thin(&mut self) {
         let (early, newest) = (MOST / 4, self.points.len() - 1);
         let mut index = 0;

@@ -10,13 +10,12 @@ use crate::dashboard::update::commands::{COMMANDS, Chapter, Command, Hint, HintL
 pub enum HelpLine {
     /// Heading of a chapter of the help.
     Heading(&'static str),
-    /// Two texts: the keys of a command with the contexts in which they work, and the label of the
-    /// command.
+    /// Keys of a command with the contexts in which they work, and the label of the command.
     Keys(String, &'static str),
 }
 
-/// Returns the state of the dashboard that determines the hints. Returns `None` while an exported
-/// image covers the screen, which then has no hint line.
+/// Returns the state of the dashboard that determines the key hints in the hint line. Returns
+/// `None` while an exported image covers the screen, which has no hint line then.
 fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
         Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => HintLine::Reading,

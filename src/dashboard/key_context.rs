@@ -3,8 +3,8 @@
 /// Panel or mode of the dashboard in which a key runs a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum KeyContext {
-    /// Every panel and mode in which no other command has the key. Overlays and text editors are
-    /// excluded.
+    /// Any panel or mode. A key is looked up here if the present panel or mode has no command for
+    /// it. Overlays and text editors do not use this context.
     Anywhere,
     /// The picture's panel has the focus, in its default mode.
     Picture,

@@ -29,8 +29,8 @@ pub struct Request {
     pub watching: bool,
 }
 
-/// Areas of the panels on the screen, borders included. A panel that is folded for lack of room has
-/// the area `None`.
+/// Areas of the panels on the screen, borders included. The area of a panel is `None` if the panel
+/// is hidden for lack of room.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layout {
     /// Area of the panel with the rendered picture.
@@ -112,7 +112,7 @@ fn edit_column(side: Rect, focus: Focus) -> [Option<Rect>; 3] {
     }
     let plot = plot_rows(rows);
     let left = rows - plot;
-    // With little room the focused panel gets the larger part.
+    // If there are fewer than 40 rows, the focused panel gets the larger part.
     let outline = match focus {
         _ if rows >= 40 => left * 2 / 5,
         Focus::Outline => left * 3 / 5,
@@ -123,8 +123,9 @@ fn edit_column(side: Rect, focus: Focus) -> [Option<Rect>; 3] {
 }
 
 /// Divides the side column of the screen into the table of watched files and the convergence plot.
-/// Returns three areas as [`edit_column`] does: the table in place of the outline, `None` for the
-/// inspector, and the plot (`None` if there is no room).
+/// Returns three areas in the order of [`edit_column`]. The first is the table, which takes the
+/// place of the outline. The second, for the inspector, is `None`. The third is the plot, or `None`
+/// if there is no room for it.
 fn watch_column(side: Rect) -> [Option<Rect>; 3] {
     let plot = plot_rows(side.height);
     let table = Rect { height: side.height - plot, ..side };
@@ -137,8 +138,9 @@ fn plot_rows(rows: u16) -> u16 {
     if rows >= 3 * PLOT_ROWS + 6 { (rows * 3 / 10).max(PLOT_ROWS) } else { 0 }
 }
 
-/// Returns two values: the largest centred area with the film's aspect ratio in the area `inside`,
-/// and its columns and rows of half cells. A half cell is the upper or lower half of a cell.
+/// Returns two values. The first is the largest area with the film's aspect ratio that fits into
+/// `inside`, centred there. The second is the number of columns and rows of half cells in this
+/// area. A half cell is the upper or lower half of a terminal cell.
 fn fitted(inside: Rect, [film_width, film_height]: [u32; 2]) -> (Rect, [usize; 2]) {
     let (columns, halves) = (f64::from(inside.width), 2.0 * f64::from(inside.height));
     let (film_width, film_height) = (f64::from(film_width.max(1)), f64::from(film_height.max(1)));
@@ -185,7 +187,7 @@ mod tests {
     const FOCI: [Focus; 3] = [Focus::Picture, Focus::Outline, Focus::Inspector];
 
     /// Checks at every terminal size that the panels stay on the screen and fill it without
-    /// overlap, and that the panel with the keyboard focus is never folded.
+    /// overlap, and that the panel with the keyboard focus is never hidden.
     #[test]
     fn panels_tile_the_screen() {
         for width in 40..220 {

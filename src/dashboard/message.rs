@@ -16,8 +16,8 @@ use std::time::Duration;
 pub enum Message {
     /// Key that was pressed.
     Key(Key),
-    /// Mouse event. Successive drags that wait to be handled are joined to one, which has the
-    /// newest position.
+    /// Mouse event. Successive mouse drags that wait in the queue are merged into one event, which
+    /// has the newest position.
     Mouse(Mouse),
     /// Pasted text, which is never interpreted as keys.
     Paste(String),
@@ -37,7 +37,7 @@ pub enum Message {
     Loaded(Box<Result<Arc<Scene>, SceneErrors>>),
     /// Another program has changed the scene file since this program last read or wrote it.
     ChangedOnDisk,
-    /// Unsaved edits of this scene from a crashed session.
+    /// Unsaved edits of this scene that a crashed run of the program has left.
     OrphanedEdits(OrphanedEdits),
     /// Warning that is shown until the next key.
     Warning(String),
@@ -48,10 +48,10 @@ pub enum Message {
     CheckpointWritten(Result<PathBuf, String>),
     /// Progress of a render for an exported image ([`Effect::ExportSized`]), 0..=1.
     ExportProgress(f64),
-    /// Image that [`Effect::ViewImage`] has prepared from the file at this path for the viewer, or
-    /// the reason of the failure.
+    /// Image that [`Effect::ViewImage`] has read from the file at this path and prepared for the
+    /// image viewer, or the reason of the failure.
     ViewerImage(PathBuf, Result<Arc<ViewerImage>, String>),
-    /// Share of the viewed image that was sent to the terminal, 0..=1.
+    /// Fraction of the viewed image's bytes that have been sent to the terminal, 0..=1.
     ImageSent(f64),
     /// Status of the connection to a remote terminal; `None` for a local terminal.
     LinkStatus(Option<LinkStatus>),
@@ -60,10 +60,10 @@ pub enum Message {
     Tick,
 }
 
-/// Unsaved edits of a crashed session, which the user can recover.
+/// Unsaved edits that a crashed run of the program has left, and that the user can recover.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrphanedEdits {
-    /// Scene with the unsaved edits.
+    /// Time since the crashed program last wrote these edits to the recovery file.
     pub scene: Arc<Scene>,
     /// Time since the unsaved edits were last written to the recovery file.
     pub age: Duration,
@@ -157,8 +157,8 @@ pub enum Effect {
     Display(Display),
     /// Render until these stop criteria are reached.
     Stop(Stop),
-    /// Return snapshots of the render with pictures of these columns and rows of half cells (a half
-    /// cell is the upper or lower half of a terminal cell), and with the values of this film pixel.
+    /// Return snapshots of the render at this resolution and with the values of this film pixel.
+    /// The resolution is in half cells (a half cell is the upper or lower half of a terminal cell).
     View(View),
     /// Pause (`true`) or resume (`false`) the render.
     Pause(bool),
@@ -203,14 +203,14 @@ pub enum Effect {
     },
     /// Cancel the render of [`Effect::ExportSized`], so that it writes nothing.
     CancelExport,
-    /// Write the scene with unsaved edits to the recovery file, from which the next start offers to
-    /// recover them. `None` removes the file.
+    /// Write the scene with its unsaved edits to the recovery file. The next start of the program
+    /// offers to recover them. `None` removes the file.
     Autosave(Option<Arc<Scene>>),
-    /// Adopt the offered edits of a crashed session as the unsaved edits of this one.
+    /// Adopt the offered edits of a crashed run of the program as unsaved edits of the scene.
     Recover,
-    /// Discard the offered edits of a crashed session.
+    /// Discard the offered edits of a crashed run of the program.
     Discard,
-    /// Read and encode an exported image for the viewer.
+    /// Read an exported image and encode it for the image viewer.
     ViewImage {
         /// Path of the PNG or EXR file to view.
         path: PathBuf,
@@ -219,7 +219,7 @@ pub enum Effect {
         /// Columns and rows of the terminal.
         screen: [u16; 2],
     },
-    /// Copy this path to the terminal's clipboard.
+    /// Copy this path to the clipboard of the user's machine by means of the terminal.
     Copy(PathBuf),
     /// Suspend the program and give the terminal to the shell.
     Suspend,

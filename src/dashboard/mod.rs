@@ -1,9 +1,9 @@
 //! Dashboard: the user interface in the terminal, for editing a scene while it is rendered.
 //!
-//! `update` is a pure function: it turns a [`Message`](message::Message) into a changed
-//! [`Model`](model::Model) and a list of [`Effect`](message::Effect)s, without access to clock,
-//! files or terminal. `view` draws a model into a buffer of cells. `run` is the event loop: it
-//! executes effects with the renderer, the files and the terminal.
+//! `update` handles a [`Message`](message::Message): it changes the [`Model`](model::Model) and
+//! returns a list of [`Effect`](message::Effect)s. It has no access to clock, files or terminal, so
+//! its result depends on its arguments only. `view` draws a model into a buffer of cells. `run` is
+//! the event loop, which executes the effects.
 
 pub mod convergence;
 pub mod editor;

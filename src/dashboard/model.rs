@@ -43,12 +43,13 @@ pub struct File {
     pub path: Option<PathBuf>,
     /// Last component of the scene file's path, for titles, with control characters escaped.
     pub name: String,
-    /// Scene as last read from or written to its file; without a file, the scene at the start.
+    /// Scene as it was last read from or written to its file. If there is no file, the scene with
+    /// which the program started.
     pub saved: Arc<Scene>,
     /// Errors in the current contents of the scene file; `None` if they are valid.
     pub broken: Option<SceneErrors>,
-    /// `true` if the scene file has never been readable. There is no scene then, and only `broken`
-    /// can be shown.
+    /// `true` if the scene file has been unreadable since the start. There is no scene then, and
+    /// the dashboard shows only the errors in `broken`.
     pub unreadable: bool,
 }
 
@@ -104,8 +105,8 @@ pub struct Notice {
     pub text: String,
     /// Kind of the notice: success, information, or refusal.
     pub tone: Tone,
-    /// Time at which the notice disappears, measured like the argument `now` of
-    /// [`update`](crate::dashboard::update::update). `None` if the notice stays until the next key.
+    /// Time at which the notice disappears, or `None` if it stays until the next key. The time has
+    /// the same origin as the argument `now` of [`update`](crate::dashboard::update::update).
     pub until: Option<Duration>,
 }
 
@@ -208,22 +209,23 @@ pub struct Model {
     pub first_time: bool,
     /// Drag in progress; `None` if no mouse button is held down.
     pub drag: Option<Drag>,
-    /// Time of the last edit, if edits that repeat it soon join its undo step. `None` if they start
-    /// a new step.
+    /// Time of the last edit, if an equal edit soon afterwards joins the undo step of this edit.
+    /// `None` if the next edit starts a new undo step.
     pub last_edit: Option<Duration>,
     /// `true` if the program quits after the pending save.
     pub quit_when_saved: bool,
-    /// Unsaved edits of a crashed session that the user has neither recovered nor discarded.
+    /// Unsaved edits that a crashed run of the program has left, and that the user has neither
+    /// recovered nor discarded.
     pub orphaned_edits: Option<OrphanedEdits>,
     /// Scene that was last passed to
-    /// [`Effect::Autosave`](crate::dashboard::message::Effect::Autosave), so that it is not passed
+    /// [`Effect::Autosave`](crate::dashboard::message::Effect::Autosave); it need not be passed
     /// again. `None` if there were no unsaved edits.
     pub autosaved: Option<Arc<Scene>>,
-    /// Columns and rows of half cells to which the renderer was last asked to resample its
-    /// pictures. A half cell is the upper or lower half of a terminal cell. `None` before the first
-    /// request.
+    /// Columns and rows of half cells that the renderer was last asked to use for its pictures. A
+    /// half cell is the upper or lower half of a terminal cell. `None` before the first request.
     pub raster: Option<[usize; 2]>,
-    /// Counter that increases whenever the terminal cells of the picture may have changed.
+    /// Counter that increases whenever the terminal cells that show the picture may have become
+    /// outdated.
     pub picture_version: u64,
     /// Table of watched film files; `None` except in `zerkalo watch`. Commands that edit or render
     /// are refused while files are watched.
@@ -237,11 +239,11 @@ pub fn short_name(path: &Path) -> String {
 }
 
 impl Model {
-    /// Creates the model of a dashboard that renders `scene` until `stop` with `threads` threads.
-    /// `scene` is an error if the scene file cannot be read. `path` is the path of the scene file;
-    /// if it is `None`, `name` is shown instead. Screen size and colours are defaults, which the
-    /// event loop replaces by those of the terminal. The event loop renders [`Model::scene`],
-    /// unless [`File::unreadable`] is `true`.
+    /// Creates the model of a dashboard that renders `scene` with `threads` threads until the
+    /// criteria `stop` are reached. `scene` is an error if the scene file cannot be read. `path` is
+    /// the path of the scene file; without a path, `name` is shown as the file name. The event loop
+    /// later sets the screen size and the colours. It renders [`Model::scene`], unless
+    /// [`File::unreadable`] is `true`.
     pub fn new(
         path: Option<PathBuf>,
         name: &str,
@@ -295,7 +297,8 @@ impl Model {
     pub fn context(&self) -> KeyContext {
         match (&self.overlay, self.focus, self.mode) {
             (Some(_), ..) => KeyContext::Overlay,
-            // The keys of the table are those of the outline. There is no camera to orbit.
+            // Watched films have no camera to orbit. The table of files uses the keys of the
+            // outline (the list of all parts of the scene).
             (None, _, Mode::Orbit) if self.watch.is_some() => KeyContext::Outline,
             (None, Focus::Outline, _) => KeyContext::Outline,
             (None, Focus::Inspector, _) => KeyContext::Inspector,
@@ -318,8 +321,8 @@ impl Model {
         }
     }
 
-    /// Returns `true` while an overlay or the inspector's text editor is open, which a question to
-    /// the user must not interrupt.
+    /// Returns `true` while an overlay or the inspector's text editor is open. A question to the
+    /// user must wait then.
     pub fn is_busy(&self) -> bool {
         self.overlay.is_some() || self.inspector.editor.is_some()
     }

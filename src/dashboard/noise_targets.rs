@@ -21,11 +21,11 @@ pub const ABOUT: &str = "Halving the noise takes two to four times as long. Ente
 /// Render time that is needed to reach a noise target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cost {
-    /// The noise target was reached after this render time in seconds. `None` if the noise was
-    /// below the target in the first report already.
+    /// Case in which the noise target has been reached. The value is the render time in seconds at
+    /// which it was reached. It is `None` if the first report was below the target already.
     Reached(Option<f64>),
-    /// The noise target has not been reached. The numbers are a lower and an upper estimate of the
-    /// remaining render time in seconds.
+    /// Case in which the noise target has not been reached. The values are a lower and an upper
+    /// estimate of the remaining render time in seconds.
     Left(f64, f64),
     /// The render time is unknown, because there is no noise estimate yet.
     Unknown,
@@ -82,7 +82,8 @@ mod tests {
         let mut now = report(1, 80, Some(0.4));
         convergence.add(&now);
         now.quality_seconds[4] = Some((0.2, 0.3));
-        // The reports are at 10, 20, 40 and 80 ms, with 2, 1, 0.5 and 0.4 levels.
+        // The simulated reports arrive after 10, 20, 40 and 80 ms. Their noise is 2, 1, 0.5 and 0.4
+        // levels.
         for at in [0, 1] {
             assert_eq!(cost(&now, &convergence, at), Cost::Reached(None), "by the first look");
         }
@@ -92,7 +93,8 @@ mod tests {
         }
         assert_eq!(cost(&now, &convergence, 4), Cost::Left(0.2, 0.3));
         assert_eq!(cost(&now, &convergence, 5), Cost::Unknown);
-        // Midway between 1 and 2 levels on logarithmic scales.
+        // The noise is the geometric mean of 2 and 1 levels. The power law then gives the geometric
+        // mean of the times 10 and 20 ms.
         let between = convergence.seconds_at(2f64.sqrt()).unwrap();
         assert!((between - 0.01 * 2f64.sqrt()).abs() < 1e-9, "{between}");
     }

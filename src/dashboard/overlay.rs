@@ -45,9 +45,10 @@ pub enum Overlay {
 }
 
 impl Overlay {
-    /// Returns three values of the list in the open overlay: the index of the entry under the
-    /// cursor, the index of the first visible entry (`None` if the list never scrolls), and the
-    /// number of entries. Returns `None` for overlays without a cursor.
+    /// Returns the state of the list in the open overlay as three values: the index of the entry
+    /// under the cursor, the index of the first visible entry, and the number of entries. The
+    /// second value is `None` if the list never scrolls. Returns `None` for overlays without a
+    /// cursor.
     pub fn list(&mut self) -> Option<(&mut usize, Option<&mut usize>, usize)> {
         match self {
             Self::NoiseTargets { cursor } => Some((cursor, None, QUALITIES.len())),
@@ -70,7 +71,7 @@ pub struct ViewedImage {
     pub path: PathBuf,
     /// Image prepared for the screen; `None` while the file is being read.
     pub image: Option<Arc<ViewerImage>>,
-    /// Share of the image that was sent to the terminal, 0..=1.
+    /// Fraction of the image's bytes that have been sent to the terminal, 0..=1.
     pub sent: f64,
 }
 
@@ -109,8 +110,8 @@ pub enum PickFor {
     Object,
     /// The picked entry is the kind of a light, which is added to the scene.
     Light,
-    /// The picked entry is the new value of a property. The two values are the part of the scene
-    /// that has the property, and the property's key.
+    /// The picked entry is the new value of a property. The fields are the part of the scene that
+    /// has the property, and the property's key in the scene file.
     Word(Target, String),
 }
 
@@ -188,8 +189,8 @@ pub enum Answer {
     Overwrite(Option<PathBuf>),
     /// Open the prompt for another path to save to.
     SaveAs,
-    /// Recover the unsaved edits of a crashed session.
+    /// Recover the unsaved edits that a crashed run of the program has left.
     Recover,
-    /// Discard the unsaved edits of a crashed session.
+    /// Discard the unsaved edits that a crashed run of the program has left.
     Discard,
 }

@@ -72,8 +72,8 @@ impl Model {
                 whole(centred(76, (pick.entries.len() as u16).saturating_add(2)))
             }
             Overlay::Form(form) => {
-                // The form replaces the side panels. It must not cover the picture, which previews
-                // the new object or light.
+                // The form covers the side panels only, because the picture previews the new object
+                // or light.
                 let side = layout.inspector.or(layout.outline).map_or(38, |side| side.width);
                 let columns = side.min(width);
                 let x = width - columns;
@@ -110,13 +110,13 @@ impl Model {
     }
 
     /// Returns the area of the lines of the outline, the list of all parts of the scene. Returns
-    /// `None` if the panel is folded.
+    /// `None` if the outline is hidden for lack of room.
     pub fn outline_rows(&self) -> Option<Rect> {
         self.layout()?.outline.map(|area| area.inner(BORDER))
     }
 
     /// Returns two areas of the panel of watched files: one for the rows of its table, one for
-    /// details on the row under the cursor. Returns `None` if the panel is folded.
+    /// details on the row under the cursor. Returns `None` if the panel is hidden for lack of room.
     pub fn watch_rows(&self) -> Option<(Rect, Rect)> {
         let inner = self.layout()?.outline?.inner(BORDER);
         let details = if inner.height >= 10 { 5 } else { 0 };
@@ -127,7 +127,7 @@ impl Model {
     }
 
     /// Returns two areas of the inspector: one for its lines, one for help on the field under the
-    /// cursor. Returns `None` if the panel is folded.
+    /// cursor. Returns `None` if the inspector is hidden for lack of room.
     pub fn inspector_rows(&self) -> Option<(Rect, Rect)> {
         let problem = self.inspector.editor.as_ref().is_some_and(|e| e.problem.is_some());
         self.layout()?.inspector.map(|area| split(area.inner(BORDER), problem))

@@ -49,8 +49,8 @@ pub struct FieldLine {
     /// Value in the syntax of the text editor, with control characters escaped. Empty if the
     /// property is not set in the scene.
     pub value: String,
-    /// Linear colour of the colour sample beside the value. `None` except in the first line of a
-    /// colour.
+    /// Linear colour of the sample that is drawn beside the value. `None` if the property is not a
+    /// colour, and in the second and third line of a colour.
     pub swatch: Option<[f64; 3]>,
 }
 
@@ -118,8 +118,9 @@ pub fn inspector(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
     lines
 }
 
-/// Returns the lines of a form: the properties of the new object or light, and those of its
-/// material if the material is new as well. `base` is the scene before the form was opened.
+/// Returns the lines of a form: the properties of the new object or light. If its material is new
+/// as well, the lines include the material's properties. `base` is the scene before the form was
+/// opened.
 pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
     let has_new_material = match form.subject.material(&form.scene) {
         Some(Target::Material(name)) => !base.materials.contains_key(&name),
@@ -132,7 +133,7 @@ pub fn form(form: &Form, base: &Scene) -> Vec<PanelLine> {
 }
 
 fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
-    // A missing target has no fields.
+    // A `subject` that no longer exists in the scene has no fields.
     let rows = rows(scene, subject).unwrap_or_default();
     rows.into_iter()
         .flat_map(|property| lines_of(subject, property))
@@ -140,8 +141,8 @@ fn fields(scene: &Scene, subject: &Target) -> Vec<PanelLine> {
         .collect()
 }
 
-/// Returns the lines of `property`, which belongs to `subject`: one line for each number if its
-/// value is a list of numbers, otherwise one line.
+/// Returns the lines of `property`, which belongs to `subject`. A value that is a list of numbers
+/// has one line for each number. Any other value has one line.
 fn lines_of(subject: &Target, property: Property) -> Vec<FieldLine> {
     let line = |component: Option<usize>, label: String, value: &str| FieldLine {
         subject: subject.clone(),
@@ -176,9 +177,9 @@ impl Model {
     }
 }
 
-/// Returns the index of the line with a property that is nearest to index `wanted`. This is the
-/// first such line from `wanted` on, or else the last one before it. Returns 0 if no line has a
-/// property.
+/// Returns the index of a line near `wanted` that shows a property. This is the first such line at
+/// or after `wanted`. If there is none, it is the last one before `wanted`. Returns 0 if no line
+/// shows a property.
 pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
     let field = |i: &usize| lines[*i].field().is_some();
     (wanted..lines.len())
@@ -187,9 +188,9 @@ pub fn nearest_field(lines: &[PanelLine], wanted: usize) -> usize {
         .unwrap_or(0)
 }
 
-/// Returns the index of the line `steps` lines below the line at `cursor`, or above it if `steps`
-/// is negative. Only lines with a property are counted. Steps beyond the first or last such line
-/// end there.
+/// Returns the index of the line to which the cursor moves from `cursor` by `steps` lines,
+/// downwards if `steps` is positive. Headings are skipped and not counted. The cursor stops at the
+/// first and at the last line with a property.
 pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     let fields: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].field().is_some()).collect();
     let position =
@@ -198,9 +199,10 @@ pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
     fields.get(to).copied().unwrap_or(0)
 }
 
-/// Returns the index of the first visible line of a list of `len` lines, of which `rows` are
-/// visible. The result is as near as possible to `scroll`, the present index, such that line
-/// `cursor` is visible. If `rows` is greater than 2, the line above the cursor is visible, too.
+/// Returns the new scroll position of a list: the index of its first visible line. The list has
+/// `len` lines, of which `rows` are visible. The result is the one nearest to the present position
+/// `scroll` at which line `cursor` is visible. If `rows` is greater than 2, the line above the
+/// cursor is visible, too.
 pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize {
     let lowest = (cursor + 1).saturating_sub(rows);
     let highest = if rows > 2 { cursor.saturating_sub(1) } else { cursor };

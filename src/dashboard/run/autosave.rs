@@ -12,23 +12,23 @@ const DEBOUNCE: Duration = Duration::from_millis(400);
 /// Longest time between an edit and its write to the recovery file, even if edits continue.
 const MAX_DELAY: Duration = Duration::from_secs(1);
 
-/// Autosave of a scene: writes unsaved edits to a recovery file. At the start it also finds
-/// orphaned edits, the unsaved edits of crashed sessions in their recovery files.
+/// Autosave of a scene: writes unsaved edits to a recovery file. At the start of the program it
+/// also looks for recovery files with unsaved edits of crashed runs (orphaned edits).
 pub struct Autosave {
-    /// Recovery file of this session.
+    /// Recovery file of this run of the program.
     recovery: Recovery,
     /// State folder of the user (XDG), for recovery files that cannot be written beside the scene
     /// file.
     state: Option<PathBuf>,
     pending: Option<Pending>,
-    /// Newest scene that this session has written to the recovery file; `None` if it has written
-    /// none.
+    /// Newest scene that this run of the program has written to the recovery file; `None` if it has
+    /// written none.
     kept: Option<Arc<Scene>>,
     /// Orphaned edits that the user has neither recovered nor discarded. The last entry is offered
     /// next.
     found: Vec<Orphan>,
-    /// Cause of the failure if the last write to the recovery file has failed, otherwise `None`.
-    /// The user is warned only of the first of consecutive failures.
+    /// Cause of the failure if the last write to the recovery file has failed, otherwise `None`. If
+    /// several writes fail in succession, the user is warned only of the first.
     failed: Option<String>,
 }
 
@@ -56,8 +56,9 @@ impl Autosave {
         }
     }
 
-    /// Updates an existing recovery file to `scene` before `scene` is saved. If the program is
-    /// killed during the save, the next start then does not offer outdated edits.
+    /// Updates an existing recovery file to `scene` before `scene` is saved. Without this update, a
+    /// program that is killed during the save would leave older edits in the recovery file, which
+    /// the next start would offer.
     pub fn saving(&mut self, file: &SceneFile, scene: &Arc<Scene>) {
         if self.recovery.path().is_some() {
             // An error is ignored here because the save reports it.
@@ -67,7 +68,7 @@ impl Autosave {
     }
 
     /// Records that `scene` was written to the scene file at `path`, and removes the recovery file.
-    /// Edits that were made after `scene` are scheduled for the new recovery file.
+    /// If newer edits than `scene` exist, schedules their write to a recovery file for `path`.
     pub fn saved(&mut self, scene: &Arc<Scene>, path: &Path, now: Instant) {
         let newest = self.pending.take().map(|pending| pending.scene).or(self.kept.take());
         self.recovery.forget();
@@ -98,9 +99,9 @@ impl Autosave {
         self.pending.as_ref().map(|p| (p.last + DEBOUNCE).min(p.first + MAX_DELAY))
     }
 
-    /// Writes pending edits to the recovery file. The text is the one that saving the edited scene
-    /// to `file` would write. Returns a warning if this fails for the first time since the last
-    /// success.
+    /// Writes pending edits to the recovery file, as the text that saving the edited scene to
+    /// `file` would write. Returns a warning if the write fails and the previous write did not
+    /// fail.
     pub fn write(&mut self, file: &SceneFile) -> Option<Message> {
         let scene = self.pending.take()?.scene;
         let text = file.text_of(&scene);
@@ -124,7 +125,7 @@ impl Autosave {
         }
     }
 
-    /// Returns the path of the recovery file at the end of the session; `None` if there is no such
+    /// Returns the path of the recovery file when the program ends; `None` if there is no such
     /// file.
     ///
     /// # Errors
@@ -152,9 +153,9 @@ impl Autosave {
         self.recovery.path()
     }
 
-    /// Searches for unsaved edits of crashed sessions, and removes incomplete files that killed
-    /// sessions left. `file` is the scene file, or its path if it is unreadable. Returns warnings,
-    /// and an offer to recover the first of the edits if any were found.
+    /// Searches for unsaved edits of crashed runs, and removes incomplete files that killed runs of
+    /// the program left. `file` is the scene file, or its path if it is unreadable. Returns
+    /// warnings. If edits were found, also returns an offer to recover one run's edits.
     pub fn search(&mut self, file: Result<&SceneFile, &Path>) -> Vec<Message> {
         // Incomplete scene files are in the folder of the scene file, incomplete exports in the
         // working directory.
@@ -186,9 +187,9 @@ impl Autosave {
         messages
     }
 
-    /// Returns the offer to recover the next edits of a crashed session, or a warning if these
-    /// edits are unreadable. Edits that `file` already contains are discarded. Returns `None` if no
-    /// edits are left. `file` is the scene file, or its path if it is unreadable.
+    /// Returns the offer to recover the edits of the next crashed run, or a warning if these edits
+    /// are unreadable. Discards edits that `file` already contains. Returns `None` if no edits are
+    /// left. `file` is the scene file, or its path if it is unreadable.
     pub fn offer(&mut self, file: Result<&SceneFile, &Path>) -> Option<Message> {
         loop {
             let orphan = self.found.last()?;
@@ -214,9 +215,9 @@ impl Autosave {
         }
     }
 
-    /// Adopts the offered edits as the unsaved edits of this session. `path` is the path of the
-    /// scene file if it is unreadable, otherwise `None`. Returns a scene file with the recovered
-    /// text if `path` is given, otherwise `None`.
+    /// Adopts the offered edits as unsaved edits of this run of the program. If the scene file is
+    /// unreadable, `path` is its path; a scene file with the recovered text is returned then.
+    /// Otherwise `path` is `None`, and so is the result.
     pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let orphan = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, orphan.text.clone()).ok());
@@ -280,7 +281,7 @@ mod tests {
         first.note(Some(scene(3)), Instant::now());
         assert!(first.write(&file).is_none());
         assert_eq!(first.path(), Some(&*folder.path().join(".a.toml.unsaved")));
-        // Edits of a session that is still running are reported but not offered.
+        // Edits of a run that has not ended yet are reported but not offered.
         let mut second = Autosave::new(Some(&path), "", None);
         let messages = second.search(Ok(&file));
         assert!(
@@ -298,7 +299,8 @@ mod tests {
         assert!(left.changed);
         assert!(second.recover(None).is_none());
         assert!(second.offer(Ok(&file)).is_none());
-        // Saving removes the recovery file.
+        // Saving (`note` with `None`) removes the recovery file, so that the folder has one file
+        // less.
         second.note(Some(scene(3)), Instant::now());
         second.write(&file);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);

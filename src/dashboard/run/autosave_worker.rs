@@ -12,19 +12,19 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub enum AutosaveJob {
-    /// Schedule an autosave of this scene; `None` removes the recovery file.
+    /// Schedule an autosave of this scene. `None` cancels it and removes the recovery file.
     Note(Option<Arc<Scene>>),
-    /// Write scheduled edits now, then send a message to this sender.
+    /// Write scheduled edits now, then report completion by a message to this sender.
     Flush(Sender<()>),
-    /// Update an existing recovery file before this scene is saved. The sender is dropped
-    /// afterwards, which informs the receiver.
+    /// Update an existing recovery file before this scene is saved. The thread drops the sender
+    /// after the update, which disconnects the receiver: the scene may be saved now.
     Saving(Arc<Scene>, Sender<()>),
     /// Record that the scene was written to the scene file at this path.
     Saved(Arc<Scene>, PathBuf),
     Recover,
     Discard,
-    /// Write scheduled edits, send the path of the recovery file (if there is one) to this sender,
-    /// and end.
+    /// Write scheduled edits, send the path of the recovery file (`None` if there is no such file)
+    /// to this sender, and end the thread.
     End(Sender<Result<Option<PathBuf>, String>>),
 }
 
@@ -40,7 +40,7 @@ pub struct AutosaveWorker {
 }
 
 impl AutosaveWorker {
-    /// Executes jobs of the thread that autosaves, until [`AutosaveJob::End`].
+    /// Executes the jobs in `inbox` until [`AutosaveJob::End`].
     pub fn run(mut self, inbox: &Receiver<AutosaveJob>) {
         let messages = self.with_file(|autosave, file| autosave.search(file));
         messages.into_iter().for_each(|message| self.send(message));

@@ -14,11 +14,11 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Timeout for a reply from a terminal that has replied before.
 const LONG_PATIENCE: Duration = Duration::from_secs(10);
-/// Shortest duration of a test transfer that gives a precise rate of the connection. The round trip
-/// is not included. The test sends larger and larger transfers until one takes this long.
+/// Duration that a test transfer must have to give a precise rate of the connection, without the
+/// round trip. The test sends larger and larger transfers until one takes this long.
 const MEASURED: Duration = Duration::from_millis(300);
-/// Largest transfer of the test of the connection's rate, in bytes. The test ends with it even if
-/// it takes less than [`MEASURED`].
+/// Number of bytes of the largest test transfer. The test ends after this transfer, even if it
+/// takes less than [`MEASURED`].
 const MOST_BYTES: usize = 1 << 20;
 
 /// Capabilities of the terminal and of its connection, for `zerkalo doctor`.
@@ -56,9 +56,9 @@ pub fn diagnose(environment: Environment, measure: bool) -> io::Result<TerminalR
     }
     let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
     let mode = InitialLink::of(&terminal, queue.is_some(), None).mode;
-    // Requests must pass through a multiplexer: its own replies do not measure the connection to
-    // the terminal. The outer `Option` is `None` if no transfer can be measured. The inner one is
-    // the multiplexer that requests pass through.
+    // A request must be wrapped to pass through a multiplexer. Otherwise the multiplexer itself
+    // replies, and the connection to the terminal is not measured. `through` is `None` if no
+    // transfer can be measured. Its inner `Option` is the multiplexer, if there is one.
     let through = match mode {
         PacingMode::Unlimited => Some(None),
         PacingMode::AckClocked(through) => Some(through),
@@ -132,9 +132,9 @@ fn rate(
     }
 }
 
-/// Returns `bytes` pseudo-random characters with the attribute "hidden", preceded by a jump to the
-/// upper left corner. Regular characters would be compressed by SSH, which would distort the
-/// measured rate.
+/// Returns an escape sequence for the upper left corner and hidden text, followed by `bytes`
+/// pseudo-random characters. SSH could compress regular text, which would distort the measured
+/// rate.
 fn hidden_text(bytes: usize) -> Vec<u8> {
     let mut text = b"\x1b[8m\x1b[H".to_vec();
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
