@@ -225,8 +225,10 @@ impl Light {
     }
 
     /// Gives the light a surface of the kind `name` (`sphere`, `rectangle` or `disk`) with the
-    /// given radius; the sides of a rectangle are 2 x `radius` long. `radius` is rounded to two
-    /// significant digits, `center` by `round_nice`. Other names change nothing.
+    /// given radius; the sides of a rectangle are 2 x `radius` long. `normal` is the normal of a
+    /// rectangle or disk. `radius` is rounded to two significant digits, and the coordinates of
+    /// `center` are rounded to a power of ten, at most 1e-4 x `radius`. If `name` is another word,
+    /// the light is unchanged.
     pub fn set_surface(&mut self, name: &str, center: DVec3, normal: [f64; 3], radius: f64) {
         let center = center.map(|x| round_nice(x, radius)).to_array();
         let radius = round_significant(radius, 2);

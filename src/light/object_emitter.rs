@@ -1,5 +1,6 @@
 //! Emissive objects as lights: sampling of points on their surfaces by solid angle or area, and the
-//! densities. Rays that hit such an object find its emission without this module.
+//! densities of the sampled directions. The emission that a ray finds when it hits such an object
+//! is not computed here.
 //!
 //! A sampled point is lifted off the surface to the side of the receiver, so that the object does
 //! not occlude its own points. The lift is along the normal and larger than the rounding errors of
@@ -43,19 +44,20 @@ pub enum ObjectSurface {
     ConvexTriangles(Vec<[DVec3; 3]>),
 }
 
-/// Emissive object, compiled as a light. It is white with radiance 1.
+/// Emissive object, compiled as a light. All results are for white light of radiance 1; callers
+/// multiply them by the emission.
 #[derive(Clone, Debug)]
 pub struct ObjectEmitter<S> {
     surface: CompiledSurface<S>,
-    /// Centre of a sphere that contains all sampled points; these are lifted off the surface.
+    /// Centre of a bounding sphere of all sampled points, including their lift off the surface.
     pub center: DVec3,
-    /// Radius of a sphere around `center` that contains all sampled points; these are lifted off
-    /// the surface.
+    /// Radius, around `center`, of a bounding sphere of all sampled points, including their lift
+    /// off the surface.
     pub radius: f64,
     /// Height of sampled points above the surface.
     lift: S,
-    /// `true` if the back emits light, too: the other side of a flat surface, the inside of a
-    /// solid.
+    /// `true` if the back emits light, too. The back is the other side of a flat surface, or the
+    /// inner side of the surface of a solid.
     two_sided: bool,
 }
 
@@ -73,11 +75,11 @@ enum CompiledSurface<S> {
     /// Up to [`MAX_FACES`] triangles. One is chosen in proportion to its solid angle.
     Faces {
         triangles: Vec<Triangle<S>>,
-        /// `true` if the triangles enclose a convex solid, so that no triangle occludes another.
+        /// `true` if the triangles enclose a convex solid; no triangle then occludes another.
         convex: bool,
     },
-    /// More than [`MAX_FACES`] triangles, sorted by their `end`. One is chosen in proportion to its
-    /// area.
+    /// More than [`MAX_FACES`] triangles, sorted by `end`, the end of the range of random numbers
+    /// for which a triangle is chosen. One is chosen in proportion to its area.
     Mesh(Vec<Triangle<S>>),
 }
 
@@ -86,7 +88,8 @@ struct Triangle<S> {
     corner: [S; 3],
     /// Edges from the first corner of the triangle to the two others.
     edges: [[S; 3]; 2],
-    /// Unit normal of the triangle's front.
+    /// Start of the triangle's range in [0, 1): the triangle is chosen for random numbers from
+    /// `start` to `end`. The length of the range is the triangle's share of the total area.
     normal: [S; 3],
     area: S,
     /// Start of the range of random numbers for which this triangle is chosen; `end` is its end.
@@ -97,8 +100,9 @@ struct Triangle<S> {
 
 impl<S: Float> ObjectEmitter<S> {
     /// Compiles the surface of an emissive object. Its back emits light, too, if `two_sided` is
-    /// `true`. `lift` is the height of sampled points above the surface; at most 1e-4 of the
-    /// surface's size is used. Returns `None` if the surface has no area.
+    /// `true`. `lift` is the height of sampled points above the surface. It is limited to 1e-4 of
+    /// the surface's size, which is the radius of a sphere, the shorter side of a rectangle, or the
+    /// root of the total area of triangles. Returns `None` if the surface has no area.
     pub fn new(surface: &ObjectSurface, two_sided: bool, lift: f64) -> Option<Self> {
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
         let (compiled, center, radius, area, size);
@@ -164,9 +168,10 @@ impl<S: Float> ObjectEmitter<S> {
     /// Samples a point of the emissive surface for each of the receivers at `origin`. `u` and `v`
     /// are uniform in [0, 1).
     ///
-    /// A sphere is sampled by the cone that it subtends, a rectangle by solid angle. One of up to
-    /// 32 triangles is chosen in proportion to its solid angle, one of more triangles in proportion
-    /// to its area. The chosen triangle is sampled by solid angle, or by area if it is tiny.
+    /// A sphere is sampled by the cone that it subtends, a rectangle by solid angle. Of at most 32
+    /// triangles, one is chosen in proportion to its solid angle. Of more triangles, one is chosen
+    /// in proportion to its area. The chosen triangle is sampled by solid angle, or by area if its
+    /// solid angle is too small for this.
     #[inline(never)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
@@ -180,7 +185,9 @@ impl<S: Float> ObjectEmitter<S> {
                 let cone = Cone::new(to_center, radius);
                 let local = warp::cone(u, v, cone.one_minus_cos);
                 let wi = Frame::around(cone.axis).to_world(local).renormalize();
-                // The lifted point in front of the sampled one.
+                // Distance to the lifted point in the sampled direction. This is the intersection
+                // with a sphere whose radius is larger by the lift, or smaller if the receiver is
+                // inside.
                 let sin2 = local.x * local.x + local.y * local.y;
                 let outer = radius + lift;
                 let root2 = outer * outer - cone.distance2 * sin2;
@@ -221,7 +228,7 @@ impl<S: Float> ObjectEmitter<S> {
                 triangle.share = angle / total;
                 let u = ((target - start) / angle).max(L::zero()).min(L::one());
                 let (wi, distance, pdf) = self.sample_triangle(&triangle, backs, (u, v));
-                // Without a face in view nothing arrives.
+                // A receiver that sees no face gets no light.
                 let seen = total.gt(L::zero());
                 (wi, distance, (L::one() / total).masked(seen), pdf.masked(seen))
             }
@@ -241,8 +248,8 @@ impl<S: Float> ObjectEmitter<S> {
     }
 
     /// Returns the density \[1/sr\] with which [`ObjectEmitter::sample`] draws the direction of a
-    /// ray from `origin` that hits the object at `distance`. `triangle` is the index of the
-    /// triangle of a mesh, stored by [`SimdFloat::from_id`].
+    /// ray from `origin` that hits the object at `distance`. `triangle` is the index of the hit
+    /// triangle if the object is a mesh. It is stored by [`SimdFloat::from_id`].
     #[inline(never)]
     pub fn density<L: SimdFloat<Scalar = S>>(
         &self,
@@ -328,10 +335,11 @@ impl<S: Float> ObjectEmitter<S> {
         (wi, distance, triangle.density(&seen, height, distance))
     }
 
-    /// Lifts each lane's triangle to the front, or to the back if the receiver is behind it in a
-    /// lane of `backs`. Returns three values: the lifted triangle as seen from the receiver, its
-    /// corners relative to the receiver, and the coordinate of its plane along the normal. The
-    /// coordinate is negative in lanes whose receiver gets light.
+    /// Lifts each lane's triangle along its normal to the front. In lanes of `backs` whose receiver
+    /// is behind the triangle, it is lifted to the back instead. Returns three values: the lifted
+    /// triangle as seen from the receiver, its corners relative to the receiver, and the coordinate
+    /// of its plane along the normal, also relative to the receiver. The coordinate is negative in
+    /// lanes whose receiver gets light.
     #[inline(always)]
     fn seen_triangle<L: SimdFloat<Scalar = S>>(
         &self,
@@ -346,8 +354,9 @@ impl<S: Float> ObjectEmitter<S> {
         (SphericalTriangle::new(corners, height, triangle.area), corners, height)
     }
 
-    /// Returns the density \[1/sr\] of directions to a sphere in the cone that it subtends. It is
-    /// zero inside of a sphere that emits outwards only.
+    /// Returns the density \[1/sr\] of directions that are sampled uniformly in `cone`, the cone
+    /// that a sphere subtends. It is zero for receivers inside of a sphere that emits outwards
+    /// only.
     #[inline(always)]
     fn cone_density<L: SimdFloat<Scalar = S>>(&self, cone: &Cone<L>) -> L {
         let density = cone.density();
@@ -357,8 +366,8 @@ impl<S: Float> ObjectEmitter<S> {
     /// Lifts a point of a flat surface to the side of the receiver. [x, y, height] are the point's
     /// coordinates across, up and along the normal, relative to the receiver. Returns two values:
     /// the coordinates of the lifted point, and the lanes of `backs` whose receiver is behind the
-    /// surface. In these lanes the sign of the third coordinate is reversed. It is then negative in
-    /// all lanes whose receiver gets light.
+    /// surface. In these lanes the sign of the third coordinate is reversed, so that this
+    /// coordinate is negative in all lanes whose receiver gets light.
     #[inline(always)]
     fn lifted<L: SimdFloat<Scalar = S>>(
         &self,
@@ -464,7 +473,8 @@ impl<L: SimdFloat> SphericalTriangle<L> {
     fn new(corners: [Vec3<L>; 3], height: L, area: L) -> Self {
         let inverse = corners.map(|corner| L::one() / corner.length_squared().sqrt());
         let [a, b, c] = [0, 1, 2].map(|k| corners[k] * inverse[k]);
-        // Without cancellation for small angles (Van Oosterom and Strackee 1983).
+        // The formula of Van Oosterom and Strackee (1983) has no cancellation at small solid
+        // angles.
         let inverse = inverse[0] * inverse[1] * inverse[2];
         let volume = height.abs() * (area + area) * inverse;
         let below = L::one() + a.dot(b) + b.dot(c) + c.dot(a);
@@ -489,7 +499,8 @@ impl<L: SimdFloat> SphericalTriangle<L> {
         let cross = a.cross(b).dot(a.cross(c));
         let alpha = self.volume.atan2(cross);
         let (sin_alpha, cos_alpha) = alpha.sin_cos();
-        // The part of the triangle up to an arc through b has the share `u` of the area.
+        // Point `end` of the edge from a to c, with the cosine q of its angle to a. The arc from b
+        // to `end` cuts off the share `u` of the triangle's area, on the side of a.
         let (s, t) = u.mul_add(self.solid_angle, -alpha).sin_cos();
         let p = t - cos_alpha;
         let r = sin_alpha.mul_add(cos_c, s);
@@ -554,7 +565,7 @@ mod tests {
 
     fn numbers(i: u32) -> (f64, f64) {
         let unit = |x: f64| x - x.floor();
-        // Roberts' sequence.
+        // R2 sequence of Roberts (2018): points that cover the unit square evenly.
         (
             unit(0.5 + f64::from(i) * 0.754_877_666_246_69),
             unit(0.5 + f64::from(i) * 0.569_840_290_998_05),

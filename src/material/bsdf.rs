@@ -200,13 +200,15 @@ fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
     power.masked(cos.gt(L::zero()))
 }
 
-/// Returns cos^alpha of the angle between `a` and `b`, of any lengths, for alpha above
-/// [`SHARP_EXPONENT`](crate::material::bsdf::SHARP_EXPONENT); 0 for angles of 90 degrees and more.
+/// Returns cos^alpha for the angle between the vectors `a` and `b`, which may have any lengths. The
+/// result is 0 for angles of 90 degrees and more. The formula is for alpha above
+/// [`SHARP_EXPONENT`](crate::material::bsdf::SHARP_EXPONENT).
 ///
-/// Near 1 the cosine loses precision. The tangent t = |a x b| / a.b does not: cos^alpha =
-/// exp(-alpha / 2 ln(1 + t^2)). The logarithm is ln(1 + t^2) = 2 artanh(s) with s = t^2 / (2 +
-/// t^2). Four terms of its series in s^2 have a relative error of s^8 / 9. This is below 1e-9 while
-/// alpha s < 88; beyond, the power is not a normal single-precision number.
+/// A rounded cosine near 1 determines the angle with low precision. The tangent t = |a x b| / a.b
+/// has full precision there, and cos^alpha = exp(-alpha / 2 ln(1 + t^2)). The logarithm is ln(1 +
+/// t^2) = 2 artanh(s) with s = t^2 / (2 + t^2). Four terms of its series in s^2 have a relative
+/// error of s^8 / 9. This is below 1e-9 while alpha s < 88; for a larger alpha s, the result is
+/// below the smallest normal single-precision number.
 #[inline(always)]
 fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
     let (along, across2) = (a.dot(b), a.cross(b).length_squared());
@@ -292,11 +294,11 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Samples a reflected ray of `lobe`. Its weight is `strength`, a constant of the material,
-    /// times the Fresnel reflectance and, for microfacets, their shadowing. `incident` is the unit
-    /// direction towards the surface, and `n` is the normal on the viewer's side. `uv` are uniform
-    /// in [0, 1). Directions below the surface have the weight 0. If `fold` is `true`, those of a
-    /// cone or square are mirrored up instead.
+    /// Samples a reflected ray of `lobe`. Its weight is the product of `strength` (a coefficient of
+    /// the material), the Fresnel reflectance and, for microfacets, the shadowing G / G_1.
+    /// `incident` is the unit direction towards the surface, and `n` is the normal on the viewer's
+    /// side. `uv` are uniform in [0, 1). Directions below the surface have the weight 0. If `fold`
+    /// is `true`, such directions of a cone or square are mirrored to the upper side instead.
     #[inline(always)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
@@ -325,9 +327,9 @@ impl<S: Float> Bsdf<S> {
         } else {
             (direction, L::select(below, L::zero(), weight))
         };
-        // The normal of the microfacet that reflects this ray is half-way between the directions to
-        // the viewer and of the reflected ray. Its cosine with either direction is half the length
-        // of their sum, which has no cancellation at grazing angles.
+        // The normal of the microfacet that reflects this ray is half-way between the direction to
+        // the viewer and that of the reflected ray. Its cosine with either direction is half the
+        // length of their sum, which has no cancellation at grazing angles.
         let cos =
             || ((direction - incident).length_squared().sqrt() * L::from_f64(0.5)).min(L::one());
         BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }
@@ -360,9 +362,9 @@ impl<S: Float> Bsdf<S> {
         }
     }
 
-    /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction` without mirroring
-    /// directions up (`fold` is `false`). Returns `None` for a mirror. All directions are unit
-    /// vectors. The other parameters are those of [`Bsdf::sample`].
+    /// Returns the density [1/sr] with which [`Bsdf::sample`] draws `direction` if its parameter
+    /// `fold` is `false`, so that no directions are mirrored. Returns `None` for a mirror. All
+    /// directions are unit vectors. The other parameters are those of [`Bsdf::sample`].
     #[inline(always)]
     pub fn density<L: SimdFloat<Scalar = S>>(
         &self,

@@ -55,8 +55,8 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// Returns `value` times the reflectance at the angle whose cosine `c` returns. `c` is not
-    /// called if the reflectance is the same at every angle.
+    /// Returns `value` times the reflectance at an angle of incidence. `c` returns the cosine of
+    /// this angle. It is not called if the reflectance is the same at every angle.
     #[inline(always)]
     pub fn times<L: SimdFloat<Scalar = S>>(&self, c: impl FnOnce() -> L, value: L) -> Vec3<L> {
         match self.mode {
@@ -86,9 +86,9 @@ impl<S: Float> Reflectance<S> {
         }
     }
 
-    /// Returns the reflectance by Cook and Torrance's form of Fresnel's equations:
-    /// F = 1/2 ((g - c) / (g + c))^2 (1 + ((c (g + c) - 1) / (c (g - c) + 1))^2), g^2 = n^2 + c^2 -
-    /// 1.
+    /// Returns the reflectance of a colour channel at the cosine `c` by Cook and Torrance's form of
+    /// Fresnel's equations, with n the index of refraction: F = 1/2 ((g - c) / (g + c))^2 (1 + ((c
+    /// (g + c) - 1) / (c (g - c) + 1))^2), g^2 = n^2 + c^2 - 1.
     #[inline(always)]
     fn exact<L: SimdFloat<Scalar = S>>(&self, c: L, channel: usize) -> L {
         if self.total[channel] {
@@ -96,8 +96,8 @@ impl<S: Float> Reflectance<S> {
         }
         let g = c.mul_add(c, L::splat(self.index2_less_1[channel])).max(L::zero()).sqrt();
         let (plus, minus) = (g + c, g - c);
-        // At n = 1 and grazing incidence, g = c = 0: there is no boundary, and the reflectance is
-        // 0.
+        // At n = 1 and grazing incidence, g = c = 0: there is no boundary then, and the reflectance
+        // is 0.
         let ratio = minus / plus.max(L::from_f64(1e-30));
         let other = (c * plus - L::one()) / (c * minus + L::one());
         L::from_f64(0.5) * ratio * ratio * (L::one() + other * other)

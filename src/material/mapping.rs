@@ -1,8 +1,9 @@
 //! Texture coordinates of surface points and their gradients, in SIMD lanes.
 //!
-//! A projection is a function of space, so that one formula serves every shape. Its gradient along
-//! the surface is equivalent to Blinn's partial derivatives of the surface (Blinn 1978, *Simulation
-//! of Wrinkled Surfaces*; Mikkelsen 2010, *Bump Mapping Unparametrized Surfaces on the GPU*).
+//! A projection is a formula in texture space, not a parametrisation of a surface; one formula
+//! therefore serves every shape. Its gradient along the surface is equivalent to Blinn's partial
+//! derivatives of the surface (Blinn 1978, *Simulation of Wrinkled Surfaces*; Mikkelsen 2010, *Bump
+//! Mapping Unparametrized Surfaces on the GPU*).
 
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
 use crate::material::texture::{Axis, Mapping, Placement};
@@ -70,8 +71,8 @@ pub struct TextureMapping<S> {
     /// Centre of the object's part in the scene. Points are mapped relative to this centre, so that
     /// rounding errors are in proportion to the size of the part.
     center: [S; 3],
-    /// Coordinates of the centre of the object's part in texture space. The origin is that of the
-    /// projection's formula.
+    /// Coordinates of the centre of the object's part in texture space, relative to the origin of
+    /// the projection's formula.
     texture_center: [S; 3],
     /// Edge lengths, in texture space, of the bounding box of the object's part.
     extent: [S; 3],
@@ -125,7 +126,7 @@ impl<S: Float> TextureMapping<S> {
         let mut scale = placement.scale;
         let extent = high - low;
         if projection == Projection::Planar && placement.mapping == Mapping::Uv {
-            // One repetition from edge to edge of a flat shape.
+            // With the mapping `uv`, a flat shape has one repetition between opposite edges.
             scale = [scale[0] / extent.x, scale[1] / extent.y];
         }
         Self {
@@ -147,8 +148,9 @@ impl<S: Float> TextureMapping<S> {
         self.projection == Projection::Uv
     }
 
-    /// Maps a normal of any length from scene space to texture space or back. `columns` are those
-    /// of the linear map in the opposite direction: its transpose maps the normals.
+    /// Maps a normal of any length from scene space to texture space or back. `columns` are the
+    /// columns of the matrix that maps points in the opposite direction: normals are mapped by the
+    /// transpose of this matrix.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(columns: &[[S; 3]; 3], n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = columns.map(Vec3::splat);
@@ -193,14 +195,15 @@ impl<S: Float> TextureMapping<S> {
         }
     }
 
-    /// Returns u and v, moved off edges of the texture if necessary, for textures whose colour
-    /// jumps at edges, such as checkers. `coordinates` are those of a point with the outer normal
-    /// `normal`. `rounding` is the rounding error of the point's largest coordinate.
+    /// Returns the texture coordinates u and v, moved off edges of the texture if necessary. This
+    /// is for textures whose colour jumps at edges, such as checkers. `coordinates` are those of a
+    /// point with the outer normal `normal`. `rounding` is the rounding error of the point's
+    /// largest coordinate.
     ///
-    /// A flat face may lie exactly on an edge, such as the lid of a box whose height is a whole
-    /// number of squares. One coordinate is constant there, and rounding would decide between two
-    /// colours at each point. A constant coordinate is therefore increased by its largest rounding
-    /// error.
+    /// A flat face of a shape may lie exactly on an edge of the texture. An example is the lid of a
+    /// box whose height is a whole number of squares. One texture coordinate is constant on such a
+    /// face, and rounding would decide between two colours at each point. A constant coordinate is
+    /// therefore increased by its largest rounding error.
     pub fn beside_edges<L: SimdFloat<Scalar = S>>(
         &self,
         coordinates: &TexCoord<L>,
@@ -219,7 +222,8 @@ impl<S: Float> TextureMapping<S> {
             let constant = across.length_squared().sqrt().le(steepness * angle);
             let largest = value.abs() + offset.abs() + scale;
             let error = largest.mul_add(L::from_f64(POINT_ROUNDINGS * L::EPSILON), moved);
-            // The ends of a turn are the same place.
+            // After a full turn, the end of the range of u is the same place as its start; a
+            // constant u at the end is replaced by the start.
             let at_end = if periodic {
                 constant & (value - offset - scale).abs().le(error)
             } else {
@@ -300,8 +304,8 @@ fn cylindrical<L: SimdFloat>(p: Vec3<L>, height: L) -> TexCoord<L> {
     }
 }
 
-/// Returns the planar projection on one side of a box, measured from the lower left corner of that
-/// side. The side is the one that `normal` points out of.
+/// Returns the planar projection on the side of a box that `normal` points out of. The coordinates
+/// are measured from the lower left corner of this side, as seen from outside.
 fn sides<L: SimdFloat>(p: Vec3<L>, normal: Vec3<L>, extent: Vec3<L>) -> TexCoord<L> {
     let zero = L::zero();
     let [ax, ay, az] = [normal.x, normal.y, normal.z].map(L::abs);

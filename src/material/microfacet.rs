@@ -87,8 +87,8 @@ const STEEP: f64 = 4.0;
 /// (Heitz 2014, eq. 57); undefined for larger `a`.
 ///
 /// Computed as exp(-a^2) k(a) / (2 a sqrt(pi) (1 + 2 a^2)). The function k is smooth, has values
-/// between 0.6 and 1, and is approximated by a Chebyshev fit of degree 10 in 2 - 6 / (a + 2). The
-/// error is below 1e-8 (1 + Lambda).
+/// between 0.6 and 1, and is approximated by a Chebyshev series of degree 10. Its variable is 2 - 6
+/// / (a + 2), which is from -1 to 1 for these a. The error is below 1e-8 (1 + Lambda).
 #[inline(always)]
 fn beckmann_lambda<L: SimdFloat>(a: L) -> L {
     const K: [f64; 11] = [
@@ -181,7 +181,7 @@ impl<L: SimdFloat> MicrofacetEval<L> for MicrofacetDistribution<L::Scalar> {
         if self.ggx {
             return ((alpha2 * sin2 / cos2 + L::one()).sqrt() - L::one()) * L::from_f64(0.5);
         }
-        // Most packets hit the surface steeply in all lanes: then nothing is masked.
+        // In most packets every lane hits the surface so steeply that masking is neglected.
         let grazing = cos2.lt(sin2 * alpha2 * L::from_f64(STEEP * STEEP));
         if grazing.none() {
             return L::zero();

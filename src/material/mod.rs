@@ -191,8 +191,8 @@ impl Material {
 
     /// Returns the absorption coefficient of the inside [1 / scene unit] in each channel. By Beer's
     /// law, the fraction exp(-coefficient x distance) of the light is left after a distance.
-    /// Coefficients are at most 1e30. A channel of `attenuation_color` that is 0 is replaced by
-    /// 1e-38.
+    /// Coefficients are at most 1e30. A channel of `attenuation_color` below 1e-38 counts as 1e-38,
+    /// so that its logarithm is finite.
     pub fn absorption(&self) -> [f64; 3] {
         let coefficient = |c: f64| -c.max(1e-38).ln() / self.attenuation_distance;
         self.attenuation_color.0.map(|c| coefficient(c).clamp(0.0, 1e30))

@@ -6,7 +6,7 @@
 use crate::lanes::{Mask, SimdFloat, Vec3};
 use crate::material::bsdf::Transmission;
 
-/// Boundary of two media with incident rays, one per lane: directions and cosines of refraction.
+/// Refraction of incident rays, one per lane, at the boundary of two media.
 #[derive(Clone, Copy, Debug)]
 pub struct Interface<L: SimdFloat> {
     /// Unit direction of the refracted rays; undefined in lanes of `tir`.
@@ -68,7 +68,8 @@ impl<L: SimdFloat> Interface<L> {
     fn polarised(&self) -> (L, L) {
         let Self { cos_i, cos_t, n_i, n_t, .. } = *self;
         let reflectance = |a: L, b: L| {
-            // With equal indices and a grazing ray, a and b are zero: there is no boundary.
+            // With equal indices and a grazing ray, a and b are zero: there is no boundary then,
+            // and the reflectance is 0.
             let r = (a - b) / (a + b).max(L::from_f64(1e-30));
             r * r
         };
@@ -98,7 +99,7 @@ impl<L: SimdFloat> Interface<L> {
     ///
     /// If `transmission.dielectric` is `false`, Fresnel's equations are not used. A solid then
     /// reflects only on its outer side, which prevents endless reflections between its inner walls.
-    /// Total internal reflection reflects all light in both cases.
+    /// In total internal reflection all light is reflected, with and without Fresnel's equations.
     #[inline(always)]
     pub fn split(&self, transmission: &Transmission<L::Scalar>, outer: L::Mask) -> FresnelSplit<L> {
         let k_t = L::splat(transmission.strength);
@@ -182,14 +183,14 @@ mod tests {
             let f = f0_from_index(n);
             assert!((interface::<f64>(0.0, 1.0, n).reflectance() - f).abs() < 1e-14);
             assert!((interface::<f64>(0.0, n, 1.0).reflectance() - f).abs() < 1e-14);
-            // A slab with all orders: R = 2 F / (1 + F), T = (1 - F) / (1 + F).
+            // Slab with all orders of inner reflection: R = 2 F / (1 + F), T = (1 - F) / (1 + F).
             let pane = interface::<f64>(0.0, 1.0, n).pane_reflectance();
             assert!((pane - 2.0 * f / (1.0 + f)).abs() < 1e-14, "{n}");
             assert!((1.0 - pane - (1.0 - f) / (1.0 + f)).abs() < 1e-14, "{n}");
             // At Brewster's angle p-polarised light is not reflected.
             let (_, p) = interface::<f64>(n.atan().to_degrees(), 1.0, n).polarised();
             assert!(p < 1e-20, "{n}: {p}");
-            // At grazing incidence F is 1, except without a boundary.
+            // At grazing incidence F is 1, except for n = 1: there is no boundary then.
             let grazing = interface::<f64>(90.0, 1.0, n).reflectance();
             assert!((grazing - if n == 1.0 { 0.0 } else { 1.0 }).abs() < 1e-9, "{n}: {grazing}");
         }
@@ -210,8 +211,8 @@ mod tests {
                 assert_eq!(i.tir, f == 1.0 && n > 1.0, "{n} {degrees}");
                 if !i.tir && n > 1.0 {
                     assert!((f + transmittance(&i) - 1.0).abs() < 1e-12, "{n} {degrees}");
-                    // 1 - F = 4 n cos t / cos i at most, and cos^2 t = 2 d cot c at the distance d
-                    // from the critical angle c.
+                    // Let d be the angular distance from the critical angle c. Then cos^2 t = 2 d
+                    // cot c, and 1 - F is at most 4 n cos t / cos i.
                     let d = f64::from(step.abs()) * 1e-10 * 57.3_f64.to_radians();
                     let cos_t = (2.0 * d * (n * n - 1.0).sqrt()).sqrt();
                     let jump = 4.0 * n * cos_t / (1.0 - 1.0 / (n * n)).sqrt();

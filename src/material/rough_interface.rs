@@ -2,8 +2,8 @@
 //!
 //! Each microfacet reflects and refracts like clear glass, about its own normal (Walter et al.
 //! 2007, *Microfacet Models for Refraction through Rough Surfaces*). The lobes `cone` and `square`
-//! have no microfacets. They surround the refracted direction in the same way as the mirror
-//! direction.
+//! have no microfacets. They distribute transmitted rays about the refracted direction as they
+//! distribute reflected rays about the mirror direction.
 
 use crate::lanes::{Float, Frame, Mask, SimdFloat, Vec3};
 use crate::material::bsdf::{Bsdf, ReflectionLobe, Transmission, along_tan2, spread};
@@ -31,7 +31,7 @@ pub struct InterfaceMedia<L: SimdFloat> {
 
 impl<L: SimdFloat> InterfaceMedia<L> {
     /// Returns the lanes with equal indices of refraction on both sides of the interface, except
-    /// those of thin surfaces. Rays are not refracted there, even by a rough surface.
+    /// those of thin surfaces. Rays are not refracted in these lanes, even by a rough surface.
     #[inline(always)]
     fn same(&self) -> L::Mask {
         (self.n_i.le(self.n_t) & self.n_t.le(self.n_i)).and_not(self.thin)
@@ -190,7 +190,8 @@ impl<S: Float> Bsdf<S> {
             let through: L = facets.shadowing_behind((nh, nv, vh), (no, oh));
             let passed = shares.transmitted * L::select(media.thin, shadowing, through);
             let value = Vec3::select(behind, gray(passed), reflected) * density;
-            // The half vector is the difference of two nearly equal vectors.
+            // At nearly equal indices the half vector of refraction is the difference of two nearly
+            // equal vectors: it has too few valid digits.
             let same = behind.and_not(media.thin)
                 & (media.n_t - media.n_i).abs().le(media.n_i * L::from_f64(MIN_REFRACTION));
             let possible = density.gt(L::zero()).and_not(same);
@@ -255,7 +256,7 @@ fn facet<L: SimdFloat>(
     let reflected = Vec3::select(behind, direction.reflect(n), direction) - incident;
     let refracted = direction * media.n_t - incident * media.n_i;
     let half = Vec3::select(refracts, refracted, reflected);
-    // Towards the viewer's side.
+    // Points the half vector to the viewer's side.
     let half = half * L::one().copysign(half.dot(n));
     let length2 = half.length_squared();
     let h = half * (L::one() / length2.sqrt());

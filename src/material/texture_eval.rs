@@ -39,7 +39,7 @@ pub struct BumpMap {
 fn pixel_position(x: f64, size: u32, wrap: Wrap) -> (i32, f64) {
     let size = f64::from(size);
     let x = match wrap {
-        // The texture coordinates of a triangle without area are not finite.
+        // The texture coordinates of a triangle without area are not finite. They count as 0.
         _ if !x.is_finite() => 0.0,
         Wrap::Repeat => x - x.floor(),
         Wrap::Clamp => x.clamp(-1.0, 2.0),
@@ -163,8 +163,8 @@ impl BumpMap {
         let rows: [u32; 4] = array_from_fn(|i| wrapped(y + i as i32 - 1, height, wrap));
         let height_at = |i: usize, j: usize| f64::from(self.image.height(columns[i], rows[j]));
         let lerp = |f: f64, a: f64, b: f64| a + f * (b - a);
-        // Twice the slope per pixel, to the right and downward, at the four pixels around the
-        // point.
+        // Central differences of the heights to the right and downwards, each of which is twice the
+        // slope per pixel. They are needed at the four pixels around the point.
         let right = |i: usize, j: usize| height_at(i + 1, j) - height_at(i - 1, j);
         let down = |i: usize, j: usize| height_at(i, j + 1) - height_at(i, j - 1);
         let du = lerp(fy, lerp(fx, right(1, 1), right(2, 1)), lerp(fx, right(1, 2), right(2, 2)));
