@@ -21,7 +21,7 @@ pub(crate) fn open_regular_with(options: &mut OpenOptions, path: &Path) -> io::R
     // The type is checked before opening, because the opening of a device may have effects.
     require_regular(fs::metadata(path)?.file_type())?;
     let file = options.custom_flags(OFlags::NONBLOCK.bits() as i32).open(path)?;
-    // Meanwhile the path may lead to another file.
+    // The file at `path` may have been replaced between the check and the opening.
     require_regular(file.metadata()?.file_type())?;
     Ok(file)
 }

@@ -8,8 +8,8 @@ use std::path::Path;
 
 /// Returns `true` if a file in `folder` with this metadata belongs to the user of this process.
 /// Some file systems, such as network mounts, give all files one owner, who may be another user. A
-/// file with the same owner as a new file of this process in `folder` therefore belongs to the
-/// user, too.
+/// file therefore also counts as the user's own if its owner is the owner that a new file of this
+/// process in `folder` gets.
 pub fn is_own(metadata: &Metadata, folder: &Path) -> bool {
     let owner = metadata.uid();
     let owner_of_new_file = || {

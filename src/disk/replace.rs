@@ -44,16 +44,16 @@ impl WriteError {
 /// Action if the file to be written exists already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Existing {
-    /// Replaces the file. If its path is a symbolic link, the link stays and its target is
-    /// replaced. The permissions stay.
+    /// Replaces the file. The new file gets the permissions of the old one. If the path is a
+    /// symbolic link, the link stays and its target is replaced.
     Replace,
     /// Fails if the file exists, even if another program creates it in the meantime.
     Refuse,
 }
 
-/// New content of a file. It is written to a temporary file in the same folder, which
-/// [`Replacement::commit`] renames to the file. The temporary file is removed if the value is
-/// dropped before.
+/// New content of a file. It is written to a temporary file in the same folder.
+/// [`Replacement::commit`] renames the temporary file to the path of the file. If the value is
+/// dropped without a commit, the temporary file is removed.
 #[derive(Debug)]
 pub struct Replacement {
     /// Path of the file as requested.
@@ -71,9 +71,9 @@ impl Replacement {
     /// Creates the temporary file for the new content of the file at `path`.
     ///
     /// # Errors
-    /// Fails if the file could not be replaced now: it is not a regular file, it is read-only, it
-    /// exists and `existing` refuses that, the folder is not writable, or the path is a symbolic
-    /// link that `may_follow` does not permit.
+    /// Fails if the file could not be replaced now. This is the case if the file is read-only or
+    /// not a regular file, if it exists although `existing` demands a new file, if the folder is
+    /// not writable, or if the path is a symbolic link that `may_follow` does not permit.
     pub fn begin(path: &Path, existing: Existing) -> Result<Self, WriteError> {
         let error = |kind, what: &str, remedy: &str| WriteError::new(path, kind, what, remedy);
         let target = match existing {
@@ -207,8 +207,8 @@ fn is_stream(path: &Path) -> bool {
         || follow(path).is_err_and(|e| e.kind() == ErrorKind::Unsupported)
 }
 
-/// Follows the symbolic links at `path`. Returns the path that they lead to, which is not a link; a
-/// file may not exist there.
+/// Follows the symbolic links at `path`. Returns the path at the end of the links. This path is no
+/// link itself, and there need not be a file at it.
 ///
 /// # Errors
 /// [`ErrorKind::PermissionDenied`] with an explanation if [`may_follow`] does not permit a link;
@@ -367,7 +367,7 @@ mod tests {
         let [path, dangling] = ["a", "link"].map(|name| folder.path().join(name));
         symlink("nowhere", &dangling).unwrap();
         let new = Replacement::begin(&path, Existing::Refuse).unwrap();
-        // Another program creates the file in the meantime.
+        // Another program creates the file after `begin` and before `commit`.
         fs::write(&path, "theirs").unwrap();
         assert!(message(new.commit()).contains("such a file already"));
         for path in [&path, &dangling] {
@@ -407,12 +407,12 @@ mod tests {
         let owner = |user, mode| Owner { user, mode };
         let link = |user| owner(user, 0o120_777);
         for (link_user, folder, user, expected) in [
-            // Sticky and writable by all, as /tmp.
+            // The folder is sticky and everybody may write to it, like /tmp.
             (1001, owner(0, 0o41_777), 1000, false),
             (1001, owner(0, 0o41_777), 0, false),
             (1001, owner(0, 0o41_777), 1001, true),
             (0, owner(0, 0o41_777), 1000, true),
-            // Not sticky; not writable by all.
+            // The folder is not sticky, or not everybody may write to it.
             (1001, owner(0, 0o40_777), 1000, true),
             (1001, owner(0, 0o41_775), 1000, true),
             (1001, owner(0, 0o40_755), 1000, true),
@@ -442,7 +442,7 @@ mod tests {
         let error = message(write(&link, b"new"));
         assert!(error.contains("symbolic link of user 4321"), "{error}");
         assert_eq!(fs::read(&victim).unwrap(), b"mine");
-        // The second link of a chain counts as well.
+        // A link whose target is the link of the other user is refused, too.
         let outer = folder.path().join("outer");
         symlink(&link, &outer).unwrap();
         assert!(message(write(&outer, b"new")).contains("symbolic link of user 4321"));

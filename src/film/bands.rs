@@ -6,7 +6,7 @@ use std::io;
 /// Source of a picture's samples. A picture that does not fit into memory is rendered in bands of
 /// rows, one after another, while the file is written.
 pub trait Bands {
-    /// Returns the film that holds row `y` of the picture. Its first row is the row
+    /// Returns the film that holds row `y` of the picture. Row 0 of this film is the row
     /// [`Film::first_row`] of the picture. Encoders request all rows, in increasing order.
     ///
     /// # Errors
@@ -15,10 +15,10 @@ pub trait Bands {
 
     /// Returns the metadata of the picture as pairs of a key and a value.
     ///
-    /// A value that is known only after the last row, such as the noise, may change until then. It
-    /// has at most 128 bytes. A key has 1 to 79 printable ASCII characters, without leading,
-    /// trailing or double spaces. It starts with a capital letter, because OpenEXR's own keys start
-    /// with a small one.
+    /// A value that is known only after the last row, such as the noise, may change until then.
+    /// Such a value has at most 128 bytes. A key has 1 to 79 printable ASCII characters, without
+    /// leading, trailing or double spaces. Its first letter is upper-case, because the keys that
+    /// OpenEXR itself defines start with a lower-case letter.
     fn metadata(&self) -> Vec<(String, String)>;
 }
 

@@ -85,9 +85,9 @@ pub(super) fn fill_gaps(
     }
 }
 
-/// Returns one index for each element of a row: that of the nearest element for which `known` is
-/// true, or the lower one of two that are equally near. If `known` is true nowhere, returns each
-/// element's own index.
+/// Returns, for each element of a row, the index of the nearest element for which `known` is true.
+/// If two such elements are equally near, this is the lower index. If `known` is true nowhere,
+/// returns each element's own index.
 fn nearest(known: &[bool]) -> Vec<usize> {
     let mut below: Vec<Option<usize>> = Vec::with_capacity(known.len());
     for (i, k) in known.iter().enumerate() {

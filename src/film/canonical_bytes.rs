@@ -1,16 +1,17 @@
-//! Canonical serialisation of the film, by which tests compare films. Films with equal samples have
-//! equal bytes, in whatever order the samples were added.
+//! Canonical serialisation of the film. Tests compare films by these bytes. Films with equal
+//! samples have equal bytes, in whatever order the samples were added.
 //!
 //! All numbers are little-endian. The parts are, in this order:
 //!
-//! - Header: width, height and number of groups (u32 each), a scale for each group (f64), the seed (u64),
-//!   the length (u32) and the text of the precision's name.
-//! - Invalid samples: their number (u64), the number of stored positions (u32), and for each position
-//!   index, x, y (u32 each) and replicate (u8).
-//! - Tiles, row by row: sample counts of A and B, the two halves of the samples (u32), and
-//!   [`Tile::lattice_px`] (u8). If the tile has samples, the sums of the pixels inside the picture follow,
-//!   `[replicate][row][column][group][channel]` (i64).
-//! - Number of saturated samples (u64), if there are any.
+//! - Header: width, height and number of light groups (u32 each), a scale for each group (f64), the
+//!   seed (u64), and the name of the floating-point precision as length in bytes (u32) and text.
+//! - Invalid samples: their number (u64), the number of stored positions (u32), and for each
+//!   position index, x, y (u32 each) and replicate (u8).
+//! - Tiles, row by row: sample counts of A and B, the two halves of the samples (u32 each), and
+//!   [`Tile::lattice_px`] (u8). If the tile has samples, the sums of the pixels inside the picture
+//!   follow, `[replicate][row][column][group][channel]` (i64).
+//! - Number of samples above the largest value that the film can store (u64). It is omitted if it
+//!   is 0.
 
 use crate::film::TILE;
 use crate::film::store::Film;

@@ -5,7 +5,7 @@ use crate::value::srgb_from_linear;
 use std::fmt;
 use std::str::FromStr;
 
-/// Tone curve: maps radiance to linear light of a display, whose white is 1.
+/// Tone curve: maps scene radiance to the linear light that a display emits, relative to its white.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tone {
     /// Tone curve that clips each colour channel at 1.
@@ -56,8 +56,8 @@ impl Display {
         self.shown(radiance).map(|c| 255.0 * srgb_from_linear(c))
     }
 
-    /// Converts radiance to 8-bit sRGB: the rounded result of [`Display::codes`], computed several
-    /// times as fast.
+    /// Converts radiance to 8-bit sRGB. The result equals the rounded result of [`Display::codes`],
+    /// but is computed several times faster.
     pub fn codes_8(&self, radiance: [f64; 3]) -> [u8; 3] {
         self.to_8()(radiance)
     }
@@ -123,7 +123,8 @@ mod tests {
 
     #[test]
     fn srgb_encoding_follows_the_standard() {
-        // The two pieces of the curve join continuously, and every 8-bit value round-trips.
+        // The two pieces of the sRGB curve (linear and power) join continuously, and every 8-bit
+        // value round-trips.
         let [below, above] = [0.003_130_79, 0.003_130_81].map(srgb_from_linear);
         assert!((above - below).abs() < 1e-6 && above > below);
         for code in 0..=255u8 {
@@ -158,16 +159,20 @@ mod tests {
     #[test]
     fn neutral_follows_its_publication() {
         let neutral = Display { exposure_ev: 0.0, tone: Tone::Neutral };
-        // Below the end of the toe a grey g becomes 6.25 g^2, above it g - 0.04.
+        // The toe of the curve ends at 0.08. A grey g below it becomes 6.25 g^2; a grey above it
+        // becomes g - 0.04.
         let near = |got: [f64; 3], expected: [f64; 3]| {
             (0..3).for_each(|c| assert!((got[c] - expected[c]).abs() < 1e-12, "{got:?}"));
         };
         near(neutral.shown([0.04; 3]), [0.01; 3]);
         near(neutral.shown([0.2, 0.5, 0.7]), [0.16, 0.46, 0.66]);
-        // Peak 4 - 0.04 = 3.96: 1 - 0.24^2 / (3.96 + 0.24 - 0.76) = 0.983255813953...
+        // A grey of 4 has the peak 4 - 0.04 = 3.96. It is compressed to 1 - 0.24^2 / (3.96 + 0.24 -
+        // 0.76) = 0.983255813953...
         let peak = 1.0 - 0.0576 / 3.44;
         near(neutral.shown([4.0; 3]), [peak; 3]);
-        // Colour: offset 0 (least is 0); new peak 1 - 0.0576 / 1.48; towards white by g.
+        // The smallest channel of this colour is 0, so nothing is subtracted. The peak of 2 is
+        // compressed to 1 - 0.0576 / 1.48. The colour is then mixed with white of this peak; white
+        // has the weight g.
         let peak = 1.0 - 0.0576 / 1.48;
         let g = 1.0 - 1.0 / (0.15 * (2.0 - peak) + 1.0);
         near(neutral.shown([2.0, 1.0, 0.0]), [peak, peak / 2.0 * (1.0 + g), peak * g]);

@@ -9,7 +9,7 @@ use crate::film::tile::Tile;
 
 /// Film downsampled to a smaller image, whose pixels are called cells. It holds the mean radiance
 /// of each cell in each light group (lights with sums of their own). Light weights are applied
-/// later, so that a change of weights does not need the film.
+/// later; when they change, the film need not be read again.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Thumbnail {
     /// Number of cells (pixels of the smaller image) in a row.
@@ -217,7 +217,8 @@ impl DirtyTile<'_> {
         part.sums.resize(down.len * width, 0.0);
         let per_unit: Vec<f64> = film.scales().iter().flat_map(|s| [1.0 / s; 3]).collect();
         let mut line = vec![0.0; width];
-        // During the first pass a tile has samples only in the pixels of its lattice.
+        // A tile with the sample counts 0 is in its first pass: only the pixels whose x and y are
+        // multiples of `lattice_px` have a sample.
         let step = if tile.counts() == [0; 2] { tile.lattice_px() } else { 1 };
         for (y, rows) in down.pixels.iter().enumerate().step_by(step) {
             line.fill(0.0);
@@ -231,9 +232,9 @@ impl DirtyTile<'_> {
 }
 
 /// Adds every `step`-th pixel in row `y` of a tile to `line`. `line` has the sums of one row of
-/// cells, in the order of [`TilePart::sums`]. Areas are computed as if the row of pixels had the
-/// height 1; the caller multiplies by the height that is inside the cells. `per_unit` are factors
-/// that convert integer sums to radiance, `[group][channel]`.
+/// cells, in the order of [`TilePart::sums`]. Areas are computed as if the whole row of pixels were
+/// inside this row of cells; the caller multiplies `line` by the fraction of its height that is
+/// inside. `per_unit` are factors that convert integer sums to radiance, `[group][channel]`.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {
@@ -367,8 +368,8 @@ mod tests {
         assert_eq!(value(&film, 8, 6, 7, 5), 0.0);
         first_samples(&mut film, 0, 8);
         assert_eq!(film.samples(), 12);
-        // With cells of 4x4 pixels, every second cell has a sample. The others take the value of a
-        // neighbour.
+        // Cells have 4x4 pixels, and samples are 8 pixels apart. In each direction, every second
+        // cell therefore has a sample. The others take the value of a neighbour.
         for (col, row) in (0..6).flat_map(|row| (0..8).map(move |col| (col, row))) {
             let expected = (col / 2 * 8 + 100 * (row / 2 * 8)) as f32;
             assert_eq!(value(&film, 8, 6, col, row), expected, "{col} {row}");
@@ -384,7 +385,8 @@ mod tests {
 
     #[test]
     fn rows_without_samples_take_the_nearest_row() {
-        // The upper half of the film has samples. The lower half has none and gets the last row.
+        // The upper half of the film has samples. The lower half has none and gets the values of
+        // the last row with samples.
         let mut film = film(32, 32, &[1.0]);
         for slot in film.slots(&[1, 0]) {
             let value = (slot.origin[0] / TILE) as i64 + 3;

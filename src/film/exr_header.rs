@@ -28,8 +28,8 @@ impl<W: Write + Seek> Ordered<W> {
 }
 
 impl Ordered<Cursor<Vec<u8>>> {
-    /// Returns the bytes of the OpenEXR header with sorted attributes; none if the header is not
-    /// complete.
+    /// Returns the bytes of the OpenEXR header with sorted attributes. Returns no bytes if the
+    /// header is not complete.
     pub fn into_header(self) -> Vec<u8> {
         let mut bytes = self.sink.into_inner();
         bytes.truncate(self.header_len);

@@ -9,8 +9,9 @@ pub struct ReadPicture {
     pub size: [usize; 2],
     /// Pixels in linear radiance, `[row][column]`.
     pub pixels: Vec<[f64; 3]>,
-    /// Pictures of the two halves of the samples (replicates A and B), `[row][column]`, from which
-    /// the error is estimated. `None` if the file was not written by this program.
+    /// Pictures of the two halves of the samples (replicates A and B), `[row][column]`. Half of
+    /// their difference is an estimate of the error. `None` if the file lacks these channels, for
+    /// example because another program wrote it.
     pub replicates: Option<[Vec<[f64; 3]>; 2]>,
 }
 

@@ -23,7 +23,7 @@ pub struct InvalidSamples {
     /// Number of samples that were NaN or negative.
     pub count: u64,
     /// Positions of invalid samples in ascending order. If there are more than
-    /// [`INVALID_REMEMBERED`], the ones that are lowest in this order.
+    /// [`INVALID_REMEMBERED`], only the lowest ones are stored.
     pub first: Vec<InvalidSample>,
 }
 

@@ -103,7 +103,8 @@ mod tests {
             vec![x, y, 1.0 + r, 64.0 * x, 128.0, 64.0 * r]
         });
         let mix = LightWeights { weights: vec![[1.0, 2.0, 3.0], [0.5, 0.0, 1.0]] };
-        // Sums over 4 + 4 samples: A and B alike in x and y; 1 + 2 and 0 + 64 in blue.
+        // Each replicate has 4 samples. In red and green, A and B have equal sums. In blue, the
+        // sums of the first group are 1 and 2, those of the second 0 and 64.
         let expected = |x: f64, y: f64| [x / 4.0 + 8.0 * x, 2.0 * y / 4.0, 9.0 / 8.0 + 8.0];
         for (x, y) in [(0, 0), (19, 17), (16, 15), (3, 16)] {
             assert_eq!(film.pixel(x, y, &mix), expected(x as f64, y as f64), "{x} {y}");

@@ -9,12 +9,12 @@ use png::Decoder;
 use std::io::BufReader;
 use std::path::Path;
 
-/// Block size in bytes: metadata values in picture files are padded to a multiple of it.
+/// Block size in bytes: metadata values in picture files are padded to a multiple of this size.
 const PADDED: usize = 128;
 
 /// Pads a metadata value with spaces to a multiple of [`PADDED`] bytes. If a picture is written
-/// while it is rendered, its noise and sample counts are placeholders until the end; their final
-/// values must have the same length.
+/// while it is rendered, its noise and sample counts are placeholders at first. The final values
+/// overwrite them at the end and must have the same length.
 pub(super) fn padded(value: &str) -> String {
     let len = value.len().next_multiple_of(PADDED).max(PADDED);
     format!("{value}{}", " ".repeat(len - value.len()))

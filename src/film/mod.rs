@@ -2,9 +2,9 @@
 //!
 //! The film divides the samples into two independent halves, the replicates A and B. Each is a
 //! picture of its own. The mean of both is the picture; their difference is a measure of the
-//! remaining error. Sums are integers, so that the order of addition changes no bit. Each light
-//! group has its own sums, for white light of unit intensity. [`LightWeights`] multiply each group
-//! by colour and intensity afterwards.
+//! remaining error. Sums are integers; the order of addition therefore changes no bit of them. Each
+//! light group has its own sums, for white light of unit intensity. When a picture is computed,
+//! [`LightWeights`] multiply the sums of each group by its colour and intensity.
 
 mod bands;
 mod box_filter;

@@ -9,31 +9,31 @@
 //! The displayed error is code(M) - code(truth), where code is the display transform to 8-bit
 //! levels. It is estimated by code(M) - code(M + d) and code(M) - code(M - d), squared and
 //! averaged; M + d is A and M - d is B. These differences displace M by d, which is as large as the
-//! error of M. A curved or clipped tone curve therefore acts alike on estimate and error. The
-//! hardest case is dark pixels with 16 samples in each of A and B, few of which are lit. There the
-//! ratio of true to estimated RMSE is 1.13. A test compares two simpler estimates: half the
-//! displayed difference of A and B has the ratio 1.20, and d times the slope of the curve at M has
-//! the ratio 1.52.
+//! error of M. A curved or clipped tone curve therefore changes the estimate as much as the error.
+//! The hardest case is a dark pixel with 16 samples in each of A and B, only a few of which receive
+//! light. There the ratio of true to estimated RMSE is 1.13. A test compares two simpler estimates.
+//! Half the displayed difference of A and B has the ratio 1.20; d times the slope of the curve at M
+//! has the ratio 1.52.
 //!
 //! The estimate of a single pixel has one degree of freedom and is meaningless. The estimate of a
 //! tile has an uncertainty of about 7 % if its pixels are alike; that of a whole picture is far
 //! smaller.
 //!
 //! Adaptive sampling prefers the tiles with the largest estimates, and neglects tiles whose
-//! estimates are low by chance. An estimate of the picture's error from the same numbers would be
-//! too low: by 2 % of the RMSE after 32 samples per pixel, by 5 % after 8. Each tile therefore has
-//! two estimates, from the black and the white squares of a chessboard of pixels, whose samples are
-//! independent. The black pixels give the *allocation estimate*, which adaptive sampling uses. The
-//! white pixels give the *validation estimate*, which is reported. In a small picture, half of the
-//! pixels may give a worse estimate than all pixels do. The larger of two estimates is therefore
-//! reported: that from the white pixels, and that from all pixels. If all tiles have the same
-//! number of samples, no tile was preferred, and the estimate from all pixels is reported. The
-//! larger of the two estimates would then be too high by up to 30 % in pictures whose error is in a
-//! few pixels.
+//! estimates are low by chance. If the picture's error were estimated from the same numbers, its
+//! RMSE would be too low: by 2 % after 32 samples per pixel, by 5 % after 8. Each tile therefore
+//! has two estimates, from the black and the white squares of a chessboard of pixels. The samples
+//! of black and white pixels are independent. The black pixels give the *allocation estimate*,
+//! which adaptive sampling uses. The white pixels give the *validation estimate*, which is
+//! reported. In a small picture, half of the pixels may give a worse estimate than all pixels do.
+//! The larger of two estimates is therefore reported: that from the white pixels, and that from all
+//! pixels. If all tiles have the same number of samples, no tile was preferred, and the estimate
+//! from all pixels is reported. The larger of both estimates would be too high in this case, by up
+//! to 30 % in pictures whose error is in a few pixels.
 //!
 //! The error of a sparse picture (stars, hairlines) is concentrated in few pixels. With k effective
-//! pixels the relative uncertainty of the estimated RMSE is 1 / sqrt(2 k); the true error of a
-//! picture varies by the same ratio.
+//! pixels (see [`Noise::effective_pixels`]) the relative uncertainty of the estimated RMSE is 1 /
+//! sqrt(2 k). The true error of the picture varies by the same ratio between random seeds.
 
 use crate::film::TILE;
 use crate::film::display::{Display, Tone, toned};

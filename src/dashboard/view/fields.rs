@@ -31,7 +31,7 @@ pub struct Fields<'a> {
     /// Cursor, scroll position and text editor of the property list.
     pub state: &'a FieldList,
     /// Reason why the last change of a value by arrow keys was refused; `None` if it was accepted.
-    /// A reason in the text editor is shown in place of this one.
+    /// If the text editor has a reason of its own, the editor's reason is shown instead.
     pub problem: Option<&'a str>,
     /// `true` if the list receives the keys.
     pub active: bool,
@@ -126,8 +126,9 @@ impl Fields<'_> {
         None
     }
 
-    /// Draws help on the property under the cursor. If its value was refused, this is the reason;
-    /// otherwise it is the property's description and its valid values.
+    /// Draws help on the property under the cursor. If a new value of the property was refused, the
+    /// help is the reason. Otherwise it is the property's description and a description of its
+    /// valid values.
     fn say(&self, theme: &Theme, buffer: &mut Buffer) {
         let Some(field) = self.lines.get(self.state.cursor).and_then(PanelLine::field) else {
             return;

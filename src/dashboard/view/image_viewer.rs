@@ -11,10 +11,10 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Style};
 
-/// Draws the viewed image in half blocks (two pixels per cell). If the terminal supports an image
-/// protocol, the uploaded image replaces them later. Returns the cells of the half blocks. Returns
-/// `None` if the image is still being read, or if its upload has ended and placeholder characters
-/// show it.
+/// Draws the viewed image in half blocks (characters that show two pixels per cell) and returns
+/// these cells. If the terminal supports an image protocol, the uploaded image later replaces the
+/// half blocks. Returns `None` if the image is still being read, or if the upload has ended and
+/// placeholder characters of the protocol show the image.
 pub fn draw(
     model: &Model,
     viewed: &ViewedImage,
@@ -50,9 +50,9 @@ pub fn draw(
     Some(cells)
 }
 
-/// Returns two texts: a description of the image (size and progress of the upload), and a hint at
-/// the requirements of sharper images. The hint is empty if the terminal supports an image
-/// protocol.
+/// Returns two texts: a description of the image (size and progress of the upload), and a hint. The
+/// hint names the command that lists what the terminal needs to show sharper images. It is empty if
+/// the terminal supports an image protocol.
 fn description(viewed: &ViewedImage, image: &ViewerImage) -> (String, &'static str) {
     let [width, height] = image.size;
     let whole = format!("{width}×{height}");

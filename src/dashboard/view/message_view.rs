@@ -12,7 +12,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Modifier, Style};
 
-/// Returns the area of messages in the picture's panel: with a margin if there is room.
+/// Returns the area of messages in the picture's panel. The area has a margin if there is room.
 fn text_area(layout: &Layout) -> Rect {
     let inner = layout.picture.inner(BORDER);
     let (x, y) = if inner.width > 50 && inner.height > 12 { (3, 1) } else { (1, 0) };
@@ -24,7 +24,7 @@ fn text_area(layout: &Layout) -> Rect {
     }
 }
 
-/// Draws the errors of a file that has never been readable.
+/// Draws the errors of a scene file that has never been readable since the start of the dashboard.
 pub fn broken(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let Some(errors) = &model.file.broken else { return };
     let bold = theme.bad().add_modifier(Modifier::BOLD);

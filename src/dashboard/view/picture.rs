@@ -41,9 +41,9 @@ struct PinnedCache {
     radiance: Vec<[f32; 3]>,
 }
 
-/// Returns `true` if the picture changes rarely or only by user input. This is so if rendering has
-/// ended or is paused, if files are watched, or if the pinned (stored) picture or an exported image
-/// is visible.
+/// Returns `true` if the picture changes rarely or only by user input. This is the case if
+/// rendering has ended or is paused, if the dashboard watches the film files of other processes, or
+/// if the pinned (stored) picture or an exported image is visible.
 pub fn is_settled(model: &Model) -> bool {
     if let Some(Overlay::ViewerImage(_)) = model.overlay {
         return true;
@@ -175,9 +175,9 @@ fn round_up(value: f64) -> f64 {
 }
 
 /// Returns two values: the linear radiance of the renderer's latest picture, and the width and
-/// height of the picture. The radiance is the sum of the contributions of all light groups (lights
-/// with sums of their own in the film), each multiplied by the group's current weight. Returns
-/// `None` before the first picture.
+/// height of the picture. The film stores the contribution of each light group (a set of lights)
+/// separately. The radiance is the sum of these contributions, each multiplied by the current
+/// weight of its group. Returns `None` before the first picture.
 fn live_radiance(model: &Model, snapshot: &Snapshot) -> Option<(Vec<[f32; 3]>, [usize; 2])> {
     let picture = snapshot.picture.as_ref()?;
     let newest = snapshot.mix_for(model.scene());

@@ -24,14 +24,14 @@ struct Axis {
 impl Axis {
     /// Creates an axis that contains all positive finite `values`. The lower end is at most the
     /// smallest value divided by 1.1, the upper end at least the largest value times 1.1, and they
-    /// differ by at least a factor of 2. Returns `None` if there are no such values.
+    /// differ by at least a factor of 2. Returns `None` if no value is positive and finite.
     fn around(values: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
         for value in values.filter(|v| *v > 0.0 && v.is_finite()) {
             low = low.min(value);
             high = high.max(value);
         }
-        // The axis spans at least a factor of 2, besides the margins.
+        // The axis spans at least a factor of 2 before both ends get a margin of 10 %.
         (low <= high).then(|| {
             let stretch = (2.0 * low / high).max(1.0).sqrt() * 1.1;
             Self { low: low / stretch, high: high * stretch }
@@ -58,7 +58,8 @@ impl Axis {
 /// Formats the value of an axis's tick without trailing zeros, such as `0.5` or `20`.
 fn label(value: f64) -> String {
     if (1e-3..1e6).contains(&value) {
-        // Products with negative powers of ten are not exact.
+        // A tick below 1 is a product with a negative power of ten, which has a rounding error.
+        // Rounding to six decimals removes it.
         format!("{}", (value * 1e6).round() / 1e6)
     } else {
         format!("{value:.0e}")
@@ -83,8 +84,8 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     title.skip(14).put_right(&format!(" {} levels ", number(last.noise_codes)), 0, theme.text());
     let target = model.stop.noise_codes.filter(|t| *t > 0.0);
     let eta = model.snapshot.as_ref().and_then(|s| s.report.eta_seconds);
-    // Point at which the target is reached, at the mean of the lower and upper estimate of the
-    // time.
+    // Point at which the noise is expected to reach its target. Its time is the mean of the lower
+    // and the upper estimate.
     let reached = match (target, eta) {
         (Some(target), Some((from, to))) if target < last.noise_codes => {
             Some((last.seconds + 0.5 * (from + to), target))
@@ -161,7 +162,8 @@ fn axes(area: Rect, x: &Axis, y: &Axis, theme: &Theme, buffer: &mut Buffer) -> O
     let mut free = plot.height;
     for (tick, text) in &ticks {
         let row = ((1.0 - y.part(*tick)) * f64::from(plot.height)) as u16;
-        // Ticks come in ascending order, so rows decrease. A row gets at most one label.
+        // The values of the ticks increase, so their rows go from the bottom to the top. A row gets
+        // at most one label.
         if row < free {
             let indent = usize::from(labels) - columns(text);
             Row::new(buffer, area, row).skip(indent).put(text, theme.dim());

@@ -200,8 +200,9 @@ pub fn hints_line(model: &Model, area: Rect, theme: &Theme, buffer: &mut Buffer)
     }
 }
 
-/// Removes key hints until the others fit in `width` columns. The last two hints, which lead to all
-/// commands, are removed after those in the middle, and the first hint last of all.
+/// Removes key hints until the others fit in `width` columns. Hints in the middle are removed
+/// first. The last two hints, which lead to all commands, are removed next, and the first hint
+/// last.
 fn fitting(mut hints: Vec<&Hint>, width: usize) -> Vec<&Hint> {
     let width_of = |hints: &[&Hint]| -> usize {
         let columns_of = |hint: &&Hint| columns(hint.keys) + 1 + columns(hint.text) + 3;

@@ -72,8 +72,8 @@ pub fn draw(
     }
 }
 
-/// Draws `texts` into a table row; the first one is at the right end, each next one to its left.
-/// Each element is a text and the width in columns in which it is right-aligned.
+/// Draws `texts` into a table row from right to left: the first text is at the right end. Each
+/// element is a text and the width in columns in which the text is right-aligned.
 fn right<const N: usize>(to: &mut Row, texts: [(&str, usize); N], style: Style) {
     for (text, width) in texts {
         to.put_right(&format!("{text:>width$}"), 0, style);
@@ -159,7 +159,8 @@ fn samples(shard: &WatchedShards) -> String {
     }
 }
 
-/// Formats the age of a watched film file in whole units, such as `40 s`, `12 min`, `3 h` or `2 d`.
+/// Formats the time since a watched film file was written in whole units, such as `40 s`, `12 min`,
+/// `3 h` or `2 d`.
 fn age(age: Duration) -> String {
     let seconds = age.as_secs();
     match seconds {

@@ -19,7 +19,8 @@ use std::io::{BufReader, ErrorKind, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Smallest number of bytes that a tile takes in a film file.
+/// Smallest number of bytes that a tile takes in a film file: the two sample counts (u32 each) of a
+/// tile without samples.
 const RECORD_BYTES: u64 = 8;
 
 /// Error that makes a film file (`.zk`) unusable.
@@ -248,8 +249,9 @@ impl FilmFileHeader {
     }
 }
 
-/// Decodes the `HEAD` chunk of a film file with `length` bytes. Metadata and further chunks of the
-/// result are empty. Returns `None` if a field is not valid.
+/// Decodes the `HEAD` chunk of a film file. `length` is the length of the whole file in bytes.
+/// Metadata and further chunks of the result are empty. Returns `None` if a field is not valid, or
+/// if the tiles of so large a film do not fit into the file.
 fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
     let [width, height, groups] = [fields.u32()?, fields.u32()?, fields.u32()?].map(|n| n as usize);
     let tiles = width.div_ceil(TILE) as u64 * height.div_ceil(TILE) as u64;
@@ -326,7 +328,7 @@ impl<R: Read> Input<R> {
         bytes.resize(size, 0);
         match self.bytes.read_exact(&mut bytes) {
             Ok(()) => {}
-            // The file has become shorter in the meantime.
+            // The file has become shorter since it was opened.
             Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Err(cut(self)),
             Err(error) => return Err(self.error(error.to_string(), "check the disk")),
         }

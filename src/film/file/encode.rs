@@ -70,7 +70,8 @@ pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
 /// chunks.
 pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
     let mut checksum = crc32fast::Hasher::new();
-    // The header holds several chunks. Its own bytes stand for their checksums.
+    // The header consists of several chunks. The checksum covers all of its bytes. Of each tile
+    // chunk it covers only the checksum at the end.
     for (i, piece) in pieces.iter().enumerate() {
         let start = if i == 0 { 0 } else { piece.len() - CHECKSUM_BYTES };
         checksum.update(&piece[start..]);
@@ -82,8 +83,9 @@ pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
     })
 }
 
-/// Writes a film file from its encoded pieces: header, tiles, end. An existing file at `path` is
-/// replaced when the new one is complete and stored on the disk, or refused, as `existing` says.
+/// Writes a film file from its encoded pieces: header, tiles, end. `existing` chooses whether an
+/// existing file at `path` is replaced or the call fails. The old file is replaced only when the
+/// new one is complete and stored on the disk.
 ///
 /// # Errors
 /// Fails if the file cannot be written or is refused; an existing file is then unchanged.

@@ -20,9 +20,10 @@
 //! number of samples above the largest value that the film can store (u64), the number of invalid
 //! samples (u64), the number of their stored positions (u8), index, x, y (u32 each) and replicate
 //! (u8) of each position, and the sums. Sums are stored in planes, in the order replicate, group,
-//! channel. A plane has the number of bytes of its largest sum (u8, 0 to 8), then the low bytes of
-//! the sum of each pixel inside the picture, row by row. This takes about 60 % of the film's
-//! memory. The encoding takes less time than writing the other 40 % would take.
+//! channel. A plane begins with the number of bytes that its largest sum needs (u8, 0 to 8). The
+//! sums of the pixels inside the picture follow row by row, each with this number of bytes. The
+//! file takes about 60 % of the film's size in memory. The encoding takes less time than writing
+//! the other 40 % to disk would.
 
 mod decode;
 mod encode;

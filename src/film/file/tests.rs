@@ -125,7 +125,8 @@ fn altered_bytes_are_refused() {
     let mut rng = Rng(3);
     for round in 0..600 {
         let mut altered = bytes.clone();
-        // The first rounds walk over the magic bytes, the version and the head.
+        // The first 300 rounds each alter one of the first 300 bytes, which include the magic
+        // bytes, the version and the `HEAD` chunk. All other rounds alter a random byte.
         let at = if round < 300 { round } else { rng.bits() as usize % bytes.len() };
         altered[at] ^= 1 << (rng.bits() % 8);
         let error = read(&altered).unwrap_err();
@@ -158,7 +159,8 @@ fn parts_of_different_files_are_refused() {
     assert!(read(&missing).is_err());
 }
 
-/// Checks that a `HEAD` chunk with a large size is refused before memory is allocated.
+/// Checks that a `HEAD` chunk that claims a large film in a short file is refused before memory is
+/// allocated.
 #[test]
 fn claimed_size_is_compared_with_the_length_of_the_file() {
     let film = film(1, 1, &[1.0]);

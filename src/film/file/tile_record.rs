@@ -50,7 +50,8 @@ fn encode_plane(pixels: &[&[i64]], i: usize, out: &mut Vec<u8>) {
     }
     let start = out.len();
     let end = start + pixels.len() * bytes;
-    // Each sum is written with all its bytes. The next one overwrites those that are zero.
+    // Each sum is written with all of its eight bytes. The next sum overwrites the high bytes,
+    // which are zero.
     out.resize(end + WORD, 0);
     for (n, sums) in pixels.iter().enumerate() {
         out[start + n * bytes..][..WORD].copy_from_slice(&sums[i].to_le_bytes());
@@ -86,7 +87,7 @@ pub(super) fn decode(tile: &mut Tile, groups: usize, fields: &mut Fields) -> Opt
                 let rest = &plane[n * bytes..];
                 let sum = match rest.first_chunk::<WORD>() {
                     Some(word) => u64::from_le_bytes(*word) & mask,
-                    // The last sums of the plane.
+                    // Fewer than eight bytes remain at the end of the plane.
                     None => {
                         let mut word = [0; WORD];
                         word[..bytes].copy_from_slice(&rest[..bytes]);
