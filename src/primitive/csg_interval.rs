@@ -1,15 +1,16 @@
-//! Intervals of lines for compound solids (CSG): sorted interval ends, intervals inside of solids,
-//! and transitions between inside and outside.
+//! Intervals in which a line is inside of the parts of a compound solid (CSG): their sorted ends,
+//! and the transitions of the line between inside and outside.
 
 use crate::lanes::SimdFloat;
 use crate::primitive::solid::Span;
 
-/// Smallest divisor of the tolerance of coincident faces. The tolerance is divided by the cosine
-/// between line and surface normal; at smaller cosines it does not grow further.
+/// Lower bound of the cosine between line and surface normal by which the tolerance of coincident
+/// faces is divided. The bound keeps the tolerance finite for lines parallel to the surface.
 const FLATTEST: f64 = 1e-9;
 
-/// End of an interval in which a line is inside of a solid. `t` is its distance along the line.
-/// Other ends within the distance `tie` are taken as coincident.
+/// End of an interval in which a line is inside of a solid. `t` is the distance of this end along
+/// the line. Two ends are taken as coincident if their distance is at most the smaller one of their
+/// two tolerances `tie`.
 #[derive(Clone, Copy)]
 pub struct Event<L> {
     pub t: L,
@@ -30,9 +31,9 @@ impl<L: SimdFloat> Interval<L> {
     }
 }
 
-/// Transition of a line through a surface, one per lane. `before` and `after` are the lanes in
-/// which the line is inside of the compound, or of an operand of its set operations, before and
-/// after the surface. `tag` is the id of the part to which the surface belongs.
+/// Transition of the line of each lane through a surface. `before` and `after` are the lanes in
+/// which the line is inside of a solid before and after the surface. The solid is the compound, or
+/// an operand of its set operations. `tag` is the id of the part to which the surface belongs.
 #[derive(Clone, Copy)]
 pub struct Transition<L: SimdFloat> {
     pub before: L::Mask,
@@ -47,10 +48,11 @@ impl<L: SimdFloat> Transition<L> {
         Self { before: !self.before, after: !self.after, ..self }
     }
 
-    /// Combines `self` and `other`, the transitions of two operands, to the transition of the
-    /// result of a set operation. `before` and `after` are the lanes in which the result is inside
-    /// before and after the surface. The surface is that of `self` in lanes in which `self` changes
-    /// to the same side as the result, otherwise that of `other`.
+    /// Combines `self` and `other`, the transitions of two operands, into the transition of the
+    /// result of a set operation. `before` and `after` are the lanes in which the line is inside of
+    /// the result before and after the surface. The surface is that of `self` in lanes in which
+    /// `self` changes sides and ends on the same side as the result. In other lanes it is that of
+    /// `other`.
     fn joined(self, other: Self, before: L::Mask, after: L::Mask) -> Self {
         let same = (self.after & after) | (!self.after & !after);
         let first = same & ((self.before & !self.after) | (!self.before & self.after));
@@ -90,8 +92,8 @@ pub fn with_scratch<const FEW: usize, T: Copy, R>(
 }
 
 /// Returns the start and the end of the interval `span`. `tie` is the tolerance of coincident faces
-/// for lines perpendicular to the face. In lanes that miss the solid, both have the largest
-/// possible distance.
+/// for a line perpendicular to the face. In lanes whose line misses the solid, start and end both
+/// have the largest finite distance, `L::MAX`.
 #[inline(always)]
 pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     let never = L::from_f64(L::MAX);
@@ -105,8 +107,8 @@ pub fn events<L: SimdFloat>(span: &Span<L>, tie: L) -> [Event<L>; 2] {
     [end(span.enter, span.enter_cosine), end(span.leave, span.leave_cosine)]
 }
 
-/// Inserts `end` among the first `count` elements of `ends`, which are sorted by distance in every
-/// lane and stay so.
+/// Inserts `end` into `ends`, whose first `count` elements are sorted by distance in each lane. The
+/// first `count + 1` elements are then sorted.
 #[inline(always)]
 pub fn insert<L: SimdFloat>(mut end: Event<L>, ends: &mut [Event<L>], count: usize) {
     for slot in &mut ends[..count] {

@@ -79,8 +79,8 @@ impl CanonicalShape for CsgSolid {
         DefaultMapping::Box
     }
 
-    /// Returns the simplified geometry of all parts, for the search for narrow gaps between
-    /// objects.
+    /// Returns the proxies of all parts: simplified geometry with which narrow gaps between objects
+    /// are found.
     fn proxies(&self) -> Vec<Proxy> {
         self.parts.iter().flat_map(|form| form.proxies()).collect()
     }
@@ -97,7 +97,8 @@ impl CsgSolid {
             CsgTree::Intersection(list) => {
                 let boxes = list.iter().filter_map(|t| self.bounds_of(t));
                 let (low, high) = boxes.reduce(|a, b| (a.0.max(b.0), a.1.min(b.1)))?;
-                // Disjoint boxes give a box without extent.
+                // If the boxes are disjoint along an axis, the result has no extent along this
+                // axis.
                 Some((low, high.max(low)))
             }
             CsgTree::Difference(list) => self.bounds_of(list.first()?),

@@ -26,7 +26,7 @@ impl CanonicalShape for EllipsoidForm {
     }
 
     fn bounds(&self) -> Option<Bounds> {
-        // Half-widths of the image of the unit sphere are the lengths of the matrix's rows.
+        // The half-widths of the image's bounding box are the lengths of the matrix's rows.
         let m = &self.scene_from_unit;
         let rows = m.matrix3.transpose();
         let half = DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
@@ -37,7 +37,8 @@ impl CanonicalShape for EllipsoidForm {
         let map = &self.scene_from_unit;
         let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis]
             .map(|a| a.length_squared());
-        // The largest singular value is at most the root of the sum of squares.
+        // The largest half-axis is the largest singular value of the matrix. The Frobenius norm is
+        // an upper bound of it.
         BoundingSphere { center: map.translation, radius: (x + y + z).sqrt() }
     }
 
@@ -94,10 +95,12 @@ fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_unit.matrix3.inverse();
     let q = inverse.transpose() * inverse;
     let size = q.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
-    // A point in the middle has several nearest points; the offset selects one of them.
+    // If `point` is the centre or on an axis, several surface points can be nearest to it. The
+    // offset selects one of them.
     let aside = DVec3::new(0.6, 0.5, 0.7) * (1e-8 / size.sqrt());
     let p = point - scene_from_unit.translation + aside;
-    // The smallest half-axis is at least 1 / sqrt(size) and at most 3^(1/4) times that.
+    // `size` is the Frobenius norm of Q. The smallest half-axis is therefore at least 1 /
+    // sqrt(size) and at most 3^(1/4) times as long. The first bounds of l follow from it.
     let (mut low, mut high) = (-1.8 / size, 0.25 * p.length_squared() + 1.0 / size);
     let mut nearest = p;
     for _ in 0..160 {
@@ -172,7 +175,8 @@ impl<L: SimdFloat> Primitive<L> for Ellipsoid<L::Scalar> {
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L> {
         let center = Vec3::splat(self.center);
         let on_unit = times(&self.unit_from_scene, point - center).normalize();
-        // Normals transform by the inverse transpose: columns of the inverse.
+        // Normals transform by the transpose of the inverse map. The columns of this transpose are
+        // the rows of `unit_from_scene`.
         let m = &self.unit_from_scene;
         let normal = Vec3::splat(m[0]) * on_unit.x
             + Vec3::splat(m[1]) * on_unit.y

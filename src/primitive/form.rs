@@ -37,8 +37,8 @@ macro_rules! forms {
         impl Deref for Form {
             type Target = dyn CanonicalShape;
 
-            /// Returns the geometry in any variant. Its properties, such as the bounds, can
-            /// therefore be read from the form.
+            /// Returns the geometry that the variant holds. Properties that every kind of geometry
+            /// has, such as the bounds, can therefore be read from the form itself.
             fn deref(&self) -> &Self::Target {
                 match self {
                     $(Self::$kind(form) => form,)+
@@ -96,13 +96,13 @@ impl Form {
         self.plane().is_some()
     }
 
-    /// Returns `true` if the geometry fills space.
+    /// Returns `true` if the geometry does not lie in a plane.
     pub fn is_solid(&self) -> bool {
         !self.is_flat()
     }
 
-    /// Returns the largest magnitude of the coordinates from which the surface is computed. For a
-    /// plane it is the distance from the origin.
+    /// Returns the largest magnitude of a coordinate of the bounding box. For an infinite plane it
+    /// is the distance of the plane from the origin.
     pub fn max_coordinate(&self) -> f64 {
         match self.bounds() {
             Some((low, high)) => low.abs().max(high.abs()).max_element(),

@@ -71,18 +71,18 @@ struct BoxFrame<S> {
     reach: S,
 }
 
-/// Returns the lowest and the highest corner of a bounding box, moved outward by 4 `epsilon` times
-/// the largest coordinate. This bounds rounding errors of the box and of the primitive's own
-/// intersection test.
+/// Returns the lowest and the highest corner of a bounding box, moved outward by a margin. The
+/// margin is 4 times the largest coordinate times `epsilon`, the relative rounding error. It bounds
+/// the rounding errors of the box and of the primitive's own intersection test.
 pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
     let reach = low.abs().max(high.abs()).max_element();
     let pad = DVec3::splat(reach * 4.0 * epsilon);
     [low - pad, high + pad]
 }
 
-/// Assumed rounding error between a solid's bounding box and its faces, as a fraction of the box's
-/// largest coordinate. Far from the origin of the scene file, box and faces are rounded differently
-/// in double precision.
+/// Assumed distance, caused by rounding, between the bounding box of a solid and the faces that
+/// touch the box, as a fraction of the box's largest coordinate. Far from the origin of the scene
+/// file, double precision rounds the box and the faces differently.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> ItemBox<S> {
@@ -120,8 +120,9 @@ impl<S: Float> ItemBox<S> {
                 SlabPacket::new(ray, Vec3::new(pad, pad, pad))
             }
             Some(space) => {
-                // Largest rounding error of origin, direction and centre in the space of the box,
-                // at the distance of the primitive.
+                // Bound of the ray's rounding error at the distance of the primitive, in scene
+                // units. It covers the errors of the ray's origin, of its direction and of the
+                // box's centre.
                 let lost = (far + L::splat(space.reach)) * L::from_f64(64.0 * L::EPSILON);
                 let rows = space.rows.map(Vec3::splat);
                 let transform =

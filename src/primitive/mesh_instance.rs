@@ -63,7 +63,8 @@ impl CanonicalShape for MeshForm {
         let stretched = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
         let size = ((high - low) * DVec3::from(stretched)).to_array();
         let longest = size.into_iter().fold(0.0, f64::max);
-        // Thickness of needles and thin sheets; a flat mesh has no inside.
+        // The shortest side is the thickness of a needle or a thin sheet. Sides of length 0 are
+        // left out, because a flat mesh encloses no volume.
         let thinnest = size.into_iter().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
         thinnest.min(longest / EXTENT_PER_DETAIL)
     }
@@ -151,7 +152,7 @@ fn triangle_distance([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
 fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3) -> f64 {
     let inverse = scene_from_mesh.inverse();
     let inside = inverse.transform_point3(point);
-    // Lower bound of a length in the scene over that in the mesh.
+    // Lower bound of the ratio of a length in the scene to the same length in mesh space.
     let columns = inverse.matrix3.to_cols_array();
     let shrinks = columns.iter().map(|x| x * x).sum::<f64>().sqrt().recip();
     let mut least = f64::INFINITY;
@@ -180,7 +181,7 @@ fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3
                     scene_from_mesh
                         .transform_point3(DVec3::from(corner.map(|axis| f64::from(axis[place]))))
                 });
-                // Empty places hold NaN, which `min` ignores.
+                // Unused places of a leaf hold NaN, which `min` ignores.
                 least = least.min(triangle_distance(corners, point));
             }
         }
@@ -198,16 +199,16 @@ struct MeshInstance<S> {
     /// Columns of the linear map from scene space to mesh space.
     mesh_from_scene: [[S; 3]; 3],
     /// Centre of the mesh's bounding box in scene space; `mesh_center` is the same point in mesh
-    /// space. Points are transformed relative to it, so that their rounding error is in proportion
-    /// to the mesh's size and distance.
+    /// space. Points are transformed relative to the centre. The rounding error of the linear map
+    /// is then in proportion to the distance between the point and the centre.
     center: [S; 3],
     mesh_center: [S; 3],
     reach: S,
     smooth: bool,
 }
 
-/// All meshes of a scene, compiled for ray intersection. Each mesh is one primitive; a hit also has
-/// the id of a triangle.
+/// All meshes of a scene, compiled for ray intersection. Each mesh is one primitive. A hit holds
+/// the id of the mesh and the id of the triangle.
 pub struct Meshes<S> {
     items: Vec<MeshInstance<S>>,
 }
@@ -229,7 +230,8 @@ impl<S: Float> MeshInstance<S> {
             .into_iter()
             .map(DVec3::length)
             .fold(0.0, f64::max);
-        // Rounding in the space of the mesh is at most that of its corners.
+        // Rounding errors in mesh space are at most those of the largest corner coordinate. `inner`
+        // is this coordinate, converted to scene units.
         let inner = low.abs().max(high.abs()).max_element() * scale;
         let outer = form.max_coordinate();
         Some(Self {
@@ -262,8 +264,8 @@ impl<S: Float> MeshInstance<S> {
         self.vector(p - Vec3::splat(self.center)) + Vec3::splat(self.mesh_center)
     }
 
-    /// Returns two values: the rays in the space of the mesh, and the length in this space of a
-    /// step of length 1 in the scene along each ray.
+    /// Returns two values for each ray: the ray in mesh space, and the length in mesh space of a
+    /// step that has length 1 along the ray in the scene.
     #[inline(always)]
     fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
         let direction = self.vector(ray.direction);
@@ -284,7 +286,8 @@ impl<S: Float> MeshInstance<S> {
         // Indices: vertex, axis, lane. Each triangle and each vertex is read once.
         let mut values = [[[S::default(); MAX_WIDTH]; 3]; 3];
         for lane in 0..L::WIDTH {
-            // Lanes that hit another item may hold any tag.
+            // Lanes that hit another primitive may hold any triangle id. It is clamped to a valid
+            // index.
             let triangle =
                 triangles[(triangle_tag.id_lane(lane) as usize).min(triangles.len() - 1)];
             for (vertex, values) in triangle.into_iter().zip(&mut values) {
@@ -361,8 +364,8 @@ impl<S: Float> Meshes<S> {
         Self { items: forms.iter().filter_map(MeshInstance::new).collect() }
     }
 
-    /// Replaces `hit` in the lanes in which a mesh with a number in `range` is nearer. The id of a
-    /// mesh is `base` plus its number.
+    /// Replaces `hit` in the lanes whose ray hits a mesh nearer than `hit`. Only the meshes with
+    /// the numbers in `range` are tested. The id of a mesh is `base` plus its number.
     #[inline(never)]
     pub fn closest<L: SimdFloat<Scalar = S>>(
         &self,
@@ -377,8 +380,9 @@ impl<S: Float> Meshes<S> {
                 continue;
             }
             let (inner, length) = item.ray(ray);
-            // The limit is widened by the rounding of the transform. Only the comparison in the
-            // scene's distances below decides, so that the order of primitives does not matter.
+            // The limit in mesh space is widened by the rounding error of the transform. The
+            // decision is made below by the distances in the scene, so that it does not depend on
+            // the order of the primitives.
             let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
             let limit = L::select(near, limit, L::from_f64(-1.0));
             let found = triangle_mesh::closest(&item.mesh, &inner, limit);
@@ -427,8 +431,8 @@ impl<S: Float> Meshes<S> {
     ) -> SurfacePoint<L> {
         let item = &self.items[item];
         let triangle = item.triangle(triangle_tag);
-        // Normals are scaled, so that neither the largest nor the smallest triangle leaves the
-        // range of numbers.
+        // The normal is divided by its largest component. Otherwise the square of its length would
+        // overflow for large triangles and underflow for small ones.
         let flat = triangle.normal();
         let largest = flat.max_abs();
         let sound = largest.gt(L::zero());
@@ -445,8 +449,8 @@ impl<S: Float> Meshes<S> {
     /// id `triangle_tag`. `normal` is the geometric normal on the viewer's side; `direction` is the
     /// direction of the rays.
     ///
-    /// The shading normal is on the viewer's side. One that would turn away from the viewer is bent
-    /// back.
+    /// The shading normal is on the viewer's side. A normal that would turn away from the viewer is
+    /// bent towards the viewer.
     #[inline(never)]
     pub fn shading_normal<L: SimdFloat<Scalar = S>>(
         &self,
@@ -463,7 +467,8 @@ impl<S: Float> Meshes<S> {
         let [a, b, c] = item.vertices(triangle_tag, item.mesh.smooth_normals());
         let smooth = item.normal(a * weights[0] + b * weights[1] + c * weights[2]);
         let smooth = smooth * (L::one() / smooth.length_squared().sqrt());
-        // Cancelling normals and triangles without area give NaN, which is replaced here.
+        // `smooth` is NaN if the vertex normals cancel or the triangle has no area. `keep_visible`
+        // replaces it by `normal`.
         keep_visible(smooth, normal, direction)
     }
 

@@ -28,7 +28,8 @@ impl CanonicalShape for ParallelogramForm {
         let linear = map.matrix3;
         let (u, v) = (linear * self.u, linear * self.v);
         let corner = map.transform_point3(self.corner);
-        // A map that mirrors space would turn the front to the back: exchange the edges.
+        // A map that mirrors space would exchange front and back. The edges are exchanged to
+        // prevent this.
         let (u, v) = if linear.determinant() < 0.0 { (v, u) } else { (u, v) };
         Self { corner, u, v }.into()
     }
@@ -69,7 +70,8 @@ impl CanonicalShape for ParallelogramForm {
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
         let normal = self.u.cross(self.v).normalize();
         let from_corner = point - self.corner;
-        // Distance from the edge at the corner, and distance of the opposite edge from it.
+        // `distance` is that of the point from `edge`; `width` is that of the opposite edge from
+        // `edge`.
         let is_between = |edge: DVec3, other: DVec3| {
             let across = edge.cross(normal).normalize();
             let (distance, width) = (across.dot(from_corner), across.dot(other));
@@ -113,8 +115,8 @@ impl CanonicalShape for ParallelogramForm {
     }
 }
 
-/// Parallelogram compiled for ray intersection. A point p of its plane has the coordinates (p -
-/// corner) . `dual_u` and (p - corner) . `dual_v`. Inside, both are in 0..=1.
+/// Parallelogram compiled for ray intersection. A point p of its plane has the two coordinates (p -
+/// corner) . `dual_u` and (p - corner) . `dual_v`. Inside of the parallelogram, both are in 0..=1.
 #[derive(Clone, Copy)]
 pub struct Parallelogram<S> {
     corner: [S; 3],

@@ -131,7 +131,8 @@ pub fn intersections<L: SimdFloat>(f: Vec3<L>, d: Vec3<L>, radius2: L) -> Option
     let root = discriminant.max(L::zero()).sqrt();
     let q = b + root.copysign(b);
     let c = f.length_squared() - radius2;
-    // q = 0 only for a line that starts at its own tangent point: both ends are 0.
+    // q is 0 only if the ray starts on the sphere and is tangent to it there. Both distances are
+    // then 0.
     let other = c / q;
     let other = L::select(q.abs().gt(L::zero()), other, L::zero());
     let behind = b.lt(L::zero());
@@ -161,7 +162,7 @@ impl<L: SimdFloat> SolidPrimitive<L> for Sphere<L::Scalar> {
     fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let f = ray.origin - Vec3::splat(self.center);
         let (enter, leave, meets) = intersections(f, ray.direction, L::splat(self.radius2))?;
-        // Half the chord over the radius.
+        // The cosine is half the chord divided by the radius.
         let cosine = (leave - enter) * (L::from_f64(0.5) / L::splat(self.radius));
         Some(Span { enter, leave, enter_cosine: cosine, leave_cosine: cosine, meets })
     }

@@ -1,16 +1,17 @@
 //! Tori under any affine map. Rays are transformed into the space of a torus about the y axis, with
 //! a ring of radius 1 and a tube of radius r: (rho - 1)^2 + y^2 <= r^2, rho^2 = x^2 + z^2
 //!
-//! The roots of a quartic are found by Newton's method in brackets, one root in each bracket. Let s
-//! be the distance along the line from its point closest to the centre. Half the derivative of the
-//! quartic is s - rho'(s). The distance rho(s) from the axis is a hyperbola. Its second derivative
-//! is largest at the point closest to the axis, and exceeds 1 between two known positions. The
-//! derivative of the quartic is therefore monotone on three pieces of the line, and has one or
-//! three zeros. The quartic is monotone between these zeros, which bracket its roots (after Yuksel
-//! 2022, *High-Performance Polynomial Root Finding for Graphics*).
+//! The positions at which a line meets the torus are the roots of a quartic. They are found by
+//! Newton's method in brackets, one root in each bracket. Let s be the distance along the line from
+//! its point closest to the centre. Half the derivative of the quartic is s - rho'(s). The distance
+//! rho(s) from the axis is a hyperbola. Its second derivative is largest at the point closest to
+//! the axis, and exceeds 1 between two known positions. The derivative of the quartic is therefore
+//! monotone on three pieces of the line, and has one or three zeros. The quartic is monotone
+//! between these zeros, which bracket its roots (after Yuksel 2022, *High-Performance Polynomial
+//! Root Finding for Graphics*).
 //!
-//! The quartic is computed from the distance to the ring. Its polynomial coefficients would cancel
-//! for thin tubes.
+//! The quartic is evaluated from the distance to the ring, not from its polynomial coefficients,
+//! because these would cancel for thin tubes.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -58,8 +59,8 @@ impl CanonicalShape for TorusForm {
     }
 
     /// Returns the bounding box. The torus is the Minkowski sum of its ring and of a ball with the
-    /// radius of the tube. Each half-width of the box is therefore the sum of those of ring and
-    /// ball.
+    /// radius of the tube. Each half-width of the box is therefore the sum of the half-widths of
+    /// ring and ball.
     fn bounds(&self) -> Option<Bounds> {
         let m = &self.scene_from_torus;
         let rows = m.matrix3.transpose();
@@ -97,9 +98,10 @@ impl CanonicalShape for TorusForm {
         2.0 * self.tube / rows.map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
-    /// Returns the exact distance if the map to the scene is a similarity. Otherwise returns a
-    /// lower bound: the larger of the distance from the bounding box, and the distance in the space
-    /// of the torus times a lower bound of the factor by which the map scales lengths.
+    /// Returns the distance between `point` and the surface. It is exact if the map to the scene is
+    /// a similarity. Otherwise it is a lower bound, the larger of two numbers. One is the distance
+    /// from the bounding box. The other is the distance in the space of the torus times a lower
+    /// bound of the factor by which the map scales lengths.
     fn clearance(&self, point: DVec3) -> Option<f64> {
         let inverse = self.scene_from_torus.inverse();
         let (distance, _) = self.ring_distance(inverse.transform_point3(point));
@@ -165,12 +167,12 @@ impl<S: Float> Torus<S> {
     }
 }
 
-/// Width of the margin around the torus in the search for intersections, as a multiple of the
-/// machine epsilon. The radius of the ring is 1.
+/// Width of the margin around the torus in which intersections are searched, in multiples of the
+/// machine epsilon. Lengths are measured in the space in which the ring has radius 1.
 const ROOM: f64 = 64.0;
 
-/// Largest number of steps of the search for one intersection. Bisection alone needs 54 in double
-/// precision.
+/// Largest number of steps of the search for one intersection. Bisection alone needs 54 steps in
+/// double precision.
 const MAX_STEPS: usize = 64;
 
 /// Line of a ray in the space in which the torus's ring has radius 1. A position on the line is a
@@ -213,7 +215,8 @@ impl<L: SimdFloat> UnitLine<L> {
         let d = times(&torus.unit_from_scene, ray.direction);
         let scale = L::one() / d.length_squared().sqrt();
         let d = d * scale;
-        // The second step removes the rounding of the first step along the direction.
+        // The point closest to the centre is computed in two steps. The second step removes the
+        // rounding error of the first step along the direction.
         let back = -f.dot(d);
         let p = d.mul_add(back, f);
         let again = -p.dot(d);
@@ -227,7 +230,8 @@ impl<L: SimdFloat> UnitLine<L> {
             return None;
         }
         let chord = chord2.max(L::zero()).sqrt();
-        // Interval between the planes above and below.
+        // Part of the line between the planes that touch the tube (with its margin) from below and
+        // above.
         let inverse = L::one() / d.y.abs().max(L::from_f64(1e-30)).copysign(d.y);
         let half = tube + room;
         let (y0, y1) = ((-half - p.y) * inverse, (half - p.y) * inverse);
@@ -300,7 +304,8 @@ impl<L: SimdFloat> UnitLine<L> {
         // Point nearest to the axis, and its distance from the axis.
         let middle = -(p.x.mul_add(d.x, p.z * d.z)) / a2;
         let least = (p.x.mul_add(d.z, -(p.z * d.x)) / a).abs();
-        // rho'' > 1 where rho^3 < (a least)^2; the cube root by y <- (y x)^(1/4).
+        // rho'' > 1 where rho^3 < (a least)^2. The cube root y of x = (a least)^2 is computed by
+        // iteration of y <- (y x)^(1/4).
         let bends = a2.gt(least);
         let cube = a2 * least * least;
         let mut root = one;
@@ -376,7 +381,8 @@ impl<L: SimdFloat> UnitLine<L> {
         let within = |s: L| s.max(self.low).min(self.high).max(start);
         let [first, second, third] = self.extremes().map(within);
         let places = [self.low.max(start), first, second, third, self.high.max(start)];
-        // Both ends are outside, except for a start inside.
+        // The last position is outside of the torus. The first one is outside, too, unless it is
+        // `start` and `start` is inside.
         let inside = [
             start.gt(self.low) & self.inside(places[0]),
             self.inside(first),
@@ -403,7 +409,7 @@ impl<L: SimdFloat> Primitive<L> for Torus<L::Scalar> {
             return None;
         }
         let Separators { places, inside } = line.separators(line.origin);
-        // First bracket with the line on different sides at its ends.
+        // The first bracket that has one end inside of the torus and the other end outside.
         let (mut low, mut high, mut sign) = (places[0], places[4], L::one());
         let mut open = ahead;
         for i in 0..4 {
@@ -431,7 +437,8 @@ impl<L: SimdFloat> Primitive<L> for Torus<L::Scalar> {
         let inverse = L::one() / L::select(on_axis, L::one(), rho);
         let ring = Vec3::new(L::select(on_axis, L::one(), p.x * inverse), L::zero(), p.z * inverse);
         let outward = (p - ring).normalize();
-        // Normals transform by the inverse transpose: columns of the inverse.
+        // Normals transform by the transpose of the inverse map. The columns of this transpose are
+        // the rows of `unit_from_scene`.
         let m = &self.unit_from_scene;
         let normal = Vec3::splat(m[0]) * outward.x
             + Vec3::splat(m[1]) * outward.y

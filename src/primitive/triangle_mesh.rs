@@ -13,36 +13,36 @@ use crate::bvh::packet::{
 use crate::bvh::single::traverse_rays;
 use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 
-/// Coherence limit of a mesh's BVH: the bound of the differences between the rays of a packet that
-/// traverses it as a whole. The rays of other packets traverse it one by one.
+/// Coherence limit of a mesh's BVH: it determines which packets of rays traverse the BVH as a
+/// whole. The rays of other packets traverse it one by one.
 ///
-/// A packet is coherent if two differences are within the bound: the length of the difference of
-/// two unit directions, and the difference of two origins, divided by the size of the mesh. The
-/// bound is this number times the number of lanes, divided by the square root of the number of
-/// triangles.
+/// A packet is coherent if each ray differs from the packet's first active ray by at most a bound.
+/// The bound applies to two differences: the length of the difference of the unit directions, and
+/// the largest coordinate of the difference of the origins, divided by the size of the mesh. It is
+/// this constant times the number of lanes, divided by the square root of the number of triangles.
 ///
 /// Measured by `benches/mesh.rs` (lines `together or apart`): packets of eight rays are faster than
 /// single rays up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million.
 /// For packets of four the differences are at most half as large.
 const COHERENCE_LIMIT: f64 = 2.5;
 
-/// Largest difference between the rays of a packet, divided by the number of lanes, for which the
-/// packet traverses a mesh's BVH as a whole. It replaces the bound of [`COHERENCE_LIMIT`] where
-/// that bound is larger: in meshes of few triangles.
+/// Upper limit of the bound on differences between the rays of a coherent packet, divided by the
+/// number of lanes. It applies to meshes of less than about 3900 triangles. [`COHERENCE_LIMIT`]
+/// would allow larger differences in these meshes.
 const MAX_COHERENT_SPREAD: f64 = 0.04;
 
 /// Closest triangle of a mesh that each ray hits.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleHit<L> {
-    /// Distance of the hit in units of the ray direction's length, or the limit if there is no
-    /// nearer hit.
+    /// Distance of the hit in units of the ray direction's length. It is the distance limit of the
+    /// search if the ray hits no triangle within this limit.
     pub t: L,
     /// Id of the triangle that is hit; undefined without a hit.
     pub triangle: L,
 }
 
-/// Rays with the coordinate frames of the watertight triangle test: those of a packet, or one ray
-/// repeated in every lane.
+/// Rays, each with the coordinate frame of the watertight triangle test. They are the rays of a
+/// packet, or one ray repeated in every lane.
 #[derive(Clone, Copy)]
 struct ShearedRay<L> {
     origin: Vec3<L>,
@@ -90,27 +90,29 @@ impl<L: SimdFloat> ShearedRay<L> {
     /// the lanes that hit it. Hits have a positive distance, and may be on either side of the
     /// triangle.
     ///
-    /// The corners are projected along the ray onto the plane through its origin. A corner has the
-    /// same projection in all triangles that share it, and the computed sign of each edge's area is
-    /// exact or zero. Hence no ray passes between two triangles that share an edge or a corner
-    /// (after Woop, Benthin and Wald 2013, *Watertight Ray/Triangle Intersection*, with an
-    /// orthonormal frame for the shear).
+    /// The corners are projected along the ray onto the plane through the ray's origin. A corner
+    /// has the same projection in all triangles that share it. The area that an edge spans with the
+    /// ray's origin is computed with the exact sign, or as 0. Hence no ray passes between two
+    /// triangles that share an edge or a corner (after Woop, Benthin and Wald 2013, *Watertight
+    /// Ray/Triangle Intersection*, with an orthonormal frame for the shear).
     #[inline(always)]
     fn intersect(&self, corners: [Vec3<L>; 3]) -> (L, L::Mask) {
         let p = corners.map(|c| self.frame.to_local(c - self.origin));
-        // Products are not fused: equal rounding keeps their order.
+        // The products are rounded separately, without fused multiply-add. Rounding preserves the
+        // order of two products, so that their difference never has the wrong sign.
         let area = |a: Vec3<L>, b: Vec3<L>| a.x * b.y - a.y * b.x;
         let (u, v, w) = (area(p[1], p[2]), area(p[2], p[0]), area(p[0], p[1]));
         let zero = L::zero();
         let left = u.ge(zero) & v.ge(zero) & w.ge(zero);
         let right = u.le(zero) & v.le(zero) & w.le(zero);
-        // Edge-on triangles are a line: 0 / 0 is no hit.
+        // An edge-on triangle is projected to a line without area. Its t is 0 / 0, which counts as
+        // no hit.
         let t = (u * p[0].z + v * p[1].z + w * p[2].z) / (u + v + w);
         (t, (left | right) & t.gt(zero))
     }
 
-    /// Returns the corners of consecutive triangles of a BVH leaf, one triangle per lane. The first
-    /// one has the number `part` times the number of lanes.
+    /// Returns the corners of consecutive triangles of a BVH leaf, one triangle per lane. The index
+    /// of the first triangle in the leaf is `part` times the number of lanes.
     #[inline(always)]
     fn corners(leaf: &TriangleBlock, part: usize) -> [Vec3<L>; 3] {
         leaf.corners.each_ref().map(|c| {
@@ -120,8 +122,8 @@ impl<L: SimdFloat> ShearedRay<L> {
     }
 }
 
-/// Traversal of a mesh's BVH. If `ANY` is `true`, it ends for a ray with the first triangle that
-/// the ray hits, which may not be the closest.
+/// Traversal of a mesh's BVH. If `ANY` is `true`, the traversal of a ray ends at the first triangle
+/// that it finds on the ray, which may not be the closest.
 struct MeshTraversal<'a, const ANY: bool> {
     mesh: &'a Mesh,
 }
@@ -147,7 +149,8 @@ impl<const ANY: bool> MeshTraversal<'_, ANY> {
             let first = self.mesh.first_triangle(number);
             for part in 0..BVH_WIDTH.div_ceil(L::WIDTH) {
                 let [a, b, c] = ShearedRay::<L>::corners(leaf, part);
-                // Triangles with a box that the packet may hit.
+                // Bounding boxes of the triangles, one per lane. A triangle is tested only if the
+                // packet may enter its box.
                 let low = Vec3::new(a.x.min(b.x), a.y.min(b.y), a.z.min(b.z));
                 let high = Vec3::new(a.x.max(b.x), a.y.max(b.y), a.z.max(b.z));
                 let sides = [

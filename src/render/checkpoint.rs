@@ -59,8 +59,8 @@ impl SampleInputs {
         }
     }
 
-    /// Encodes the inputs of the render's samples as a chunk of a film file. Returns the chunk's tag
-    /// and its contents.
+    /// Encodes the inputs of the render's samples as a chunk of a film file. Returns the tag of the
+    /// chunk and its contents.
     pub fn encode(&self) -> (Tag, Vec<u8>) {
         let mut out = self.contents_hash.unwrap_or(0).to_le_bytes().to_vec();
         for text in [&self.program, &self.sampler, &self.scene] {
@@ -217,8 +217,9 @@ impl Checkpoint {
         &self.header.weights
     }
 
-    /// Compiles the scene of the checkpoint and restores the render, whose samples are then shown
-    /// as a picture of `scene`.
+    /// Compiles the scene of the checkpoint and restores the render of this scene. The samples are
+    /// then shown as a picture of `scene`, which may differ from the checkpoint's scene in its
+    /// lights.
     ///
     /// # Errors
     /// Fails if the samples of the checkpoint are not those of `scene` and `options`.

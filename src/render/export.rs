@@ -97,7 +97,8 @@ const SETTINGS: &str = "Settings";
 /// Text before the display transform in the metadata entry [`SETTINGS`].
 const DISPLAY: &str = ", exposure ";
 
-/// Returns the metadata entries of a picture that depend on the film alone: samples, rays, noise.
+/// Returns the metadata entries of a picture that depend on the film alone: samples per pixel,
+/// noise, and the numbers of bad and saturated samples.
 fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     let spp = &report.spp;
     let noise = match report.noise {
@@ -116,7 +117,8 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     ]
 }
 
-/// Replaces the entries of `film_entries` in `metadata` by those of `report`.
+/// Replaces the entries about samples and noise in `metadata` (those of `film_entries`) by the
+/// values of `report`.
 pub fn update_metadata(metadata: &mut [(String, String)], report: &Report) {
     for (key, value) in film_entries(report) {
         metadata.iter_mut().filter(|(k, _)| k == key).for_each(|(_, v)| v.clone_from(&value));

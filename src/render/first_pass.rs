@@ -31,9 +31,9 @@ pub fn run(
 /// each tile, the tiles of a strip share packets.
 const STRIP_TILES: usize = 8;
 
-/// Step \[pixels\] of the first pass above which adjacent tiles share packets. A stage of the pass
-/// traces every n-th pixel in x and y, with n the step. Up to this step the pixels of one tile fill
-/// packets.
+/// Largest step \[pixels\] of a stage of the first pass in which the pixels of one tile fill
+/// packets. A stage traces every n-th pixel in x and y, with n the step. In stages with larger
+/// steps, adjacent tiles share packets.
 const SHARED_ABOVE: usize = 2;
 
 fn trace_first_pass<L: SimdFloat>(

@@ -181,7 +181,7 @@ mod tests {
             assert!(regions.bytes <= cap, "{cap}: {regions:?}");
             assert!(regions.rows.is_multiple_of(16), "{regions:?}");
             assert_eq!(16384u32.div_ceil(regions.rows), regions.count, "{regions:?}");
-            // Fewer regions do not fit.
+            // One region fewer would not fit.
             let rows = 16384u32.div_ceil(regions.count.max(2) - 1).next_multiple_of(16);
             let band = Film::memory_bytes([16384, rows], 1) + 1024 * 1024 * u64::from(rows / 16);
             assert!(regions.count == 1 || resident.now + band > cap - 200_000_000, "{regions:?}");

@@ -63,8 +63,8 @@ pub fn run_typed<L: SimdFloat>(
         let error = if wave.estimate { estimator.tile(tile) } else { None };
         Some(JobReport { rays: counts.rays, glossy: counts.glossy, error })
     };
-    // A single job for a single thread is traced on the calling thread, which saves the change of
-    // threads.
+    // If the wave has a single job and the pool a single thread, the calling thread traces the job.
+    // This saves a switch of threads.
     let reports = if pool.current_num_threads() == 1 && slots.len() == 1 {
         slots.into_iter().zip(&wave.jobs).map(trace).collect()
     } else {
@@ -99,11 +99,11 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
         }
     }
 
-    /// Traces the samples of `job` and adds them to `tile`, whose first pixel is at `origin`. They
-    /// belong to the replicate (half of the samples) number `replicate`. Returns the ray counts. A
-    /// packet has `WIDTH` lanes. It holds `WIDTH` samples of one pixel if its first sample index is
-    /// a multiple of `WIDTH` and as many samples remain. Otherwise it holds samples of several
-    /// pixels.
+    /// Traces the samples of `job` in the replicate (half of the samples) with the number
+    /// `replicate`, and adds them to `tile`, whose first pixel is at `origin`. Returns the ray
+    /// counts. A packet has `WIDTH` lanes. It holds `WIDTH` samples of one pixel if its first
+    /// sample index is a multiple of `WIDTH` and as many samples remain. Otherwise it holds samples
+    /// of several pixels.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {
@@ -122,7 +122,7 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
             tile.advance(replicate, job.count);
             return Counts::default();
         };
-        // The sums are loaded into the cache while the first samples are traced.
+        // The tile's sums are loaded into the cache while the first samples are traced.
         tile.prefetch(replicate);
         let mut rejected = RejectedSamples::new(replicate);
         let (mut index, end) = (job.first, job.first + job.count);
@@ -276,8 +276,9 @@ fn samples_per_packet(first: u32, end: u32, width: usize) -> usize {
     1 << aligned.trailing_zeros().min((end - first).ilog2())
 }
 
-/// Order of a tile's pixels along a Morton curve; pixels are numbered row by row. Pixels that share
-/// a packet then form a block of 2 x 1, 2 x 2, 4 x 2 or 4 x 4.
+/// Indices of a tile's pixels in the order of a Morton curve. An index counts the pixels row by
+/// row. Consecutive pixels of this order share packets; the pixels of a packet form a block of 2 x
+/// 1, 2 x 2, 4 x 2 or 4 x 4.
 const MORTON_ORDER: [u8; TILE_PIXELS] = {
     let mut order = [0; TILE_PIXELS];
     let mut i = 0;
