@@ -1,11 +1,13 @@
 //! Acceleration structures: time per sample of each structure, and its growth with the number of
 //! objects.
 //!
-//! - The structures are compared on three scenes: the reflecting tracks, 300 objects of several kinds, a mesh.
-//! - The growth is measured on the tracks with fewer and more balls in each row, and on a crowd of objects.
+//! - The structures are compared on three scenes: the reflecting tracks (a mirror ball and rows of
+//!   small balls), 300 objects of several kinds, and a mesh.
+//! - The growth is measured on the tracks with different numbers of balls, and on a cloud of
+//!   objects at random positions.
 //!
-//! `cargo bench -p zerkalo-benches --bench acceleration`. One core. The structures alternate on
-//! each scene; the least of five times counts.
+//! `cargo bench -p zerkalo-benches --bench acceleration`. It runs on one core. The structures take
+//! turns on each scene; the shortest of five times counts.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -22,9 +24,9 @@ use zerkalo::scene::{Acceleration, Document, Object, Scene};
 use zerkalo::shape::{Shape, Sphere};
 use zerkalo::world::{AnyWorld, Options};
 
-/// Picture size, in pixels, of the tracks with varying numbers of balls.
+/// Picture size, in pixels, of the reflecting tracks when the number of balls varies.
 const SIZE: [u32; 2] = [640, 480];
-/// Picture size, in pixels, of all scenes but the tracks with varying numbers of balls.
+/// Picture size, in pixels, of all other measured scenes.
 const SMALL: [u32; 2] = [320, 240];
 
 /// Samples per pixel of each measured render.
@@ -90,8 +92,9 @@ diffuse = 0.2
 reflection = 0.7
 "#;
 
-/// Returns a scene with `count` objects in the unit ball. `shapes` are their descriptions, each at
-/// the origin and of about unit size.
+/// Returns a scene with `count` objects at random positions in the unit ball. `shapes` are the
+/// lines of the scene file that describe the objects' shapes, each at the origin and of about unit
+/// size.
 fn crowd(count: usize, shapes: &[&str]) -> Scene {
     let mut random = Random(11);
     let mut text = ROOM.to_string();
@@ -117,8 +120,9 @@ fn crowd(count: usize, shapes: &[&str]) -> Scene {
 const BALL: &str = "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }";
 
 /// Returns the scene of the reflecting tracks with `4 n n` small balls instead of 400: `4 n` rows
-/// of `n`. The rows are distributed over the same curves. The radius keeps the balls' share of the
-/// picture.
+/// of `n`. The rows follow the same curves as in the original scene. The radius of the balls is
+/// proportional to `1 / n`, so that the balls cover about the same fraction of the picture for
+/// every `n`.
 fn tracks(scene: &Scene, n: usize) -> Scene {
     let mut scene = scene.clone();
     let [mirror, ball, ..] = &scene.objects[..] else { panic!("no tracks") };

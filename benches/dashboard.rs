@@ -1,6 +1,6 @@
-//! Input latency of the dashboard, in a terminal of 160x45 cells with keys pressed at a fixed rate. The
-//! program records the latencies (`--trace`): from the reading of a key until the frame that shows its
-//! effect has been written.
+//! Input latency of the dashboard, in a terminal of 160x45 cells with keys pressed at a fixed rate.
+//! The program itself records the latencies (`--trace`). A latency is the time from reading a key
+//! until the program has written the frame that shows the effect of this key.
 
 #[path = "../tests/pty/terminal.rs"]
 mod terminal;
@@ -19,7 +19,8 @@ const SIZE: [u16; 2] = [160, 45];
 /// Escape sequences of arrow keys whose camera moves cancel each other.
 const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[A", "\x1b[D", "\x1b[B"];
 
-/// Line of the file that `--trace` writes: a key, the kind of response and the latency.
+/// Line of the file that `--trace` writes for a key: the kind of response and the latency.
+/// `picture` is `true` if the response is a new picture.
 struct Event {
     picture: bool,
     milliseconds: f64,
@@ -51,7 +52,7 @@ fn main() {
 
 /// Starts the program in `folder` and waits for its first picture.
 fn open(folder: &Path, more: &[&str]) -> Terminal {
-    // Removes unsaved edits of the session before, which would open a prompt.
+    // Removes the unsaved edits of the previous run, because the dashboard would ask about them.
     let _ = fs::remove_file(folder.join(".room.toml.unsaved"));
     let command = [&[PROGRAM, "room.toml"], more].concat();
     let terminal =
@@ -62,7 +63,8 @@ fn open(folder: &Path, more: &[&str]) -> Terminal {
 }
 
 /// Presses `count` arrow keys at intervals of `interval`. If the interval is longer than 100 ms,
-/// also presses a key between them that toggles the panels. Returns the recorded events.
+/// also presses `z` after half of each interval; this key toggles the panels. Returns the recorded
+/// events.
 fn press_keys(folder: &Path, count: usize, interval: Duration) -> Vec<Event> {
     let trace = folder.join("trace.csv");
     let mut terminal = open(folder, &["--trace", trace.to_str().unwrap()]);
@@ -72,7 +74,8 @@ fn press_keys(folder: &Path, count: usize, interval: Duration) -> Vec<Event> {
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
         terminal.send(ARROWS[i % ARROWS.len()]);
         if interval > Duration::from_millis(100) {
-            // Shows and hides the panels: the next frame shows it.
+            // `z` shows or hides the panels. Its effect is visible in the next frame, without a new
+            // picture.
             std::thread::sleep(interval / 2);
             terminal.send("z");
         }
@@ -101,11 +104,11 @@ fn idle_percent(folder: &Path) -> f64 {
     std::thread::sleep(Duration::from_secs(seconds));
     let ticks = processor_ticks(terminal.process_id()) - before;
     end(terminal);
-    // Ticks of Linux are hundredths of a second.
+    // A clock tick is 1/100 s on Linux; ticks per second are therefore percent of a processor.
     ticks as f64 / seconds as f64
 }
 
-/// Returns user and system time of the process `id` in clock ticks (fields 14 and 15 of
+/// Returns the sum of user and system time of the process `id` in clock ticks (fields 14 and 15 of
 /// proc_pid_stat(5)).
 fn processor_ticks(id: u32) -> u64 {
     let stat = fs::read_to_string(format!("/proc/{id}/stat")).unwrap();
@@ -113,7 +116,7 @@ fn processor_ticks(id: u32) -> u64 {
     after_name.split_whitespace().skip(11).take(2).map(|n| n.parse::<u64>().unwrap()).sum()
 }
 
-/// Ends the program without the prompt for unsaved edits.
+/// Ends the program by SIGTERM. It then does not ask about unsaved edits.
 fn end(terminal: Terminal) {
     let id = terminal.process_id().to_string();
     assert!(Command::new("kill").args(["-TERM", &id]).status().unwrap().success());

@@ -1,5 +1,5 @@
-//! Cost of film operations other than tracing: noise of a tile, picture for display, addition of
-//! films, files.
+//! Cost of film operations other than tracing: estimation of a tile's noise, conversion to a
+//! displayed picture, addition of films, reading and writing of files.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -8,8 +8,8 @@ use zerkalo::film::{
     Thumbnail, Tone, WholeFilm,
 };
 
-/// Returns a film of a noisy gradient with `groups` light groups. Each pixel has 64 samples in each
-/// of the two replicates (halves of the samples).
+/// Returns a film of a noisy gradient with `groups` light groups. The samples of each pixel form
+/// two replicates of 64 samples each; the noise is estimated from the difference between them.
 fn film(width: usize, height: usize, groups: usize) -> Film {
     let scales = vec![2f64.powi(28); groups];
     let mut film = Film::new(Header { width, height, scales, seed: 1, precision: "single".into() });

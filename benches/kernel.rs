@@ -7,8 +7,8 @@
 //! - compilation of a scene
 //! - one wave (set of concurrent jobs) of samples
 //!
-//! `cargo bench -p zerkalo-benches --bench kernel`. Throughput counts lanes, so that SIMD types
-//! compare directly.
+//! `cargo bench -p zerkalo-benches --bench kernel`. Throughput is in lanes per second, so that
+//! results for SIMD types of different widths are comparable.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
@@ -65,7 +65,7 @@ impl Random {
     }
 }
 
-/// Returns the name of a SIMD type in the names of benches.
+/// Returns the name that stands for a SIMD type in the names of benches.
 fn name<L: SimdFloat>() -> &'static str {
     L::NAME
 }
@@ -96,7 +96,7 @@ fn kinds(c: &mut Criterion) {
     }
 }
 
-/// Measures the intersection of spheres in a unit ball, in a linear list and in a BVH.
+/// Measures ray queries for spheres that fill a unit ball, with a linear list and with a BVH.
 fn list_or_tree(c: &mut Criterion) {
     for n in [8, 16, 24, 32, 64, 256, 4096] {
         let mut random = Random(n as u64);
@@ -123,8 +123,9 @@ fn list_or_tree(c: &mut Criterion) {
     }
 }
 
-/// Measures sixteen samples per pixel of a small physical mirror room on one thread, with
-/// accumulation in the film: the speed-up by SIMD lanes in a whole render.
+/// Measures a render of sixteen samples per pixel of a small physical mirror room on one thread,
+/// with accumulation in the film. The ratio of the results for two SIMD types is the speed-up in a
+/// whole render.
 fn paths<L: SimdFloat>(c: &mut Criterion) {
     let mut scene = physical();
     scene.film.size = [160, 120];

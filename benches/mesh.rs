@@ -1,7 +1,7 @@
-//! Triangle meshes of three sizes: BVH build time, memory, and closest hits per second of processor time on
-//! one core. Camera rays are blocks of neighbouring pixels of a picture of 1024 x 1024; random rays join
-//! random points. The last part compares packet traversal with single-ray traversal for packets whose
-//! directions differ more and more.
+//! Triangle meshes of three sizes: BVH build time, memory, and closest hits per second of processor
+//! time on one core. The packets of camera rays cover small rectangles of pixels of a picture of
+//! 1024 x 1024. Random rays connect two random points. The last part compares packet traversal with
+//! single-ray traversal, for packets with less and less coherent directions.
 //!
 //! `cargo bench -p zerkalo-benches --bench mesh`; `-- --short` leaves out the last part.
 
@@ -33,7 +33,8 @@ fn packet<L: SimdFloat>(mut ray: impl FnMut(usize) -> ([f64; 3], [f64; 3])) -> R
     }
 }
 
-/// Returns camera rays in packets. Each packet is a block of neighbouring pixels, two rows high.
+/// Returns camera rays in packets. The rays of a packet belong to a rectangle of pixels, two rows
+/// high.
 fn camera<L: SimdFloat>() -> Vec<Ray<L>> {
     let (eye, across) = ([0.0, 0.0, 3.5], L::WIDTH / 2);
     let pixel = |i: usize| 2.2 * (i as f64 / SIDE as f64) - 1.1;
@@ -47,8 +48,8 @@ fn camera<L: SimdFloat>() -> Vec<Ray<L>> {
     corners.map(block).collect()
 }
 
-/// Returns `rays` random rays in packets. `spread` is the largest difference of directions within a
-/// packet; above 1 the rays of a packet are independent.
+/// Returns `rays` random rays in packets. `spread` is the largest distance between the unit
+/// directions of two rays of a packet. If it is above 1, all rays are independent of each other.
 fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
     let mut random = Random(7);
     (0..rays / L::WIDTH)
@@ -67,8 +68,8 @@ fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
 }
 
 /// Returns the number of rays, in millions, that are traced per second. `as_packet` selects packet
-/// traversal (`true`) or single-ray traversal (`false`). With `None`, traversal chooses by the
-/// packet's coherence.
+/// traversal (`true`) or single-ray traversal (`false`). If it is `None`, the traversal chooses
+/// between the two by the packet's coherence.
 fn speed<L: SimdFloat>(mesh: &Mesh, rays: &[Ray<L>], as_packet: Option<bool>) -> f64 {
     let limit = L::from_f64(L::MAX);
     let seconds = in_turns(

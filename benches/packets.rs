@@ -1,7 +1,9 @@
-//! Packets against single rays: closest hits per second by kind of primitive, and samples per
-//! second of whole scenes. The same kernels run with packets and with a width of one lane.
+//! Comparison of ray packets with single rays: closest hits per second by kind of primitive, and
+//! samples per second of whole scenes. The same kernels run with packets, and with a SIMD width of
+//! one lane.
 //!
-//! `cargo bench -p zerkalo-benches --bench packets`. One core; both widths alternate.
+//! `cargo bench -p zerkalo-benches --bench packets`. It runs on one core. The two widths take
+//! turns.
 
 #[path = "common/mod.rs"]
 mod common;
@@ -31,7 +33,7 @@ const RAYS: usize = 1 << 15;
 const ROUNDS: usize = 8;
 
 /// Returns origins and directions of rays from a sphere around `form` towards its bounding box.
-/// Each eight successive rays are neighbours.
+/// Each group of eight successive rays has a common origin and similar directions.
 fn rays_towards(form: &Form) -> Vec<([f64; 3], [f64; 3])> {
     let mut random = Random(3);
     let (low, high) = form.bounds().unwrap_or_else(|| (-glam::DVec3::ONE, glam::DVec3::ONE));

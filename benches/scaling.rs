@@ -1,37 +1,41 @@
-//! Simulation of renders on many machines: time until the picture is written against the number of
-//! shards, with machines of different speed, failures and restarts.
+//! Simulation of renders on many machines. A picture is divided into shards, which the machines
+//! trace in parallel. The result is the time until the picture is written, as a function of the
+//! number of shards. The machines have different speeds, and they fail and are restarted.
 //!
 //!     cargo bench -p zerkalo-benches --bench scaling -- [KEY=VALUE ..]
 //!
 //! The keys are the fields of [`Setup`], measured as docs/many-machines.md describes. The model:
 //!
-//! - The pilot and the plan run on one machine, the merge as well.
-//! - The engine starts `starts_per_second` tasks a second. Each task reads and compiles the scene,
-//!   traces its shard, and writes its part to the shared file system.
-//! - The speed of a machine has a log-normal distribution with the standard deviation `spread`.
-//!   The share `slow` of the machines is three times as slow as that.
-//! - A machine fails after a time with an exponential distribution. The engine notices it after
-//!   `requeue_seconds`, and the shard continues on another machine from its latest checkpoint.
-//! - If there are more shards than machines, a machine that has finished gets the next shard.
+//! - One machine renders the pilot (a first render that predicts the sample counts) and plans the
+//!   shards. One machine also merges their results.
+//! - The workflow engine starts `starts_per_second` tasks a second. Each task reads and compiles
+//!   the scene, traces its shard, and writes the samples to the shared file system.
+//! - The speed of a machine has a log-normal distribution; the standard deviation of its logarithm
+//!   is `spread`. A fraction `slow` of the machines has a third of this speed.
+//! - A machine fails after a time with an exponential distribution. After `requeue_seconds` the
+//!   engine notices the failure, and the shard continues from its latest checkpoint on another
+//!   machine.
+//! - If there are more shards than machines, each machine that finishes a shard gets the next one.
 //!
 //! Random numbers have fixed seeds; the output is the same on every machine.
 
 use std::collections::BinaryHeap;
 
-/// Numbers of the simulation, measured or assumed. The defaults are those of the scene
-/// gallery-glass in 3840x2160 pixels, traced to a noise of 0.25 8-bit levels.
+/// Parameters of the simulation, measured or assumed. Their defaults are those of a render of the
+/// scene gallery-glass with 3840x2160 pixels, traced to a noise of 0.25 8-bit levels.
 #[derive(Clone, Copy, Debug)]
 struct Setup {
     /// Seconds that the whole picture takes on one machine.
     total: f64,
-    /// Share of all rays that are traced before the last round of shards: in the pilot of a render
-    /// in one round, in pilot and first round of a render in two rounds.
+    /// Fraction of all rays that are traced before the last round of shards. In a render with one
+    /// round, the pilot traces these rays; in a render with two rounds, the pilot and the first
+    /// round.
     pilot: f64,
-    /// Share of all rays that are traced in the pilot of a render in two rounds.
+    /// Fraction of all rays that the pilot traces in a render with two rounds.
     first_pilot: f64,
     /// Seconds to start a task: start of the program, reading and compilation of the scene.
     start_seconds: f64,
-    /// Size in megabytes of a shard's file that holds samples of all tiles.
+    /// Size in megabytes of a shard's film file if it holds samples of all tiles.
     part_mb: f64,
     /// Mean number of blocks (16 samples of every pixel of a tile) that the shards together trace
     /// in a tile. With more shards than blocks, a shard's file holds samples of some tiles only.
@@ -42,13 +46,13 @@ struct Setup {
     merge_mb_s: f64,
     /// Seconds to write the picture or the merged film.
     picture_seconds: f64,
-    /// Relative excess of the work of the largest shard over the mean.
+    /// Work of the largest shard relative to the mean work of a shard, minus 1.
     imbalance: f64,
     /// Number of tasks that the engine starts per second.
     starts_per_second: f64,
     /// Standard deviation of the natural logarithm of the machines' speeds.
     spread: f64,
-    /// Share of the machines that have a third of the speed of the others.
+    /// Fraction of the machines whose speed is divided by 3.
     slow: f64,
     /// Mean time between failures of a machine, in hours.
     mtbf_hours: f64,
@@ -145,7 +149,7 @@ impl Setup {
         for shard in 0..shards {
             let Some(Free { at, machine }) = free.pop() else { break };
             let mut now = at.max(shard as f64 / self.starts_per_second) + self.start_seconds;
-            // The largest shard is one of the first ones.
+            // The model assumes that the first shard is the largest one.
             let excess = if shard == 0 { 1.0 + self.imbalance } else { 1.0 };
             let mut left = work / shards as f64 * excess;
             let mut speed = speeds[machine];
@@ -213,8 +217,8 @@ impl Setup {
     }
 }
 
-/// Machine and the time from which it is free. The order is that of a heap: the greatest is free
-/// first.
+/// Machine and the time from which it is free. The order is reversed, so that the top of a max-heap
+/// is the machine that is free first.
 #[derive(PartialEq)]
 struct Free {
     at: f64,

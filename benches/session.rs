@@ -1,6 +1,6 @@
-//! Latency of a session (background renderer): pictures, edits and tasks on a film of the given
-//! size. Prints median, 99th percentile and maximum in milliseconds. The default sizes are 640x480
-//! and 3840x2160 pixels.
+//! Latency of a session, which renders on a background thread. It is measured for requests of
+//! pictures, for edits and for other tasks, with a film of the given size. Prints median, 99th
+//! percentile and maximum in milliseconds. The default sizes are 640x480 and 3840x2160 pixels.
 //!
 //! cargo bench -p zerkalo-benches --bench session -- 3840x2160
 

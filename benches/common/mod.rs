@@ -4,10 +4,11 @@
 use std::time::Instant;
 use zerkalo::asset::TriangleMesh;
 
-/// Returns the processor time of this thread in seconds, which other load disturbs little. On
-/// systems without `/proc/thread-self/schedstat`, returns the wall-clock time since `start`.
+/// Returns the processor time of this thread in seconds. Other programs on the machine affect it
+/// less than the wall-clock time. On systems without `/proc/thread-self/schedstat`, returns the
+/// wall-clock time since `start`.
 pub fn seconds(start: Instant) -> f64 {
-    // Yielding makes the kernel update the counter.
+    // The kernel updates the counter of this thread when the thread yields.
     std::thread::yield_now();
     let times = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = times.and_then(|t| t.split(' ').next()?.parse::<f64>().ok());

@@ -1,12 +1,12 @@
 //! Latency from a key to the first change of the picture over a slow connection. The program runs
 //! behind an OpenSSH server: directly, in tmux, and in screen.
 //!
-//! A relay on loopback limits the rate and delays all bytes. With `--tunnel` a pair of TUN devices
-//! does so, and the server's TCP connection has the round trip. `benches/link.sh` installs the
-//! requirements.
+//! A relay on loopback limits the rate and delays all bytes. With `--tunnel`, a pair of TUN devices
+//! does this instead. The server's own TCP connection then has the simulated round-trip time.
+//! `benches/link.sh` installs the required programs.
 //!
-//! Arguments: a part of the names of measured rows, and the number of keys. `ZERKALO_PROGRAM` is
-//! the path of another build of the program, for comparison.
+//! Arguments: a text, and the number of keys. Only table rows whose names contain the text are
+//! measured. `ZERKALO_PROGRAM` is the path of another build of the program, for comparison.
 
 #[path = "../../tests/pty/terminal.rs"]
 mod terminal;
@@ -42,7 +42,7 @@ const KEYS: usize = 40;
 const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[C", "\x1b[D", "\x1b[D"];
 
 fn main() {
-    // `cargo test --benches` runs it without measurement.
+    // `cargo test --benches` runs this program without `--bench`. It measures nothing then.
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
@@ -146,7 +146,7 @@ enum Replies {
     Never,
 }
 
-/// Setting of a measurement, a row of the printed table.
+/// Settings of one measurement, which is printed as one row of the table.
 #[derive(Clone, Copy)]
 struct Row {
     name: &'static str,
@@ -201,7 +201,7 @@ fn measure(
     let mut terminal = Terminal::start(&start);
     terminal.wait_for_text("spp");
     terminal.set_replying(row.replies == Replies::Always);
-    // A noise target out of reach keeps it converging.
+    // A noise target that cannot be reached in this time keeps the picture converging.
     terminal.send("T");
     terminal.wait_for_text("top at");
     terminal.send("\x15noise 0.01\r");
@@ -210,7 +210,7 @@ fn measure(
     seconds.sort_by(f64::total_cmp);
     let quantile = |share: f64| seconds[((share * keys as f64).ceil() as usize).max(1) - 1];
     let mut rates = vec![status(&terminal)];
-    // A converged picture, of which little is sent.
+    // The next rate is reported for a converged picture, of which little is sent.
     terminal.send("T");
     terminal.wait_for_text("top at");
     terminal.send("\x15noise 2\r");
@@ -218,7 +218,8 @@ fn measure(
     rates.push(status(&terminal));
     terminal.send("q");
     std::thread::sleep(Duration::from_secs(3));
-    // The moved camera is an unsaved edit; the prompt is answered.
+    // The arrow keys have moved the camera, which is an unsaved edit. `d` answers the question
+    // about it: discard.
     if terminal.screen(|screen| screen.contents().contains("unsaved edits")) {
         terminal.send("d");
         std::thread::sleep(Duration::from_secs(3));
@@ -234,9 +235,10 @@ fn measure(
     );
 }
 
-/// Presses key number `i`. Returns the seconds until the picture has clearly changed.
+/// Presses key number `i`. Returns the seconds until 25 cells of the picture have clearly changed
+/// in colour.
 fn press_key(terminal: &mut Terminal, i: usize) -> f64 {
-    // Irregular pauses.
+    // The pauses differ in length, so that the keys do not stay in phase with a periodic update.
     std::thread::sleep(Duration::from_millis(1500 + 37 * (i as u64 % 11)));
     let before = terminal.screen(colors);
     let start = Instant::now();
@@ -272,8 +274,8 @@ fn colors(screen: &vt100::Screen) -> BTreeMap<(u16, u16), [u8; 3]> {
     cells.filter_map(color).collect()
 }
 
-/// Returns the colour with this index in xterm's palette of 256 colours. The first 16 are all black
-/// here.
+/// Returns the colour with this index in xterm's palette of 256 colours. The first 16 colours
+/// depend on the terminal; this function returns black for them.
 fn indexed(index: u8) -> [u8; 3] {
     const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
     match index {

@@ -1,5 +1,6 @@
-//! Relay that limits the server's output to a rate and delays both directions. It reads from the server
-//! no more than it transmits, so that the server's TCP send queue fills as on a slow connection.
+//! Relay that limits the rate of the server's output and delays both directions. It reads from the
+//! server only as fast as it transmits, so that the server's TCP send queue fills as on a slow
+//! connection.
 
 use rustix::net::sockopt::set_socket_recv_buffer_size;
 use rustix::net::{AddressFamily, SocketType, connect, socket};
@@ -10,8 +11,9 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Size in bytes of the receive buffer of the relay's socket to the server. The kernel acknowledges
-/// bytes as soon as they are in the buffer.
+/// Size in bytes of the receive buffer of the relay's socket to the server. It is small, because
+/// the kernel acknowledges all bytes that reach the buffer, even if the relay has not read them
+/// yet.
 const RECEIVE_BUFFER: usize = 4 << 10;
 /// Largest number of bytes that the relay forwards at once.
 const PIECE: usize = 700;
@@ -55,13 +57,13 @@ fn connected(target: SocketAddr) -> io::Result<TcpStream> {
     Ok(TcpStream::from(socket))
 }
 
-/// Forwards one direction of a connection, from `from` to `to`, at most at `rate` bytes per second
-/// and delayed by `one_way`.
+/// Forwards one direction of a connection, from `from` to `to`, at no more than `rate` bytes per
+/// second and with a delay of `one_way`.
 fn forward(mut from: TcpStream, mut to: TcpStream, rate: f64, one_way: Duration) {
     let pipe = Arc::new((Mutex::new(Pipe::default()), Condvar::new()));
     let other = Arc::clone(&pipe);
     thread::spawn(move || {
-        // Small pieces, so that the rate is even.
+        // The pieces are small, so that the bytes arrive at a steady rate and not in bursts.
         let mut buffer = [0; PIECE];
         let mut free_at = Instant::now();
         loop {

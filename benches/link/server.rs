@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// OpenSSH server that accepts a generated user key. Dropping it ends it.
+/// OpenSSH server that accepts a generated user key. It ends when this value is dropped.
 pub struct Server {
     child: Child,
     folder: PathBuf,
@@ -15,8 +15,8 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts `sshd` with keys and settings in `folder`, on loopback or in the network namespace of a
-    /// tunnel.
+    /// Starts `sshd` with keys and settings in `folder`. It listens on loopback, or in the network
+    /// namespace of `tunnel` if one is given.
     ///
     /// # Errors
     /// Fails if a program is missing or the server does not start.
@@ -79,7 +79,8 @@ impl Server {
         Ok(server)
     }
 
-    /// Returns the words of an ssh command that runs `command` on the server in a terminal, via `address`.
+    /// Returns the words of an ssh command that connects to `address` and runs `command` on the
+    /// server in a terminal.
     pub fn ssh(&self, address: SocketAddr, command: &str) -> Vec<String> {
         let mut words: Vec<String> = ["ssh", "-tt", "-F", "none", "-i"].map(String::from).into();
         words.push(self.folder.join("user").display().to_string());

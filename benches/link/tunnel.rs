@@ -1,5 +1,5 @@
-//! Tunnel with a rate and a delay between the host and a network namespace, so that the server's TCP
-//! connection has its own round trip, congestion control and send queue.
+//! Tunnel with limited rate and a delay between the host and a network namespace, so that the
+//! server's TCP connection has its own round trip, congestion control and send queue.
 
 use std::io::{BufRead, BufReader};
 use std::net::Ipv4Addr;
@@ -11,18 +11,19 @@ pub const NAMESPACE: &str = "zerkalo-bench";
 /// Address of the server in its network namespace.
 pub const SERVER_IP: Ipv4Addr = Ipv4Addr::new(10, 77, 0, 2);
 
-/// Process that connects a network namespace to the host by a tunnel. Dropping it removes the
-/// namespace.
+/// Process that connects a network namespace to the host by a tunnel. When this value is dropped,
+/// the process ends and the namespace is removed.
 pub struct Tunnel {
     child: Child,
 }
 
 impl Tunnel {
-    /// Starts a tunnel of `rate` bytes per second towards the host, with a delay of `one_way` in both
-    /// directions.
+    /// Starts a tunnel that transmits `rate` bytes per second towards the host and delays each
+    /// direction by `one_way`.
     ///
     /// # Errors
-    /// Fails if a program or the permission is missing.
+    /// Fails if `ip` or `python3` is missing, or if the process lacks the permission to create
+    /// network namespaces and TUN devices.
     pub fn start(rate: f64, one_way: Duration) -> Result<Self, String> {
         let added = Command::new("ip").args(["netns", "add", NAMESPACE]).status();
         if !added.is_ok_and(|status| status.success()) {

@@ -20,7 +20,7 @@ const UNUSED_BYTES: usize = 256 << 20;
 /// Largest size in bytes of an image file for a texture or an environment: 512 MiB.
 const MAX_IMAGE_BYTES: u64 = 512 << 20;
 
-/// Estimated peak memory per triangle while the BVH of a mesh is built \[bytes\].
+/// Estimated peak memory for building the BVH of a mesh \[bytes per triangle\].
 const BUILD_BYTES: u64 = 400;
 
 /// Stage of loading an asset file, for progress messages: reading the file, or building the BVH of
@@ -86,8 +86,8 @@ impl<T> Default for Cache<T> {
 }
 
 impl<T> Cache<T> {
-    /// Returns the cache entry for `key`, a new one if there is none. Removes the entries of the
-    /// same file with another modification time or length.
+    /// Returns the cache entry for `key`, and creates it if there is none. Removes the entries for
+    /// other versions of the same file, which have another modification time or length.
     fn entry(&mut self, key: &Key) -> CacheEntry<T> {
         self.last_used += 1;
         self.files.retain(|k, _| k.path != key.path || k == key);
@@ -122,9 +122,9 @@ impl<T> Cache<T> {
     }
 }
 
-/// Cache of all files that scenes name. Each file is read once for all scenes and threads, and
-/// again only if it changes on disk. Errors are cached as well. Unused files are evicted if they
-/// take more than 256 MiB.
+/// Cache of all asset files that scenes name. All scenes and threads share the content of a file.
+/// The file is read once, and again only if it changes on disk. Errors are cached as well. Unused
+/// files are evicted if they take more than 256 MiB.
 pub struct Assets {
     meshes: Mutex<Cache<Mesh>>,
     images: Mutex<Cache<Image>>,

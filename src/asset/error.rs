@@ -33,8 +33,8 @@ pub struct AssetError {
 }
 
 impl AssetError {
-    /// Creates an error about the file at `path` as a whole. `found` and `expected` are as in
-    /// [`AssetError`].
+    /// Creates an error about the file at `path` as a whole. `found` and `expected` become the
+    /// fields of these names in [`AssetError`].
     pub(super) fn of_file(path: &Path, found: impl Into<String>, expected: &str) -> Self {
         let (file, expected) = (path.to_path_buf(), expected.to_string());
         Self { file, place: FileLocation::Whole, found: found.into(), expected }

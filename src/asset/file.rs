@@ -41,7 +41,8 @@ impl FileContents {
             let found = format!("there is no memory for its {}", megabytes(metadata.len()));
             return error(found, "a smaller file, or more free memory");
         }
-        // One byte more than the limit is read, to detect that the file grew meanwhile.
+        // One byte more than the limit is read, to detect a file that has grown since its length
+        // was checked.
         file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| read_error(path, &e))?;
         if bytes.len() as u64 > limit {
             let found = "the file grew while it was read".to_string();
@@ -63,13 +64,14 @@ impl FileContents {
 
     /// Resolves `name`, a file name that occurs in this file, relative to the folder of this file,
     /// by the rule in docs/scene-format.md. Returns `None` if `name` is an absolute path, a path
-    /// with `..` or a URL, because these lead out of the folder.
+    /// with `..` or a URL, because it could then name a file outside of the folder.
     pub fn resolve_relative(&self, name: &str) -> Option<PathBuf> {
         let name = name.replace('\\', "/");
         let inside = Path::new(&name)
             .components()
             .all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-        // `true` for a drive such as `C:` and for a URL such as `http:`.
+        // A colon in the first component indicates a Windows drive such as `C:` or a URL such as
+        // `http:`.
         let drive = name.split('/').next().is_some_and(|first| first.contains(':'));
         let folder = self.path.parent().unwrap_or(Path::new(""));
         (inside && !drive && !name.is_empty()).then(|| folder.join(name))

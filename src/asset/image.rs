@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 pub const MAX_SIDE: u32 = 32_768;
 
 /// Largest number of pixels of a texture image: 64 Mi. An image of this size takes at most 402 MB
-/// when decoded, and 940 MB during decoding.
+/// of memory after decoding, and at most 940 MB during decoding.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
 /// Largest number of pixels per byte of an image file. PNG has the largest ratio: at most eight
@@ -36,7 +36,7 @@ pub struct Image {
     texels: Texels,
 }
 
-/// Returns a table of linear light, 0..=1, for the sRGB levels from 0 (black) to `last` (white).
+/// Returns a table that converts sRGB levels, 0 (black) to `last` (white), to linear light, 0..=1.
 fn linear_table(last: u16) -> Vec<f32> {
     let linear = |level| linear_from_srgb(f64::from(level) / f64::from(last)) as f32;
     (0..=last).map(linear).collect()
@@ -143,9 +143,9 @@ impl Image {
     }
 }
 
-/// Checks the size of an image of `width` x `height` pixels in the file `source`. Valid are at most
-/// `max_side` pixels per side, and 1 to `max_pixels` pixels altogether, but at most
-/// [`PIXELS_PER_BYTE`] per byte of the file.
+/// Checks the size of an image of `width` x `height` pixels in the file `source`. Neither side may
+/// exceed `max_side`. The number of pixels must be from 1 to `max_pixels`. It must also be at most
+/// [`PIXELS_PER_BYTE`] times the length of the file in bytes.
 pub(super) fn check_size(
     source: &FileContents,
     [width, height]: [u32; 2],

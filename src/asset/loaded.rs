@@ -41,8 +41,8 @@ impl<T> fmt::Debug for Loaded<T> {
 }
 
 impl<T> Loaded<T> {
-    /// Returns the content of the file. Returns `None` if the file has not been read yet or cannot
-    /// be read.
+    /// Returns the content of the file. Returns `None` if the file has not been read yet, or if
+    /// reading it failed.
     pub fn content(&self) -> Option<&Arc<T>> {
         self.0.as_ref()?.as_ref().ok()
     }
@@ -52,8 +52,9 @@ impl<T> Loaded<T> {
         self.0.get_or_insert_with(load);
     }
 
-    /// Returns the error of reading the file as a validation error of the key `file`. Returns
-    /// `None` if the file was read, or has not been read yet.
+    /// Returns the error of reading the file as a validation error of the key `file`, which names
+    /// the file in the scene description. Returns `None` if the file was read without error, or has
+    /// not been read yet.
     pub fn fault(&self) -> Option<ValidationError> {
         let error = self.0.as_ref()?.as_ref().err()?;
         Some(ValidationError::new("file", error.what(), error.expected.clone()))

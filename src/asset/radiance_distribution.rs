@@ -8,8 +8,8 @@
 use std::f64::consts::{PI, TAU};
 
 /// Luminance that the sampling distribution adds to every pixel, as a fraction of the image's mean
-/// luminance. The density is thus at least about 1/17 of the uniform one in all directions. This
-/// limits the variance at points from which the bright part of the image is occluded.
+/// luminance. The density in every direction is thus at least about 1/17 of the uniform density.
+/// This limits the variance at shading points from which the bright part of the image is occluded.
 const FLOOR: f64 = 1.0 / 16.0;
 
 /// Sampling distribution of directions over the pixels of an equirectangular image.
@@ -35,7 +35,8 @@ impl RadianceDistribution {
         let luminance = |p: &[f32; 3]| {
             0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])
         };
-        // Mean over a pixel of a function that is interpolated between the centres of the pixels.
+        // Mean over a pixel, along one axis, of the linear interpolation between the pixel centres.
+        // The arguments are the values of the previous, this and the next pixel.
         let smoothed =
             |before: f64, middle: f64, after: f64| 0.125 * before + 0.75 * middle + 0.125 * after;
         let along_row = |row: usize| -> Vec<f64> {
@@ -257,8 +258,9 @@ mod tests {
         }
     }
 
-    /// Checks that the weight of a sample, interpolated luminance divided by sampling density, is
-    /// bounded, also beside a bright pixel.
+    /// Checks that the weight of a sample, also beside a bright pixel, is at most 17 times the mean
+    /// weight. A weight is the interpolated radiance divided by the sampling density; the mean
+    /// weight is 4 pi times the mean radiance. The factor 17 follows from [`FLOOR`], 1/16.
     #[test]
     fn weights_are_bounded_beside_a_bright_pixel() {
         let dark = [0.01f32; 3];

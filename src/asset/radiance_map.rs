@@ -19,10 +19,12 @@ use std::io::Cursor;
 /// Largest number of pixels in a row or column of an environment image.
 const MAX_MAP_SIDE: u32 = 16_384;
 
-/// Largest number of pixels of an environment image: 32 Mi, such as 8192 x 4096. They take 403 MB.
+/// Largest number of pixels of an environment image: 32 Mi, such as 8192 x 4096. The pixels of such
+/// an image take 403 MB.
 const MAX_MAP_PIXELS: u64 = 1 << 25;
 
-/// Largest radiance of a pixel in an environment image; that of the sun is about 2e9 W/(sr m^2).
+/// Largest valid radiance of a pixel in an environment image. For comparison: the radiance of the
+/// sun is about 2e9 W/(sr m^2).
 const MAX_RADIANCE: f32 = 1e15;
 
 /// Decoded image of radiance from all directions, for environment lights. Its values are linear,
@@ -123,7 +125,8 @@ impl RadianceMap {
         let (x, y) = (x * columns as f64 - 0.5, y * rows as f64 - 0.5);
         let (column, row) = (x.floor(), y.floor());
         let (s, t) = (x - column, y - row);
-        // The columns go around, the outermost rows continue to the poles.
+        // The left and the right edge of the image are adjacent. Between the centres of an
+        // outermost row and the pole, the values of this row are used.
         let left = if column < 0.0 { columns - 1 } else { (column as usize).min(columns - 1) };
         let right = if left + 1 < columns { left + 1 } else { 0 };
         let (above, below) = (row.max(0.0) as usize, (row + 1.0) as usize);
@@ -193,8 +196,8 @@ fn decode(
     Ok(RadianceMap::new([width, height], pixels))
 }
 
-/// Checks the size of all layers of an OpenEXR file, because the decoder allocates memory for a
-/// block of rows of a layer before it reads the block.
+/// Checks the size of all layers of an OpenEXR file. A wrong size could make the decoder run out of
+/// memory, because it allocates a block of rows of a layer before it reads the block.
 fn check_layers(source: &FileContents) -> Result<(), AssetError> {
     let data = MetaData::read_from_buffered(&source.bytes[..], false).map_err(|error| {
         let found = format!("the header cannot be read: {error}");
@@ -248,7 +251,8 @@ mod tests {
         let map = RadianceMap::parse(&source(exr)).unwrap();
         assert_eq!(map.size, [9, 5]);
         assert_eq!(map.pixels[2 * 9 + 4], [128.0, 0.5, 2.0]);
-        // The channels of a Radiance file share an exponent.
+        // The channels of a pixel in a Radiance file share an exponent, so that only similar values
+        // are stored exactly.
         let simple = Rgb32FImage::from_fn(9, 5, |x, _| Rgb([f32::exp2(x as f32); 3]));
         let map = RadianceMap::parse(&source(hdr(&simple))).unwrap();
         assert_eq!(map.pixels[9 + 8], [256.0; 3]);
@@ -289,7 +293,8 @@ mod tests {
         assert!((red([-s * c, c, -s * s]) - 1.0).abs() < 1e-12);
         assert!((red([s * c, c, -s * s]) - 2.0).abs() < 1e-12);
         assert!((red([s * c, c, s * s]) - 3.0).abs() < 1e-12);
-        // Straight ahead, between four pixels; behind, where the image goes around; at the poles.
+        // Directions on boundaries of pixels: straight ahead, between four pixels; behind, between
+        // the left and the right edge of the image; to the right; and at the poles.
         assert!((red([0.0, 0.0, -1.0]) - 3.5).abs() < 1e-12);
         assert!((red([0.0, 0.0, 1.0]) - 3.5).abs() < 1e-12);
         assert!((red([1.0, 0.0, 0.0]) - 4.5).abs() < 1e-12);
@@ -334,7 +339,7 @@ mod tests {
                 assert!(!found(bytes[..kept].to_vec()).is_empty(), "{kept} bytes");
             }
         }
-        // A layer that is larger than the picture.
+        // The next file declares a layer that is wider than the limit.
         let mut wide = encoded(floats().into(), ImageFormat::OpenExr);
         let window = b"dataWindow\0box2i\0\x10\0\0\0";
         let start = wide.windows(window.len()).position(|bytes| bytes == window).unwrap();

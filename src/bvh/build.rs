@@ -2,8 +2,8 @@
 //!
 //! A node stores the bounds of its eight children as a structure of arrays. A single ray, or the
 //! interval bounds of a packet, is tested against all eight boxes at once. The build clusters the
-//! primitives to a binary BVH, optimises it, and collapses it into few nodes with many children
-//! each.
+//! primitives into a binary BVH and optimises this BVH by reinsertion. It then collapses the binary
+//! BVH into wide nodes with up to eight children.
 
 use crate::bvh::clustering::{SearchWindow, cluster};
 use crate::bvh::reinsertion::optimize;
@@ -187,20 +187,22 @@ impl Bvh8Build {
 /// Laine 2017, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*). Unlike
 /// in that paper, the leaves are those of the binary BVH.
 struct CollapsePlan {
-    /// Best division of the slots of wide nodes; a slot holds one of the eight children. If the
-    /// binary node `i` may take `n` slots, 2 to 8, `splits[i][n - 1]` has the numbers of slots for
-    /// its two children, or `[0, 0]` if the node itself takes a single slot. If the binary node `i`
-    /// becomes a wide node, `splits[i][0]` divides the eight slots between its two children.
+    /// Best use of the eight child slots of wide nodes. `splits[i][n - 1]` is for the case that the
+    /// subtree of the binary node `i` may take `n` slots, 2 to 8, of a wide node. It has the
+    /// numbers of slots for the two children of node `i`, or `[0, 0]` if node `i` itself takes one
+    /// slot. `splits[i][0]` is for the case that node `i` becomes a wide node; it divides the eight
+    /// slots between the two children.
     splits: Vec<[[u8; 2]; BVH_WIDTH]>,
 }
 
 impl CollapsePlan {
     fn new(nodes: &[Bvh2Node]) -> Self {
         let mut splits = vec![[[0; 2]; BVH_WIDTH]; nodes.len()];
-        // Smallest sum of areas of a binary node's subtree, for each number of slots that it may
-        // take.
+        // For each binary node and each number of slots that its subtree may take: the smallest sum
+        // of the areas of the wide nodes in this subtree.
         let mut costs = vec![[0.0f32; BVH_WIDTH]; nodes.len()];
-        // Wide nodes whose boxes have no area also have a cost.
+        // This area is added to the area of each wide node, so that a node without area has a cost,
+        // too.
         let least_area = 1e-7 * nodes[0].aabb().half_area() + f32::MIN_POSITIVE;
         let mut order = vec![0];
         for position in 0.. {
@@ -328,11 +330,12 @@ mod tests {
         }
     }
 
-    /// Family of boxes: a function from the number of a box to its low and its high corner.
+    /// Set of test boxes: a function that returns the low and the high corner of the box with the
+    /// given number.
     type Family = fn(usize) -> [[f32; 3]; 2];
 
-    /// Families of boxes, each with a name, for which the clustering is slow: the distances between
-    /// neighbours are equal or grow steadily.
+    /// Sets of test boxes, each with a name, for which clustering by nearest neighbours alone is
+    /// slow, because the distances between neighbours are equal or grow steadily.
     const FAMILIES: [(&str, Family); 8] = [
         ("one box", |_| [[0.0; 3], [1.0; 3]]),
         ("one point", |_| [[0.5; 3]; 2]),
@@ -355,15 +358,15 @@ mod tests {
         (0..count).map(aabb).collect()
     }
 
-    /// Checks that the clustering of 4,000 boxes of each family takes at most 95 passes. Each pass
-    /// takes time proportional to the number of remaining nodes. Without merges of neighbours on
-    /// the Morton curve, 2,000 to 4,000 passes would be needed.
+    /// Checks that the clustering of 4,000 boxes of each set in [`FAMILIES`] takes at most 95
+    /// passes. Each pass takes time proportional to the number of remaining nodes. Without merges
+    /// of neighbours on the Morton curve, 2,000 to 4,000 passes would be needed.
     #[test]
     fn clustering_of_coincident_boxes_takes_few_passes() {
         for (name, family) in FAMILIES {
             for quality in [BuildQuality::FAST, BuildQuality::MEDIUM] {
                 let tree = cluster(&boxes(family, 4000), quality.window);
-                // The depth bound is the number of passes and 1, at least 96.
+                // `max_depth` is the number of passes plus 1, but at least 96.
                 assert_eq!(tree.max_depth, 96, "{name}: {} passes", tree.max_depth - 1);
             }
         }
@@ -384,8 +387,8 @@ mod tests {
     }
 
     /// Checks that a build with twice as many boxes takes at most 2.3 times as long, up to a
-    /// million boxes, and that a million equal boxes take less than two seconds. The previous
-    /// builder took over a minute for 100,000 boxes of most families.
+    /// million boxes, and that a million equal boxes take less than two seconds. For most families,
+    /// the previous builder took over a minute for 100,000 boxes.
     ///
     /// cargo test --release --lib -- --ignored --nocapture builds_of_coincident_boxes
     #[test]

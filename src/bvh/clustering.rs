@@ -4,7 +4,7 @@
 //! A pass over the nodes, in the order of the Morton curve, merges every pair of nodes that are
 //! nearest to each other. If many distances are equal, such as between coincident boxes, boxes in a
 //! row or the triangles of a fan, a pass may find a single such pair. The number of passes would
-//! then be proportional to the number of boxes. In this case the passes merge neighbours on the
+//! then be proportional to the number of boxes. Such slow passes therefore merge neighbours on the
 //! curve instead.
 
 use glam::{DVec3, Vec3A};
@@ -13,9 +13,10 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
-/// Number of node visits per primitive after which slow clustering passes (see [`SLOW`]) are
-/// shortened. A shortened pass merges the 1st and 2nd node on the Morton curve, the 3rd and 4th,
-/// and so on. Boxes at random positions need 3 visits per primitive altogether.
+/// Number of node visits per primitive, over all passes so far, after which slow clustering passes
+/// (see [`SLOW`]) no longer merge nearest nodes. Instead they merge the 1st and 2nd node on the
+/// Morton curve, the 3rd and 4th, and so on. Boxes at random positions need 3 visits per primitive
+/// altogether.
 const PATIENT_VISITS: usize = 8;
 
 /// Number of nodes per merged pair above which a clustering pass counts as slow.
@@ -28,15 +29,14 @@ const NONE: u32 = u32::MAX;
 /// and after it on the Morton curve.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchWindow {
-    /// Number of passes, at the start, that search only the node before and the node after each
-    /// node.
+    /// Number of initial passes that search only the previous and the next node of each node.
     pub narrow_passes: usize,
     /// Number of nodes before and after each node that the other passes search.
     pub distance: usize,
 }
 
-/// Search result for one node. The index is that of its nearest node, and the number before it is
-/// half the surface area of the box around the two nodes.
+/// Search result for one node: half the surface area of the box around this node and its nearest
+/// node, and the index of the nearest node.
 type Nearest = (f32, u32);
 
 /// Builds the binary BVH of primitives with the bounding boxes `bounds`, at least one, by

@@ -17,7 +17,7 @@ pub struct SlabPacket<L> {
     pub above: Vec3<L>,
     /// Ray origins minus the padding by which boxes are enlarged.
     pub below: Vec3<L>,
-    /// Reciprocals of the ray directions. They are finite also for axis-parallel rays.
+    /// Reciprocals of the ray directions. They are finite even if a component is 0.
     pub inverse: Vec3<L>,
 }
 
@@ -63,11 +63,13 @@ pub struct PacketBounds<S> {
     pub near: [usize; 3],
     /// For each axis, the row of [`Bvh8Node::bounds`] with the box sides that the rays pass last.
     pub far: [usize; 3],
-    /// For each axis, the number that is subtracted from the near sides of boxes: the largest ray
-    /// origin plus the padding if the directions ascend, otherwise the smallest minus the padding.
+    /// For each axis, the number that is subtracted from the near sides of boxes. If the ray
+    /// directions are positive on this axis, it is the largest ray origin plus the padding;
+    /// otherwise it is the smallest ray origin minus the padding.
     pub near_origin: [S; 3],
-    /// For each axis, the number that is subtracted from the far sides of boxes: the smallest ray
-    /// origin minus the padding if the directions ascend, otherwise the largest plus the padding.
+    /// For each axis, the number that is subtracted from the far sides of boxes. If the ray
+    /// directions are positive on this axis, it is the smallest ray origin minus the padding;
+    /// otherwise it is the largest ray origin plus the padding.
     pub far_origin: [S; 3],
     /// Smallest and largest reciprocals of the ray directions, for each axis.
     pub inverse: [[S; 3]; 2],
@@ -107,8 +109,9 @@ impl<S: Float> PacketBounds<S> {
     /// `limit`. `side(k)` returns numbers of row k of [`Bvh8Node::bounds`]: one side of each tested
     /// box. `ONE` is `true` if the bounds contain a single ray.
     ///
-    /// A box that a ray enters by [`SlabPacket::enters`] is always accepted, because rounded
-    /// differences and products are monotonic.
+    /// If [`SlabPacket::enters`] returns `true` for a box and a ray within the bounds, this
+    /// function accepts the box, too: differences and products remain monotonic when they are
+    /// rounded.
     #[inline(always)]
     pub fn enters<const ONE: bool, L: SimdFloat<Scalar = S>>(
         &self,
@@ -243,7 +246,8 @@ pub fn traverse_packet<L: SimdFloat>(
                 let side = |k: usize| load_wide(&node.bounds[k], part);
                 let (near, candidates) = match bounds {
                     Some(bounds) => bounds.enters::<false, L>(side, L::splat(farthest)),
-                    // Without bounds there is no order. This test only excludes empty slots.
+                    // Without bounds the children are not ordered by distance. This test only
+                    // excludes empty slots.
                     None => (L::zero(), side(0).le(side(3))),
                 };
                 let mut bits = candidates.bits() & valid_lanes() & ((1 << L::WIDTH) - 1);

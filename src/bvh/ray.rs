@@ -45,8 +45,8 @@ pub struct Hit<L> {
 }
 
 impl<L: SimdFloat> Hit<L> {
-    /// Creates a packet without hits whose distance limits are `t`: [`Hit::keep_closer`] and
-    /// [`Hit::merge`] accept only hits closer than `t`. A negative `t` marks an inactive lane.
+    /// Creates a packet without hits. `t` has the distance limits of the rays: [`Hit::keep_closer`]
+    /// and [`Hit::merge`] accept only hits closer than `t`. A negative `t` marks an inactive lane.
     #[inline(always)]
     pub fn with_t_max(t: L) -> Self {
         Self { t, item: L::from_id(0), triangle: L::from_id(0) }
@@ -76,8 +76,8 @@ impl<L: SimdFloat> Hit<L> {
     pub fn merge(&mut self, other: &Self) {
         let mut nearer = other.t.lt(self.t);
         let tie = (other.t.le(self.t) & other.t.lt(L::from_f64(L::MAX))).and_not(nearer);
-        // This is rare. Ids are subnormal numbers if read as floats, and some processors compare
-        // these slowly.
+        // The ids are compared only if there is a tie, which is rare. Ids are subnormal numbers if
+        // read as floats, and some processors compare subnormal numbers slowly.
         if tie.any() {
             nearer = nearer | (tie & other.item.lt(self.item));
         }

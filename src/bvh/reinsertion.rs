@@ -1,9 +1,10 @@
 //! Optimisation of a binary BVH by reinsertion (Meister and Bittner 2018, *Parallel Reinsertion for
-//! Bounding Volume Hierarchy Optimization*), with a bound on the time.
+//! Bounding Volume Hierarchy Optimization*), with a bound on the number of node visits.
 //!
 //! A subtree moves to the place where the sum of all surface areas becomes smallest. The search for
-//! this place skips subtrees that cannot improve the sum. If boxes are nested, no subtree can be
-//! skipped, and the search for each node would visit all others; the optimisation then ends early.
+//! this place skips subtrees that cannot improve the sum. If boxes are nested, the search cannot
+//! skip any subtree and would visit all other nodes for each node. In this case the optimisation
+//! ends early, at the bound.
 
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -27,9 +28,9 @@ struct Reinsertion {
 struct Search {
     /// Number of node visits left, over all searches, before the optimisation ends.
     visits_left: usize,
-    /// Nodes to visit, the last one first. The number before a node is half the surface area saved
-    /// so far: the decrease by the removal of the subtree, less the growth of the nodes above this
-    /// node.
+    /// Nodes to visit, the last one first. Each node has half of the surface area that is saved so
+    /// far: the decrease by the removal of the subtree, less the growth of the nodes above this
+    /// node by its insertion.
     stack: Vec<(f32, u32)>,
 }
 
@@ -94,8 +95,8 @@ impl Search {
         let aabb = nodes[node].aabb();
         let parent = tree.parents[node] as usize;
         let (mut best, mut best_saved) = (0, 0.0);
-        // The removal of `node` shrinks its ancestors up to `pivot`, which then encloses
-        // `pivot_box`; `removed` is the area that this saves.
+        // The removal of `node` deletes its parent and shrinks the ancestors up to `pivot`, whose
+        // box is then `pivot_box`. `removed` is half of the surface area that this saves.
         let mut removed = area(nodes[parent].aabb());
         let mut sibling = Bvh2Node::get_sibling_id(node);
         let mut pivot_box = *nodes[sibling].aabb();

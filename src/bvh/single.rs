@@ -44,8 +44,8 @@ struct RayTraversal<S> {
 /// Traverses the hierarchy with each ray of the bit mask `lanes` separately. Calls `leaf(lane,
 /// index, limit)` for each leaf whose box the ray of a lane enters at a distance of at most its
 /// limit. The children of a node are visited from near to far. `leaf` returns the new limit of the
-/// ray. Calls `prefetch_leaf(index)` some time before it visits the leaf. `frames` has memory for
-/// one stack frame for each lane and level.
+/// ray. Calls `prefetch_leaf(index)` one step before it visits the leaf, so that the other rays
+/// advance in between. `frames` has memory for one stack frame for each lane and level.
 #[inline(never)]
 pub fn traverse_rays<L: SimdFloat>(
     bvh: &Bvh8,
@@ -148,8 +148,8 @@ impl<S: Float> RayTraversal<S> {
             let (near, enters) = self.bounds.enters::<true, L>(side, L::splat(self.limit));
             let first = part * L::WIDTH;
             entered |= (enters.bits() & valid_lanes()) << first;
-            // The distance is reduced by more than the rounding error of single precision, so that
-            // no key exceeds the true distance.
+            // The distance is reduced by more than the rounding error of single precision. The key
+            // therefore never exceeds the true distance, and no child within the limit is skipped.
             let near =
                 L::select(enters, near * L::from_f64(1.0 - 2e-7), L::from_f64(f64::INFINITY));
             for (i, key) in keys[first..].iter_mut().enumerate().take(L::WIDTH) {
@@ -161,7 +161,8 @@ impl<S: Float> RayTraversal<S> {
             return false;
         }
         let slot = pop_least(&mut keys) & SLOT_MASK;
-        // The frame is written even if no child remains, which saves a branch.
+        // The frame is always written, which saves a branch. If no child remains, `frames` is not
+        // increased, and the next frame overwrites this one.
         let remaining = entered.count_ones() - 1;
         frames[self.frames] = StackFrame { keys, node: self.child, remaining };
         self.frames += usize::from(remaining != 0);
@@ -169,8 +170,8 @@ impl<S: Float> RayTraversal<S> {
         true
     }
 
-    /// Continues with the nearest unvisited child within the ray's limit, from the topmost stack
-    /// frame that has one. Returns `false` if no frame has one.
+    /// Continues with the nearest unvisited child in the topmost stack frame that has such a child
+    /// within the ray's distance limit. Returns `false` if no frame has one.
     #[inline(always)]
     fn next(&mut self, bvh: &Bvh8, frames: &mut [StackFrame]) -> bool {
         while self.frames > 0 {

@@ -1,5 +1,5 @@
-//! Builder of meshes: collects vertices and triangles from the reader of a file format, then checks
-//! and compacts them.
+//! Builder of meshes. The parser of a file format adds vertices and triangles to it. The builder
+//! then checks them, and removes triangles without area.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
@@ -15,12 +15,11 @@ const MAX_COORDINATE: f64 = 1e9;
 /// coordinates of this magnitude are not subnormal in single precision.
 const MIN_EXTENT: f64 = 1e-9;
 
-/// Limit of the largest absolute coordinate of a mesh, in multiples of the mesh's extent. Up to
-/// this limit, positions are stored relative to the origin; above it, relative to the centre of the
-/// mesh.
+/// Ratio of a mesh's largest absolute coordinate to its extent above which the positions are stored
+/// relative to the centre of the mesh. Below it, they are stored relative to the origin.
 const MAX_OFFSET: f64 = 16.0;
 
-/// Mesh under construction by the reader of a file format.
+/// Mesh under construction, to which the parser of a file format adds vertices and triangles.
 pub struct Builder<'a> {
     source: &'a FileContents,
     positions: Vec<[f64; 3]>,
@@ -100,8 +99,8 @@ impl<'a> Builder<'a> {
         self.positions.len()
     }
 
-    /// Adds a vertex. The number of vertices is checked by [`Builder::finish`], which rejects more
-    /// than [`MAX_VERTICES`].
+    /// Adds a vertex. This method does not check the number of vertices; [`Builder::finish`] fails
+    /// if there are more than [`MAX_VERTICES`].
     pub fn vertex(&mut self, position: [f64; 3]) {
         self.positions.push(position);
     }

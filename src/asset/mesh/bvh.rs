@@ -28,8 +28,8 @@ pub struct Mesh {
     smooth: OnceLock<Vec<[f32; 3]>>,
 }
 
-/// Two meshes are equal only if they are the same allocation: meshes that were read twice from one
-/// file differ.
+/// Two meshes are equal only if they are the same allocation. Two meshes that were read from the
+/// same file are therefore not equal.
 impl PartialEq for Mesh {
     fn eq(&self, other: &Self) -> bool {
         std::ptr::eq(self, other)
@@ -70,8 +70,8 @@ impl Mesh {
             let reduce = |f: fn(f32, f32) -> f32| std::array::from_fn(|k| f(f(a[k], b[k]), c[k]));
             [reduce(f32::min), reduce(f32::max)]
         };
-        // A high traversal cost gives large leaves. They are cheap, because a ray is intersected
-        // with all triangles of a leaf at the cost of one.
+        // A high traversal cost gives large leaves. Large leaves are cheap, because a single ray is
+        // intersected with all triangles of a leaf at once by SIMD.
         let quality = BuildQuality { traversal_cost: 8.0, ..BuildQuality::FAST };
         let Bvh8Build { bvh: boxes, order, leaves } =
             Bvh8::build(mesh.triangles.len(), corners, BVH_WIDTH, quality);

@@ -2,9 +2,9 @@
 //! their nodes applied. Positions, normals, texture coordinates and base colour factors are read.
 //! Cameras, lights, images, animations, skins and morph targets are ignored.
 //!
-//! The `gltf` library parses and validates the JSON. The numbers in the buffers are read by this
-//! module, because the iterators of the library trust the offsets and types in the file: they panic
-//! or wrap if these are wrong.
+//! The `gltf` library parses and validates the JSON. This module reads the numbers in the buffers
+//! itself. The iterators of the library trust the offsets and types in the file; if the file is
+//! wrong, they panic or their arithmetic overflows.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::{FileContents, MAX_BYTES};
@@ -65,7 +65,8 @@ fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), Ass
     let gltf = Gltf::from_slice_without_validation(&source.bytes);
     let gltf = gltf.map_err(|error| library_error(source, &error))?;
     let json = gltf.document.into_json();
-    // The validation of the library uses these indices before it checks them.
+    // This loop checks the accessor indices of attributes, because the validation by the library
+    // uses these indices before it checks them.
     for (m, mesh) in json.meshes.iter().enumerate() {
         for index in mesh.primitives.iter().flat_map(|p| p.attributes.values()) {
             if index.value() >= json.accessors.len() {
@@ -139,7 +140,8 @@ fn buffers<'a>(
                     }
                 }
                 None => {
-                    // Only escaped spaces are decoded. Other escapes are not in common use.
+                    // Of the percent-encoded characters only spaces are decoded, because other ones
+                    // are rare in file names.
                     let Some(path) = source.resolve_relative(&uri.replace("%20", " ")) else {
                         return wrong(
                             format!("uri is \"{}\"", truncated(uri)),
@@ -276,9 +278,9 @@ impl<'a> Part<'a> {
         }))
     }
 
-    /// Returns the elements of `accessor`, a glTF list. Checks that an element has the shape
-    /// `dimensions` and numbers of the type `kind`, and that all elements are inside of their
-    /// buffer.
+    /// Returns the elements of `accessor`, a glTF list. Checks that the elements have `dimensions`
+    /// (such as a vector of three) and components of the type `kind`, and that all elements are
+    /// inside of their buffer.
     fn slice(
         &self,
         accessor: &Accessor<'a>,
@@ -327,7 +329,8 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Elements of a glTF accessor. They are inside of its buffer, as [`Part::slice`] has checked.
+/// Elements of a glTF accessor. [`Part::slice`] has checked that they are inside of the accessor's
+/// buffer.
 #[derive(Clone, Copy)]
 struct Slice<'a> {
     bytes: &'a [u8],

@@ -70,7 +70,8 @@ impl TriangleMesh {
         center.iter().for_each(|x| hash.update(&x.to_le_bytes()));
         triangles.as_flattened().iter().for_each(|i| hash.update(&i.to_le_bytes()));
         color_of.iter().for_each(|i| hash.update(&i.to_le_bytes()));
-        // The lengths separate the lists.
+        // With the lengths of the lists in the hash, two meshes whose numbers are divided
+        // differently among the lists have different hashes.
         let lengths = [positions.len(), triangles.len(), colors.len()];
         lengths.iter().for_each(|n| hash.update(&(*n as u64).to_le_bytes()));
         hash.update(&[u8::from(normals.is_some()), u8::from(uvs.is_some())]);

@@ -17,7 +17,7 @@ use tobj::{LoadError, LoadOptions, MTLLoadResult};
 /// Largest size of an MTL file in bytes: 16 MiB.
 const MAX_MTL_BYTES: u64 = 16 << 20;
 
-/// Largest number of MTL files of one OBJ file. Further ones are ignored.
+/// Largest number of MTL files of one OBJ file. Further MTL files are ignored.
 const MAX_MTL_FILES: usize = 64;
 
 /// Linear colour of triangles without a diffuse colour, in an OBJ file with materials.
@@ -59,9 +59,9 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
         let base = builder.vertices();
         let vertices = mesh.positions.len() / 3;
         builder.reserve(vertices, mesh.indices.len() / 3)?;
-        // In a model in which only some corners have normals or texture coordinates, these lists
-        // are shorter, and the library does not report which corners they belong to. Such lists are
-        // ignored.
+        // If only some corners of a model have normals, the list of normals is shorter than that of
+        // the vertices, and the library does not report which corners they belong to. Such a list
+        // is ignored. The same holds for texture coordinates.
         let normals = (mesh.normals.len() == mesh.positions.len()).then_some(&mesh.normals);
         let uvs = (mesh.texcoords.len() == 2 * vertices).then_some(&mesh.texcoords);
         for (i, p) in mesh.positions.chunks_exact(3).enumerate() {
@@ -142,8 +142,8 @@ fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
             corners += 1;
             for (list, index) in word.split(|b| *b == b'/').take(3).enumerate() {
                 let index = std::str::from_utf8(index).ok().and_then(|i| i.parse::<i128>().ok());
-                // Words that are not numbers are reported by the library. Indices into empty lists
-                // are ignored by it.
+                // The library reports words that are not numbers, and ignores indices into empty
+                // lists.
                 let Some(index) = index.filter(|_| list == 0 || totals[list] > 0) else { continue };
                 let (from, to) = (-(so_far[list] as i128), totals[list] as i128);
                 if index == 0 || index < from || index > to {
@@ -251,9 +251,10 @@ impl<'a> Libraries<'a> {
         Self { source, found: RefCell::default() }
     }
 
-    /// Returns the materials of the MTL file `name`. Returns no materials if `name` leads out of
-    /// the folder (recorded as an error), if the file cannot be read (recorded as a note), if it
-    /// was loaded before, or if [`MAX_MTL_FILES`] other files were loaded before.
+    /// Returns the materials of the MTL file `name`. Returns no materials in four cases: `name`
+    /// leads out of the folder, which is recorded as an error; the file cannot be read, which is
+    /// recorded as a note; the file was loaded before; or [`MAX_MTL_FILES`] other files were loaded
+    /// before.
     fn load(&self, name: &Path) -> MTLLoadResult {
         let nothing = || tobj::load_mtl_buf(&mut &b""[..]);
         let mut found = self.found.borrow_mut();

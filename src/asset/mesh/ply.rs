@@ -15,8 +15,8 @@ use ply_rs_bw::ply::{
 /// elements.
 const PIECE: usize = 4096;
 
-/// Names of the eight PLY vertex properties that are read. Each property has a list of names,
-/// because programs name it differently.
+/// Names of the eight PLY vertex properties that are read. Each property has a list of accepted
+/// names, because different programs write different names.
 const NUMBERS: [&[&str]; 8] = [
     &["x"],
     &["y"],
@@ -151,7 +151,8 @@ fn library_error(source: &FileContents, error: &ParseError, byte: Option<usize>)
         (None, None) => FileLocation::Whole,
     };
     let message = error.to_string();
-    // The first line of the message is the error. The others repeat the input.
+    // The first line of the message states the error. The other lines repeat the input and are
+    // dropped.
     let first = message.lines().next().unwrap_or_default();
     let first =
         first.split_once(": ").filter(|(l, _)| l.starts_with("Line ")).map_or(first, |p| p.1);

@@ -42,8 +42,8 @@ pub fn parse(mut source: FileContents) -> Result<TriangleMesh, AssetError> {
             let expected = format!("at most {}", (bytes.len() - HEADER) / TRIANGLE);
             return Err(source.error(FileLocation::Byte(80), found, &expected));
         }
-        // Some binary files start with `solid` like a text file. The library must not take them for
-        // one.
+        // Some binary files start with `solid` like a text file. The first byte is overwritten, so
+        // that the library does not read such a file as text.
         bytes[0] = b' ';
     }
     let mut builder = Builder::new(&source);
