@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 pub enum Aperture {
     /// Radius of the lens in scene units; 0 is a pinhole.
     Radius(f64),
-    /// F-number: focal length divided by the diameter of the lens. The film has 36 x 24 mm, and a
-    /// scene unit is one metre.
+    /// F-number: focal length divided by the diameter of the lens. The film size is 36 x 24 mm, and
+    /// a scene unit is one metre.
     FNumber(f64),
 }
 
@@ -145,10 +145,10 @@ impl Camera {
     }
 
     /// Returns the distance of the plane in focus from the eye along the view direction, greater
-    /// than 0. Without `focus`, the plane contains the target. A point in focus behind the eye
-    /// counts as one at the same distance in front. The result is at least a millionth of the lens
-    /// radius. For a point or target in focus, it is also at least a millionth of the distance of
-    /// this point from the eye.
+    /// than 0. If `focus` is `None`, the target is the point in focus. If the point in focus is
+    /// behind the eye, the plane is at the same distance in front of the eye. The result is at
+    /// least a millionth of the lens radius, and at least a millionth of the distance between the
+    /// eye and the point in focus.
     pub fn focus_depth(&self) -> f64 {
         let point = match (self.focus, self.target) {
             (Some(Focus::Distance(distance)), _) => Err(distance),
@@ -203,7 +203,8 @@ mod tests {
             aperture: Some(aperture),
             ..Camera::default()
         };
-        // 50 mm at f/2: 12.5 mm. The view angles are those of the 24 and the 36 mm side.
+        // A lens of 50 mm at f/2 has a radius of 12.5 mm. Both view angles below give the focal
+        // length of 50 mm: across the 24 mm side and across the 36 mm side of the film.
         let degrees = |half: f64| 2.0 * (half / 0.05f64).atan().to_degrees();
         for view_angle in
             [ViewAngle::Vertical(degrees(0.012)), ViewAngle::Horizontal(degrees(0.018))]

@@ -59,8 +59,8 @@ fn view_angle() -> ViewAngle {
     ViewAngle::Vertical(40.0)
 }
 
-/// Creates the camera of a scene file without `[camera]`, which looks at the origin. A `[camera]`
-/// in a file needs `target` or `direction`.
+/// Creates the camera of a scene file without a `[camera]` table. This camera looks at the origin.
+/// A `[camera]` table must have `target` or `direction`.
 impl Default for Camera {
     fn default() -> Self {
         Self {
@@ -157,8 +157,8 @@ impl Camera {
             ));
         };
         let up = unit(self.up)?;
-        // If the vectors are parallel within 1e-6, rounding errors would determine the picture's
-        // axes.
+        // If the sine of the angle between the vectors is 1e-6 or less, rounding errors would
+        // determine the picture's axes.
         (view.cross(up).length() <= 1e-6).then(|| {
             ValidationError::new(
                 "up",

@@ -1,11 +1,12 @@
-//! Interactive camera movements: orbit, pan, dolly, fly, look, roll, zoom, frame.
+//! Interactive camera movements: orbit, pan, dolly, fly, look, roll, zoom, and framing of a sphere.
 //!
-//! Every function returns a moved camera. It has a `target` if the old camera has one, otherwise a
-//! `direction`. The pivot of a movement is the target; for a camera with a direction it is the
-//! point ahead at the distance that the caller gives. Coordinates are rounded to about a millionth
-//! of the distance to the pivot. If the moved camera would be invalid (coordinates out of range, or
-//! eye and target equal), the function returns the old camera. Rotations are relative to `up`; the
-//! view direction stays at least 0.1 degrees away from `up`.
+//! Every movement function returns a new camera. The new camera has a `target` if the old camera
+//! has one, otherwise a `direction`. The pivot of a movement is the target. A camera without a
+//! target has its pivot straight ahead, at a distance that the caller gives. Coordinates are
+//! rounded to about a millionth of the distance between eye and pivot. If the moved camera would be
+//! invalid (coordinates out of range, or eye and target equal), the function returns the old
+//! camera. Rotations are relative to `up`; the view direction stays at least 0.1 degrees away from
+//! `up`.
 
 use crate::camera::{Camera, ViewAngle};
 use crate::value::{floor_log10, round_significant, rounded_to, unit};
@@ -44,7 +45,7 @@ impl Camera {
     /// `distance` ahead.
     pub fn orbit(&self, right: f64, up: f64, distance: f64) -> Self {
         let distance = self.pivot_distance(distance);
-        // The view direction rotates against the movement of the eye.
+        // If the eye moves to the right around the pivot, the view direction rotates to the left.
         let Some(forward) = self.turned(-right, -up) else { return self.clone() };
         let pivot = DVec3::from_array(self.eye) + self.frame()[2] * distance;
         let pivot = self.target.map_or(pivot, DVec3::from_array);
@@ -60,9 +61,9 @@ impl Camera {
         self.shifted((x * right + y * up) * distance, distance)
     }
 
-    /// Multiplies the camera's distance to its pivot (the target) by `factor`; less than 1 is
-    /// nearer. The pivot of a camera without a target is the point `distance` ahead. The camera
-    /// stays on its side of the pivot.
+    /// Multiplies the camera's distance to its pivot (the target) by `factor`. A factor less than 1
+    /// moves the camera nearer, but never past the pivot. The pivot of a camera without a target is
+    /// the point `distance` ahead.
     pub fn dolly(&self, factor: f64, distance: f64) -> Self {
         let old = self.pivot_distance(distance);
         if !(factor > 0.0 && factor.is_finite()) {
@@ -72,7 +73,8 @@ impl Camera {
         let eye = DVec3::from_array(self.eye);
         let pivot = self.target.map_or(eye + forward * old, DVec3::from_array);
         let new = old * factor;
-        // Below this distance coordinates have too little precision.
+        // The dolly stops at this distance from the pivot, because coordinates of type `f64` would
+        // have too little precision below it.
         if new < 1e-6 * pivot.abs().max_element().max(1e-6) {
             return self.clone();
         }
@@ -120,8 +122,8 @@ impl Camera {
             let half = (0.5 * degrees).to_radians().tan() * factor;
             let [narrow, wide] = ZOOM_ANGLES;
             let new = round_significant(2.0 * half.atan().to_degrees(), 4).clamp(narrow, wide);
-            // An angle outside of the limits keeps its value: clamping would move it against the
-            // zoom.
+            // An angle that is already outside of the limits keeps its value, because clamping
+            // would change it in the direction opposite to the zoom.
             if (new < degrees) == (factor < 1.0) { new } else { degrees }
         };
         let view_angle = match self.view_angle {
@@ -131,8 +133,9 @@ impl Camera {
         self.valid_or_self(Self { view_angle, ..self.clone() })
     }
 
-    /// Moves the eye so that the sphere of `radius` around `center` fills the picture with a margin
-    /// of 10 %; the view direction stays. `center` and `radius` are in scene units. `aspect` is the
+    /// Moves the eye so that the sphere of `radius` around `center` fills the picture. The distance
+    /// is 10 % greater than that at which the sphere touches the picture's edges. The view
+    /// direction does not change. `center` and `radius` are in scene units. `aspect` is the
     /// picture's width divided by its height. A camera with a target gets `center` as its target.
     pub fn framed(&self, center: [f64; 3], radius: f64, aspect: f64) -> Self {
         let forward = self.frame()[2];
@@ -165,7 +168,7 @@ impl Camera {
         }
         let axis = unit(self.up).unwrap_or(DVec3::Y);
         let [side, _, forward] = self.frame();
-        // Forward direction in the plane perpendicular to `up`.
+        // View direction without its component along `up`.
         let ahead = axis.cross(side);
         let pitch = forward.dot(axis).clamp(-1.0, 1.0).asin().to_degrees();
         let pitch = (pitch + up).clamp(-MAX_PITCH, MAX_PITCH).to_radians();

@@ -130,8 +130,9 @@ impl PerspectiveCamera {
     /// Returns the approximate smallest angle \[radians\] between rays through the centres of
     /// neighbouring pixels. This angle occurs at the picture's corners.
     pub fn pixel_angle(&self) -> f64 {
-        // At the distance d from the eye, a step p across the ray rotates the ray by about p / d,
-        // and an oblique step by at least p / d^2.
+        // Let a pixel of size p on the picture plane be at the distance d from the eye. A step of p
+        // perpendicular to the ray rotates the ray by about p / d. A step of p on the plane, which
+        // may be oblique to the ray, rotates it by at least p / d^2.
         self.pixel() / self.raster_corner.length_squared()
     }
 

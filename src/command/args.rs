@@ -363,8 +363,9 @@ pub enum SamplerArg {
     Random,
 }
 
-/// Largest number of tracing threads per processor. More threads only wait for each other: a render
-/// of 64 x 48 pixels with 4,096 threads on two processors takes half a minute.
+/// Largest number of tracing threads per processor. More threads slow a render down, because they
+/// wait for each other: with 4,096 threads on two processors, a render of 64 x 48 pixels takes half
+/// a minute.
 const THREADS_PER_PROCESSOR: usize = 4;
 
 /// Number of tracing threads that `--threads` may always request, even on machines with few
@@ -377,7 +378,7 @@ fn processors() -> usize {
 }
 
 /// Returns the largest number of tracing threads on this machine. A larger value of `--threads` is
-/// reduced to it.
+/// reduced to this number.
 fn max_threads() -> usize {
     THREADS_ANYWHERE.max(THREADS_PER_PROCESSOR * processors())
 }

@@ -34,7 +34,8 @@ impl CheckpointWriter {
         let thread = std::thread::spawn(move || {
             for checkpoint in inbox {
                 let written = checkpoint.map_or(Ok(()), |it| it.write(&target, Existing::Replace));
-                // A closed channel means that the render has ended by an error.
+                // If the channel is closed, the render has ended with an error and does not need
+                // the result.
                 let _ = outbox.send(written);
             }
         });
@@ -71,7 +72,8 @@ impl CheckpointWriter {
             Ok(written) => {
                 self.busy = false;
                 self.due = Instant::now() + self.interval;
-                // The next one may succeed, for example when space was freed.
+                // An error is only a warning, because the next checkpoint may succeed, for example
+                // after space on the disk was freed.
                 written.unwrap_or_else(|error| warn(&format!("warning: {error}")));
             }
             Err(TryRecvError::Empty | TryRecvError::Disconnected) => {}
@@ -85,7 +87,8 @@ impl CheckpointWriter {
     fn request(&self, session: &Session) {
         let encoded = self.encoded.clone();
         session.checkpoint(self.provenance.clone(), move |checkpoint| {
-            // The thread ends only after the last sender.
+            // `send` fails only if the receiving thread has panicked, because this thread runs
+            // until all senders are dropped.
             let _ = encoded.send(checkpoint);
         });
     }
@@ -93,7 +96,8 @@ impl CheckpointWriter {
     /// Writes the last checkpoint, waits until it is complete, and returns the path of its file.
     pub fn finish(self, session: &Session) -> Result<PathBuf, WriteError> {
         self.request(session);
-        // The task is dropped with its sender when it has run, so that the thread ends.
+        // Waits until the session has run the checkpoint task and dropped it with its sender.
+        // Otherwise the thread, which runs until all senders are dropped, would not end.
         session.with(|_, _| ());
         let Self { path, encoded, results, thread, .. } = self;
         drop(encoded);

@@ -40,7 +40,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
             .map_err(|errors| (PathBuf::new(), errors)),
     };
     reporter.mute();
-    // The samples of a checkpoint are continued.
+    // If a checkpoint is opened, the render continues its samples with the same seed and sampler.
     let sampling = match &checkpoint {
         Some(checkpoint) => checkpoint.sampling(),
         None => SampleSettings { seed: args.compute.seed, kind: SamplerKind::Sobol },
@@ -63,7 +63,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         settings: Settings {
             adaptive: true,
             criterion: Criterion::Codes,
-            // The dashboard replaces this value by that of the scene.
+            // The dashboard replaces this 0 by the `rays_per_pixel` of the scene.
             rays_per_pixel: 0,
             stop: DEFAULT_STOP,
         },
@@ -125,8 +125,8 @@ fn read_checkpoint(path: &Path) -> Result<Checkpoint, Failure> {
 }
 
 /// Opens the scene of a checkpoint. This is the scene file from which the checkpoint was rendered,
-/// if the samples are still valid for it; otherwise it is the scene stored in the checkpoint,
-/// without a file.
+/// if the checkpoint's samples are still valid for the present content of this file. Otherwise it
+/// is the scene that is stored in the checkpoint, as a scene without a file.
 ///
 /// # Errors
 /// Fails if the scene in the checkpoint is not valid.
@@ -144,8 +144,8 @@ fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, F
 }
 
 /// Opens the scene file at `path`. The inner error means that the file can be read but is not a
-/// valid scene. It has the path and the errors of the file, which the dashboard shows until the
-/// user has corrected the file.
+/// valid scene. It holds the path of the file and its errors. The dashboard shows these errors
+/// until the user has corrected the file.
 ///
 /// # Errors
 /// Fails if the file cannot be read.

@@ -1,10 +1,10 @@
 //! Restart of the program with one memory arena of glibc's allocator if `ulimit -v` limits its
 //! address space.
 //!
-//! The allocator of glibc reserves an arena of 64 MB of address space for each thread. Under
-//! `ulimit -v` the arenas of a few threads take all of it, and allocations of a few bytes fail
-//! while most of the memory is free. With one arena no address space is lost. The number of arenas
-//! is read from the environment at the start of a process.
+//! The allocator of glibc reserves an arena of 64 MB of address space for each thread. If the
+//! address space is limited by `ulimit -v`, the arenas of a few threads take all of it. Small
+//! allocations then fail while most of the memory is free. With one arena for all threads this
+//! cannot happen. The number of arenas is read from the environment at the start of a process.
 
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const VARIABLE: &str = "MALLOC_ARENA_MAX";

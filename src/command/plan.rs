@@ -17,8 +17,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 
 /// Noise at which the pilot ends by default, divided by the noise target. The pilot is a first
-/// render of the picture, which predicts the sample counts. With a ratio of 2, it takes a third to
-/// a half of the rays of the whole picture and predicts the noise within 10 %.
+/// render of the picture to a coarser noise; it predicts the sample counts. With a ratio of 2, the
+/// pilot traces a third to a half of all rays. It predicts the final noise within 10 %.
 const PILOT: f64 = 2.0;
 
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {
@@ -167,7 +167,7 @@ fn stop(noise_codes: f64) -> Stop {
 
 fn settings(noise_codes: f64) -> Settings {
     let criterion = Criterion::Codes;
-    // The renderer replaces the cap by that of the scene.
+    // The renderer replaces this 0 by the `rays_per_pixel` of the scene.
     Settings { adaptive: true, criterion, rays_per_pixel: 0, stop: stop(noise_codes) }
 }
 

@@ -5,10 +5,10 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::time::Duration;
 
-/// Seconds before the first output of progress. Shorter renders show none.
+/// Seconds of rendering before the first output of progress. Shorter renders show no progress.
 const QUIET_SECONDS: f64 = 0.25;
-/// Seconds before the first line of progress in a log. Each later interval is twice the previous
-/// one, up to [`LONGEST_INTERVAL_SECONDS`].
+/// Seconds before the first line of progress in a log. The interval after each line is equal to the
+/// rendering time so far, but at most [`LONGEST_INTERVAL_SECONDS`].
 const FIRST_LINE_SECONDS: f64 = 1.0;
 /// Longest interval between lines of progress in a log, in seconds.
 const LONGEST_INTERVAL_SECONDS: f64 = 60.0;
@@ -100,7 +100,7 @@ fn span(low: f64, high: f64) -> String {
     if low_text == high_text {
         return low_text;
     }
-    // A common unit is written once: `3-5 s`.
+    // A unit that both ends have in common is written once: `3-5 s`.
     match (low_text.split_once(' '), high_text.split_once(' ')) {
         (Some((a, unit)), Some((b, same))) if unit == same => format!("{a}-{b} {unit}"),
         _ => format!("{low_text} - {high_text}"),

@@ -32,23 +32,24 @@ pub struct Division {
 
 impl Division {
     /// Divides the picture of `scene` so that the process uses at most `cap` bytes, and prints the
-    /// expected memory. If a film that stores the part of the picture due to each light separately
-    /// does not fit, all lights share one part. If that does not fit either, the picture is divided
-    /// into regions.
+    /// expected memory. The first choice is a film that stores the contribution of each light to
+    /// the picture separately. If this film does not fit, all lights share one stored contribution.
+    /// If that film does not fit either, the picture is divided into regions.
     ///
     /// # Errors
-    /// Fails if the smallest regions do not fit, or if a checkpoint is requested and the film with
-    /// a separate part for each light does not fit.
+    /// Fails if the smallest regions do not fit. Also fails if a checkpoint is requested and the
+    /// film with a separate contribution of each light does not fit.
     pub fn new(scene: &Scene, args: &RenderArgs, cap: u64) -> Result<Self, Failure> {
         let options =
             world::Options { precision: args.precision.get(), ..world::Options::default() };
-        // The memory of the compiled scene is measured.
+        // The scene is compiled first, so that the measured memory of the process includes it.
         let world = AnyWorld::compile(scene, &options);
         let groups = world.light_groups().members.len();
         let merged = world.light_groups().merged_count();
         let (size, threads) = (scene.film.size, args.compute.threads());
         let (cap, limit) = usable(cap);
-        // The render of a whole picture compares a larger sum with the available memory.
+        // Before it starts, the render of a whole picture checks for more memory than `divide`
+        // estimates. If this check fails, the picture is divided although it fits by the estimate.
         let refused = |groups| check(size, groups, 0).is_err();
         let divided = |groups| match divide(size, groups, threads, cap) {
             Ok(whole) if whole.count == 1 && refused(groups) => {
@@ -97,8 +98,8 @@ impl Division {
 }
 
 /// Returns two values: the number of bytes that the process may use, and the name of the memory
-/// limit for messages. The number is `cap`, the value of `--memory`, or the available memory if
-/// that is less.
+/// limit for messages. The number is `cap`, the value of `--memory`. If less is available, it is
+/// the available memory plus the resident memory of the process.
 fn usable(cap: u64) -> (u64, &'static str) {
     let now = resident_memory().map_or(0, |resident| resident.now);
     match available_memory() {

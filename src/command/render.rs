@@ -165,7 +165,7 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
         CheckpointWriter::new(path, interval, provenance.clone())
     });
     let end = watch(&session, &signals, checkpoints.as_mut())?;
-    // The picture is written even if the checkpoint cannot be.
+    // An error of writing the checkpoint is kept until the picture has been written.
     let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
     let writing = Instant::now();
     let (report, precision, biased, written) = write(&session, args, output, provenance)
@@ -316,7 +316,7 @@ fn schedule_settings(args: &RenderArgs) -> Settings {
     Settings {
         adaptive: !args.uniform,
         criterion: if linear { Criterion::Linear } else { Criterion::Codes },
-        // The renderer replaces this value by that of the scene.
+        // The renderer replaces this 0 by the `rays_per_pixel` of the scene.
         rays_per_pixel: 0,
         stop: Stop { spp: args.spp, noise_codes, rmse_linear: args.rmse, seconds: args.time },
     }

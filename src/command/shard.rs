@@ -118,8 +118,8 @@ fn check_shard(args: &RenderArgs, plan: &Plan, path: &Path, shard: u32) -> Resul
 }
 
 /// Reads the film file of an earlier run of the same shard, one process's part of a divided render.
-/// Returns three values: film, number of rays, and `true` if the shard is complete. Returns `None`
-/// if there is no such file, or if it is damaged.
+/// Returns three values: the film, the number of traced rays, and `true` if the shard is complete.
+/// Returns `None` if there is no such file, or if the file is damaged.
 fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure> {
     if !path.exists() {
         return Ok(None);
@@ -156,7 +156,8 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
 }
 
 /// Compiles the scene and creates the render of the shards with the given `numbers`; a shard is a
-/// part of the plan. `saved` has two values of an earlier run: the film and the number of rays.
+/// part of the plan. `saved` has the film and the number of rays of an earlier run, which the
+/// render continues.
 fn start(
     args: &RenderArgs,
     document: &Document,

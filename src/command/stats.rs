@@ -28,9 +28,9 @@ pub struct Stats {
     pub spp_min: u32,
     pub spp_mean: f64,
     pub spp_max: u32,
-    /// Number of camera, shadow and reflected rays.
+    /// Number of all traced rays: camera rays, shadow rays, and rays that continue a path.
     pub rays: u64,
-    /// Seconds of rendering alone, by a monotonic clock.
+    /// Seconds of rendering by a monotonic clock, without compilation of the scene and writing.
     pub seconds: f64,
     pub compile_seconds: f64,
     /// Seconds of encoding, writing and syncing the picture.
@@ -42,7 +42,7 @@ pub struct Stats {
     /// none.
     pub first_picture_seconds: Option<f64>,
     /// Estimated RMSE of the displayed picture, in 8-bit levels. It is estimated from the
-    /// difference between two halves of the samples, the replicates A and B. Null if these have
+    /// difference between two halves of the samples, the replicates A and B. Null if A and B have
     /// never had equal numbers of samples.
     pub noise_codes: Option<f64>,
     /// 95th percentile of the tiles' estimated RMSE, in 8-bit levels.

@@ -18,15 +18,15 @@ struct Document<'a> {
     reference_linear: f64,
     reference_seconds: f64,
     compared_at_codes: f64,
-    /// Relative uncertainty that the noise of the reference picture causes in the measured errors:
-    /// the largest of all measured points.
+    /// Relative uncertainty of a measured error that is due to the noise of the reference picture:
+    /// the largest value over all measured points.
     errors_spread: f64,
     /// Relative spread of a time in the table over repeated renders: the largest of all such times.
     times_spread: f64,
     /// Largest fraction of the processors' time that other programs used during a measured render.
     /// Null if unknown.
     taken_by_others: Option<f64>,
-    /// Noise targets that were not reached, each with an extrapolated time.
+    /// Noise targets that were not reached, each with a range of extrapolated times.
     expected: Vec<Expected>,
     variations: Vec<Variation<'a>>,
 }

@@ -42,8 +42,8 @@ fn time(seconds: f64) -> String {
     }
 }
 
-/// Returns the number of decimals with which `value`, at least 1, has three significant digits. For
-/// values below 1 it is 2.
+/// Returns the number of decimals with which `value` has three significant digits, but at most 2.
+/// `value` is positive.
 fn digits(value: f64) -> usize {
     if value >= 99.95 {
         0
@@ -64,7 +64,7 @@ fn reached(target: &TimeToTarget) -> String {
 }
 
 /// Formats a range of seconds from its lower to its upper end, such as `12.0 to 30.0 s`. If both
-/// have the same unit, it is written once.
+/// ends have the same unit, the unit is written once.
 fn between((low, high): (f64, f64)) -> String {
     let (low, high) = (time(low), time(high));
     match (low.split_once(' '), high.split_once(' ')) {
