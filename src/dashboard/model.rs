@@ -209,8 +209,8 @@ pub struct Model {
     pub first_time: bool,
     /// Drag in progress; `None` if no mouse button is held down.
     pub drag: Option<Drag>,
-    /// Time of the last edit, if an equal edit soon afterwards joins the undo step of this edit.
-    /// `None` if the next edit starts a new undo step.
+    /// Time of the last edit, if an edit with the same label soon afterwards joins the undo step of
+    /// this edit. `None` if the next edit starts a new undo step.
     pub last_edit: Option<Duration>,
     /// `true` if the program quits after the pending save.
     pub quit_when_saved: bool,

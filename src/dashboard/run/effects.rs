@@ -28,8 +28,8 @@ const LOW_PRIORITY: i32 = 19;
 pub enum Outcome {
     /// The event loop continues. Results of the effect, if there are any, arrive as messages.
     Done,
-    /// The renderer has started a new picture. The value is its generation, the number of the
-    /// version of the scene that it shows.
+    /// The renderer has started a new picture. The value is the generation of the picture: the
+    /// number of the scene version that it shows.
     Rendering(u64),
     /// Suspend the program and give the terminal back to the shell.
     Suspend,
@@ -40,8 +40,8 @@ pub enum Outcome {
 /// Executor of the dashboard's effects, such as saving and exporting, and source of snapshots of
 /// the render.
 pub trait Effects {
-    /// Returns the channel that receives a message whenever the renderer publishes a new snapshot:
-    /// state of the render at one moment, with the picture so far.
+    /// Returns the channel that receives a message whenever the renderer publishes a new snapshot,
+    /// the state of the render at one moment with the picture so far.
     fn wakeup(&self) -> &Receiver<()>;
 
     /// Takes the renderer's latest snapshot (state of the render at one moment). Returns `None` if
@@ -56,7 +56,7 @@ pub trait Effects {
     /// message to [`Effects::observe`] before it updates the model with the message.
     fn done(&self) -> &Receiver<Message>;
 
-    /// Updates the state of the executor by `message`, the result of an effect.
+    /// Updates the executor after an effect, whose result is `message`.
     fn observe(&mut self, message: &Message);
 
     /// Executes `effect`. Its results arrive as messages. `frames` is the output to the terminal,
@@ -72,9 +72,9 @@ pub trait Effects {
     /// editing. Blocks until the edits are written, at most for `patience`.
     fn flush(&self, patience: Duration);
 
-    /// Completes pending writes and ends the threads. Waits until `deadline` for the renderer and
-    /// for pictures that are being written, or without limit if `deadline` is `None`. Unsaved edits
-    /// are written before this wait.
+    /// Completes pending writes and ends the threads. First writes unsaved edits. Then waits until
+    /// `deadline` for the renderer and for pictures that are being written, or without limit if
+    /// `deadline` is `None`.
     ///
     /// Returns two values: the remaining messages, and the path of the recovery file. The path is
     /// `None` if there are no unsaved edits. If unsaved edits are lost, an error with the reason
@@ -101,10 +101,10 @@ pub struct EffectRunner {
 }
 
 impl EffectRunner {
-    /// Creates the executor for the scene file `file`, or for the path of an unreadable one, and
-    /// starts the threads that render, read and write. `state` is the folder for recovery files
-    /// that cannot be written beside their scene file, and `threads` the number of threads that
-    /// trace rays.
+    /// Creates the executor and starts the threads that render, read and write. `file` is the scene
+    /// file, or the path of a scene file that is unreadable. `state` is the folder for recovery
+    /// files that cannot be written beside their scene file. `threads` is the number of threads
+    /// that trace rays.
     pub fn new(
         file: Result<SceneFile, PathBuf>,
         state: Option<PathBuf>,
@@ -140,8 +140,8 @@ impl EffectRunner {
         })
     }
 
-    /// Starts rendering `scene`. Returns its generation: the number of this version of the scene,
-    /// which is repeated in the renderer's reports.
+    /// Starts rendering `scene`. Returns the number of this version of the scene (its generation).
+    /// The renderer's reports repeat this number.
     pub fn show(&mut self, scene: Arc<Scene>) -> u64 {
         self.session.set_scene(scene)
     }
@@ -163,7 +163,8 @@ impl EffectRunner {
     }
 
     fn set_threads(&self) {
-        // On failure the old threads stay. The renderer's reports contain their number.
+        // If the threads cannot be started, the old ones continue. No message is needed, because
+        // the renderer's reports contain the number of threads.
         let _ = self.session.set_threads(self.threads, self.niceness);
     }
 
@@ -285,14 +286,15 @@ impl Effects for EffectRunner {
             if let Some(resized) = resized {
                 resized.end();
             }
-            // The session runs its tasks in order, so all requested exports are written after this
-            // one.
+            // The render session runs its tasks in order. When this empty task runs, all exports
+            // that were requested before it have been written.
             session.with(|_, _| ());
             drop((session, results));
         };
         let patience = deadline
             .map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()));
-        // If there is no thread, the session ends here, without the pictures.
+        // If the thread cannot be started, the render session ends here, and pictures that were not
+        // written yet are lost.
         if let Ok(ending) = Worker::spawn("end", end) {
             ending.join_within(patience);
         }

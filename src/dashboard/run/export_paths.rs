@@ -5,16 +5,16 @@ use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Largest counter in the name of an exported file, such as 7 in `room-7.png`. It limits the time
-/// of the search for a free name.
+/// Largest number in the name of an exported file, such as 7 in `room-7.png`. The limit bounds the
+/// time of the search for an unused name.
 const MOST: u32 = 100_000;
 
-/// Creates a file in `folder` by calling `write` with the first free path: `STEM-1.EXTENSION`,
+/// Creates a file in `folder` by calling `write` with the first unused path of `STEM-1.EXTENSION`,
 /// `STEM-2.EXTENSION` and so on. Returns this path. `write` must create the file atomically and
-/// fail if the path exists, so that a name never refers to an incomplete file.
+/// fail if the path exists; no name ever refers to an incomplete file then.
 ///
 /// # Errors
-/// Fails with the error of `write`, or with a message if no name is free.
+/// Fails with the error of `write`, or with a message if no name is unused.
 pub fn numbered<E: Display>(
     folder: &Path,
     stem: &str,
@@ -30,7 +30,8 @@ pub fn numbered<E: Display>(
         }
         match write(&path) {
             Ok(()) => return Ok(path),
-            // Another program has created a file of this name since the check.
+            // Another program has created a file of this name after the check, so the next number
+            // is tried.
             Err(_) if is_taken(&path) => {}
             Err(error) => return Err(error.to_string()),
         }

@@ -22,7 +22,8 @@ use std::time::Duration;
 /// Interval at which the progress of a render at another size is polled.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Writer of exports, with the properties that are common to all exports of a scene.
+/// Writer of exported images and checkpoints. It holds the settings that all exports of a scene
+/// share.
 #[derive(Clone)]
 pub struct Exporter {
     /// Scene file, whose text is written to the metadata of exported images.
@@ -107,7 +108,7 @@ pub struct ExportRequest {
     /// Options of scene compilation and sampling. They include the exposure and tone curve of the
     /// image.
     pub options: Options,
-    /// Settings of sample allocation (how samples are distributed over the picture), and the stop
+    /// Settings of sample allocation (the distribution of samples over the picture), and the stop
     /// criteria of the render.
     pub settings: Settings,
     /// Number of threads that trace rays.
@@ -181,8 +182,9 @@ fn render(
     Some(written.unwrap_or_else(|| Err("the renderer has no picture".to_string())))
 }
 
-/// Returns the description of the image at `path` for the user. `film` is the picture in the image,
-/// and `report` the renderer's report on it.
+/// Returns the description of an exported image, for the user. `path` is the path of the image
+/// file, `film` the film whose picture it shows, and `report` the renderer's report on this
+/// picture.
 pub fn exported(path: PathBuf, film: &Film, report: &Report) -> Exported {
     Exported {
         scp: export_paths::scp(&path),
@@ -194,8 +196,8 @@ pub fn exported(path: PathBuf, film: &Film, report: &Report) -> Exported {
 }
 
 /// Returns the beginning of the names of exported files, such as `room` in `room-2.png`. It is the
-/// name of the scene file at `path` without its extension. For a scene without a file, `name` takes
-/// the place of the file name.
+/// name of the scene file at `path` without its extension. If `path` is `None`, `name` takes the
+/// place of the scene file's name.
 pub fn stem(path: Option<&Path>, name: &str) -> String {
     let path = path.unwrap_or(Path::new(name));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());

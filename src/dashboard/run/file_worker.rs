@@ -1,6 +1,6 @@
-//! Thread that reads and writes the scene file and watches it for changes by other programs. The
-//! thread keeps a slow disk from blocking the dashboard. Recovery files are written by a thread of
-//! their own, which never waits for the scene file.
+//! Thread that reads and writes the scene file and checks it for changes by other programs. Because
+//! it is a separate thread, a slow disk does not block the dashboard. Another thread writes the
+//! recovery files, and never waits for the scene file.
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::autosave::Autosave;
@@ -18,13 +18,14 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Interval between checks of the scene file for changes by other programs.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
-/// Longest wait for the update of the recovery file before a save.
+/// Longest time for which a save waits until the recovery file has been updated.
 const PREPARED_WITHIN: Duration = Duration::from_secs(2);
 /// Longest wait for pending saves when the program ends.
 const SAVED_WITHIN: Duration = Duration::from_secs(2);
 /// Longest wait for the recovery file when the program ends. If the file cannot be written beside
-/// the scene file in this time, one in the user's state folder gets the same time. Both waits and
-/// [`SAVED_WITHIN`] together are shorter than the grace period after a terminating signal.
+/// the scene file in this time, a write to the user's state folder gets the same time. Together
+/// these two waits and [`SAVED_WITHIN`] are shorter than the grace period after a terminating
+/// signal.
 const KEPT_WITHIN: Duration = Duration::from_secs(1);
 
 pub(super) enum Job {
@@ -32,11 +33,13 @@ pub(super) enum Job {
         scene: Arc<Scene>,
         path: Option<PathBuf>,
         overwrite: bool,
-        /// Receiver that is disconnected as soon as the recovery file has the edits of `scene`.
+        /// Receiver that is disconnected as soon as the recovery file is up to date; the scene may
+        /// be saved then.
         prepared: Receiver<()>,
     },
     Load,
-    /// Continue with this scene file, which was recovered in place of an unreadable one.
+    /// Continue with this scene file. Its text was recovered because the scene file on disk is
+    /// unreadable.
     Adopt(Box<SceneFile>),
     End,
 }
@@ -54,9 +57,9 @@ pub struct Files {
 }
 
 impl Files {
-    /// Starts the threads for `file`, an open scene file or the path of an unreadable one. The
-    /// threads send their results to `results`. `state` is the folder for recovery files that
-    /// cannot be written beside their scene file.
+    /// Starts the threads. `file` is the scene file, or the path of a scene file that is
+    /// unreadable. The threads send their results to `results`. `state` is the folder for recovery
+    /// files that cannot be written beside their scene file.
     pub fn new(
         file: Result<SceneFile, PathBuf>,
         state: Option<PathBuf>,
@@ -68,8 +71,9 @@ impl Files {
             Ok(file) => (file.path().map(Path::to_path_buf), Some(file)),
             Err(path) => (Some(path), None),
         };
-        // A readable file has no stamp yet, so the first check compares its contents. The errors of
-        // an unreadable file have been reported; its stamp avoids a second report.
+        // The stamp of a file is its modification time and length. A readable file gets no stamp
+        // yet, so that the first check compares its contents. An unreadable file gets one, so that
+        // its errors, which have been reported, are not reported again.
         let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
         let name = file.as_ref().map_or("", |file| file.document().name());
         let autosave = Autosave::new(path.as_deref(), name, state.clone());
@@ -98,8 +102,9 @@ impl Files {
         Ok(Self { jobs, autosaves, shared, unsaved: None, threads: Some(threads) })
     }
 
-    /// Writes `scene` to the scene file, or to `path`, which becomes the scene file. `overwrite`
-    /// allows the replacement of content from other programs. The result is a [`Message::Saved`].
+    /// Writes `scene` to the scene file, or to `path`, which then becomes the scene file. If
+    /// `overwrite` is `true`, content that another program has written may be replaced. The result
+    /// is a [`Message::Saved`].
     pub fn save(&self, scene: Arc<Scene>, path: Option<PathBuf>, overwrite: bool) {
         let (preparing, prepared) = bounded(0);
         self.give_autosave(AutosaveJob::Saving(Arc::clone(&scene), preparing));
@@ -126,8 +131,8 @@ impl Files {
         let _ = completion.recv_timeout(patience);
     }
 
-    /// Adopts the edits of the last [`Message::OrphanedEdits`], from a crashed session, as the
-    /// unsaved edits of this session.
+    /// Adopts the edits of the last [`Message::OrphanedEdits`], which a crashed run of the program
+    /// has left, as unsaved edits of the scene.
     pub fn recover(&self) {
         self.give_autosave(AutosaveJob::Recover);
     }
@@ -176,9 +181,9 @@ impl Drop for Files {
     }
 }
 
-/// Writes `scene`, which has unsaved edits of `file`, to the recovery file of `recovery` in the
-/// state folder. Returns the path of the recovery file. The write has a thread of its own, because
-/// the disk of the state folder may not respond either.
+/// Writes `scene`, an edited version of the scene in `file`, to the recovery file in the user's
+/// state folder. Returns the path of the recovery file. A separate thread writes it, because the
+/// disk of the state folder may not respond either.
 fn keep_elsewhere(
     scene: &Scene,
     file: &SceneFile,
@@ -188,7 +193,8 @@ fn keep_elsewhere(
     let (reply, kept) = bounded(1);
     thread::spawn(move || {
         let kept = recovery.keep(&text, base).map(|()| recovery.path().map(Path::to_path_buf));
-        // This releases the lock of the file, so that the next start offers its edits.
+        // This unlocks the recovery file, so that the next start of the program offers the edits in
+        // it.
         drop(recovery);
         // Sending fails if the receiver has timed out and is gone.
         let _ = reply.send(kept.map_err(|error| error.to_string()));
@@ -199,8 +205,8 @@ fn keep_elsewhere(
         .map_err(|why| format!("unsaved edits are lost: they cannot be kept ({why})"))
 }
 
-/// Stamp of a file, by which changes are detected: modification time and length. `None` if the file
-/// has no metadata.
+/// Stamp of a file: its modification time and length. A new stamp shows that the file may have
+/// changed. `None` if the file has no metadata.
 type FileStamp = Option<(SystemTime, u64)>;
 
 fn stamp(path: &Path) -> FileStamp {
@@ -444,9 +450,9 @@ mod tests {
         (path, Arc::new(scene))
     }
 
-    /// Opens the scene file at `path` in a set-up that simulates a disk that does not respond. The
-    /// threads of the returned `Files` block when they send a message, because the test does not
-    /// receive from the returned receiver.
+    /// Opens the scene file at `path` and simulates a disk that does not respond: the threads of
+    /// the returned `Files` block as soon as they send a message, because the channel has no
+    /// capacity and the test does not receive.
     fn opened_blocking(path: &Path, state: Option<PathBuf>) -> (Files, Receiver<Message>) {
         let (results, inbox) = bounded(0);
         (Files::new(Ok(SceneFile::open(path).unwrap()), state, results).unwrap(), inbox)
@@ -469,7 +475,7 @@ mod tests {
     fn edits_are_kept_elsewhere_if_the_recovery_file_blocks() {
         let folder = tempfile::tempdir().unwrap();
         let (path, scene) = edited(folder.path());
-        // The offer of these edits blocks the thread.
+        // The thread offers these edits in a message, and blocks because nothing receives it.
         fs::write(folder.path().join(".a.toml.unsaved"), "[trace]\nmax_depth = 3\n").unwrap();
         let state = folder.path().join("state");
         let (mut files, _inbox) = opened_blocking(&path, Some(state.clone()));

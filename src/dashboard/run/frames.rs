@@ -32,7 +32,7 @@ pub struct FramePipeline {
     queue: Option<TcpSendQueue>,
     /// `true` if the terminal supports synchronised updates, which it displays as a whole.
     synchronised: bool,
-    /// Writer that writes frames to the terminal. Its results must be passed to
+    /// Writer that writes frames to the terminal. The caller must pass its results to
     /// [`FramePipeline::written_at`].
     pub writer: Writer,
     /// Time at which the frame that is being written was passed to the writer; `None` if no frame
@@ -58,8 +58,8 @@ pub struct FramePipeline {
     removing: bool,
 }
 
-/// Three values of the model when the last frame was drawn: the version of the picture, its mean
-/// number of samples per pixel, and `true` if it changes only rarely or by user input.
+/// State of the model when the last frame was drawn: the version of the picture, the picture's mean
+/// number of samples per pixel, and `true` if the picture changes rarely or only by user input.
 #[derive(Clone, Copy, Debug, Default)]
 struct FrameMeta {
     version: u64,
@@ -116,7 +116,7 @@ impl FramePipeline {
         self.clipboard = copied(text);
     }
 
-    /// Marks the contents of the terminal as unknown, so that the next frame redraws the whole
+    /// Treats the contents of the terminal as unknown, so that the next frame redraws the whole
     /// screen.
     pub fn forget(&mut self) {
         self.diff = FrameDiff::default();
@@ -129,8 +129,8 @@ impl FramePipeline {
         self.upload.as_ref().map(ImageUpload::share)
     }
 
-    /// Starts to send the image in the model's viewer if it is new. Stops sending an image that is
-    /// no longer in the viewer.
+    /// Starts to send the image that the image viewer of `model` shows, unless this image is being
+    /// sent already. Stops sending an image that the viewer no longer shows.
     pub fn follow(&mut self, model: &Model) {
         let image = match &model.overlay {
             Some(Overlay::ViewerImage(viewed)) => viewed.image.as_ref(),
@@ -160,8 +160,8 @@ impl FramePipeline {
             return DrawOutcome::Nothing;
         };
         if !upload.has_begun() {
-            // From here on the exit sequence must remove the image, so that the image does not stay
-            // on the terminal after a signal or panic.
+            // The exit sequence, which a signal or panic sends to the terminal, must remove the
+            // image from now on. Otherwise the image would stay on the terminal.
             self.tty.set_exit_sequence(&upload.any_removal());
             self.removing = false;
         }
@@ -192,8 +192,8 @@ impl FramePipeline {
         (self.diff.pending().visible, self.sent)
     }
 
-    /// Updates flow control at time `now`: stops waiting for overdue acknowledgements of the
-    /// terminal, and reads the length of the kernel's send queue if this is due.
+    /// Updates flow control at time `now`. Stops waiting for acknowledgements of the terminal that
+    /// are overdue. Reads the length of the kernel's send queue if the time for this has come.
     pub fn look(&mut self, now: Duration) {
         self.flow.expire(now);
         if self.flow.wants_queue_length(now) {
@@ -201,16 +201,16 @@ impl FramePipeline {
         }
     }
 
-    /// Returns the time at which the connection to the terminal will count as silent if no input
-    /// arrives until then. Returns `None` if it cannot become silent, because no bytes are known to
-    /// wait for transmission.
+    /// Returns the time at which the connection to the terminal counts as silent, unless input
+    /// arrives before. Returns `None` if the connection cannot become silent, because no sent bytes
+    /// are known to be waiting for transmission.
     pub fn silent_at(&self) -> Option<Duration> {
         self.flow.silent_at(self.writing_since)
     }
 
-    /// Returns the earliest time, `now` or later, at which a frame with new content can be sent.
-    /// `answers` is `true` if the frame would respond to user input; such a frame may be sent
-    /// sooner.
+    /// Returns the earliest time, `now` or later, at which a frame with new content can be sent. A
+    /// frame that responds to user input may be sent sooner than others; `answers` is `true` for
+    /// such a frame.
     pub fn snapshot_due(&self, now: Duration, answers: bool) -> Duration {
         match self.flow.allowance(now, answers) {
             Some(_) => now,
@@ -220,7 +220,7 @@ impl FramePipeline {
 
     /// Returns the time at which [`FramePipeline::draw`] must be called next. Returns `None` if
     /// there is nothing to send until the next event. `changed` is `true` if the model has changed
-    /// since the last frame, `answers` if the frame would respond to user input.
+    /// since the last frame. `answers` is `true` if the frame would respond to user input.
     pub fn due(&self, now: Duration, changed: bool, answers: bool) -> Option<Duration> {
         let pending = self.diff.pending();
         let text = changed || pending.text || !self.removal.is_empty();
@@ -241,10 +241,11 @@ impl FramePipeline {
         }
     }
 
-    /// Draws the model if `changed` is `true`, and sends as many of the differences as the
+    /// Draws the model if `changed` is `true`, and sends as many of the changed cells as the
     /// connection has room for. `answers` is `true` if the frame responds to user input.
-    /// `image_epoch` is a counter that increases when the picture is replaced by a different one
-    /// instead of refined. Must be called only if [`FramePipeline::ready`] returns `true`.
+    /// `image_epoch` is a counter that increases when another picture replaces the present one;
+    /// refinement does not increase it. Must be called only if [`FramePipeline::ready`] returns
+    /// `true`.
     pub fn draw(
         &mut self,
         model: &Model,
@@ -259,7 +260,8 @@ impl FramePipeline {
             if upload.is_open() {
                 return self.slice(now, whole);
             }
-            // Cells of the picture are not sent if the image covers them or soon will.
+            // Cells of the picture are not sent if the viewed image covers them or is about to
+            // cover them.
             budget.picture &= !upload.follows(true);
         }
         if changed {

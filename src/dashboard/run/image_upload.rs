@@ -50,9 +50,9 @@ impl ImageUpload {
         self.sent < self.image.transfer.bytes.len()
     }
 
-    /// Returns `true` if the next output may be a part of the image: its upload has begun, or it
-    /// may begin because the half blocks are visible. Half blocks are a coarse preview of the image
-    /// in terminal cells. `waits` is `true` if the screen does not show all of them yet.
+    /// Returns `true` if the next output may be a part of the image. This is so if the upload has
+    /// begun, or if the half blocks (the image's coarse preview in terminal cells) are visible.
+    /// `waits` is `true` if some cells of the screen have not been sent yet.
     pub fn follows(&self, waits: bool) -> bool {
         self.has_begun() || self.is_unfinished() && (self.seen || !waits)
     }
@@ -63,8 +63,8 @@ impl ImageUpload {
         self.sent as f64 / all as f64
     }
 
-    /// Appends the next slice of the image's bytes to `out`. The slice has about `room` bytes, the
-    /// number that the connection accepts now, or `SLICE` bytes if that is less.
+    /// Appends the next slice of the image's bytes to `out`. `room` is the number of bytes that the
+    /// connection accepts now. The slice has about `room` bytes, at most about `SLICE`.
     pub fn next(&mut self, room: usize, out: &mut Vec<u8>) {
         let transfer = &self.image.transfer;
         let (range, open) = transfer.slice(self.sent, room.min(SLICE));
@@ -72,8 +72,9 @@ impl ImageUpload {
         (self.sent, self.open) = (range.end, open);
     }
 
-    /// Returns two values: the escape sequence that removes the part of the image that was sent
-    /// (empty if none was), and `true` if the cells below the image must be drawn again afterwards.
+    /// Returns two values. The first is the escape sequence that removes the sent part of the
+    /// image; it is empty if nothing was sent. The second is `true` if the cells under the image
+    /// must be drawn again after the removal.
     pub fn removal(&self) -> (Vec<u8>, bool) {
         let transfer = &self.image.transfer;
         if !self.has_begun() {
@@ -83,8 +84,8 @@ impl ImageUpload {
         ([end, &transfer.remove].concat(), transfer.destroys)
     }
 
-    /// Returns an escape sequence that removes the image, whatever part of it was sent. It also
-    /// clears the screen if the cells below the image must be drawn again.
+    /// Returns an escape sequence that removes the image at any progress of its upload. It also
+    /// clears the screen if the image has overwritten the cells under it.
     pub fn any_removal(&self) -> Vec<u8> {
         let clear: &[u8] = if self.image.transfer.destroys { b"\x1b[2J" } else { b"" };
         [END, &self.image.transfer.remove, clear].concat()

@@ -12,19 +12,19 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-/// Longest duration of sending an image to the terminal. On slow connections the image is
-/// downscaled to meet it.
+/// Longest time in which an image may be sent to the terminal. On slow connections the image is
+/// downscaled to keep within this time.
 const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
 
-/// Returns the limits for an image in the viewer: protocol, size and bytes. The terminal has
-/// `screen` columns and rows. `line_rate` is the rate of its connection in bytes per second; `None`
-/// for a local terminal.
+/// Returns the limits for an image in the viewer: its protocol, size and number of bytes. `screen`
+/// is the number of columns and rows of the terminal. `line_rate` is the rate of the connection in
+/// bytes per second; it is `None` for a local terminal.
 pub fn viewport(
     terminal: &Capabilities,
     screen: [u16; 2],
     line_rate: Option<f64>,
 ) -> ImageViewport {
-    // The size of a cell may have changed since the start.
+    // The user may have changed the font size, and thereby the cell size, since the start.
     let cell_px = cell_px().or(terminal.cell_px);
     let protocol = Protocol::of(&Capabilities { cell_px, ..terminal.clone() });
     let max_bytes = line_rate.map(|rate| rate * MAX_TRANSFER_TIME.as_secs_f64());

@@ -11,12 +11,12 @@ use std::time::Duration;
 
 /// Time for which the terminal's size must stay unchanged before its last change takes effect.
 const SETTLED: Duration = Duration::from_millis(90);
-/// Longest time after the first of several changes of the terminal's size until they take effect.
+/// Longest delay of changes of the terminal's size, measured from the first of several changes.
 const LONGEST: Duration = Duration::from_millis(400);
 /// Longest wait for the write of the recovery file before the program is suspended.
 const SECURED_WITHIN: Duration = Duration::from_secs(2);
-/// Longest wait until the stop signal has stopped the process. After it the program resumes by
-/// itself.
+/// Longest wait until the stop signal has stopped the process. If the process has not stopped by
+/// then, the program resumes.
 const STOPS_WITHIN: Duration = Duration::from_millis(500);
 
 /// Terminal, and the receivers of its events.
@@ -27,13 +27,14 @@ pub(super) struct TerminalIo {
     pub input: Receiver<io::Result<TimedEvent>>,
     /// Receiver of signals to the process.
     pub signals: Receiver<SignalEvent>,
-    /// Receiver of the notification that the terminal has been restored for good, for example by a
-    /// panic.
+    /// Receiver of the notification that the terminal has been restored and will not be set up
+    /// again, for example because of a panic.
     pub left: Receiver<()>,
 }
 
-/// Debounce of changes of the terminal's size: a series of changes takes effect once. The two times
-/// are those of the first and of the last change of the series. `None` if no change is pending.
+/// Debounce of changes of the terminal's size: several changes in quick succession take effect
+/// once. The fields are the times of the first and of the last of these changes. `None` if no
+/// change is pending.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ResizeDebounce(Option<(Duration, Duration)>);
 
@@ -65,7 +66,8 @@ impl Dashboard {
                 None
             }
             SignalEvent::Stop => self.suspend(StopTarget::Itself, terminal_io),
-            // A process cannot handle SIGSTOP, so the terminal is set up again after it.
+            // The process may have been stopped by SIGSTOP, which it cannot handle. The terminal is
+            // therefore set up again.
             SignalEvent::Continue => self.resume(terminal_io),
         }
     }

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 #[derive(Clone, Copy, Debug)]
 struct Awaiting {
     read: Instant,
-    /// Generation (version number of the scene) of the oldest picture that responds to the event;
-    /// newer pictures respond, too. 0 if any frame is a response.
+    /// Generation (version number of the scene) of the oldest picture that is a response to the
+    /// event. Newer pictures are responses, too. If it is 0, any frame is a response.
     scene: u64,
 }
 
@@ -26,9 +26,9 @@ struct Answered {
     after: Duration,
 }
 
-/// Recorder of input latencies. Input events without a response are always tracked: a frame that
-/// responds to one is sent without waiting for the frame interval. Latencies are stored only on
-/// request.
+/// Recorder of input latencies. It always tracks input events without a response, because a frame
+/// that responds to input is sent without waiting for the frame interval. It stores latencies only
+/// on request.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,
@@ -42,17 +42,17 @@ pub struct LatencyRecorder {
     load: Load,
 }
 
-/// Traffic to the terminal during the times at which its contents differed visibly from the picture
-/// that it should show.
+/// Traffic to the terminal, counted only while the terminal differs visibly from the picture that
+/// it should show.
 #[derive(Clone, Copy, Debug, Default)]
 struct Load {
-    /// Three values of the last update: its time, `true` if the terminal then differed visibly from
-    /// the picture that it should show, and the number of bytes sent to the terminal since the
-    /// start.
+    /// Time of the last update, and two values at this time: `true` if the terminal differed
+    /// visibly from the picture that it should show, and the number of bytes sent since the start.
     last: (Duration, bool, u64),
-    /// Total time during which the terminal differed from the picture.
+    /// Total time during which the terminal differed visibly from the picture that it should show.
     waited: Duration,
-    /// Number of bytes that were sent to the terminal while it differed from the picture.
+    /// Number of bytes of the frames after which the terminal still differed visibly from the
+    /// picture that it should show.
     bytes: u64,
 }
 
@@ -101,15 +101,16 @@ impl LatencyRecorder {
         }
     }
 
-    /// Records the traffic to the terminal at the time `now`, after a frame. `waits` is `true` if
-    /// the terminal differs visibly from the picture that it should show. `sent` is the number of
+    /// Records the traffic to the terminal at time `now`, after a frame. `waits` is `true` if the
+    /// terminal still differs visibly from the picture that it should show. `sent` is the number of
     /// bytes sent since the start.
     pub fn line(&mut self, now: Duration, waits: bool, sent: u64) {
         let Load { last: (before, waited, known), .. } = self.load;
         if waited {
             self.load.waited += now.saturating_sub(before);
         }
-        // Bytes of a frame after which no difference is pending do not count.
+        // The bytes of a frame count only if the terminal still differs from the picture after the
+        // frame.
         if waits {
             self.load.bytes += sent - known;
         }
@@ -161,8 +162,8 @@ impl LatencyRecorder {
     }
 }
 
-/// Returns a quantile of `sorted`: the smallest element that at least the fraction `share` (0 to 1)
-/// of all elements do not exceed. Returns 0 if `sorted` is empty.
+/// Returns a quantile of `sorted`: the smallest element such that at least the fraction `share` (0
+/// to 1) of all elements is less than or equal to it. Returns 0 if `sorted` is empty.
 fn quantile(sorted: &[Duration], share: f64) -> Duration {
     let rank = (share * sorted.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied().unwrap_or_default()
@@ -188,7 +189,7 @@ mod tests {
         assert!(recorder.replies(1));
         recorder.sent(1);
         assert!(!recorder.replies(1), "it is on its way");
-        // A frame is no response to events that are read while it is being written.
+        // An event that is read while a frame is being written waits for the next frame.
         recorder.event(at(9), None);
         recorder.written(at(20));
         recorder.sent(7);

@@ -51,7 +51,7 @@ pub use diagnose::{TerminalReport, diagnose};
 
 /// Parameters with which a dashboard is run.
 pub struct Setup {
-    /// Scene file. An unreadable file is given by its path and errors.
+    /// Scene file. For an unreadable file, its path and the errors in it.
     pub file: Result<SceneFile, (PathBuf, SceneErrors)>,
     /// Checkpoint of this scene whose render is continued; `None` for a new render.
     pub checkpoint: Option<Checkpoint>,
@@ -62,7 +62,7 @@ pub struct Setup {
     pub threads: usize,
     /// Options of scene compilation and sampling.
     pub options: Options,
-    /// Settings of sample allocation (how samples are distributed over the picture), and the
+    /// Settings of sample allocation (the distribution of samples over the picture), and the
     /// initial stop criteria.
     pub settings: Settings,
     /// Settings of the terminal.
@@ -82,7 +82,7 @@ pub struct TerminalSetup {
     pub bandwidth: Option<f64>,
 }
 
-/// Result of a dashboard session that has ended.
+/// Result of a dashboard after it has ended.
 #[derive(Debug)]
 pub struct Ended {
     /// Exit status if a signal or the loss of the terminal has ended the dashboard; `None` if the
@@ -90,8 +90,8 @@ pub struct Ended {
     pub signalled: Option<u8>,
     /// Image or error of each export that ended after the screen was restored.
     pub exported: Vec<Result<Exported, String>>,
-    /// Path of the recovery file with the unsaved edits, which the next start offers to recover.
-    /// `None` if all edits are saved. The error explains why unsaved edits are lost.
+    /// Path of the recovery file with unsaved edits, which the next start of the program offers to
+    /// recover. `None` if all edits are saved. If unsaved edits are lost, an error with the reason.
     pub kept: Result<Option<PathBuf>, String>,
     /// Path or error of each checkpoint that was written after the screen was restored.
     pub checkpoints: Vec<Result<PathBuf, String>>,
@@ -179,16 +179,18 @@ fn run_on_terminal(
     while let Ok(message) = dashboard.effects.done().try_recv() {
         dashboard.take_done(message);
     }
-    // The resize passes the raster size on to the renderer.
+    // This message also informs the renderer of the size of the picture in half cells (upper and
+    // lower halves of terminal cells).
     dashboard.dispatch(Message::Resize(dashboard.model.screen));
     let input = input::read(input)?;
     let terminal_io =
         TerminalIo { tty: screen.tty(), input, signals: signals.events, left: screen.left.clone() };
     let result = dashboard.watch(&terminal_io);
-    // Only the user's own end waits for pictures that are being written.
+    // If the user quits, the program waits without limit for pictures that are being written. If a
+    // signal or the loss of the terminal ends it, the wait is limited.
     let deadline = (!matches!(result, Ok(None))).then(|| Instant::now() + signals::ENDED_WITHIN);
-    // The file thread starts to write unsaved edits before anything here may block. A timeout of 0
-    // does not wait for that write.
+    // The autosave thread starts to write unsaved edits before this thread may block. A timeout of
+    // 0 does not wait for that write.
     dashboard.effects.flush(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
         dashboard.await_answers(&terminal_io.input);
@@ -215,7 +217,7 @@ struct Dashboard {
     model: Model,
     effects: Box<dyn Effects>,
     frames: FramePipeline,
-    /// Capabilities of the terminal, as far as they are known.
+    /// Known capabilities of the terminal. Late replies of the terminal add to them.
     terminal: Capabilities,
     latency: LatencyRecorder,
     began: Instant,
@@ -324,7 +326,8 @@ impl Dashboard {
                 return;
             }
             Event::Reply(reply @ (Reply::Graphics(true) | Reply::Version(_))) => {
-                // Replies that pass through a multiplexer may arrive after the capability query.
+                // A terminal behind a multiplexer may reply only after the capability query has
+                // ended.
                 self.terminal.learn(&reply);
                 return;
             }
@@ -333,8 +336,8 @@ impl Dashboard {
         input::join(waiting, Input { at, message });
     }
 
-    /// Waits for outstanding replies of the terminal before it is restored. Otherwise the shell
-    /// would read the replies as input.
+    /// Waits for outstanding replies of the terminal, before the terminal is restored. Otherwise
+    /// the shell would read the replies as input.
     fn await_answers(&mut self, input: &Receiver<io::Result<TimedEvent>>) {
         let end = self.frames.flow.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
@@ -348,9 +351,9 @@ impl Dashboard {
         }
     }
 
-    /// Updates the model with a message and executes the resulting effects. If the response to the
-    /// message needs a newly rendered picture, returns the generation of the new scene (the number
-    /// of its version), otherwise `None`.
+    /// Updates the model with `message` and executes the resulting effects. If the response to the
+    /// message needs a newly rendered picture, returns the number of the new version of the scene
+    /// (its generation). Otherwise returns `None`.
     fn dispatch(&mut self, message: Message) -> Option<u64> {
         let mut awaited = None;
         let is_snapshot = matches!(message, Message::Snapshot(_));
@@ -363,8 +366,9 @@ impl Dashboard {
             match self.effects.run(effect, &mut self.frames, &self.terminal) {
                 Outcome::Done => {}
                 Outcome::Rendering(generation) => {
-                    // A change of lights needs no new picture: the light groups of the current
-                    // snapshot are mixed again.
+                    // A change of lights alone needs no newly rendered picture: the current
+                    // snapshot has one picture per light group, and these are added up with new
+                    // weights.
                     let snapshot = self.model.snapshot.as_deref();
                     let relit =
                         scene.is_some_and(|s| snapshot.is_some_and(|n| n.mix_for(&s).is_some()));
@@ -418,7 +422,8 @@ impl Dashboard {
     }
 
     /// Draws a frame if one is due and the connection has room for it. Returns the time from now
-    /// until the next frame or timeout. Returns `None` if neither is due before the next event.
+    /// until this method must be called again, or `None` if it need not be called before the next
+    /// event.
     fn draw(&mut self) -> Option<Duration> {
         let now = self.began.elapsed();
         if let Some(due) = self.resizing.due() {
@@ -450,11 +455,12 @@ impl Dashboard {
                 match drawn {
                     DrawOutcome::Nothing | DrawOutcome::Deferred | DrawOutcome::Slice => {}
                     DrawOutcome::Same => {
-                        // The screen already shows the response.
+                        // The screen already shows the response, so the latency ends now.
                         self.latency.sent(self.shown);
                         self.latency.written(Instant::now());
                     }
-                    // No picture has generation 0, so it stands for a frame without picture.
+                    // Generations of pictures begin at 1, so the value 0 means a frame without
+                    // picture.
                     DrawOutcome::Text => self.latency.sent(0),
                     DrawOutcome::Picture => self.latency.sent(self.shown),
                 }
@@ -473,7 +479,7 @@ impl Dashboard {
     }
 
     /// Pauses rendering while the terminal does not reply, because pictures would not arrive.
-    /// Returns the time at which rendering will be paused if no reply arrives until then. Returns
+    /// Returns the time at which rendering will be paused unless a reply arrives before. Returns
     /// `None` if rendering is paused for this reason already, or if no reply is expected.
     fn rest(&mut self, now: Duration) -> Option<Duration> {
         let silent_at = self.frames.silent_at();
@@ -485,11 +491,11 @@ impl Dashboard {
     }
 }
 
-/// Shortest interval between updates of the connection's status and of the upload's progress on the
-/// screen.
+/// Shortest interval between two updates of the displayed connection status, and between two
+/// updates of the displayed upload progress.
 const STATUS_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Default stop criterion: noise of half an 8-bit level, which is half a quantisation step of the
-/// image file.
+/// Default stop criterion: a noise of half an 8-bit level, which is half a quantisation step of an
+/// 8-bit image file.
 pub const DEFAULT_STOP: Stop =
     Stop { spp: None, noise_codes: Some(0.5), rmse_linear: None, seconds: None };

@@ -1,5 +1,5 @@
-//! Handling of signals that end the program, and of signals for resizing, stopping and continuing.
-//! After a terminating signal the dashboard has a grace period to end by itself.
+//! Handling of signals that end, stop or continue the program, and of the signal that the terminal
+//! was resized. After a terminating signal the dashboard has a grace period to end by itself.
 
 use crate::terminal::Tty;
 use crossbeam_channel::{Receiver, unbounded};
@@ -17,7 +17,7 @@ use std::time::Duration;
 pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Longest time from a terminating signal to the end of the dashboard, even if the renderer is
-/// busy. It is shorter than the grace period, so that the program can still report where unsaved
+/// busy. It is shorter than the grace period. The remaining time suffices to report where unsaved
 /// edits are kept.
 pub(super) const ENDED_WITHIN: Duration = Duration::from_secs(4);
 
@@ -65,8 +65,8 @@ pub(super) enum StopTarget {
 }
 
 /// Registers signal handlers, which queue signals until [`watch`] handles them. Must be called
-/// before the terminal enters raw mode, because the default handlers would end the program without
-/// leaving this mode.
+/// before the terminal enters raw mode. The default handlers would end the program and leave the
+/// terminal in raw mode.
 pub(super) fn block() -> io::Result<iterator::Signals> {
     iterator::Signals::new([SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])
 }
@@ -102,10 +102,9 @@ pub(super) fn watch(
     Ok(Signals { events, ending })
 }
 
-/// Stops the processes of `target`; they may still run for a moment after the return. The signal is
-/// SIGTTIN, because SIGTSTP has a handler in this program. Without a shell that could continue the
-/// processes, nothing happens: in orphaned process groups the kernel ignores every stop signal
-/// except SIGSTOP.
+/// Stops the processes of `target`, which may still run for a moment after this function returns.
+/// The signal is SIGTTIN, because SIGTSTP has a handler in this program. Nothing happens if no
+/// shell could continue the processes: the kernel ignores SIGTTIN in orphaned process groups.
 pub(super) fn stop(target: StopTarget) -> io::Result<()> {
     match target {
         StopTarget::Itself => kill_process(getpid(), Signal::TTIN)?,

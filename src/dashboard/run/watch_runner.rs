@@ -1,5 +1,5 @@
-//! Execution of effects in `zerkalo watch`: the picture is displayed and exported; there is no
-//! scene to edit or render.
+//! Execution of effects in `zerkalo watch`. The picture can be displayed and exported, but there is
+//! no scene to edit or render.
 
 use crate::dashboard::message::{Effect, Exported, Format, Message};
 use crate::dashboard::run::effects::{Effects, Outcome, run_on_terminal};
@@ -38,7 +38,7 @@ impl WatchRunner {
             // Sending fails only at the end of the program, when the receiver is gone.
             let _ = reports.send(Message::Watched(Box::new(report)));
         })?;
-        // The first frame shows the table.
+        // This waits for the first report, so that the first frame shows the table of films.
         if let Ok(report) = done.recv_timeout(FIRST_REPORT_WITHIN) {
             let _ = results.send(report);
         }
@@ -58,8 +58,8 @@ impl WatchRunner {
     }
 }
 
-/// Writes the picture of `film` to a file with the next free name. The name begins with that of the
-/// scene file.
+/// Writes the picture of `film` to an image file with an unused name. The name begins with that of
+/// the scene file.
 fn write(
     film: &Film,
     header: &FilmFileHeader,
@@ -135,8 +135,9 @@ impl Effects for WatchRunner {
         deadline: Option<Instant>,
     ) -> (Vec<Message>, Result<Option<PathBuf>, String>) {
         let mut finished = Vec::new();
-        // Reports may come in between. This runner keeps a sender, so that a session which has
-        // panicked is noticed by its wake-ups.
+        // Other messages may arrive before those of the exports. `done` is never disconnected,
+        // because this runner holds a sender; a panic of the watch session is therefore detected by
+        // `has_ended`.
         while self.exporting > 0
             && deadline.is_none_or(|deadline| Instant::now() < deadline)
             && !self.session.has_ended()

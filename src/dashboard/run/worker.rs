@@ -5,7 +5,7 @@ use std::io;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// Handle of a thread that may never end, because a disk or the renderer may not respond.
+/// Handle of a thread that may never end, because it may wait for a disk or for the renderer.
 pub struct Worker {
     thread: JoinHandle<()>,
     /// Receiver that is disconnected at the end of the thread.
@@ -23,7 +23,7 @@ impl Worker {
         Ok(Self { thread, ended })
     }
 
-    /// Waits for the end of the thread for at most `patience`, or without limit if this is
+    /// Waits until the thread has ended, at most for `patience`, or without limit if `patience` is
     /// `Duration::MAX`. Returns `true` if the thread has ended.
     pub fn join_within(self, patience: Duration) -> bool {
         if self.ended.recv_timeout(patience) == Err(RecvTimeoutError::Timeout) {

@@ -11,20 +11,20 @@ use crate::scene::edit::{
 const ORBIT_DEGREES: f64 = 5.0;
 /// Angle in degrees of one step of turning the camera about the eye.
 const LOOK_DEGREES: f64 = 3.0;
-/// Length of one step of panning the camera, as a fraction of the distance between camera and pivot
-/// (the point that the camera orbits).
+/// Length of one step of panning the camera, as a fraction of the distance between the eye and the
+/// pivot (the point that the camera orbits).
 const PAN_SHARE: f64 = 0.05;
-/// Factor of the distance between the camera and its pivot (the point that it orbits) for a coarse
-/// step towards the pivot.
+/// Factor by which a coarse step towards the pivot (the point that the camera orbits) multiplies
+/// the distance between eye and pivot.
 const DOLLY: f64 = 0.9;
-/// Factor of the distance between the camera and its pivot (the point that it orbits) for a fine
-/// step towards the pivot.
+/// Factor by which a fine step towards the pivot (the point that the camera orbits) multiplies the
+/// distance between eye and pivot.
 const DOLLY_FINE: f64 = 0.99;
 /// Factor by which a zoom step inwards multiplies the width of the camera's view.
 const ZOOM: f64 = 0.95;
 
-/// Returns the components of `direction` on the screen, to the right and upwards. Each is one
-/// of -1, 0 and 1. Both are 0 for directions along the view direction.
+/// Returns two components of `direction` on the screen: to the right, and upwards. Each component
+/// is -1, 0 or 1. For a `direction` along the view direction, both components are 0.
 fn right_up(direction: Direction) -> [f64; 2] {
     match direction {
         Direction::Left => [-1.0, 0.0],
@@ -38,8 +38,8 @@ fn right_up(direction: Direction) -> [f64; 2] {
 impl UpdateContext<'_> {
     /// Replaces the camera by the result of `f`. The arguments of `f` are the camera and the
     /// distance from the eye to the pivot, the point that the camera orbits. `coalesce` decides if
-    /// the move joins the previous undo step. All camera moves have the same label, so that moves
-    /// of different kinds can form one undo step.
+    /// the move joins the previous undo step. Because all camera moves have the same label, moves
+    /// of different kinds can join.
     pub(super) fn set_camera(&mut self, coalesce: Coalesce, f: impl Fn(&Camera, f64) -> Camera) {
         let scene = self.scene();
         let camera = f(&scene.camera, pivot_distance(scene));
@@ -113,7 +113,7 @@ impl UpdateContext<'_> {
         let scene = self.scene();
         let ball = bounds(scene, &self.model.selection).unwrap_or_else(|| scene_bounds(scene));
         let [width, height] = scene.film.size.map(f64::from);
-        // Bounds without extent get a radius that includes their surroundings.
+        // If the bounds have no extent, a radius is chosen that also shows the surroundings.
         let radius = if ball.radius > 0.0 { ball.radius } else { 5.0 * step_length(scene) };
         self.set_camera(Coalesce::Single, |camera, _| {
             camera.framed(ball.center, radius, width / height)
@@ -139,8 +139,8 @@ impl UpdateContext<'_> {
     }
 
     /// Orbits the camera by a drag of `right` and `down` half cells (upper or lower halves of
-    /// terminal cells). The scene moves in the direction of the drag. A drag across the full width
-    /// of the picture turns it by 180 degrees.
+    /// terminal cells). The scene follows the drag. A drag across the full width of the picture
+    /// orbits the camera by 180 degrees.
     pub(super) fn orbit_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(180.0);
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -149,8 +149,8 @@ impl UpdateContext<'_> {
     }
 
     /// Turns the camera about the eye by a drag of `right` and `down` half cells (upper or lower
-    /// halves of terminal cells). A drag across the full width of the picture turns it by 90
-    /// degrees.
+    /// halves of terminal cells). A drag across the full width of the picture turns the camera by
+    /// 90 degrees.
     pub(super) fn look_by_hand(&mut self, right: f64, down: f64) {
         let degrees = self.per_half_cell(90.0);
         self.set_camera(Coalesce::Gesture, |camera, _| {
@@ -159,8 +159,8 @@ impl UpdateContext<'_> {
     }
 
     /// Pans the camera by a drag of `right` and `down` half cells (upper or lower halves of
-    /// terminal cells). Points as far from the eye as the pivot, the point that the camera orbits,
-    /// stay under the mouse.
+    /// terminal cells). Points stay under the mouse if they are at the depth of the pivot, the
+    /// point that the camera orbits.
     pub(super) fn pan_by_hand(&mut self, right: f64, down: f64) {
         let share = self.per_half_cell(2.0 * self.half_width());
         self.set_camera(Coalesce::Gesture, |camera, distance| {
@@ -168,15 +168,16 @@ impl UpdateContext<'_> {
         });
     }
 
-    /// Returns half the width of the camera's view at distance 1 from the eye, in scene units.
+    /// Returns half the width of the camera's view at distance 1 in front of the eye, in scene
+    /// units.
     pub(super) fn half_width(&self) -> f64 {
         let scene = self.scene();
         let [width, height] = scene.film.size.map(f64::from);
         scene.camera.half_size(width / height)[0]
     }
 
-    /// Returns the size of the camera movement for a drag of one half cell (upper or lower half of
-    /// a terminal cell). `across` is its size for a drag across the full width of the picture.
+    /// Returns the amount of a camera movement for a drag by one half cell (upper or lower half of
+    /// a terminal cell). `across` is the amount for a drag across the full width of the picture.
     /// Returns 0 if the terminal is too small for a picture.
     pub(super) fn per_half_cell(&self, across: f64) -> f64 {
         self.model.layout().map_or(0.0, |layout| across / layout.raster[0] as f64)

@@ -21,7 +21,8 @@ pub enum Chapter {
     Camera,
     /// Chapter of commands on lights.
     Light,
-    /// Chapter of commands on the mirror: the reflecting material of the selection or the scene.
+    /// Chapter of commands on the mirror: a reflecting material of the selection, or else of the
+    /// scene.
     Mirror,
     /// Chapter of commands on objects.
     Objects,
@@ -75,8 +76,8 @@ pub struct Hint {
 pub struct Command {
     /// Chapter of the help that lists the command.
     pub chapter: Chapter,
-    /// Description in a few words, for help, command palette and docs/keys.md. No other command has
-    /// the same.
+    /// Description in a few words, for help, command palette and docs/keys.md. Each command has a
+    /// different description.
     pub label: &'static str,
     /// Contexts of the command, each with the names of its keys there, separated by spaces. A
     /// command without keys runs only from the command palette.
@@ -126,13 +127,13 @@ const fn hint(
     Hint { lines, position, keys, text }
 }
 
-/// Returns `true` if there is a scene: the scene file is or was readable.
+/// Returns `true` if there is a scene: the scene file is readable now, or was readable earlier.
 fn with_scene(model: &Model) -> bool {
     !model.file.unreadable
 }
 
-/// Returns `true` if there is a scene, or if the command palette or a question is open, which the
-/// user can answer without a scene.
+/// Returns `true` if there is a scene, or if the command palette or a question is open. The user
+/// can answer these without a scene.
 fn with_scene_or_choice(model: &Model) -> bool {
     with_scene(model)
         || matches!(model.overlay, Some(Overlay::CommandPalette(_) | Overlay::Question(_)))
@@ -366,7 +367,7 @@ impl Command {
         self.formatted_keys(key, |context| Some(context.place()))
     }
 
-    /// Returns the keys that the command has in `zerkalo watch` while no overlay is open, as text.
+    /// Returns the keys that run the command in `zerkalo watch` while no overlay is open, as text.
     /// `key` formats the name of one key.
     pub fn watch_keys(&self, key: impl Fn(&str) -> String) -> String {
         self.formatted_keys(key, |context| match context {

@@ -21,16 +21,16 @@ impl UpdateContext<'_> {
         *cursor = walk_fields(&lines, *cursor, steps);
     }
 
-    /// Returns the property or number under the cursor of the open form, or of the inspector if no
-    /// form is open. Returns `None` if the line has neither.
+    /// Returns the line under the cursor of the open form, or of the inspector if no form is open.
+    /// Returns `None` if the line shows no property, such as a heading.
     pub(super) fn field(&self) -> Option<FieldLine> {
         self.model.field_lines().get(self.model.field_list().cursor)?.field().cloned()
     }
 
-    /// Starts the input of a value for the property under the cursor. If `typed` is a character, a
-    /// text editor opens with it; a space changes a switch or a choice to its next value instead.
-    /// If `typed` is `None`, the editor opens with the present value; a switch is toggled instead,
-    /// and a choice outside of a form opens its list.
+    /// Starts the input of a value for the property under the cursor. `typed` is the character that
+    /// the user has typed. It opens a text editor that contains it, but a space changes a switch or
+    /// a choice to its next value. If `typed` is `None`, a switch is toggled, a choice outside of a
+    /// form opens its list, and any other property opens a text editor with the present value.
     pub(super) fn open_field(&mut self, typed: Option<char>) {
         let Some(field) = self.field() else { return };
         let words = field.property.words;

@@ -69,7 +69,7 @@ impl UpdateContext<'_> {
                 self.model.history.mark_saved(scene);
                 self.model.last_edit = None;
                 self.notify(Tone::Good, format!("saved {}", self.model.file.name), Some(3.0));
-                // The program does not quit if the scene was edited during the write.
+                // If the scene was edited while it was being saved, the program does not quit.
                 if std::mem::take(&mut self.model.quit_when_saved) && !self.model.is_unsaved() {
                     self.emit(Effect::Quit);
                 }
@@ -122,7 +122,8 @@ impl UpdateContext<'_> {
     pub(super) fn loaded(&mut self, result: Result<Arc<Scene>, SceneErrors>) {
         match result {
             Ok(scene) => {
-                // Indices may have changed, so the selection is restored by name.
+                // Indices of objects and lights may differ in the reloaded scene, so the selection
+                // is restored by name.
                 let title = self.model.selection.title(self.model.history.scene());
                 self.model.overlay = None;
                 self.end_mode();
@@ -174,7 +175,7 @@ impl UpdateContext<'_> {
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
             Ok(Exported { path, size: [width, height], spp, noise_codes, scp }) => {
-                // A finished export of this size is the one that was running.
+                // If the sizes agree, the export that has ended is the running one.
                 if self.model.export.is_some_and(|e| e.size.map(|n| n as usize) == [width, height])
                 {
                     self.model.export = None;

@@ -26,8 +26,8 @@ impl UpdateContext<'_> {
         self.model.mode = mode;
     }
 
-    /// Leaves one state: the first active one of overlay, text editor, mode, panel, full screen,
-    /// comparison.
+    /// Leaves the first of these states that is active: overlay, text editor, mode, focus on
+    /// another panel than the picture, full screen, comparison.
     pub(super) fn leave(&mut self) {
         if self.model.overlay.is_some() {
             self.close_overlay();

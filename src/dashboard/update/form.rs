@@ -31,8 +31,8 @@ impl UpdateContext<'_> {
             Some(Overlay::Pick(Pick { purpose, title, entries, cursor, scroll: 0 }));
     }
 
-    /// Opens the form for a new object or light of the kind `what`. The result of `edit` is the
-    /// scene that includes it. Shows a notice instead if `edit` is an error.
+    /// Opens the form for a new object or light of the kind `what`. `edit` is the edit that adds it
+    /// to the scene. If `edit` is an error, shows a notice instead.
     pub(super) fn open_form(&mut self, what: &str, edit: Result<Edit, EditError>) {
         match edit {
             Ok(Edit { scene, subject, label, .. }) => {
@@ -57,7 +57,7 @@ impl UpdateContext<'_> {
         let Some(Overlay::Form(form)) = self.model.overlay.take() else { return };
         let base = Arc::clone(self.model.history.scene());
         let mut scene = form.scene;
-        // Materials that were created for the form but that no object uses are not kept.
+        // Materials that were created while the form was open are removed if no object uses them.
         let unused: Vec<_> = scene
             .materials
             .keys()

@@ -82,8 +82,8 @@ impl UpdateContext<'_> {
         self.run(command);
     }
 
-    /// Runs a command if it is available. Otherwise reports the reason to the user: there is no
-    /// scene, or `zerkalo watch` neither edits nor renders.
+    /// Runs a command if it is available. Otherwise shows the reason why it is not: there is no
+    /// scene, or `zerkalo watch` cannot edit or render.
     pub(super) fn run(&mut self, command: &Command) {
         if self.model.watch.is_some() && !command.while_watching {
             self.refuse("Read-only: `zerkalo watch` edits and renders nothing · ? keys");

@@ -14,8 +14,9 @@ impl UpdateContext<'_> {
         self.say_lens();
     }
 
-    /// Focuses the camera on the probed pixel. Without a pixel probe, focuses on the middle of the
-    /// selection, or else on the middle of the picture.
+    /// Focuses the camera on the point at the pixel probe. Without a pixel probe, focuses on the
+    /// middle of the selection. If the selection has no middle either, focuses on the point at the
+    /// centre of the picture.
     pub(super) fn focus(&mut self) {
         let [width, height] = self.scene().film.size.map(|n| n as usize);
         let selection = bounds(self.scene(), &self.model.selection);

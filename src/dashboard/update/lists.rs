@@ -1,4 +1,4 @@
-//! Movement of the cursor, and opening of the entry under it, in outline, inspector, command
+//! Commands that move the cursor and open the entry under it, in outline, inspector, command
 //! palette, lists, help and questions.
 
 use crate::dashboard::editor::Editor;
@@ -185,8 +185,8 @@ impl UpdateContext<'_> {
         palette.scroll = 0;
     }
 
-    /// Moves the cursor of the open list to the next entry that starts with the letter `c`,
-    /// cyclically.
+    /// Moves the cursor of the open list to the next entry that starts with the letter `c`. The
+    /// search continues at the first entry after the last one.
     pub(super) fn jump_to(&mut self, c: char) {
         let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
         let begins = |i: &usize| {
@@ -199,8 +199,8 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Opens a question to the user with `answers`: letter, text and effect of each. `Esc` closes
-    /// the question without an answer.
+    /// Opens the question `text` to the user. `answers` holds the letter, text and effect of each
+    /// answer. `Esc` closes the question without an answer.
     pub(super) fn ask(&mut self, text: String, answers: &[(char, &'static str, Answer)]) {
         let question = Question { text, answers: answers.to_vec(), cursor: 0 };
         self.model.overlay = Some(Overlay::Question(question));

@@ -1,5 +1,5 @@
-//! Dashboard commands that change the roughness, reflection or lobe of a material. This is the
-//! material of the selection, otherwise a reflecting material of the scene, called the mirror.
+//! Dashboard commands that change the roughness, reflection or lobe of a material. They change the
+//! mirror: a reflecting material of the selection if there is one, otherwise one of the scene.
 
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::edit::{self, Edit, EditError, Target};
@@ -21,7 +21,7 @@ impl UpdateContext<'_> {
         self.commit_mirror(edit, Coalesce::Single);
     }
 
-    /// Makes the result of an edit of the mirror (the reflecting material) the current scene, and
+    /// Makes the result of an edit of the mirror (a reflecting material) the current scene, and
     /// reports the material's new values in a notice. `coalesce` decides if the edit joins the
     /// previous undo step.
     fn commit_mirror(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {

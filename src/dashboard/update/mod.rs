@@ -34,8 +34,8 @@ use std::mem::discriminant;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Longest time between two edits by repeated keys that form one undo step. It is longer than the
-/// delay after which a held key starts to repeat.
+/// Longest time between two edits with the same label that form one undo step, such as those of a
+/// held key. It is longer than the delay after which a held key starts to repeat.
 const REPEAT_WINDOW: Duration = Duration::from_millis(700);
 
 /// Updates the model with a message and returns the effects. `now` is the current time since any
@@ -53,8 +53,8 @@ struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
-    /// `true` if lists in panels scroll until their cursor is visible. `false` after a message that
-    /// must leave their scroll positions unchanged, such as scrolling by the user.
+    /// `true` if lists in panels scroll so far that their cursor is visible. `false` if the message
+    /// must not change their scroll positions, for example because the user has scrolled.
     follow: bool,
     /// Character of the key that ran the current command; `None` if the key types no character.
     typed: Option<char>,
@@ -85,7 +85,8 @@ enum StepSize {
 enum Coalesce {
     /// Rule: the edit is an undo step of its own.
     Single,
-    /// Rule: the edit is merged with an edit of the same label at most [`REPEAT_WINDOW`] before.
+    /// Rule: the edit is merged with the previous edit if this has the same label and is at most
+    /// [`REPEAT_WINDOW`] old.
     Repeat,
     /// Rule: the edit is merged with edits of the same label until the gesture (a drag or mode)
     /// ends.
@@ -170,7 +171,8 @@ impl UpdateContext<'_> {
         self.repaint();
     }
 
-    /// Requests snapshots with the current raster and the values at the pixel probe.
+    /// Requests snapshots at the present size of the picture in half cells (upper and lower halves
+    /// of terminal cells), with the values at the pixel probe.
     fn show_view(&mut self) {
         let (raster, probe) = (self.model.raster, self.model.probe);
         self.emit(Effect::View(View { raster, probe }));
@@ -251,7 +253,7 @@ impl UpdateContext<'_> {
         }
     }
 
-    /// Shows the notice `text` for at least `seconds`, and for longer if the text is long. If
+    /// Shows the notice `text` for `seconds`, or longer if reading the text takes longer. If
     /// `seconds` is `None`, shows it until the next key.
     fn notify(&mut self, tone: Tone, text: impl Into<String>, seconds: Option<f64>) {
         let text = sanitized(&text.into());
@@ -284,8 +286,8 @@ impl UpdateContext<'_> {
 
     /// Restores three invariants of the model after an update. The selection exists in the scene.
     /// Cursors are in range and visible. The renderer knows the present size of the picture in half
-    /// cells (upper and lower halves of terminal cells). Also requests an autosave if one is
-    /// needed.
+    /// cells (upper and lower halves of terminal cells). If there are new unsaved edits, also
+    /// requests an autosave.
     fn normalize(&mut self) {
         if !self.model.selection.exists(self.model.scene()) {
             let last = |len: usize, of: fn(usize) -> Target| len.checked_sub(1).map(of);
@@ -339,8 +341,8 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns the item `by` positions after the first one for which `is_current` is `true`; the last
-/// item is followed by the first. If there is no such item, counts from the first item.
+/// Returns the item `by` positions after the current item, cyclically. The current item is the
+/// first one for which `is_current` is `true`, or the first of all if there is none.
 fn cycled<T>(items: &[T], is_current: impl Fn(&T) -> bool, by: isize) -> &T {
     let position = items.iter().position(is_current).unwrap_or(0) as isize;
     &items[(position + by).rem_euclid(items.len() as isize) as usize]

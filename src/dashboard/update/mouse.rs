@@ -15,7 +15,8 @@ use ratatui::layout::Rect;
 /// Number of lines that a list scrolls per tick of the mouse wheel.
 pub(super) const WHEEL_LINES: i32 = 3;
 
-/// Returns `true` if the mouse is in `area`. It is not in an area that is `None` (a folded panel).
+/// Returns `true` if the mouse is in `area`. An area that is `None` belongs to a hidden panel, and
+/// never contains the mouse.
 pub(super) fn is_in(mouse: Mouse, area: impl Into<Option<Rect>>) -> bool {
     area.into().is_some_and(|area| area.contains((mouse.column, mouse.row).into()))
 }
@@ -74,7 +75,7 @@ impl UpdateContext<'_> {
     }
 
     fn press_in_outline(&mut self, rows: Rect, mouse: Mouse) {
-        // `rows` is the layout before the focus change, which may unfold the panel.
+        // `rows` is the area before the panel gets the focus, which may change the layout.
         let lines = outline(self.scene());
         let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
         let subject = line.and_then(OutlineLine::subject).cloned();
@@ -251,9 +252,9 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Returns the first object on the camera ray through a film pixel (column, row), as two values:
-/// the index of the object and the visible point. The ray goes through the centre of the lens and
-/// the centre of the pixel. Returns `None` if it hits no object.
+/// Returns the first object that the camera ray through a film pixel (column, row) hits, as two
+/// values: the index of the object, and the hit point. The ray goes through the centre of the lens
+/// and the centre of the pixel. Returns `None` if the ray hits no object.
 pub(super) fn first_hit(scene: &Scene, [x, y]: [usize; 2]) -> Option<(usize, DVec3)> {
     let camera = &scene.camera;
     let [width, height] = scene.film.size.map(f64::from);

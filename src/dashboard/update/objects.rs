@@ -8,10 +8,10 @@ use glam::{DVec2, DVec3};
 /// Angle in degrees of one step of turning the selection.
 const TURN_DEGREES: f64 = 15.0;
 const TURN_DEGREES_FINE: f64 = 1.0;
-/// Largest factor by which a drag multiplies the movement of the selection in depth. The ground
-/// plane is seen at an angle and therefore appears shortened. To stay under the mouse, the
-/// selection must move farther by the factor 1 / sin(angle between view direction and plane), which
-/// is unbounded at grazing angles.
+/// Largest factor by which a drag multiplies the movement of the selection in depth. The view
+/// direction meets the ground plane at an angle, so depth appears shortened by the sine of this
+/// angle. The selection stays under the mouse if its movement is divided by this sine. The quotient
+/// is unbounded at grazing angles and therefore limited.
 const MOST_STRETCH: f64 = 4.0;
 
 /// Returns the coordinate axis in the ground plane, positive or negative, whose direction is
@@ -22,12 +22,12 @@ fn nearest_axis(v: DVec3) -> DVec3 {
 
 impl UpdateContext<'_> {
     /// Returns two coordinate axes in the ground plane: the one that points most nearly to the
-    /// right in the picture, and the one that points most nearly away from the eye. Steps along
-    /// coordinate axes keep round coordinates round.
+    /// right in the picture, and the one that points most nearly away from the eye. Steps go along
+    /// coordinate axes so that round coordinates stay round.
     fn ground_axes(&self) -> [DVec3; 2] {
         let [right, _, _] = self.scene().camera.frame();
         let right = nearest_axis(right);
-        // View direction of an upright observer whose right-hand side is `right`.
+        // This is the view direction of an upright observer who has `right` on the right-hand side.
         [right, DVec3::Y.cross(right)]
     }
 
@@ -52,9 +52,9 @@ impl UpdateContext<'_> {
         self.commit(edit, self.gesture());
     }
 
-    /// Returns the rule by which the current edit joins an undo step. In a mode that moves or
-    /// turns, and during a drag, all edits of the gesture form one step. Otherwise an edit joins a
-    /// recent one.
+    /// Returns the rule by which the current edit joins an undo step. During a drag, and in a mode
+    /// that moves or turns the selection, all edits with the same label form one step. Otherwise an
+    /// edit joins one with the same label that was made shortly before.
     fn gesture(&self) -> Coalesce {
         let in_mode = matches!(self.model.mode, Mode::Move | Mode::Rotate);
         if in_mode || self.model.drag.is_some() { Coalesce::Gesture } else { Coalesce::Repeat }
@@ -88,7 +88,8 @@ impl UpdateContext<'_> {
 
     pub(super) fn turn_selection(&mut self, direction: Direction, step_size: StepSize) {
         let degrees = if step_size == StepSize::Fine { TURN_DEGREES_FINE } else { TURN_DEGREES };
-        // Positive angles are counter-clockwise from above, which moves the near side to the right.
+        // A positive angle turns counter-clockwise as seen from above. The side of the object that
+        // faces the viewer then moves to the right.
         self.turn_by(if direction == Direction::Right { degrees } else { -degrees });
     }
 

@@ -94,7 +94,7 @@ impl UpdateContext<'_> {
         };
         match (answered, &mut self.model.overlay) {
             (Err(problem), Some(Overlay::Prompt(prompt))) => prompt.editor.problem = Some(problem),
-            // The answer may have opened another overlay.
+            // The prompt is closed only if the answer has not replaced it by another overlay.
             (Ok(()), overlay @ Some(Overlay::Prompt(_))) => *overlay = None,
             _ => {}
         }
@@ -108,8 +108,8 @@ impl UpdateContext<'_> {
         if path.extension().is_none() {
             path.set_extension("toml");
         }
-        // The path of the scene's own file is an ordinary save, which checks for changes by other
-        // programs.
+        // If the user types the path of the scene's own file, this is an ordinary save, which
+        // checks for changes by other programs.
         let is_own_file = self.model.file.path.as_ref() == Some(&path);
         self.write((!is_own_file).then_some(path), false);
         Ok(())
@@ -153,7 +153,7 @@ impl UpdateContext<'_> {
     }
 }
 
-/// Formats stop criteria, such as `noise 0.5 time 60`; without criteria, `none`.
+/// Formats stop criteria, such as `noise 0.5 time 60`. If there are none, returns `none`.
 pub(super) fn stop_text(stop: &Stop) -> String {
     let targets = [
         ("noise", stop.noise_codes),
