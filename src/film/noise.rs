@@ -62,7 +62,8 @@ impl Mse {
     }
 }
 
-/// Estimated error of one tile. Its pixels alternate between white and black, like a checkerboard.
+/// Estimated error of one tile. Its pixels alternate between white and black, like the squares of a
+/// chessboard. Each colour gives an estimate of its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileNoise {
     /// Validation estimate, from the white pixels of the checkerboard. The noise of the picture is
@@ -104,8 +105,8 @@ impl Estimator {
         }
     }
 
-    /// Estimates the error of a tile. Returns `None` if the replicates A and B (halves of the
-    /// samples) have different numbers of samples, or if they have none.
+    /// Estimates the error of a tile. Returns `None` if the tile has no samples, or if its
+    /// replicates A and B (halves of the samples) have different numbers of samples.
     pub fn tile(&self, tile: &Tile) -> Option<TileNoise> {
         let [count, count_b] = tile.counts();
         if count == count_b { self.tile_so_far(tile) } else { None }
@@ -114,11 +115,11 @@ impl Estimator {
     /// Estimates the error of a tile, even if replicate B (the second half of the samples) has
     /// fewer samples than A. Returns `None` if A or B has no samples.
     ///
-    /// A has n samples and B has m, each of variance v. (A - B)^2 then has the mean v (n + m) / nm.
-    /// The picture (nA + mB) / (n + m) has the variance v / (n + m). Hence d = (A - B) sqrt(nm) /
-    /// (n + m) replaces the half difference. This is exact for independent samples. If the variance
-    /// of a mean falls faster than v / n, the estimate is too high, by at most a quarter if B has
-    /// at least half as many samples as A.
+    /// Let A have n samples and B have m, each of variance v. (A - B)^2 then has the mean v (n + m)
+    /// / nm. The picture (nA + mB) / (n + m) has the variance v / (n + m). The half difference is
+    /// therefore replaced by d = (A - B) sqrt(nm) / (n + m). This is exact for independent samples.
+    /// With stratified samples, the variance of a mean of n samples may fall faster than v / n. The
+    /// estimate is then too high, by at most a quarter if B has at least half as many samples as A.
     pub fn tile_so_far(&self, tile: &Tile) -> Option<TileNoise> {
         let counts = tile.counts();
         if counts.contains(&0) || tile.lattice_px() != 0 {
@@ -252,7 +253,8 @@ impl Noise {
         let (_, p95, _) = tile_errors.select_nth_unstable_by(rank, f64::total_cmp);
         let p95_codes = p95.sqrt();
         let worst = tile_errors.iter().copied().fold(0.0, f64::max);
-        // The sums contain means over the three channels, the squares contain sums over channels.
+        // `sum` adds up means over the three channels, but `squares` is computed from sums over
+        // them. The factor 3 converts the means to sums.
         let effective = |sum: f64, squares: f64| {
             let sum = 3.0 * sum;
             if squares > 0.0 { sum * sum / squares } else { 0.0 }

@@ -5,9 +5,9 @@ use crate::film::testing::{Rng, each_tile, fill, film, only, white};
 use crate::film::*;
 use crate::film::{Replicates, quantised_8};
 
-/// Pixel of known mean in a simulated picture. A sample is `dark + LIGHT` with probability
-/// `chance`, otherwise `dark`. If `normal` is `true`, sums of samples are normally distributed with
-/// the same mean instead.
+/// Pixel of known mean in a simulated picture. If `normal` is `false`, a sample is `dark + LIGHT`
+/// with probability `chance`, otherwise `dark`. If `normal` is `true`, sums of samples are normally
+/// distributed with the same mean.
 #[derive(Clone, Copy)]
 struct Pixel {
     chance: f64,
@@ -160,7 +160,8 @@ fn estimate_of_one_pixel_matches_the_formula() {
     let mix = LightWeights { weights: vec![[1.0; 3], [0.0, 0.0, 0.25]] };
     let display = Display { exposure_ev: 1.0, tone: Tone::Clip };
     let tile = Estimator::new(film.scales(), &mix, &display).tile(film.tile(0).unwrap()).unwrap();
-    // The half differences are those of red (0.125 and 0.25) and blue (0.25 + 0.25 and 0.25).
+    // A and B differ in red (0.125 and 0.25) and, summed over both groups, in blue (0.5 and 0.25).
+    // The error is half of each difference.
     let expected = (0.0625f64.powi(2) + 0.125f64.powi(2)) / 3.0;
     assert!((tile.reported.linear - expected).abs() < 1e-15, "{tile:?}");
     let code = |x: f64| display.codes([x; 3])[0];
@@ -171,7 +172,7 @@ fn estimate_of_one_pixel_matches_the_formula() {
     let expected = (apart(0.125, 0.25) + apart(0.5, 0.25)) / 3.0;
     assert!((tile.reported.codes / expected - 1.0).abs() < 1e-4, "{tile:?} {expected}");
     assert_eq!((tile.pixels, tile.allocation), (1, tile.reported));
-    // Far above white the displayed difference is 0.
+    // Far above white the displayed difference is 0, because A and B are both clipped.
     let bright = Display { exposure_ev: 9.0, tone: Tone::Clip };
     let noise = film.noise(&only(0, 2), &bright).unwrap();
     assert_eq!((noise.rmse_codes, quantised_8(bright.codes([0.125; 3])[0])), (0.0, 255));
@@ -229,7 +230,7 @@ fn unequal_counts_have_no_noise() {
 }
 
 /// Checks the noise estimate of tiles whose replicate B (second half of the samples) has fewer
-/// samples than A. The mean estimate of 200 random tiles must equal their mean square error.
+/// samples than A. Over 200 random tiles, the estimated and the true RMSE must agree within 2 %.
 #[test]
 fn replicate_with_fewer_samples_still_has_an_estimate() {
     let display = Display { exposure_ev: -2.0, tone: Tone::Clip };
@@ -274,8 +275,9 @@ fn noise_combines_the_tiles() {
     assert!((noise.rmse_linear - 0.1).abs() < 1e-14);
     assert!((noise.rmse_codes - 143.5f64.sqrt()).abs() < 1e-12);
     assert_eq!((noise.p95_codes, noise.worst_codes), (19.0, 20.0));
-    // If the numbers of samples differ, the larger of the estimates from half of the pixels and
-    // from all pixels is reported; otherwise the second one.
+    // If the tiles have different numbers of samples, the larger of two estimates is reported: that
+    // from the white half of the pixels, and that from all pixels. If the numbers are equal, the
+    // estimate from all pixels is reported.
     let rmse = |reported: f64, allocation: f64, samples: [u32; 2]| {
         let mse = |x: f64| Mse { linear: x, codes: x };
         let tile = |samples| {

@@ -60,7 +60,7 @@ impl ImageOutput {
         }
     }
 
-    /// Changes this output so that it never replaces an existing file, and returns it. Writing then
+    /// Returns this output with the rule that it never replaces an existing file. Writing then
     /// fails if the file exists when the write begins, or when the last row is complete.
     pub fn create_new(self) -> Self {
         Self { existing: Existing::Refuse, ..self }
@@ -81,11 +81,12 @@ impl ImageOutput {
         Replacement::begin(&self.path, self.existing).map(drop)
     }
 
-    /// Writes the picture to a temporary file in the same directory, row by row. Renames the file
-    /// when it is complete and stored on the disk.
+    /// Writes the picture to a temporary file in the same directory, row by row. Renames this file
+    /// to the path of the picture when it is complete and stored on the disk.
     ///
     /// # Errors
-    /// Fails if the file cannot be written or `bands` fail; an existing file is then unchanged.
+    /// Fails if the file cannot be written, or if `bands` cannot supply a row. An existing file is
+    /// then unchanged.
     pub fn write(&self, picture: &ImageData, bands: &mut dyn Bands) -> Result<(), WriteError> {
         replace_file(&self.path, self.existing, |file| {
             let mut out = BufWriter::with_capacity(1 << 16, file);

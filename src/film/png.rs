@@ -53,7 +53,7 @@ fn encode_to(
 /// Returns all bytes of a PNG file before its image data.
 fn preamble(picture: &ImageData, metadata: &[(String, String)]) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
-    // The writer adds the last chunk when it is dropped.
+    // The writer adds the last chunk of a PNG file when it is dropped. This chunk is cut off.
     drop(start(picture, metadata, &mut bytes)?);
     bytes.truncate(bytes.len() - END_CHUNK_BYTES);
     Ok(bytes)
@@ -73,8 +73,8 @@ fn start<W: Write>(
         Depth::Sixteen => BitDepth::Sixteen,
     });
     encoder.set_compression(Compression::Fast);
-    // Gamma and chromaticities that the PNG specification gives for sRGB, for readers that ignore
-    // the sRGB chunk.
+    // Some readers ignore the sRGB chunk. For them the file also contains the gamma and the
+    // chromaticities that the PNG specification gives for sRGB.
     encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
     encoder.set_source_gamma(ScaledFloat::from_scaled(45_455));
     let xy = |x, y| (ScaledFloat::from_scaled(x), ScaledFloat::from_scaled(y));
@@ -85,7 +85,8 @@ fn start<W: Write>(
         blue: xy(15_000, 6_000),
     });
     for (key, value) in metadata {
-        // More programs read the older text chunk, but it can hold only Latin-1.
+        // Text chunks (tEXt) can hold only Latin-1, but more programs read them than the newer iTXt
+        // chunks. They are therefore used for ASCII values.
         if value.is_ascii() {
             encoder.add_text_chunk(key.clone(), padded(value))?;
         } else {

@@ -35,7 +35,7 @@ pub fn read_png(path: &Path) -> Result<([usize; 2], Vec<[u8; 3]>), String> {
         ColorType::GrayscaleAlpha => {
             codes.as_chunks::<2>().0.iter().map(|[y, _]| [*y; 3]).collect()
         }
-        // The decoder has expanded palettes already.
+        // Indexed colours do not occur here, because the decoder expands palettes.
         ColorType::Grayscale | ColorType::Indexed => codes.iter().map(|y| [*y; 3]).collect(),
     };
     Ok(([width as usize, height as usize], pixels))
@@ -54,7 +54,8 @@ mod tests {
         std::fs::write(&path, png_of_rgb([5, 3], &codes).unwrap()).unwrap();
         let (size, pixels) = read_png(&path).unwrap();
         assert_eq!((size, pixels.as_flattened()), ([5, 3], &codes[..]));
-        // A truncated file gives an error or the complete picture.
+        // A truncated file gives an error, or the complete picture if fewer than 16 bytes are
+        // missing.
         let whole = std::fs::read(&path).unwrap();
         for length in 0..whole.len() {
             std::fs::write(&path, &whole[..length]).unwrap();

@@ -1,4 +1,4 @@
-//! Lookup table of the sRGB encoding, which is many times faster than the power function.
+//! Lookup table for the sRGB encoding. It is many times faster than the power function.
 
 use crate::value::srgb_from_linear;
 use std::sync::LazyLock;
@@ -10,8 +10,8 @@ const SEGMENTS_LOG2: u32 = 7;
 /// because the sRGB encoding is linear up to 0.0031308.
 const FIRST_OCTAVE: i32 = -9;
 const SHIFT: u32 = 52 - SEGMENTS_LOG2;
-/// Number that is subtracted from the upper bits of a double to get its index in the sRGB table.
-/// Entry 0 is the linear part of the encoding; entry 1 begins at 2^FIRST_OCTAVE.
+/// Number that is subtracted from the upper bits of a double to get the index of the double in the
+/// sRGB table. Entry 0 is the linear part of the encoding; entry 1 begins at 2^FIRST_OCTAVE.
 const BASE: u64 = (((1023 + FIRST_OCTAVE) as u64) << SEGMENTS_LOG2) - 1;
 const ENTRIES: usize = ((-FIRST_OCTAVE as usize) << SEGMENTS_LOG2) + 2;
 
@@ -21,8 +21,8 @@ const MAX_ERROR_CODES: f64 = 5.5e-4;
 /// Piecewise linear approximation of the sRGB encoding, exact at 128 points per octave of linear
 /// light.
 pub(super) struct SrgbTable {
-    /// Linear pieces of the sRGB encoding in 8-bit levels: the value of each line at 0, and its
-    /// slope.
+    /// Line segments that approximate the sRGB encoding in 8-bit levels. The two numbers are the
+    /// value of the extended line at 0 and its slope.
     chords: [[f64; 2]; ENTRIES],
 }
 
@@ -98,7 +98,7 @@ mod tests {
             let linear = f64::from(i) * 5e-6;
             assert_eq!(SrgbTable::shared().code_8(linear), exact(linear), "{linear}");
         }
-        // All values close to a border between two 8-bit values.
+        // Values close to each border between two 8-bit values, within a relative distance of 2e-5.
         for border in (0..255).map(|code| (f64::from(code) + 0.5) / 255.0) {
             let linear = linear_from_srgb(border);
             for step in -2000..=2000 {

@@ -1,5 +1,5 @@
 //! Film: storage of samples as tiles of integer sums. After a restart, each tile is cleared when it
-//! is next written. The sum of two films is exact, because their sums are integers.
+//! is next written. Two films are added without rounding, because their sums are integers.
 
 use crate::film::TILE;
 use crate::film::display::Display;
@@ -10,7 +10,8 @@ use crate::film::tile::{MAX_FILM_GROUPS, Tile};
 use std::collections::TryReserveError;
 use std::fmt;
 
-/// Smallest size in bytes of a film whose memory is allocated as a whole, before the first sample.
+/// Smallest size in bytes of a film whose tiles are all allocated before the first sample. The
+/// tiles of a smaller film are allocated when they are first written.
 const RESERVED_FROM: u64 = 64 << 20;
 
 /// Properties of a film: size, scales, random seed, precision. Two films can be added only if these
@@ -76,8 +77,9 @@ pub enum Mismatch {
     /// The headers of the two films differ. The fields are the name of the property, its value in
     /// the first film, and its value in the second film.
     Header(&'static str, String, String),
-    /// In the tile with this number, each of the films has the first sample of only some pixels. A
-    /// film cannot hold their sum, whose pixels would have different numbers of samples.
+    /// In the tile with this number, each of the films has the first sample of only some pixels.
+    /// The films cannot be added, because the pixels of the sum would have different numbers of
+    /// samples.
     Overlap(usize),
 }
 
@@ -110,8 +112,8 @@ impl Film {
         Self::try_new(header).expect("memory for the tiles of a film")
     }
 
-    /// Creates a film without samples as [`Film::new`] does. A large film gets all its memory here,
-    /// so that no later write can fail.
+    /// Creates a film without samples as [`Film::new`] does. A large film gets all its memory here;
+    /// later writes then need no further memory.
     ///
     /// # Errors
     /// Fails if the memory cannot be allocated.
@@ -165,7 +167,8 @@ impl Film {
         Ok(Self { epoch: 1, tiles, header, first_row: 0 })
     }
 
-    /// Creates a film without samples with the properties `header` in the memory of this film.
+    /// Replaces this film by a film without samples that has the properties `header`. The new film
+    /// uses the memory of this film.
     ///
     /// # Errors
     /// Fails if the memory cannot be allocated.
@@ -179,7 +182,7 @@ impl Film {
             return Ok(self);
         }
         let mut film = Self::without_memory(header)?;
-        // Larger than every epoch of the old tiles.
+        // The epoch is larger than that of every old tile, as after a restart.
         film.epoch = self.epoch + 1;
         for (tile, old) in film.tiles.iter_mut().zip(self.tiles) {
             tile.take_memory(old);
@@ -229,8 +232,8 @@ impl Film {
         &self.header
     }
 
-    /// Returns the film's epoch, the number of its restarts. A tile has the same contents as before
-    /// if neither the epoch nor the sample counts of the tile have changed.
+    /// Returns the film's epoch, a counter of its restarts. The contents of a tile are unchanged as
+    /// long as the epoch, the sample counts of the tile and its [`Tile::lattice_px`] are unchanged.
     pub(super) fn epoch(&self) -> u64 {
         self.epoch
     }
@@ -273,8 +276,8 @@ impl Film {
         self.tile(index).map_or([0; 2], Tile::counts)
     }
 
-    /// Iterates over the tiles for which [`Film::tile`] is not `None`. Returns the number of each
-    /// tile and the tile.
+    /// Iterates over the tiles that have been prepared for writing since the last restart, as pairs
+    /// of the tile's number and the tile.
     pub fn touched(&self) -> impl Iterator<Item = (usize, &Tile)> {
         self.tiles.iter().enumerate().filter(|(_, tile)| tile.is_of(self.epoch))
     }
@@ -360,8 +363,8 @@ impl Film {
         }
     }
 
-    /// Returns the estimated error of the picture. Returns `None` if a tile has no samples, or
-    /// unequal numbers of them in the two replicates (halves of the samples).
+    /// Returns the estimated error of the picture. Returns `None` if a tile has no samples, or if
+    /// its two replicates (halves of the samples) have different numbers of samples.
     pub fn noise(&self, weights: &LightWeights, display: &Display) -> Option<Noise> {
         let estimator = Estimator::new(self.scales(), weights, display);
         let noise_of_tile = |index| self.tile(index).and_then(|tile| estimator.tile(tile));
@@ -388,8 +391,8 @@ impl Film {
         self.touched().map(|(_, tile)| tile.saturated_pixels()).sum()
     }
 
-    /// Adds the samples of another film. Films of disjoint sample ranges, added in any order, give
-    /// the same sums as one film of all ranges.
+    /// Adds the samples of another film. If several films hold disjoint ranges of samples, adding
+    /// them in any order gives the same sums as one film with all of the ranges.
     ///
     /// # Errors
     /// Fails if the headers differ, or if there is a tile in which each film has the first sample

@@ -28,8 +28,8 @@ static ZERO_SUMS: [i64; 3 * MAX_FILM_GROUPS] = [0; 3 * MAX_FILM_GROUPS];
 /// and B.
 #[derive(Debug)]
 pub struct Tile {
-    /// Epoch of the tile: number of the film's restarts when its contents were written; 0 for a new
-    /// tile.
+    /// Epoch of the tile's contents: the film's epoch (a counter of its restarts) when they were
+    /// written; 0 for a new tile.
     epoch: u64,
     /// Number of integer sums of a pixel: `groups * 3` for red, green and blue.
     stride: usize,
@@ -64,8 +64,8 @@ impl Tile {
         }
     }
 
-    /// Takes the memory of the integer sums of `old`, a tile of another film. This tile must not
-    /// have been written.
+    /// Takes the memory of the integer sums of `old`, a tile of another film. Nothing may have been
+    /// written to this tile before.
     pub(super) fn take_memory(&mut self, old: Self) {
         self.sums = old.sums;
     }
@@ -96,7 +96,7 @@ impl Tile {
         if sums.capacity() >= len {
             sums.resize(len, 0);
         } else {
-            // The memory is allocated anew, because growth would copy old contents.
+            // New memory is allocated, because growing the vector would copy its old contents.
             sums = vec![0; len];
         }
         *self = Self { epoch, sums, ..Self::cleared(self.stride / 3, self.extent) };
@@ -168,8 +168,8 @@ impl Tile {
     }
 
     /// Returns the integer sums of one pixel in one replicate (half of the samples; 0: A, 1: B) for
-    /// writing, `[group][channel]`. Callers must ensure that no sum overflows; [`Tile::add`] works
-    /// for all values.
+    /// writing, `[group][channel]`. Callers must ensure that no sum overflows; [`Tile::add`]
+    /// handles overflow itself.
     #[inline(always)]
     pub fn pixel_mut(&mut self, replicate: usize, pixel: usize) -> &mut [i64] {
         let start = (replicate * TILE_PIXELS + pixel) * self.stride;
@@ -177,7 +177,7 @@ impl Tile {
         let (word, bit) = (&mut self.written[replicate][pixel / 64], 1 << (pixel % 64));
         if *word & bit == 0 {
             *word |= bit;
-            // One group needs only three stores; a call would take longer.
+            // With one light group, three stores are faster than a call of `fill`.
             match &mut *sums {
                 [r, g, b] => (*r, *g, *b) = (0, 0, 0),
                 several => several.fill(0),
@@ -313,7 +313,8 @@ fn saturated_sum(sum: i64) -> i64 {
 
 #[inline(always)]
 fn on_lattice(pixel: usize, step_px: usize) -> bool {
-    // Steps are powers of two, so that x and y of lattice pixels have no bits below the step.
+    // The step is a power of two. A coordinate is a multiple of the step if it has no bits below
+    // the bit of the step.
     ((pixel % TILE) | (pixel / TILE)) & (step_px - 1) == 0
 }
 
@@ -396,7 +397,8 @@ mod tests {
         tile.clear_if_stale(2);
         assert_eq!((tile.pixel(0, 0)[0], tile.counts()), (0, [0, 0]));
         assert_eq!(tile.saturated_samples(), 0);
-        // The write is the first access, in memory with the same and with another number of groups.
+        // The first access to the cleared tile is a write. Below, tiles with 1 and 3 groups reuse
+        // memory of a tile with another number of groups.
         tile.add(0, 0, &[2; 6]);
         assert_eq!((tile.pixel(0, 0), tile.pixel(1, 0)), (&[2; 6][..], &[0; 6][..]));
         for groups in [1, 3] {

@@ -3,10 +3,13 @@
 //! A kernel (intersection, shading, sampling) is written once, generic over the trait
 //! [`SimdFloat`]: a vector of `WIDTH` floats. The trait has these instances:
 //!
-//! | type | precision | width | use | |---|---|---|---| | `wide::f32x8` | single | 8 | production,
-//! speed | | `wide::f64x4` | double | 4 | production, accuracy | | `wide::f32x16`, `wide::f64x8` |
-//! both | 16, 8 | production when built for AVX-512 | | `f32`, `f64` | both | 1 | tests, benches,
-//! and primitives without packet kernels |
+//! | type | precision | width | use |
+//! |---|---|---|---|
+//! | `wide::f32x8` | single | 8 | production, speed |
+//! | `wide::f64x4` | double | 4 | production, accuracy |
+//! | `wide::f32x16` | single | 16 | production when built for AVX-512 |
+//! | `wide::f64x8` | double | 8 | production when built for AVX-512 |
+//! | `f32`, `f64` | both | 1 | tests, benches, and primitives without packet kernels |
 //!
 //! All operations that [`SimdFloat`] declares up to `sqrt` are IEEE operations. Therefore all
 //! instances of one precision return identical bits. [`SimdFloat::mul_add`] is fused on all
@@ -93,8 +96,8 @@ macro_rules! float {
 float!(f32);
 float!(f64);
 
-/// Implements methods of [`SimdFloat`] for the type `$type` by calling its own methods of the same
-/// names.
+/// Implements methods of [`SimdFloat`] for the type `$type` by calling the inherent methods of this
+/// type with the same names.
 macro_rules! by_own_methods {
     ($type:ident: $($name:ident($($argument:ident),*) -> $result:ty),+ $(,)?) => {$(
         #[inline(always)]
@@ -222,11 +225,11 @@ pub trait SimdFloat:
 
     /// Computes `self * a + b`, rounded once if the target has fused multiply-add, else twice.
     fn mul_add(self, a: Self, b: Self) -> Self;
-    /// Lane-wise minimum. Lanes where `self` is NaN become `other`. Lanes where `other` is NaN are
-    /// unspecified, but never panic.
+    /// Lane-wise minimum. Lanes where `self` is NaN become `other`. Lanes where `other` is NaN have
+    /// an unspecified value.
     fn min(self, other: Self) -> Self;
-    /// Lane-wise maximum. Lanes where `self` is NaN become `other`. Lanes where `other` is NaN are
-    /// unspecified, but never panic.
+    /// Lane-wise maximum. Lanes where `self` is NaN become `other`. Lanes where `other` is NaN have
+    /// an unspecified value.
     fn max(self, other: Self) -> Self;
     /// Returns the minimum and the maximum over all lanes. NaN lanes are ignored. If all lanes are
     /// NaN, the results are [`SimdFloat::MAX`] and its negative.
@@ -306,9 +309,9 @@ pub fn next_distinct<L: SimdFloat>(ids: L, mask: L::Mask) -> Option<(u32, L::Mas
     Some((id, mask & ids.id_eq(id)))
 }
 
-/// Constant 1.5 x 2^52, by whose addition a double `x` is rounded to the nearest integer. For |x|
-/// below 2^51 the sum has no fraction bits. The integer is the difference between the bits of the
-/// sum and the bits of the constant.
+/// Constant 1.5 x 2^52. Adding it to a double `x` with |x| below 2^51 rounds `x` to the nearest
+/// integer, because the sum has no fraction bits. This integer is the difference between the bits
+/// of the sum and the bits of the constant.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// Rounds `x` to the nearest integer, ties to even. `|x|` is below 2^51.

@@ -114,8 +114,8 @@ fn gather16(table: &[f32], indices: &[u32; MAX_WIDTH]) -> f32x16 {
     f32x16::new(cast(lanes))
 }
 
-/// Returns the four element-wise sums of the two halves of `sums` if it has eight elements. Returns
-/// `sums` itself if it has four.
+/// Adds the two halves of `sums` element by element if it has eight elements. Returns `sums` itself
+/// if it has four.
 #[inline(always)]
 fn fold_to_four(sums: &[i64]) -> i64x4 {
     sums.chunks_exact(4)
@@ -180,7 +180,8 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn min_max(self) -> ($scalar, $scalar) {
-                // The two halves are combined first, then the remaining lanes one by one.
+                // The two halves of the vector are compared lane by lane. Then the lanes of the
+                // result are compared one by one.
                 let max = $vector::splat($scalar::MAX);
                 let [a, b]: [$half; 2] = cast(SimdFloat::min(self, max));
                 let [c, d]: [$half; 2] = cast(SimdFloat::max(self, -max));
@@ -242,8 +243,9 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed_sum(self, scale: f64) -> i64 {
-                // The rounded integer is the difference between the bits of `x + ROUNDER` and those
-                // of `ROUNDER`.
+                // Each rounded integer is the difference between the bits of `x + ROUNDER` and
+                // those of `ROUNDER`. The sum of all lanes is taken first; the bits of `ROUNDER`
+                // are then subtracted once for each lane.
                 let (scale, rounder) = ($double::splat(scale), $double::splat(ROUNDER));
                 let mut sum = $long::splat(0);
                 for part in self.as_array().chunks_exact(<$double as SimdFloat>::WIDTH) {
@@ -256,8 +258,8 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn fixed(self, scale: f64) -> [i64; MAX_WIDTH] {
-                // Lanes are converted in groups. For single numbers the compiler emits scattered
-                // stores.
+                // Lanes are converted in groups that fill a vector of doubles. If they were
+                // converted one by one, the compiler would emit scattered stores.
                 let (scale, rounder) = ($double::splat(scale), $double::splat(ROUNDER));
                 let mut each = [0; MAX_WIDTH];
                 let parts = self.as_array().chunks_exact(<$double as SimdFloat>::WIDTH);

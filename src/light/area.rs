@@ -49,8 +49,8 @@ pub(super) fn up() -> [f64; 3] {
 }
 
 /// Returns the unit vectors of a rectangle's frame: across, up and along `normal`. `up` is made
-/// perpendicular to the normal; if they are parallel within 1e-6, the z axis replaces it, or the x
-/// axis for a normal along z. Returns `None` if `normal` is zero.
+/// perpendicular to the normal. If both are parallel (the sine of their angle is at most 1e-6), the
+/// z axis replaces `up`; for a normal along z, the x axis does. Returns `None` if `normal` is zero.
 fn frame(normal: [f64; 3], up: [f64; 3]) -> Option<[DVec3; 3]> {
     let front = unit(normal)?;
     let across = |up: DVec3| Some(up.cross(front)).filter(|across| across.length() > 1e-6);
@@ -98,8 +98,8 @@ impl EmitterSurface {
         }
     }
 
-    /// Returns the smallest extent of the surface \[scene units\]: the shorter side of a rectangle;
-    /// the radius of a sphere or disk.
+    /// Returns a measure of the smallest dimension of the surface \[scene units\]: the shorter side
+    /// of a rectangle, or the radius of a sphere or disk.
     pub fn thickness(&self) -> f64 {
         match self {
             Self::Rectangle(rectangle) => rectangle.size[0].min(rectangle.size[1]),

@@ -56,7 +56,8 @@ impl<S: Float> SpotCone<S> {
         let one_minus_cos = |degrees: f64| 2.0 * (0.5 * degrees).to_radians().sin().powi(2);
         let (inner, mut outer) = (one_minus_cos(spot.inner_angle), one_minus_cos(spot.outer_angle));
         if spot.inner_angle == 180.0 {
-            // All directions, also those whose s is rounded to more than 2.
+            // The cone contains all directions. Rounding may give s a value above 2, its exact
+            // maximum, so the limit is larger.
             outer = 3.0;
         }
         let scale = (outer - inner).max(0.0).recip().min(SHARP);
@@ -80,7 +81,7 @@ impl<S: Float> SpotCone<S> {
 /// Light that arrives at surface points from a light of unit strength, one point per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSample<L> {
-    /// Unit vector towards the light.
+    /// Unit vector from the surface point towards the light.
     pub wi: Vec3<L>,
     /// Distance from the surface point to the light; the largest finite number for a directional
     /// light.
@@ -149,8 +150,9 @@ impl<S: Float> DeltaLight<S> {
     }
 
     /// Returns the irradiance that the light, with unit strength, causes at normal incidence at the
-    /// scene's centre. If the light is nearer to the centre than `radius`, returns the irradiance
-    /// at the distance `radius` from the light.
+    /// scene's centre. If the irradiance falls with the square of the distance and the light is
+    /// nearer to the centre than `radius`, returns the irradiance at the distance `radius` from the
+    /// light.
     pub fn typical_irradiance(&self, radius: f64) -> f64 {
         match self.position().filter(|_| self.is_inverse_square()) {
             Some(position) => {
@@ -176,9 +178,9 @@ mod tests {
     /// Checks that the irradiance around a spot light follows the smoothstep of the cosine of the
     /// angle to its axis. `L` is the number type and `epsilon` its rounding error.
     ///
-    /// The tolerance follows from the error of the direction to the light, which is about ten times
-    /// `epsilon`: coordinates are below 8, distances at least 0.5. The smoothstep multiplies this
-    /// error by its slope, which is at most 1.5 times that of t (see [`SpotCone`]).
+    /// The tolerance follows from the error of the direction to the light. This error is about ten
+    /// times `epsilon`, because coordinates are below 8 and distances at least 0.5. The smoothstep
+    /// multiplies the error by its slope, which is at most 1.5 times that of t (see [`SpotCone`]).
     fn check<L: SimdFloat>(epsilon: f64) {
         let origin = DVec3::new(0.25, 0.0, 0.5);
         for (inner, outer) in [(10.0, 30.0), (0.0, 90.0), (0.0, 0.5), (70.0, 160.0), (180.0, 180.0)]
@@ -195,7 +197,7 @@ mod tests {
                     let along = axis * angle.cos() + across * angle.sin();
                     let point = DVec3::from(position) + along * distance - origin;
                     let sample = compiled.sample_li(Vec3::<L>::of(point.to_array()));
-                    // 1 - cos without cancellation.
+                    // Form of 1 - cos(a) without cancellation at small angles.
                     let drop = |a: f64| 2.0 * (0.5 * a).sin().powi(2);
                     let [low, high] = [outer, inner].map(|a: f64| drop(a.to_radians()));
                     let t = ((low - drop(angle)) / (low - high)).clamp(0.0, 1.0);

@@ -8,9 +8,9 @@ use crate::sampling::warp;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
-/// Smallest solid angle at which a rectangle or triangle is sampled by solid angle; smaller ones
-/// are sampled by area. The unit is 1 sr times the rounding error of the number type. At this solid
-/// angle, rounding moves the sampled points by 1e-5 of the surface's size.
+/// Smallest solid angle at which a rectangle or triangle is sampled by solid angle, in sr divided
+/// by the rounding error (epsilon) of the number type. Smaller surfaces are sampled by area. At
+/// this solid angle, rounding moves the sampled points by 1e-5 of the surface's size.
 pub(super) const MIN_SOLID_ANGLE: f64 = 2e5;
 
 /// Surface of a compiled light with a size.
@@ -63,9 +63,9 @@ impl<S: Float> Emitter<S> {
     /// Compiles `light`. Positions become relative to `origin`, the scene's centre. Returns `None`
     /// if the light has no size or no direction.
     ///
-    /// The surface is lifted by `lift`, at most 1e-4 of its size, so that rounding does not hide an
-    /// emitter that touches an object: a flat emitter moves to the side that emits light, a sphere
-    /// grows and keeps its power.
+    /// Rounding could hide an emitter that touches an object. The surface is therefore lifted by
+    /// `lift`, at most 1e-4 of its size: a flat emitter moves to the side that emits light, a
+    /// sphere grows and keeps its power.
     pub fn new(light: &Light, origin: DVec3, lift: f64) -> Option<Self> {
         let surface = light.surface()?;
         let frame = surface.frame()?;
@@ -135,7 +135,8 @@ impl<S: Float> Emitter<S> {
                 let across = to_center - direction * along;
                 let root2 = radius2 - across.length_squared();
                 let root = root2.max(L::zero()).sqrt();
-                // Power of the origin: positive outside of the sphere.
+                // Power of the ray's origin with respect to the sphere: squared distance to the
+                // centre minus squared radius. It is positive outside of the sphere.
                 let power = to_center.length_squared() - radius2;
                 let outside = power.gt(L::zero());
                 let t = L::select(outside, power / (along + root), along + root);
@@ -160,8 +161,9 @@ impl<S: Float> Emitter<S> {
     }
 
     /// Samples a point of the emitter for each of the surface points `origin`. `u` and `v` are
-    /// uniform in [0, 1). A sphere is sampled by the cone that it subtends, a rectangle by solid
-    /// angle unless this is tiny, a disk by area.
+    /// uniform in [0, 1). A sphere is sampled uniformly in the cone of directions that it subtends.
+    /// A rectangle is sampled by solid angle, or by area if its solid angle is tiny. A disk is
+    /// sampled by area.
     #[inline(always)]
     pub fn sample<L: SimdFloat<Scalar = S>>(
         &self,
@@ -275,8 +277,8 @@ fn plane_hit<L: SimdFloat>(
 
 /// Returns the density \[1/sr\] of directions to uniform points of a flat surface at `distance`:
 /// distance^2 / (area cos(angle to the normal)). `height` is the coordinate of the surface along
-/// its normal, relative to the receiver. It is negative for receivers in front of the surface; for
-/// all others the density is zero.
+/// its normal, relative to the receiver. It is negative if the receiver is in front of the surface.
+/// Otherwise the density is zero.
 #[inline(always)]
 pub(super) fn density_of_area<L: SimdFloat>(area: L, distance: L, height: L) -> L {
     let density = distance * distance * distance / (area * -height);
@@ -300,7 +302,7 @@ impl<L: SimdFloat> Cone<L> {
         let distance2 = to_center.length_squared();
         let sin2 = radius * radius / distance2;
         let inside = sin2.ge(L::one()) | !distance2.gt(L::zero());
-        // 1 - cos without cancellation.
+        // Form of 1 - cos without cancellation at small angles.
         let drop = sin2 / ((L::one() - sin2).max(L::zero()).sqrt() + L::one());
         let z = Vec3::of([0.0, 0.0, 1.0]);
         Self {
@@ -360,8 +362,9 @@ impl<L: SimdFloat> SphericalRectangle<L> {
         }
         let one = L::one();
         let h2 = self.height * self.height;
-        // Components along the normal of the unit normals of the planes through the point and a
-        // side; those of the lower and the upper side are b0 and b1.
+        // Each side of the rectangle spans a plane with the receiver point. These are the
+        // components of the planes' unit normals along the rectangle's normal: `b0` and `b1` for
+        // the lower and the upper side, `left` for the left side.
         let b0 = -y0 / (h2 + y0 * y0).sqrt();
         let b1 = y1 / (h2 + y1 * y1).sqrt();
         let left = -x0 / (h2 + x0 * x0).sqrt();
@@ -370,7 +373,7 @@ impl<L: SimdFloat> SphericalRectangle<L> {
         let (sin, cos) = u.mul_add(self.solid_angle, k).sin_cos();
         let f = (cos * b0 - b1) / sin;
         let c2 = one / (f * f + b0 * b0);
-        // Smallest 1 - cos^2 that is not a rounding error.
+        // Lower bound of the divisors 1 - c2 and 1 - s^2. It prevents a division by zero.
         let tiny = L::from_f64(L::EPSILON * L::EPSILON);
         let x = (c2 * h2 / (one - c2).max(tiny)).sqrt().copysign(f).max(x0).min(x1);
         let d2 = x * x + h2;
@@ -390,10 +393,10 @@ impl<L: SimdFloat> SphericalRectangle<L> {
     }
 }
 
-/// Returns the solid angle of a rectangle: the sum of the solid angles of two triangles, each by an
-/// arc tangent without cancellation at small angles (Van Oosterom and Strackee 1983). `[x0, x1]`
-/// and `[y0, y1]` are the intervals of the rectangle's coordinates relative to the receiver point,
-/// and `z` is the coordinate of its plane.
+/// Returns the solid angle of a rectangle as the sum of the solid angles of two triangles. The
+/// formula of Van Oosterom and Strackee (1983) for a triangle is an arc tangent, which has no
+/// cancellation at small angles. `[x0, x1]` and `[y0, y1]` are the intervals of the rectangle's
+/// coordinates relative to the receiver point, and `z` is the coordinate of its plane.
 #[inline(always)]
 fn solid_angle<L: SimdFloat>([x0, x1]: [L; 2], [y0, y1]: [L; 2], z: L, area: L) -> L {
     let corner = |x: L, y: L| {

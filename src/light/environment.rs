@@ -47,8 +47,8 @@ impl Environment {
         self.file().and(self.map.content())
     }
 
-    /// Calls `load` with the name of the image and stores the result. Does nothing if an image or
-    /// an error is stored already.
+    /// Calls `load` with the name of the image and stores the result. Does nothing for a gradient,
+    /// or if an image or an error is stored already.
     pub fn resolve(&mut self, load: impl FnOnce(&str) -> Result<Arc<RadianceMap>, AssetError>) {
         if !self.file.is_empty() {
             self.map.resolve(|| load(&self.file));
@@ -206,7 +206,8 @@ mod tests {
             let across = f64::sqrt(1.0 - height * height);
             let found = radiance(&light, [0.6 * across, height, -0.8 * across]);
             for c in 0..3 {
-                // Half a row, where the slope changes.
+                // The image is least exact at the horizon, where the slope of the gradient changes.
+                // The tolerance is the largest change over two rows of the image.
                 let difference = (found[c] - expected[c]).abs();
                 assert!(difference < 4.0 * PI / f64::from(GRADIENT_ROWS), "{height}: {found:?}");
             }
