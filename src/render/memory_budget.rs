@@ -164,7 +164,7 @@ mod tests {
              available (the limit of the control group). Expected a smaller picture, such as size = \
              [5888, 1408], or `zerkalo render --memory SIZE`, which renders it in regions"
         );
-        // The suggestion fits.
+        // The size that the error message suggests fits.
         assert_eq!(compare([5888, 1408], 2, available(1_000_000_000)), Ok(()));
         assert!(compare([65536, 65536], 16, available(0)).unwrap_err().contains("[1, 1]"));
     }

@@ -67,8 +67,8 @@ impl RenderState {
         }
     }
 
-    /// Replaces the film by an empty film for a band of the picture, the rows `rows`, in the memory
-    /// of the old one.
+    /// Replaces the film by an empty film for the rows `rows` of the picture. The new film reuses
+    /// the memory of the old film.
     ///
     /// # Errors
     ///
@@ -81,9 +81,9 @@ impl RenderState {
         Ok(Self { film: film.starting_at(rows.start as usize), ..self })
     }
 
-    /// Compiles `scene`, which has no validation errors, and creates a film for the rows `rows` of
-    /// the picture, in the memory of the film of `previous`. The first row is a multiple of
-    /// [`TILE`](crate::film::TILE).
+    /// Compiles `scene`, which has no validation errors, and creates an empty film for the rows
+    /// `rows` of the picture. The film reuses the memory of the film of `previous`. The first row
+    /// is a multiple of [`TILE`](crate::film::TILE).
     ///
     /// # Errors
     /// Fails if there is not enough memory for the film.
@@ -100,7 +100,8 @@ impl RenderState {
             let size = [previous.film.width(), previous.film.height()].map(|n| n as u32);
             Film::memory_bytes(size, previous.film.groups())
         };
-        // Bands are part of a division for which the memory has been compared.
+        // For a band of the picture, the needed memory was compared with the available memory when
+        // the picture was divided into bands.
         if size == scene.film.size {
             memory_budget::check(size, groups, previous.as_ref().map_or(0, film_of))?;
         }

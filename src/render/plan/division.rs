@@ -60,7 +60,8 @@ impl Plan {
         let mut turn = 0;
         let range = |tile: &PlannedTile| {
             let (whole, remaining) = (tile.blocks() / shards, tile.blocks() % shards);
-            // Place of the shard in the order of this tile, in which the shard `turn` is first.
+            // Position of the shard in the order in which the shards get the blocks of this tile.
+            // The shard with the index `turn`, counted from 0, is first.
             let place = (shard - 1 + shards - turn) % shards;
             turn = (turn + remaining) % shards;
             let start = |place: u32| tile.block_start(place * whole + place.min(remaining));
@@ -113,8 +114,8 @@ mod tests {
     #[test]
     fn shards_of_equal_tiles_have_equal_blocks() {
         let plan = plan(4, &[[8, 40]; 12]);
-        // Blocks: 8..16, 16..32, 32..40. The fourth shard of the first tile is the first of the
-        // second one.
+        // Each tile has the blocks 8..16, 16..32 and 32..40. The fourth shard gets no block of the
+        // first tile, and is therefore first in the second tile.
         let ranges = |shard: u32| plan.ranges(shard)[..2].to_vec();
         assert_eq!(ranges(0), [0..8, 0..8]);
         assert_eq!(ranges(1), [8..16, 16..32]);

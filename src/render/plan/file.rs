@@ -1,5 +1,5 @@
-//! Plan files of renders that are divided among shards: text with one setting or tile per line, in
-//! a fixed order, and a checksum at the end.
+//! Plan files. A plan divides a render among shards, which different processes trace. Its file is
+//! text with one setting or tile per line, in a fixed order, and a checksum at the end.
 //!
 //! The line of a tile has four fields. The first is its base: the number of samples per pixel that
 //! each replicate (half of the samples) had when the plan started. The second is this number in the
@@ -208,7 +208,8 @@ impl Plan {
         lines.setting("tiles", &format!("{count}, the number of tiles of the size"), |text| {
             number(text).filter(|n: &usize| *n == count)
         })?;
-        // Memory is only reserved for lines that are there.
+        // The file may promise more tiles than it has lines. Memory is reserved only for the lines
+        // that it has.
         let mut tiles = Vec::with_capacity(count.min(lines.rest.len() / MIN_TILE_BYTES));
         for _ in 0..count {
             tiles.push(lines.tile()?);

@@ -21,8 +21,8 @@ pub struct Merged {
 }
 
 impl Merged {
-    /// Adds the films of the files at `paths`, in any order. Shards may be missing or unfinished if
-    /// `partial` is `true`.
+    /// Adds the films of the files at `paths`, in any order. If `partial` is `true`, shards (parts
+    /// of the planned render) may be missing or unfinished.
     ///
     /// # Errors
     /// Fails if a file cannot be read or has no shards of a plan, if the files belong to different

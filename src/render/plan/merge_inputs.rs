@@ -21,8 +21,8 @@ pub(super) struct MergeInput {
     pub rays: u64,
 }
 
-/// Plans (renders divided among shards) of film files, by checksum. Files of one plan share it in
-/// memory.
+/// Plans of film files, by checksum. A plan is a render divided among shards. All files of one plan
+/// share one copy of it in memory.
 #[derive(Debug, Default)]
 pub(super) struct Plans(HashMap<u64, Arc<Plan>>);
 

@@ -62,8 +62,9 @@ pub struct PlanSettings {
     /// Number of shards into which the render is divided, 1 to [`MAX_SHARDS`]. Each is for one
     /// process. They are numbered from 1.
     pub shards: u32,
-    /// Checksum of the earlier plan whose film, merged from its shards, this plan continues. `None`
-    /// if it continues a pilot render, from whose noise the samples of each tile were planned.
+    /// Checksum of the earlier plan that this plan continues: it starts from the film that was
+    /// merged from the shards of the earlier plan. `None` if this plan starts from a pilot, a short
+    /// render whose noise determines the samples of each tile.
     pub base_plan: Option<u64>,
 }
 
@@ -98,9 +99,10 @@ pub struct PlannedTile {
 }
 
 impl Plan {
-    /// Creates the plan of a render that continues from the samples of `schedule` and ends at its
-    /// noise target. `usual_slopes` (see [`Plan::slopes`]) replace slopes that the schedule has not
-    /// measured. Returns `None` if the schedule has no noise target, or no estimate of the noise.
+    /// Creates the plan of a render that continues from the samples of `schedule` and ends at the
+    /// noise target of `schedule`. `usual_slopes` are assumed exponents of the error (see
+    /// [`Plan::slopes`]), used where the schedule has not measured any. Returns `None` if the
+    /// schedule has no noise target, or no estimate of the noise.
     pub fn of_schedule(
         schedule: &Schedule,
         usual_slopes: [f64; 2],
@@ -177,8 +179,8 @@ impl Plan {
     }
 
     /// Returns the schedule that continues `film`, which holds all samples of this plan.
-    /// `estimator` estimates the error of each tile. Returns `None` if it has no estimate for a
-    /// tile.
+    /// `estimator` estimates the error of each tile. Returns `None` if `estimator` has no estimate
+    /// for a tile.
     pub fn schedule(
         &self,
         film: &Film,
@@ -199,8 +201,8 @@ impl Plan {
         Some(Schedule::of_samples(&samples?, settings))
     }
 
-    /// Returns a phrase for messages: the first line that differs between the texts of the plans
-    /// `self` and `other`, as it is in each of them.
+    /// Returns a phrase for messages about two plans that differ: the first line that is not equal
+    /// in the texts of `self` and `other`, in both versions.
     fn difference(&self, other: &Self) -> String {
         let [ours, theirs] = [self, other].map(Self::text);
         let different = ours.lines().zip(theirs.lines()).find(|(a, b)| a != b);

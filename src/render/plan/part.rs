@@ -129,8 +129,8 @@ impl Part {
 }
 
 impl Plan {
-    /// Returns the numbers of the plan's shards that are not among `numbers`, which are in
-    /// ascending order.
+    /// Returns the numbers of the plan's shards, with [`BASE`], that are not among `numbers`.
+    /// `numbers` are in ascending order.
     pub(super) fn absent(&self, numbers: &[u32]) -> Vec<u32> {
         let all = BASE..=self.settings.shards;
         all.filter(|number| numbers.binary_search(number).is_err()).collect()

@@ -95,7 +95,8 @@ impl ShardRender {
         while sum < STEP_SECONDS * speed
             && let Some(job) = self.remaining.pop_front()
         {
-            // Cuts are aligned, so that later packets are full.
+            // A job is cut at a multiple of `SAMPLE_ALIGNMENT`, so that packets after the cut are
+            // full.
             let end = (job.first + longest) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT;
             let count = job.count.min(end - job.first);
             if count < job.count {
@@ -121,7 +122,8 @@ impl ShardRender {
         self.samples[1] += traced;
         self.measured.0 += traced;
         self.measured.1 += start.elapsed().as_secs_f64();
-        // The rest of cut jobs is traced next, while the tile is in the cache.
+        // The rest of each cut job is traced in the next step, while its tile is still in the
+        // cache.
         cut.into_iter().rev().for_each(|job| self.remaining.push_front(job));
         true
     }

@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
-/// Time since the last replacement of an unfinished film file, after which the file counts as late.
-/// `zerkalo render` replaces its files every minute.
+/// Longest time since the last replacement of an unfinished film file; after it the file counts as
+/// late. It is three times the interval of a minute at which `zerkalo render` replaces its files.
 const LATE: Duration = Duration::from_secs(180);
 
 /// Film files that other processes write, and the sum of their films.
@@ -109,7 +109,8 @@ pub struct WatchedShards {
     /// Number of samples, over all pixels, that the plan assigns to the shards of the file. `None`
     /// if it is unknown.
     pub total: Option<u64>,
-    /// Time since the film file was written. `None` if there is no file.
+    /// Time from the last modification of the film file to the argument `now` of
+    /// [`WatchedFilms::shards`]. `None` if there is no file.
     pub age: Option<Duration>,
 }
 
@@ -143,7 +144,8 @@ impl WatchedFilms {
             let [one, two] = [other.path.display(), path.display()];
             return Err(format!("{one} and {two} are two plans; name one of them"));
         }
-        // The base of a later round has a name of its own.
+        // If the plan continues an earlier plan, its base is the merged film of the earlier plan.
+        // That film has a name of its own, which the name of the plan does not determine.
         let base_plan = self.named.as_ref().and_then(|input| input.plan.settings.base_plan);
         let shards = self.named.as_ref().map_or(0, |input| input.plan.settings.shards);
         let first = if base_plan.is_some() { BASE + 1 } else { BASE };
@@ -255,7 +257,8 @@ impl WatchedFilms {
     fn read_changed(&mut self) -> Vec<usize> {
         let mut changed = Vec::new();
         for (i, file) in self.files.iter_mut().enumerate() {
-            // The stamp is taken before the file is read: a later replacement is read next time.
+            // The stamp is taken before the file is read. If the file is replaced in the meantime,
+            // the stamps differ at the next call, and the file is read again.
             let stamp = FileStamp::of(&file.path);
             if stamp != file.stamp {
                 file.stamp = stamp;
@@ -266,10 +269,10 @@ impl WatchedFilms {
         changed
     }
 
-    /// Checks that the films of all files can be added; returns `None` if they can. Otherwise
-    /// refuses each of the `changed` files whose film cannot be added to those of the unchanged
-    /// files and of the `changed` files before it. The returned text is the reason of the failed
-    /// check of all files.
+    /// Checks that the films of all files can be added. Returns `None` if they can. Otherwise tests
+    /// the `changed` files one by one. A file is refused if its film cannot be added to the films
+    /// of the unchanged files and of the `changed` files accepted before it. Returns the reason for
+    /// which the check of all files failed.
     fn accept(&mut self, changed: &[usize]) -> Option<String> {
         let all: Vec<usize> = (0..self.files.len()).collect();
         let refused = self.try_join(&all).err()?;
@@ -461,7 +464,8 @@ impl WatchedFile {
     }
 
     fn row(&self, now: SystemTime) -> WatchedShards {
-        // The clocks of two machines may differ.
+        // The modification time may be in the future, because the clocks of two machines may
+        // differ. The age is then 0.
         let age = |stamp: FileStamp| now.duration_since(stamp.modified).unwrap_or_default();
         let age = self.stamp.map(age);
         let shards = match self.input() {

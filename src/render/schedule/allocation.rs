@@ -39,11 +39,11 @@ pub(super) const EXPLORATION: f64 = 0.0625;
 /// a run of samples of every pixel of a tile. So many blocks keep every thread busy until the end
 /// of the round.
 const MIN_BLOCKS: usize = 64;
-/// Limit of the gain (error reduction per ray) below which an allocation round ends early, as a
-/// share of the largest gain of a tile that was set aside. A tile is set aside for the rest of the
-/// round when its next block would more than double its sample count, because a noise estimate is
-/// reliable for one doubling only. The round gives at least [`MIN_BLOCKS`] blocks before it ends
-/// early.
+/// Smallest gain (error reduction per ray) of the next block for which an allocation round goes on,
+/// as a share of the largest gain among the tiles that were set aside. A tile is set aside for the
+/// rest of the round when its next block would more than double its sample count, because a noise
+/// estimate is reliable for one doubling only. The round gives at least [`MIN_BLOCKS`] blocks,
+/// whatever their gain is.
 const WORTHWHILE: f64 = 0.25;
 /// Weight per pixel of a tile's own allocation estimate in its expected error. The validation
 /// estimates of all tiles of its class (tiles with similar estimates) have the weight 1 per pixel.
@@ -132,10 +132,10 @@ type Class = (u32, Option<i32>);
 
 /// Returns the length of the next block of a tile with `count` samples per pixel and replicate
 /// (half of the samples). A block is a run of samples that is allocated as a whole. If `count` is
-/// below [`SAMPLE_ALIGNMENT`], the block ends at the next power of two; if it is no multiple of
-/// [`SAMPLE_ALIGNMENT`], at the next multiple. Otherwise the length is about a quarter of `count`:
-/// a power of two and at least [`SAMPLE_ALIGNMENT`], because such blocks of the sample sequence are
-/// well distributed.
+/// below [`SAMPLE_ALIGNMENT`], the block ends at the next power of two. If `count` is larger but no
+/// multiple of [`SAMPLE_ALIGNMENT`], the block ends at the next multiple. Otherwise the length is
+/// the largest power of two up to a quarter of `count`, at least [`SAMPLE_ALIGNMENT`], because such
+/// blocks of the sample sequence are well distributed.
 fn block(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT {
         return (count + 1).next_power_of_two() - count;
@@ -196,8 +196,8 @@ impl<'a> Allocation<'a> {
         self.counts[tile] += samples;
     }
 
-    /// Allocates one block of samples to each of the tiles with the fewest samples, until the
-    /// allocation round has about `rays` rays in total.
+    /// Allocates one block of samples to one tile after another, starting with the tile that has
+    /// the fewest samples. Ends when the allocation round has about `rays` rays in total.
     pub fn explore(&mut self, rays: f64) {
         let mut order: Vec<usize> = (0..self.counts.len()).collect();
         order.sort_by_key(|tile| self.counts[*tile]);
@@ -288,9 +288,10 @@ impl Schedule {
     /// Returns the expected error of each tile as a function of its sample count. The error at the
     /// present count is a weighted mean of two kinds of estimates: the validation estimates of the
     /// tile's class (tiles with similar error estimates), and the tile's own allocation estimate. A
-    /// class with few tiles is widened by others. The weight of an estimate is the number of pixels
-    /// of its tile; that of the own estimate is multiplied by [`OWN_WEIGHT`]. The own estimate
-    /// keeps the expected error above 0 if the validation estimates of the class are 0.
+    /// class with few tiles also uses the estimates of the nearest classes. The weight of an
+    /// estimate is the number of pixels of its tile. The weight of the own estimate is multiplied
+    /// by [`OWN_WEIGHT`]. The own estimate keeps the expected error above 0 if the validation
+    /// estimates of the class are 0.
     fn calibrated(&self, models: &[TileModels]) -> Vec<ErrorModel> {
         let variance =
             |model: &ErrorModel, tile: &Tile| model.mse(tile.done) * f64::from(tile.done);

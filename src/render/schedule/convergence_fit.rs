@@ -8,10 +8,11 @@ use crate::render::schedule::tile::{FLATTEST, STEEPEST, clamp_slope};
 /// points span three doublings.
 const POINTS: usize = 7;
 
-/// Relative uncertainty of the extrapolated number of rays left until an error target, if the
+/// Relative uncertainty of the extrapolated number of rays left until an error target, even if the
 /// convergence slope is well fitted. The slope decreases a little during the render, because the
-/// rays of exploration (samples for the tiles with the fewest samples) contribute less to it at the
-/// end. At slope 0.75 this increases the number of rays over two doublings by 4 to 10 %.
+/// rays of exploration (samples for the tiles with the fewest samples) reduce the error less and
+/// less. At a slope of 0.75, extrapolation over two doublings of the rays therefore needs 4 to 10 %
+/// more rays than predicted.
 const SPREAD: f64 = 0.15;
 
 /// Convergence fit: RMSE of the picture as a function of rays, over the latest three doublings of
@@ -42,10 +43,10 @@ impl ConvergenceFit {
     }
 
     /// Returns a lower and an upper estimate of the total number of rays at which the picture's
-    /// RMSE falls to `target`. The RMSE is extrapolated with the steepest and the flattest of three
-    /// slopes: those over the latest one, two and three doublings of the rays. Before the first
-    /// doubling, the largest and the smallest plausible slope replace them. Returns `None` before
-    /// the first record.
+    /// RMSE falls to `target`. The RMSE is extrapolated with the steepest and with the flattest of
+    /// three slopes: those over the latest one, two and three doublings of the rays. Before the
+    /// first doubling, the largest and the smallest plausible slope are used instead. Returns
+    /// `None` if nothing has been recorded.
     pub fn rays_needed(&self, target: f64) -> Option<(f64, f64)> {
         let (rays, noise) = *self.points.last()?;
         if noise <= target {

@@ -40,10 +40,10 @@ const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
 /// Number of effective pixels (Kish) below which a noise estimate is unreliable. With k effective
 /// pixels the relative uncertainty of the RMSE is 1 / sqrt(2 k): 18 % for 16.
 const FEW_PIXELS: f64 = 16.0;
-/// Number of which the sample counts of tiles are multiples, per pixel and replicate (half of the
-/// samples). Smaller counts, and the count after the last block of a tile, need not be multiples.
-/// It is the number of lanes of the widest SIMD packets of rays. Narrower packets use the same
-/// number, because the samples of a picture must not depend on the processor.
+/// Alignment of the sample counts of tiles, per pixel and replicate (half of the samples): counts
+/// are multiples of this number. Exceptions are smaller counts, and the count after the last block
+/// of a tile. The alignment is the number of lanes of the widest SIMD packets of rays. It is the
+/// same for narrower packets, because the samples of a picture must not depend on the processor.
 pub const SAMPLE_ALIGNMENT: u32 = 16;
 /// Samples per pixel in each replicate (half of the samples) at which a tile of the film is full.
 /// It is the largest multiple of [`SAMPLE_ALIGNMENT`] for which the sum over both replicates fits
@@ -51,8 +51,9 @@ pub const SAMPLE_ALIGNMENT: u32 = 16;
 pub const MAX_SAMPLES: u32 = (1 << 31) - SAMPLE_ALIGNMENT;
 
 /// Returns the number of samples from `count` to the next multiple of [`SAMPLE_ALIGNMENT`]. Returns
-/// 0 if `count` is such a multiple, or is smaller than [`SAMPLE_ALIGNMENT`]. A larger count that is
-/// no multiple occurs if a stop criterion ended the render there and the render was then resumed.
+/// 0 if `count` is such a multiple, or is smaller than [`SAMPLE_ALIGNMENT`]. A larger count is no
+/// multiple only if a stop criterion ended the render at this count and the render was then
+/// resumed.
 fn to_packet(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT { 0 } else { count.next_multiple_of(SAMPLE_ALIGNMENT) - count }
 }
@@ -130,8 +131,8 @@ impl Schedule {
     /// [`AnyWorld::light_period`](crate::world::AnyWorld::light_period).
     ///
     /// The error falls steeply at this count. An error estimated from fewer samples does not
-    /// predict that of more. Such estimates are discarded as soon as a tile has an estimate from
-    /// `light_period` samples.
+    /// predict the error after more samples. As soon as a tile has an estimate from `light_period`
+    /// samples, its estimates from fewer samples are therefore discarded.
     pub fn with_light_period(self, light_period: u32) -> Self {
         Self { light_period, ..self }
     }
@@ -187,7 +188,7 @@ impl Schedule {
                 partial.push(Job { first: count, count: whole.count - job.count, ..whole });
             }
         }
-        // Partially traced jobs come last.
+        // The rests of partially traced jobs follow the jobs that were not traced at all.
         self.remaining.append(&mut partial);
         if self.remaining.is_empty() && wave.estimate {
             self.update_noise();
@@ -313,8 +314,8 @@ impl Schedule {
     /// the smallest number of samples per pixel and replicate (half of the samples) among them.
     fn uniform(&mut self, common: u32) -> Vec<Job> {
         let grown = match common {
-            // To the next power of two. An earlier stop criterion may have ended between two
-            // powers.
+            // The count grows to the next power of two. It is between two powers if an earlier stop
+            // criterion has ended the render there.
             n if n < SAMPLE_ALIGNMENT => (n + 1).next_power_of_two() - n,
             n => {
                 (self.uniform_growth(n) / SAMPLE_ALIGNMENT * SAMPLE_ALIGNMENT).max(SAMPLE_ALIGNMENT)

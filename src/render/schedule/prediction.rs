@@ -77,11 +77,11 @@ impl Schedule {
     }
 
     /// Predicts the sample counts at which the picture meets its error target. Samples go to the
-    /// tiles in which they reduce the error most per ray, as in an adaptive render; the share
-    /// `EXPLORATION` of the rays goes to the tiles with the fewest samples. `usual_slopes` is
-    /// `[assumed slope of tiles without glossy lobes, of tiles with them]`. Each is used as long as
-    /// no tile of its kind has doubled its sample count. Returns `None` without an error target, or
-    /// before the first noise estimate.
+    /// tiles in which they reduce the error most per ray, as in an adaptive render. A share
+    /// `EXPLORATION` of the additional rays goes to the tiles with the fewest samples.
+    /// `usual_slopes` is `[assumed slope of tiles without glossy lobes, of tiles with them]`. Each
+    /// is used as long as no tile of its kind has doubled its sample count. Returns `None` without
+    /// an error target, or before the first noise estimate.
     pub fn predict(&self, usual_slopes: [f64; 2]) -> Option<Prediction> {
         let (criterion, target) = self.target()?;
         let rmse = criterion.of_picture(self.noise?);
@@ -101,7 +101,8 @@ impl Schedule {
         let sum_of = |counts: &mut dyn Iterator<Item = u32>| -> f64 {
             counts.enumerate().map(|(tile, count)| tile_sum(tile, count)).sum()
         };
-        // The models are scaled to the reported error, which is the larger one of two estimates.
+        // The models are scaled so that their sum matches the reported error. The reported error
+        // can be larger than this sum, because it is the larger one of two estimates.
         let modelled = sum_of(&mut self.tiles.iter().map(|tile| tile.done));
         let scale = if modelled > 0.0 { square_sum(rmse) / modelled } else { 1.0 };
         let enough = square_sum(target) / scale;
@@ -127,7 +128,8 @@ impl Schedule {
         };
         Some(Prediction {
             tiles: self.tiles.iter().zip(&allocation.counts).map(tile).collect(),
-            // The predicted error is reported without the correction.
+            // The target was multiplied by `AIM`, because the true error exceeds the predicted one.
+            // The reported error is divided by `AIM` for the same reason.
             rmse: (scale * error / self.pixels() as f64).sqrt() / AIM,
             slopes,
         })

@@ -34,7 +34,8 @@ impl Schedule {
         for (tile, estimate) in self.tiles.iter_mut().zip(estimates) {
             tile.set_estimate(*estimate);
         }
-        // The current round may have begun before there were estimates, and then plans none.
+        // A round that began before there were estimates would end without new ones. It now ends
+        // with estimates if all tiles have one.
         self.estimate |= self.tiles.iter().all(|t| t.error.is_some());
         self.update_noise();
     }

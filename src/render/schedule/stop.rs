@@ -56,9 +56,9 @@ impl Schedule {
         Some(if seconds > 0.0 { seconds / (seconds + seconds_left) } else { 0.0 })
     }
 
-    /// Returns `(measure of the error, target)` for the error target of the render. If both
-    /// measures have a target, it is that of the measure that adaptive sampling minimises. Returns
-    /// `None` if the render has no error target.
+    /// Returns the error target of the render as `(measure of the error, target)`. If there is a
+    /// target for each of the two measures, returns the one for the measure that adaptive sampling
+    /// minimises. Returns `None` if the render has no error target.
     pub(super) fn target(&self) -> Option<(Criterion, f64)> {
         let codes = self.settings.stop.noise_codes.map(|t| (Criterion::Codes, t));
         let linear = self.settings.stop.rmse_linear.map(|t| (Criterion::Linear, t));
@@ -87,9 +87,10 @@ impl Schedule {
         stop.seconds.filter(|limit| started && seconds >= *limit).map(|_| StoppedBy::Time)
     }
 
-    /// Returns `true` if the error target is met except in tiles that may not get more samples: at
-    /// least one tile has its largest number of samples, and the pooled error of the other tiles
-    /// meets the target. Only tiles with glossy lobes have such a limit, the same for each
+    /// Returns `true` if the error target is met except in tiles that may not get more samples.
+    /// This requires that at least one tile has its largest number of samples, and that the pooled
+    /// error of the other tiles meets the target. The limit applies only to tiles with glossy
+    /// lobes, and is the same for all of them
     /// ([`Settings::rays_per_pixel`](crate::render::schedule::Settings::rays_per_pixel)).
     fn capped_at_target(&self) -> bool {
         let Some((criterion, target)) = self.target() else { return false };
@@ -97,7 +98,7 @@ impl Schedule {
         self.tiles.iter().any(|t| !is_open(t)) && self.pooled(criterion, is_open) <= target
     }
 
-    /// Returns the reason for which a render ends that has no job left to trace.
+    /// Returns the reason for the end of a render that has no job left to trace.
     pub(super) fn reason_without_work(&self) -> StoppedBy {
         let open = || self.tiles.iter().filter(|t| t.done < self.cap(t));
         if self.tiles.iter().all(|t| t.done == MAX_SAMPLES) {

@@ -105,11 +105,12 @@ impl Tile {
 
     /// Returns the slope p with which the tile's RMSE falls with the sample count n: RMSE ~ n^-p.
     ///
-    /// It is the mean of two slopes: the fit through the tile's first and last estimate, weighted
-    /// by the doublings between them, and `pooled`, the slope over all similar tiles, with the
-    /// weight of two doublings. The estimate of one tile is uncertain by 5 to 35 per cent; a slope
-    /// over one doubling is therefore uncertain by 0.05 to 0.4. Returns `pooled` before the first
-    /// doubling, or if an error is 0.
+    /// It is the weighted mean of two slopes. One is fitted through the tile's first and last
+    /// estimate; its weight is the number of doublings of the sample count between them. The other
+    /// is `pooled`, the slope over all similar tiles, with the weight of two doublings. The
+    /// estimate of one tile is uncertain by 5 to 35 per cent; a slope over one doubling is
+    /// therefore uncertain by 0.05 to 0.4. Returns `pooled` before the first doubling, or if an
+    /// error is 0.
     pub fn slope(&self, criterion: Criterion, pooled: f64) -> f64 {
         const PRIOR_DOUBLINGS: f64 = 2.0;
         let [first, .., last] = self.history.as_slice() else { return pooled };

@@ -19,8 +19,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Target durations in seconds of a piece of a wave (a set of jobs that run concurrently): the
-/// first while the client requests a picture or a pixel, the second while it requests neither.
+/// Target durations in seconds of a piece of a wave (a set of jobs that run concurrently). The
+/// first applies while the client requests a picture or a pixel, the second while it requests
+/// neither.
 const PIECE_SECONDS: [f64; 2] = [0.05, 0.25];
 /// Target duration in seconds of one tracing job. It is short, because a running job cannot be
 /// cancelled.
@@ -28,15 +29,16 @@ const JOB_SECONDS: f64 = 0.005;
 /// Number of pixels of a film tile.
 const TILE_PIXELS: f64 = crate::film::TILE_PIXELS as f64;
 /// Longest expected tracing time, in seconds, of a first-hit buffer that is traced before the first
-/// picture. A first-hit buffer holds the first hit of a camera ray per pixel. A buffer with a
-/// longer tracing time is traced after the picture.
+/// picture. A first-hit buffer holds the first hit of a camera ray in each cell of the dashboard's
+/// picture. A buffer with a longer tracing time is traced after the first picture.
 const FIRST_HITS_SECONDS: f64 = 0.002;
 /// Assumed seconds per ray of a first-hit buffer (first hits of camera rays) until one has been
 /// measured. It is the value of a small scene.
 const FIRST_HIT_RAY_SECONDS: f64 = 5e-8;
 
 /// Resources that a render uses: the thread pool, the slot for its newest snapshot, the channel
-/// that announces it, and the optional contents of snapshots that the client has requested.
+/// that announces this snapshot, and the optional contents of snapshots that the client has
+/// requested.
 pub(super) struct WorkContext {
     pub pool: rayon::ThreadPool,
     pub shared: Arc<Shared>,
@@ -250,8 +252,8 @@ impl ActiveRender {
                 self.throughput.record(self.seconds(), self.schedule.samples());
                 self.first_picture_after.get_or_insert_with(|| self.started.elapsed());
             }
-            // The first pass was cancelled for a newer scene, or by the flag of this very scene if
-            // it was raised after the worker had lowered the flags.
+            // The first pass was cancelled by a flag: that of a newer command, or that of this
+            // scene, if the client raised it only after the worker had lowered the flags.
             None => self.state.film.restart(),
         }
     }
@@ -311,8 +313,8 @@ impl ActiveRender {
     /// `state` is the state of the session. `is_final` is `true` after the last wave (set of
     /// concurrent jobs) of the render.
     pub fn publish(&mut self, context: &WorkContext, state: State, is_final: bool) {
-        // A film that was cleared for a restart is empty. Its coarse picture has been published
-        // already.
+        // After a cancelled first pass the film has been cleared and is empty. The coarse picture
+        // of that pass has been published already.
         if !context.snapshot_wanted(is_final) || self.first_picture_after.is_none() {
             return;
         }

@@ -38,11 +38,11 @@ fn gain(share: f64) -> f64 {
 
 #[test]
 fn adaptive_sampling_saves_samples() {
-    // If nearly all tiles are noisy, the gain is at most 1 / 0.9. From this 2 % are lost because
-    // the RMSE ends 1 % below the target, and 0.5 % because counts grow in whole blocks of a
-    // quarter.
+    // If 90 % of the tiles are noisy, the gain is at most 1 / 0.9. Two losses reduce it: 2 %
+    // because the RMSE ends 1 % below the target, and 0.5 % because sample counts grow in whole
+    // blocks of about a quarter of the count.
     for (share, least) in [(0.05, 8.4), (0.3, 2.6), (0.9, 1.08)] {
-        // The rays of exploration are missing in the noisy tiles.
+        // The noisy tiles do not get the rays of exploration, a share `EXPLORATION` of all rays.
         let (gain, least) = (gain(share), (1.0 - EXPLORATION) * least);
         assert!(gain >= least, "{share}: {gain}");
     }
@@ -75,7 +75,8 @@ fn noise_target_is_reached_without_overshoot() {
             assert_eq!(reason, StoppedBy::Noise);
             let reached = schedule.noise().unwrap().rmse_codes;
             assert!(reached <= target, "{reached} > {target}");
-            // A uniform picture cannot stop between packets of 8.
+            // A uniform render stops only at multiples of `SAMPLE_ALIGNMENT` samples per replicate.
+            // Its error may therefore end further below the target.
             let packet =
                 if adaptive { 0.0 } else { f64::from(2 * SAMPLE_ALIGNMENT) / schedule.spp().mean };
             let least = (0.98 - 0.5 * packet) * target;
@@ -190,6 +191,7 @@ fn expensive_tiles_get_fewer_samples() {
     let mut model = Model::exact(truth.collect());
     let (schedule, _) = model.finish(until(spp(2000), true));
     let ratio = f64::from(schedule.tiles[8].done) / f64::from(schedule.tiles[56].done);
-    // n ~ sqrt(1 / cost) at slope 0.5.
+    // At slope 0.5, the best sample count is in proportion to sqrt(1 / rays per sample). The tiles
+    // take 2 or 18 rays per sample, so that the ideal ratio of counts is 3.
     assert!((2.2..4.0).contains(&ratio), "{ratio}");
 }

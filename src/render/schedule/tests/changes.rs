@@ -3,9 +3,10 @@
 
 use crate::render::schedule::tests::*;
 
-/// Renders the simulated picture to the end. Before each wave (set of concurrent jobs) is traced,
-/// [`Wave::cut`] shortens it to jobs of at most `longest` samples per pixel, together about as many
-/// samples as `tiles` jobs of this length. The schedule repeats the rest in later waves.
+/// Renders the simulated picture to the end in pieces. Before each wave (set of concurrent jobs) is
+/// traced, [`Wave::cut`] shortens its jobs to at most `longest` samples per pixel, and keeps about
+/// as many jobs as have the samples of `tiles` jobs of this length. The schedule returns the rest
+/// in later waves.
 fn finish_in_pieces(
     model: &mut Model,
     schedule: &mut Schedule,
@@ -60,7 +61,8 @@ fn higher_target_resumes_after_the_lower_one() {
             );
             assert_eq!(schedule.spp().mean, f64::from(low));
             schedule.set_stop(spp(2000));
-            // The model panics on repeated samples and on samples out of order.
+            // With `aligned` unset, the model still panics on repeated samples and on samples out
+            // of order.
             model.aligned = false;
             let mut ends = Vec::new();
             while let Step::Trace(wave) = schedule.next(0.0) {
@@ -73,7 +75,8 @@ fn higher_target_resumes_after_the_lower_one() {
                 let report = model.run(&wave);
                 schedule.complete(&wave, &report);
             }
-            // A and B are even after all rounds but the last, which adds the remaining samples.
+            // Jobs end at aligned counts in all rounds but the last, which adds the remaining
+            // samples. The last two waves are those of the last round, for the replicates A and B.
             assert!(ends[..ends.len() - 2].iter().all(|even| *even), "after {low} {adaptive}");
             assert_eq!(schedule.spp().mean, 2000.0);
             // The lower target is reached at once.
@@ -119,7 +122,8 @@ fn cap_may_rise_and_fall() {
     assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
     assert_eq!((schedule.spp().min, schedule.spp().max), (40, 100));
     schedule.set_rays_per_pixel(0);
-    // The cap of 20 per replicate ended inside a packet.
+    // The cap was 20 samples per replicate, which is no multiple of `SAMPLE_ALIGNMENT`. Jobs after
+    // it start at unaligned samples.
     model.aligned = false;
     assert_eq!(finish_in_pieces(&mut model, &mut schedule, 100, MAX_SAMPLES), StoppedBy::Spp);
     assert_eq!((schedule.spp().min, schedule.spp().max), (100, 100));

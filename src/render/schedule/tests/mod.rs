@@ -146,7 +146,7 @@ impl Model {
         for sum in &mut self.walks[wave.replicate][tile] {
             *sum += step * self.rng.normal();
         }
-        // No estimate while B has fewer samples, as in the film.
+        // As in a film, there is no estimate while replicate B has fewer samples than replicate A.
         let equal = self.counts[0][tile] == self.counts[1][tile];
         let error = (wave.estimate && equal).then(|| self.estimate(tile));
         let rays = u64::from(job.count) * u64::from(self.pixels[tile]) * truth.rays_per_sample;

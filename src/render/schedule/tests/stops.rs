@@ -51,11 +51,11 @@ fn caps_hold_for_glossy_tiles_only() {
             "the noise is that of the whole picture"
         );
 
-        // All tiles are glossy, so that no work is left at the cap.
+        // All tiles are glossy. At the cap, their largest number of samples, no work is left.
         let mut model = Model::exact(vec![NOISY; 25]);
         let (schedule, reason) = model.finish(settings);
         assert_eq!((reason, schedule.spp().max), (StoppedBy::RaysPerPixel, 40));
-        // A cap does not prevent a mean sample count from being reached.
+        // A mean sample count below the cap is reached in spite of the cap.
         let (_, reason) = model_of(NOISY).finish(Settings { stop: spp(30), ..settings });
         assert_eq!(reason, StoppedBy::Spp);
     }
@@ -178,6 +178,7 @@ fn p95_is_the_percentile_of_tiles() {
     let truth = (0..100).map(|i| Truth { sigma: f64::from(i), ..NOISY }).collect();
     let mut model = Model::exact(truth);
     let (schedule, _) = model.finish(until(spp(32), false));
-    // Tile 94 is the 95th of 100: sigma 94 after 16 samples of each replicate.
+    // The 95th of 100 tiles by error is tile 94, with sigma 94. Both replicates have 16 samples, so
+    // that the RMSE of their mean is 94 / sqrt(32).
     assert!((schedule.noise().unwrap().p95_codes - 94.0 / 32f64.sqrt()).abs() < 1e-9);
 }
