@@ -1,13 +1,13 @@
-//! Run-queue delay: the time for which threads of this program were ready to run and waited for a
-//! processor. It shows that other programs disturbed a measurement. Linux reports it for each
-//! thread (`/proc/PID/task/TID/schedstat`). On other systems it is unknown.
+//! Run-queue delay: the time for which threads of this program were ready to run but waited for a
+//! processor. A long delay shows that other programs disturbed a measurement. Linux reports the
+//! delay of each thread (`/proc/PID/task/TID/schedstat`). On other systems it is unknown.
 
 use std::collections::HashMap;
 use std::fs;
 use std::time::Duration;
 
-/// Run-queue delay of each thread of this program since its start, by the system's id of the
-/// thread.
+/// Run-queue delay of each thread of this program since the start of the thread. The keys are the
+/// system's thread ids.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunQueueDelay(HashMap<String, Duration>);
 

@@ -38,8 +38,9 @@ pub struct End {
     pub use_estimate: bool,
 }
 
-/// Ratio of the errors at consecutive points of the curve. The next point is recorded when the
-/// error, as the render estimates it, has fallen to this share of that at the latest point.
+/// Ratio of the estimated errors at consecutive points of the curve. The next point is recorded
+/// when the render's own estimate of its error has fallen to this share of the estimate at the
+/// latest point. The number is about 2^(-1/4): the curve has four points while the error halves.
 const POINT_RATIO: f64 = 0.84;
 
 /// Returns the share of the processors' time that other programs used while `threads` threads ran
@@ -54,9 +55,10 @@ fn stolen_share(before: Option<&RunQueueDelay>, threads: usize, seconds: f64) ->
     Some((waited / (threads as f64 * seconds)).min(1.0))
 }
 
-/// Renders with the settings of `variant` until the conditions `end` are met. Returns three values:
-/// the points of the error curve, the share of the processors' time that other programs used
-/// meanwhile (`None` if unknown), and the render.
+/// Renders with the settings of `variant` until one of the limits in `end` is reached, or until
+/// further samples cannot change the picture. Returns three values: the points of the error curve,
+/// the share of the processors' time that other programs used meanwhile (`None` if unknown), and
+/// the render.
 ///
 /// # Errors
 ///
@@ -75,7 +77,7 @@ pub fn follow(
         let estimate = render.noise_codes();
         let timed_out = render.seconds() >= end.seconds;
         let changed = estimate.is_some_and(|t| t <= POINT_RATIO * last_estimate);
-        // A picture without noise does not change any more.
+        // Further samples do not change a picture without noise.
         let noiseless = estimate == Some(0.0);
         if changed || done || timed_out {
             last_estimate = estimate.unwrap_or(last_estimate);

@@ -169,7 +169,7 @@ pub struct Plan {
     pub seconds: f64,
     /// Number of tracing threads, except in [`Experiment::Threads`].
     pub threads: usize,
-    /// Random seed of the measured renders. The reference picture has another seed.
+    /// Exposure and tone curve of the displayed pictures, whose error in 8-bit levels is measured.
     pub seed: u64,
     /// Exposure and tone curve of the picture whose displayed error is measured.
     pub display: Display,
@@ -231,7 +231,7 @@ impl Plan {
                 vec![variant]
             }
             Experiment::Threads => {
-                // The default, which uses all threads, is not repeated.
+                // The default, all of `self.threads`, is not measured again.
                 let counts = (0..).map(|k| 1 << k).take_while(|n| *n < self.threads);
                 let variant = |n: usize| {
                     let name = if n == 1 { "1 thread".to_string() } else { format!("{n} threads") };

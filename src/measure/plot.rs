@@ -77,8 +77,8 @@ pub fn pixels(measurement: &Measurement, title: &str) -> Result<Vec<u8>, Box<dyn
     Ok(bytes)
 }
 
-/// Returns the panels of the plot, each as an experiment and its variants. The default settings
-/// have a panel of their own only if there are no experiments.
+/// Returns the panels of the plot, each as an experiment and its variants. Every panel shows the
+/// default settings, too. They have a panel of their own only if there are no experiments.
 fn panels(measurement: &Measurement) -> Vec<(Experiment, Vec<&Measured>)> {
     let mut panels: Vec<(Experiment, Vec<&Measured>)> = Vec::new();
     for measured in measurement.measured.iter().skip(1) {
@@ -162,8 +162,8 @@ fn draw<B: DrawingBackend>(backend: B, measurement: &Measurement, title: &str) -
 where
     B::ErrorType: 'static,
 {
-    // The font is embedded, so that plots are the same on every machine. An error means that it is
-    // registered already.
+    // The font is embedded, so that plots are the same on every machine. An error means that the
+    // font is registered already.
     let _ = register_font("sans-serif", FontStyle::Normal, UBUNTU_LIGHT);
     let root = backend.into_drawing_area();
     root.fill(&WHITE)?;

@@ -2,9 +2,9 @@
 
 use crate::film::{Display, Film, LightWeights, Replicates};
 
-/// Number that is added to the squared reference value in the relative error, which stays bounded
-/// at dark pixels: relMSE = mean((x - r)^2 / (r^2 + 0.01)) with x the value of a pixel in a picture
-/// and r its value in the reference.
+/// Number that is added to the squared reference value in the denominator of the relative error, so
+/// that the error stays bounded at dark pixels. The relative error is relMSE = mean((x - r)^2 /
+/// (r^2 + 0.01)), with x the value of a pixel in a picture and r its value in the reference.
 const RELATIVE_FLOOR: f64 = 0.01;
 
 /// Reference picture, with an estimate of its own error.
@@ -42,9 +42,9 @@ pub struct Errors {
     /// Relative mean squared error: the mean of (x - r)^2 / (r^2 + 0.01) over pixels and channels,
     /// with x the value of a pixel in the picture and r its value in the reference.
     pub rel_mse: f64,
-    /// Relative uncertainty of `rmse_codes`, from 0 to 1, that the error of the reference causes:
-    /// the standard deviation over different references as noisy as this one, divided by
-    /// `rmse_codes`.
+    /// Relative uncertainty of `rmse_codes`, from 0 to 1, because of the error of the reference. It
+    /// is the standard deviation of `rmse_codes` over different references as noisy as this one,
+    /// divided by `rmse_codes`.
     pub spread: f64,
 }
 
@@ -63,7 +63,9 @@ pub struct Bias {
 }
 
 impl Bias {
-    /// Returns `true` if the picture differs from the reference by more than noise can explain.
+    /// Returns `true` if the picture differs from the reference by more than noise can explain: in
+    /// the mean brightness by more than four standard errors, or in the pixels by more than
+    /// [`Self::least_codes`].
     pub fn is_seen(&self) -> bool {
         self.codes > self.least_codes || self.z.abs() > 4.0
     }
@@ -192,8 +194,8 @@ impl Reference {
         let values = (3 * self.pixels.len()) as f64;
         let remaining = |sum: f64, own: f64| (sum / values - own).max(0.0);
         let codes = remaining(sum.codes, self.own.codes);
-        // The standard error of the sum of squares is twice `crossed.sqrt()`. The root of the sum
-        // has half of its relative error.
+        // The standard error of the sum of squares is twice `crossed.sqrt()`. The relative error of
+        // its root, the RMSE, is half the relative error of the sum.
         let spread = crossed.sqrt() / values;
         Errors {
             rmse_linear: remaining(sum.linear, self.own.linear).sqrt(),
@@ -234,8 +236,8 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Returns half the difference, in 8-bit levels, between the displayed colours of `a` and `b`, the
-/// same pixel in two independent pictures.
+/// Returns half the difference, in 8-bit levels, between two displayed colours. `a` and `b` are the
+/// colours of the same pixel in two independent pictures.
 fn half(a: &[f64; 3], b: &[f64; 3], display: &Display) -> [f64; 3] {
     let [a, b] = [*a, *b].map(|x| display.codes(x));
     std::array::from_fn(|c| 0.5 * (a[c] - b[c]))
@@ -247,7 +249,8 @@ mod tests {
     use crate::measure::test_random::Rng;
 
     /// Returns random pixels with mean 0.5 and two kinds of noise: grey noise with the standard
-    /// deviation `s`, and independent noise in each channel with a third of that.
+    /// deviation `s`, and independent noise in each channel with a third of this standard
+    /// deviation.
     fn noisy_pixels(rng: &mut Rng, count: usize, s: f64) -> Vec<[f64; 3]> {
         let pixel = |_| {
             let common = rng.normal();

@@ -112,7 +112,8 @@ pub fn median(values: &[f64]) -> f64 {
 }
 
 /// Returns the relative spread of the median of `values`. In about four of five cases, the median
-/// of another measurement on the same machine differs from this one by at most this share.
+/// of another measurement on the same machine differs from the median of `values` by at most this
+/// share of it.
 ///
 /// For five and more values it is half the width of the confidence interval of the median by the
 /// sign test (Conover, *Practical Nonparametric Statistics*, confidence interval for a quantile),
@@ -199,9 +200,9 @@ impl Measured {
         self.interpolated_time(codes, |p| p.estimated_codes.unwrap_or(f64::INFINITY))
     }
 
-    /// Returns the time at which the error that decides fell to `codes` 8-bit levels: the estimated
-    /// error for biased variants, the true error for unbiased ones. Returns `None` if it stayed
-    /// larger.
+    /// Returns the time at which the error fell to `codes` 8-bit levels. The error is the render's
+    /// own estimate for biased variants, and the true error for unbiased ones. Returns `None` if
+    /// the error stayed larger.
     pub fn true_time_to(&self, codes: f64) -> Option<TimeToTarget> {
         if self.bias.is_some() { self.estimated_time_to(codes) } else { self.time_to(codes) }
     }
@@ -211,8 +212,8 @@ impl Measured {
         let to = &self.points[after];
         let from = after.checked_sub(1).map(|i| &self.points[i]);
         let (weight, from) = match from {
-            // Points are interpolated only if the errors of both have a logarithm: an error of 0
-            // has none.
+            // The interpolation needs the logarithms of both errors; errors of 0 and infinity have
+            // none.
             Some(from) if error(to) > 0.0 && error(from).is_finite() => {
                 ((error(from) / codes).ln() / (error(from) / error(to)).ln(), from)
             }
@@ -281,8 +282,8 @@ impl Measurement {
         all
     }
 
-    /// Returns the largest relative uncertainty of a reported error that the error of the reference
-    /// picture causes.
+    /// Returns the largest of the relative uncertainties that the error of the reference picture
+    /// causes in the reported errors.
     pub fn reference_uncertainty(&self) -> f64 {
         let points = self.measured.iter().flat_map(|m| &m.points);
         let reported = points.map(|p| p.errors.spread).filter(|spread| *spread <= MAX_SPREAD);

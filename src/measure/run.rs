@@ -24,8 +24,9 @@ pub struct Progress<'a> {
 
 /// Seconds of tracing before the measurement starts, so that clock rates and caches are steady.
 const WARM_UP_SECONDS: f64 = 0.3;
-/// Noise at which the render of the reference picture ends, as a share of the smallest noise
-/// target.
+/// Noise at which the render of the reference picture ends, as a share of the smallest noise target
+/// (at most [`COMPARED_AT`]). The squared error of the reference is then 9 % of the squared noise
+/// of this target.
 const REFERENCE_SHARE: f64 = 0.3;
 /// Largest duration of rendering the reference, as a share of the whole measurement's time.
 const REFERENCE_TIME: f64 = 0.3;
@@ -34,16 +35,16 @@ const REFERENCE_TIME: f64 = 0.3;
 const DEFAULT_TIME: f64 = 0.12;
 /// Smallest noise at which settings are compared, in 8-bit levels.
 const COMPARED_AT: f64 = 0.5;
-/// Longest duration of a render with a changed setting, in multiples of the duration with default
-/// settings.
+/// Longest duration of a render with a changed setting. The unit is the time in which the default
+/// settings reached the noise at which settings are compared.
 const MAX_SLOWDOWN: f64 = 5.0;
 /// Largest relative spread of the repeated times of a render that counts as steady.
 const STEADY: f64 = 0.05;
-/// Largest number of rounds of a measurement in which all times are steady. A round repeats the
-/// render of each variant once.
+/// Largest number of rounds of a measurement with steady times, unless its plan requests more. A
+/// round repeats the render of each variant once.
 const MAX_STEADY_ROUNDS: usize = 7;
-/// Largest number of rounds of a measurement, even if some times are unsteady. A round repeats the
-/// render of each variant once.
+/// Largest number of rounds of a measurement with unsteady times, unless its plan requests more. A
+/// round repeats the render of each variant once.
 const MAX_ROUNDS: usize = 31;
 
 /// Measures `scene`, which must be valid. `reference` is the reference picture; if it is `None`, a

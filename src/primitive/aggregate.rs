@@ -1,5 +1,5 @@
 //! Aggregate: all primitives of a scene, compiled for rays. It holds an array for each kind of
-//! primitive, and a BVH over all of them where a BVH is faster.
+//! primitive. If there are many primitives, it also holds a BVH over all bounded ones.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Mask, SimdFloat, Vec3};
@@ -17,9 +17,9 @@ use std::ops::Range;
 /// tested one by one. This is faster, because each tile of the picture has a short list of the
 /// primitives that its rays may hit.
 ///
-/// Measured with spheres that fill a ball (`benches/acceleration.rs`): for whole pictures the list
-/// is faster up to 95 primitives. Without the lists of tiles, the BVH is faster from about 50
-/// primitives on for coherent packets, and from about 300 on for incoherent ones.
+/// Measured with spheres that fill a ball (`benches/acceleration.rs`): for whole pictures, tests
+/// one by one are faster up to 95 primitives. Without the lists of tiles, the BVH is faster from
+/// about 50 primitives on for coherent packets, and from about 300 on for incoherent ones.
 pub const BVH_MIN_PRIMITIVES: usize = 96;
 
 impl PrimitiveSet {
@@ -243,10 +243,12 @@ impl<L: SimdFloat> Aggregate<L> {
         tree.traverse(ray, hit.t, |item, limit| {
             let (part, i) = self.tree_items[item];
             let part = &self.parts[part as usize];
-            // The limit is widened by rounding: at equal distances the lowest tag wins.
+            // The limit is widened by rounding errors, so that hits at the distance of the current
+            // hit are found, too. Of two hits at the same distance, `merge` keeps the primitive
+            // with the lower number.
             let mut item_hit = Hit::with_t_max(limit * L::from_f64(1.0 + 2.0 * L::EPSILON));
             part.batch.closest(indices(&(i..i + 1)), part.base, ray, &mut item_hit);
-            // Inactive lanes have no hit.
+            // Inactive lanes have a negative limit; here they become misses.
             item_hit.t = L::select(item_hit.t.gt(L::zero()), item_hit.t, L::from_f64(L::MAX));
             hit.merge(&item_hit);
             hit.t
@@ -254,9 +256,9 @@ impl<L: SimdFloat> Aggregate<L> {
         hit
     }
 
-    /// Iterates over the primitives of `set` that are tested one by one, without BVH. An element has
-    /// three values: the batch of the primitive (all primitives of its kind), its number in the
-    /// batch, and its bounding box; `None` for an infinite primitive.
+    /// Iterates over the primitives of `set` that are tested one by one, without BVH. An element
+    /// has three values: the batch of the primitive (all primitives of its kind), its number in the
+    /// batch, and its bounding box. The box is `None` for an infinite primitive.
     #[inline(always)]
     fn boxed<'a>(
         &'a self,

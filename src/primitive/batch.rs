@@ -115,8 +115,8 @@ macro_rules! batches {
     };
 }
 
-// The list of compiled primitives, in the order in which items are numbered: a new one is a line
-// here.
+// Kinds of compiled primitives, in the order in which primitives are numbered. A new kind needs a
+// line here.
 batches! {
     /// Batch of parallelograms, such as rectangles.
     Parallelograms(Parallelogram),
@@ -135,8 +135,9 @@ batches! {
 }
 
 impl<L: SimdFloat> PrimitiveBatch<L> {
-    /// Replaces `hit` in the lanes in which a primitive of the batch is nearer. `range` limits the
-    /// primitives that are tested. The id of a primitive is `base` plus its number in the batch.
+    /// Replaces `hit` by the hit with a primitive of the batch in the lanes in which the latter is
+    /// nearer. Only primitives with a number in `range` are tested. The id of a primitive is `base`
+    /// plus its number in the batch.
     #[inline(always)]
     pub fn closest(&self, range: Range<usize>, base: u32, ray: &Ray<L>, hit: &mut Hit<L>) {
         each!(self,
@@ -237,7 +238,7 @@ pub struct LabelledBatch<L: SimdFloat> {
 
 impl<L: SimdFloat> LabelledBatch<L> {
     /// Creates the batch of the primitives with the origins `sources`, and its noun and detail for
-    /// the scene's inventory. Returns `None` if there are none.
+    /// the scene's inventory. Returns `None` if `sources` is empty.
     fn new(batch: PrimitiveBatch<L>, sources: Vec<PrimitiveId>, forms: &[Form]) -> Option<Self> {
         let noun = forms[sources.first()?.form].noun();
         let triangles: usize = sources.iter().map(|s| forms[s.form].triangles()).sum();

@@ -30,9 +30,9 @@ pub enum LightTarget {
 /// Frustum: all rays from one point (the apex) through a convex quadrilateral. With a lens, also
 /// the rays from all points of the lens around the apex.
 ///
-/// A ray from the apex has the direction d, whose component along `forward` is 1. It meets the ray
-/// from the point apex + o of the lens at the depth f = `focus`; this ray has the direction d - o /
-/// f. At the depth z the distance between the two rays is |o (1 - z / f)|. Within an interval of
+/// Each ray from the apex has a direction d, whose component along `forward` is 1. A lens point
+/// apex + o has the ray with the direction d - o / f, where f is `focus`: the two rays meet at the
+/// depth f. At the depth z the distance between them is |o (1 - z / f)|. Within an interval of
 /// depths this distance is largest at one end.
 #[derive(Clone, Copy, Debug)]
 pub struct Frustum {
@@ -50,9 +50,9 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    /// Returns the blur of the lens between the depths `near` and `far`: the largest distance
-    /// between a ray from the edge of the lens and the ray from the apex that it meets at the depth
-    /// `focus`.
+    /// Returns the blur of the lens between the depths `near` and `far`. It is the largest distance
+    /// there between a ray from the edge of the lens and the ray from the apex with which it meets
+    /// at the depth `focus`.
     fn blur(&self, near: f64, far: f64) -> f64 {
         if self.lens_radius == 0.0 {
             return 0.0;
@@ -67,8 +67,8 @@ impl Frustum {
         ray_error(self.apex) + F32_RAY_ERROR * self.lens_radius
     }
 
-    /// Returns `ball`, enlarged by the displacement of rays by the lens and by the rounding errors
-    /// of rays.
+    /// Returns `ball`, enlarged by two distances: the displacement of rays by the lens, and their
+    /// rounding errors.
     fn blurred(&self, ball: &BoundingSphere) -> BoundingSphere {
         let depth = (ball.center - self.apex).dot(self.forward);
         let radius = ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center);
@@ -76,10 +76,10 @@ impl Frustum {
         BoundingSphere { radius: ball.radius + blur + F32_RAY_ERROR * self.lens_radius, ..*ball }
     }
 
-    /// Returns `true` if a ray of the frustum may hit `ball`. A frustum is replaced by the cone
-    /// around it if this is narrower than a half-space. Otherwise `ball` is tested against the four
-    /// planes through the apex and neighbouring corners, because a cone wider than a half-space is
-    /// not convex.
+    /// Returns `true` if a ray of the frustum may hit `ball`. If the cone around the frustum is
+    /// narrower than a half-space, `ball` is tested against this cone. A wider cone is not convex;
+    /// `ball` is then tested against four planes, each through the apex and two neighbouring
+    /// corners.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let ball = &self.blurred(ball);
         let Self { apex, forward, corners, .. } = self;
@@ -148,7 +148,7 @@ impl BoundingVolume {
         Self { ball, plane, convex, slack: 0.0 }
     }
 
-    /// Returns `true` if the object is flat, so that a ray that leaves it cannot hit it again.
+    /// Returns `true` if the object is flat. A ray that leaves a flat object cannot hit it again.
     pub fn is_flat(&self) -> bool {
         self.plane.is_some()
     }
@@ -167,14 +167,15 @@ impl BoundingVolume {
             return None;
         }
         let room = frustum.origin_error() + ray_error(ball.center);
-        // Depths along `forward` between which the form lies.
+        // Depths along `forward` between which the object lies.
         let middle = (ball.center - *apex).dot(*forward);
         let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
         if let Some((normal, offset)) = self.plane {
-            // 1 / depth of a plane is linear along lines of equal length in depth: its extremes are
-            // at the corners if all four cross the plane in front. The slacks allow for rounding of
-            // the plane's height above the apex and of the slopes of the lines, and for the tilt of
-            // the lens towards the plane.
+            // A ray from the apex with the direction c, whose component along `forward` is 1, meets
+            // the plane at the depth `height` / (`toward` . c). The divisor, the slope, is linear
+            // in c. The extreme depths are therefore at the corners if the rays of all four meet
+            // the plane in front of the apex. `slack` and `slope_error` allow for rounding errors
+            // and for the tilt of the lens towards the plane.
             let tilt = frustum.lens_radius * normal.reject_from_normalized(*forward).length();
             let height = offset - normal.dot(*apex);
             let (height, toward) = (height.abs(), normal * height.signum());
@@ -182,7 +183,8 @@ impl BoundingVolume {
             let slope_error = (tilt + F32_RAY_ERROR * frustum.lens_radius) / frustum.focus;
             let slopes = corners.map(|c| (toward.dot(c), F32_RAY_ERROR * c.length() + slope_error));
             if height <= slack {
-                // The apex may be on either side.
+                // Within rounding errors, the apex may be on either side of the plane: no depth is
+                // excluded.
             } else if slopes.iter().all(|(slope, ray_error)| slope > ray_error) {
                 let nearest =
                     slopes.map(|(slope, ray_error)| (height - slack) / (slope + ray_error));
@@ -225,8 +227,8 @@ impl BoundingVolume {
     }
 
     /// Returns `true` if the object is flat and the light and all points of the sphere `lit` are on
-    /// the same side of its plane. For a plane (unit normal, offset), `above` returns two values:
-    /// the height of the light above the plane, and the error of this height.
+    /// the same side of its plane. `above` gets this plane as unit normal and offset. It returns
+    /// two values: the height of the light above the plane, and the error of this height.
     fn is_beside(&self, lit: &BoundingSphere, above: impl Fn((DVec3, f64)) -> (f64, f64)) -> bool {
         let Some((normal, offset)) = self.plane else { return false };
         let height = normal.dot(lit.center) - offset;
@@ -261,7 +263,7 @@ impl BoundingVolume {
     pub fn may_occlude(&self, lit: &BoundingSphere, towards: &LightTarget) -> bool {
         let slack = ray_error(lit.center) + F32_RAY_ERROR * lit.radius;
         let radius = lit.radius + slack;
-        // A light on the plane within rounding may be seen on either side.
+        // A light may be on either side of the plane if its height is within rounding errors.
         let above = |(normal, offset): (DVec3, f64)| match towards {
             LightTarget::Point(light) => (normal.dot(*light) - offset, self.ray_error(*light)),
             LightTarget::Direction(direction) => (normal.dot(*direction), F32_RAY_ERROR),
@@ -306,8 +308,10 @@ fn distance_to_hull(point: DVec3, a: &BoundingSphere, b: &BoundingSphere) -> f64
     let direction = axis / length;
     let along = (point - a.center).dot(direction);
     let across = (point - a.center - direction * along).length();
-    // Distance from the ball at `x` along the axis, a convex function. Its derivative is zero where
-    // the sine of the line to the point equals the slope of the hull's side.
+    // Distance between the point and the interpolated ball with the centre at `x` on the axis: a
+    // convex function of `x`. Its derivative is zero where the line from the centre to the point is
+    // at right angles to the side of the hull. The sine of the angle between this line and the
+    // perpendicular to the axis is then `slope`.
     let slope = (b.radius - a.radius) / length;
     let distance = |x: f64| DVec2::new(across, along - x).length() - (a.radius + slope * x);
     let ends = distance(0.0).min(distance(length));
@@ -377,16 +381,17 @@ mod tests {
         assert!(part(&ball([0.0, 0.0, 7.0], 1.0)).is_none());
         let wall = Form::Plane(PlaneForm { normal: DVec3::Z, offset: 0.0 });
         let seen = part(&wall).unwrap();
-        // A square with half-sides 0.5.
+        // The visible part is a square with half-sides of 0.5.
         assert!(seen.center.length() < 1e-3 && (seen.radius - 0.5f64.sqrt()).abs() < 1e-3);
         assert!(part(&Form::Plane(PlaneForm { normal: DVec3::Z, offset: 6.0 })).is_none());
-        // Seen edge-on, without an end.
+        // A plane that reaches the horizon: its visible part is infinite.
         let floor = part(&Form::Plane(PlaneForm { normal: DVec3::Y, offset: -0.1 })).unwrap();
         assert!(floor.radius.is_infinite());
     }
 
-    /// Checks the distance between a point and the convex hull of two balls. No interpolated ball,
-    /// with a centre and a radius between those of the two, is nearer to the point.
+    /// Checks the distance between a point and the convex hull of two balls: no interpolated ball
+    /// is nearer to the point. The centre and the radius of an interpolated ball are between those
+    /// of the two balls.
     #[test]
     fn hull_of_two_balls_holds_every_segment_between_them() {
         let mut random = 7u64;

@@ -1,6 +1,7 @@
-//! Trait of all canonical forms: the geometry of one kind of primitive, in double precision,
-//! between the description and the compiled kernel. Each kind implements all properties in its own
-//! file. A method has a default implementation only if this is right for most kinds.
+//! Trait of all canonical forms: the geometry of one kind of primitive, in double precision. It is
+//! the stage between the description in the scene file and the compiled primitive. Each kind
+//! implements all properties in its own file. A method has a default implementation only if this
+//! default is right for most kinds.
 
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::form::Form;
@@ -25,7 +26,7 @@ pub enum DefaultMapping {
     Planar,
     /// Spherical mapping, for geometry that is round on all sides.
     Spherical,
-    /// Cylindrical mapping, for geometry that is round about an axis.
+    /// Box mapping, for geometry with flat sides and for all other geometry.
     Cylindrical,
     /// Box mapping, for geometry with flat sides and of any other kind.
     Box,
@@ -88,7 +89,7 @@ pub trait CanonicalShape {
     }
 
     /// Returns the axis-parallel bounding box; `None` if the geometry has no finite bounds. It is
-    /// the smallest one, except for compounds.
+    /// the smallest possible box, except for compounds.
     fn bounds(&self) -> Option<Bounds>;
 
     /// Returns a bounding sphere; its radius is infinite if the geometry has no finite bounds. The
@@ -113,8 +114,8 @@ pub trait CanonicalShape {
     fn is_convex(&self) -> bool;
 
     /// Returns the smallest thickness of a solid, or the shorter edge of flat geometry, in scene
-    /// units. For a compound it is that of its thinnest part; the search for narrow gaps finds
-    /// thinner pieces that cuts leave.
+    /// units. For a compound it is the thickness of the thinnest part. Cuts may leave thinner
+    /// pieces; the search for narrow gaps finds these.
     fn thickness(&self) -> f64;
 
     /// Returns a lower bound of the distance between `point` and the surface; `None` if there is no
@@ -122,8 +123,8 @@ pub trait CanonicalShape {
     /// geometry it may be the distance to the box.
     fn clearance(&self, point: DVec3) -> Option<f64>;
 
-    /// Returns the unit normals of the surfaces that are at most `slack` from `point`: one list for
-    /// each solid that the geometry consists of. Empty if there are none.
+    /// Returns the unit normals of the surfaces whose distance from `point` is at most `slack`. The
+    /// result has one list for each solid of the geometry that has such a surface.
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>>;
 
     /// Returns the smallest t > 0 at which `origin + t direction` is on the surface; `None` if
@@ -137,9 +138,9 @@ pub trait CanonicalShape {
     /// for geometry with too many details.
     fn proxies(&self) -> Vec<Proxy>;
 
-    /// Returns two numbers, a low and a high one, between which `axis . p` is for all points p of
-    /// the geometry. Returns `None` if the geometry is unbounded along the unit vector `axis`. The
-    /// default is the extent of the bounding box.
+    /// Returns a lower and an upper bound of `axis . p` over all points p of the geometry. Returns
+    /// `None` if the geometry is unbounded along the unit vector `axis`. The default is the extent
+    /// of the bounding box.
     fn extent_along(&self, axis: DVec3) -> Option<(f64, f64)> {
         extent_of_box(self.bounds(), axis)
     }

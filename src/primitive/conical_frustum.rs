@@ -15,9 +15,9 @@ use crate::primitive::solid::{SolidPrimitive, Span};
 use glam::{DAffine3, DMat3, DVec3};
 use std::f64::consts::TAU;
 
-/// Canonical form of cylinders, cones and tapered cylinders: the image of the solid
-/// x^2 + y^2 <= (1 + (top_radius - 1) z)^2, 0 <= z <= 1 under an invertible affine map.
-/// [`Form::conical_frustum`] creates it for any proportions.
+/// Canonical form of cylinders, cones and tapered cylinders: the image of the solid x^2 + y^2 <=
+/// (1 + (top_radius - 1) z)^2, 0 <= z <= 1 under an invertible affine map.
+/// [`Form::conical_frustum`] creates it for any ratio of the two radii.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConicalFrustumForm {
     /// Map from the space in which the frustum has base radius 1 and height 1 to the scene.
@@ -51,7 +51,8 @@ impl CanonicalShape for ConicalFrustumForm {
     }
 
     fn bounds(&self) -> Option<Bounds> {
-        // Half-widths of the base's disc: lengths of the rows of the first two columns.
+        // Half-widths of the base's bounding box. Each is the length of a row of the matrix of the
+        // first two columns, which map the unit disc to the base.
         let m = &self.scene_from_unit;
         let rows = m.matrix3.transpose();
         let half = DVec3::new(
@@ -128,9 +129,9 @@ impl CanonicalShape for ConicalFrustumForm {
 }
 
 /// Returns the distance between `point` and the surface of a conical frustum. In each half-plane
-/// through the axis, the surface has an outline of three segments: from the middle of the base over
-/// both rims to the middle of the cap. The radius of the base is 1, and `top` is the radius of the
-/// cap.
+/// through the axis, the surface has an outline of three segments: from the middle of the base to
+/// its rim, from there to the rim of the cap, and on to the middle of the cap. The radius of the
+/// base is 1, and `top` is the radius of the cap.
 fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
     const ANGLES: usize = 64;
     let place = |x, y, z| scene_from_unit.transform_point3(DVec3::new(x, y, z));
@@ -149,7 +150,7 @@ fn surface_distance(scene_from_unit: &DAffine3, top: f64, point: DVec3) -> f64 {
         if sampled[i] > beside {
             continue;
         }
-        // The least value lies between the neighbours.
+        // The minimum is between the angles of the neighbouring samples.
         let (mut low, mut high) = ((i as f64 - 1.0) * step, (i as f64 + 1.0) * step);
         for _ in 0..80 {
             let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
@@ -179,7 +180,8 @@ pub struct ConicalFrustum<S> {
 }
 
 /// Squared radius, in canonical space, of a sphere around the middle of the axis that contains the
-/// frustum, with a margin for rounding errors.
+/// frustum. It is 1 + 1/4 for a rim of radius 1 at the height 1/2, with a margin for rounding
+/// errors.
 const AROUND2: f64 = 1.26;
 
 impl<S: Float> ConicalFrustum<S> {
@@ -235,12 +237,13 @@ impl<L: SimdFloat> Chord<L> {
 /// Returns the chord of each ray's line in the frustum; `None` if no line hits it.
 ///
 /// Distances are counted from the line's point closest to the solid's middle, so that a distant
-/// origin costs no precision. Let p be this point, d the direction, r the radius at p and k the
-/// slope; p' and d' are p and d without their z coordinates. The line crosses the lateral surface
-/// where a t^2 + 2 b t + c = 0. The discriminant is computed as |r d' - k d_z p'|^2 - (p' x d')^2.
-/// Unlike b^2 - a c, it does not cancel; for a cylinder it compares the radius with the line's
-/// distance from the axis. The roots are computed as q / a and c / q. One of them stays finite for
-/// a = 0, a line parallel to a generator.
+/// origin costs no precision. Let p be this point, d the direction, r the frustum's radius at the
+/// height of p, and k the slope; p' and d' are p and d without their z coordinates. The line
+/// crosses the lateral surface where a t^2 + 2 b t + c = 0. The discriminant is computed as |r d' -
+/// k d_z p'|^2 - (p' x d')^2. Unlike b^2 - a c, it does not cancel; for a cylinder it compares the
+/// radius with the line's distance from the axis. The roots are computed as q / a and c / q. Here q
+/// is -(b + sign(b) D) with D the root of the discriminant. For a line parallel to a generator a is
+/// 0; c / q stays finite.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let (zero, half) = (L::zero(), L::from_f64(0.5));
@@ -248,7 +251,8 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     let d = times(&s.unit_from_scene, ray.direction);
     let scale = L::one() / d.length_squared().sqrt();
     let d = d * scale;
-    // The second step removes the rounding of the first step along the direction.
+    // The first step along the direction leads from `f` to the point closest to the middle. The
+    // second step removes the rounding error of the first.
     let back = -f.dot(d);
     let p = d.mul_add(back, f);
     let again = -p.dot(d);
@@ -275,17 +279,21 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     let t0 = L::select(turns, q / a, zero);
     let t1 = L::select(turns, c / q, zero);
     let (low, high) = (t0.min(t1), t0.max(t1));
-    // A line along a generator or the axis without a crossing is inside everywhere or nowhere.
+    // A line that is parallel to a generator or to the axis and does not cross the lateral surface
+    // is inside of it everywhere or nowhere.
     let level = L::mask(true).and_not(turns) & a.abs().le(zero);
     let (all, none) = (L::from_f64(L::MAX), L::from_f64(-L::MAX));
-    // The nappe with a positive radius counts; the line ends or begins on it.
+    // Only the nappe with a positive radius belongs to the solid. A steep line crosses this nappe
+    // once: it enters there if the radius grows along the line, and leaves otherwise.
     let widens = kd.gt(zero);
     let enter_side = L::select(steep, L::select(widens, high, none), low);
     let leave_side = L::select(steep, L::select(widens, all, low), high);
     let enter_side = L::select(level, none, enter_side);
     let leave_side = L::select(level, all, leave_side);
     let crosses = (steep | discriminant.ge(zero)).and_not(level) | (level & c.le(zero));
-    // Interval between the planes of the ends; a parallel line is inside or outside by its height.
+    // Interval between the planes of the base and the cap. For a line parallel to these planes it
+    // is practically unbounded if the line is between them, and otherwise too far away to overlap
+    // the solid.
     let tiny = L::from_f64(1e-30);
     let inverse = L::one() / d.z.abs().max(tiny).copysign(d.z);
     let (z0, z1) = ((-half - p.z) * inverse, (half - p.z) * inverse);
@@ -304,13 +312,13 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
     })
 }
 
-/// Returns two values for a point of the lateral surface with the canonical coordinates `x` and `y`:
-/// its outward normal in scene space, not normalised, and its distance from the axis in canonical
-/// space.
+/// Returns two values for the point of the lateral surface with the canonical coordinates `x` and
+/// `y`. The first is its outward normal in scene space, which is not normalised. The second is its
+/// distance from the axis in canonical space.
 #[inline(always)]
 fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3<L>, L) {
     let rho = x.mul_add(x, y * y).sqrt();
-    // At the apex the axis represents all normals.
+    // The apex has no normal; the direction of the axis is used there.
     let inverse = L::select(rho.gt(L::zero()), L::one() / rho, L::zero());
     let (nx, ny, nz) = (x * inverse, y * inverse, -L::splat(s.slope));
     // Normals transform by the inverse transpose: columns of the inverse.

@@ -137,7 +137,8 @@ impl<S: Float> ConvexPolyhedron<S> {
         let radius2 = corners.iter().map(|c| c.distance_squared(center)).fold(0.0, f64::max);
         let mut out = Self {
             center: center.to_array().map(S::from_f64),
-            // Rounded up: the test may pass a miss, but never rejects a hit.
+            // Rounded up, so that the test against the bounding sphere never rejects a hit. It may
+            // accept a miss.
             radius2: S::from_f64(radius2 * (1.0 + 8.0 * S::EPSILON)),
             reach: S::from_f64(form.max_coordinate()),
             slabs: Vec::new(),
@@ -179,10 +180,10 @@ impl<S: Float> ConvexPolyhedron<S> {
         }
         let mut enter = L::from_f64(-L::MAX);
         let mut leave = L::from_f64(L::MAX);
-        // A direction parallel to a face is replaced by a nearly parallel one, on the side of its
-        // zero's sign. 0 / 0 cannot occur: a line inside the face is not cut by it, one outside has
-        // an empty chord, and one in the face's plane touches the solid or not depending on the
-        // sign.
+        // The speed of a ray towards a face to which it is parallel is +0 or -0. It is replaced by
+        // a tiny speed with the same sign. The quotient 0 / 0 cannot occur then. A line on the
+        // inner side of the face is not cut by it. A line on the outer side gets an empty chord. A
+        // line in the plane of the face touches the solid or misses it, depending on the sign.
         let tiny = L::from_f64(1e-30);
         let steep = |speed: L| speed.abs().max(tiny).copysign(speed);
         for slab in &self.slabs {
@@ -202,8 +203,8 @@ impl<S: Float> ConvexPolyhedron<S> {
             enter = L::select(entering, t.max(enter), enter);
             leave = L::select(entering, leave, t.min(leave));
         }
-        // Each lane is decided by itself: other lanes of the packet do not affect a line past a
-        // corner.
+        // Each lane depends on its own chord only, so that the result for a line close to a corner
+        // does not depend on the other lanes of the packet.
         Some((enter, leave, near & enter.le(leave)))
     }
 }
@@ -254,8 +255,8 @@ impl<L: SimdFloat> SolidPrimitive<L> for ConvexPolyhedron<L::Scalar> {
     fn spans(&self, ray: &Ray<L>) -> Option<Span<L>> {
         let (enter, leave, meets) = self.chord(ray)?;
         let from_center = ray.origin - Vec3::splat(self.center);
-        // The face at an end is the nearest one there, among those that the line crosses in the
-        // right sense.
+        // The face at each end of the chord is the one whose plane is closest to this end, among
+        // the faces that the line crosses inwards (at the entry) or outwards (at the exit).
         let mut best = (L::from_f64(-L::MAX), L::from_f64(-L::MAX));
         let mut cosines = (L::one(), L::one());
         let mut face = |normal: Vec3<L>, offset: L| {

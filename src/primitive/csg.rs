@@ -1,14 +1,14 @@
 //! Compounds (constructive solid geometry): unions, intersections and differences of solids, by
-//! intervals (Roth 1982, *Ray Casting for Modeling Solids*).
+//! intervals along lines (Roth 1982, *Ray Casting for Modeling Solids*).
 //!
 //! Each part returns the spans in which a line is inside of it. The sorted ends of all spans divide
 //! the line into pieces. Within a piece each part is either inside or outside, and so is the
 //! compound. A change from one piece to the next is a surface.
 //!
-//! Ends closer to each other than [`TIE`] rounding errors, measured across the surface, coincide:
-//! there is no piece between them. A cut flush with a face therefore leaves no skin, and parts in
-//! contact leave no crack, whatever order rounding gives to equal faces. Parts thinner than this
-//! distance are dropped.
+//! Two ends coincide if their distance, measured perpendicular to the surface, is at most [`TIE`]
+//! rounding errors. There is no piece between them. A cut flush with a face therefore leaves no
+//! skin, and parts in contact leave no crack, although rounding errors put equal faces into a
+//! random order. Parts thinner than this distance disappear.
 
 use crate::bvh::{Hit, Ray};
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -31,8 +31,8 @@ use std::ops::Range;
 /// by four units in the last place, each hit with a few rounding errors.
 const TIE: f64 = 16.0;
 
-/// Operation of a stack machine, which computes whether a point is inside of a compound solid. Its
-/// input is whether the point is inside of each part.
+/// Instruction of a stack machine. The machine computes whether a point is inside of a compound
+/// solid. Its input is one mask for each part: the lanes whose point is inside of this part.
 #[derive(Clone, Copy, Debug)]
 enum Op {
     /// Pushes the mask of the lanes whose point is inside of the part with this number.
@@ -78,8 +78,8 @@ macro_rules! leaves {
     };
 }
 
-// The list of solids that can be parts of compounds, with the largest number of spans of one line:
-// a new one is a line here.
+// Solids that can be parts of compounds, each with the largest number of spans of one line in it. A
+// new solid needs a line here.
 leaves! {
     Sphere(1),
     Ellipsoid(1),
@@ -116,7 +116,8 @@ struct SolidOperand<S> {
 }
 
 /// All compounds of a scene, compiled for ray intersection. Every part counts as a primitive, so
-/// that a hit identifies the part. In lists of primitives the first part means the whole compound.
+/// that a hit identifies the part. In lists of primitives the first part stands for the whole
+/// compound.
 pub struct Compounds<S> {
     compounds: Vec<SolidOperand<S>>,
     parts: Vec<Part<S>>,
@@ -189,8 +190,8 @@ impl<S: Float> Compounds<S> {
         depth
     }
 
-    /// Returns the spans of part number `i` of a compound: the intervals of each line inside of the
-    /// part. `spans` are those of all parts.
+    /// Returns the spans of part number `i` of a compound: the intervals in which each line is
+    /// inside of the part. `spans` has the spans of all parts of the compound.
     #[inline(always)]
     fn spans_of<'a, L>(
         &self,
@@ -202,7 +203,7 @@ impl<S: Float> Compounds<S> {
     }
 
     /// Returns the lanes in which the point at the distance `t` along the ray is inside of the
-    /// compound. `spans` are those of all its parts.
+    /// compound. `spans` has the intervals in which the ray is inside of each part of the compound.
     #[inline(always)]
     fn inside<L: SimdFloat<Scalar = S>>(
         &self,
@@ -232,8 +233,8 @@ impl<S: Float> Compounds<S> {
 
     /// Returns the transition of the compound between the points at the distances `before` and
     /// `after` along each line: whether each point is inside of the compound, and the surface
-    /// between the two. `spans` has the intervals of the lines inside each part of the compound.
-    /// The id of a part is `base` plus its number.
+    /// between the two. `spans` has the intervals in which each line is inside of each part of the
+    /// compound. The id of a part is `base` plus its number.
     fn change<L: SimdFloat<Scalar = S>>(
         &self,
         compound: &SolidOperand<S>,
@@ -276,8 +277,8 @@ impl<S: Float> Compounds<S> {
         })
     }
 
-    /// Replaces `hit` in the lanes of `wanted` in which `compound` is nearer. The id of a part in
-    /// `hit` is `base` plus its number.
+    /// Replaces `hit` by the hit with `compound` in the lanes of `wanted` in which the latter is
+    /// nearer. The id of a part in `hit` is `base` plus the number of the part.
     fn intersect_item<L: SimdFloat<Scalar = S>>(
         &self,
         compound: &SolidOperand<S>,
@@ -290,7 +291,7 @@ impl<S: Float> Compounds<S> {
         let along = from_center.dot(ray.direction);
         let across = ray.direction.mul_add(-along, from_center);
         let radius2 = L::splat(compound.radius2);
-        // The ball is ahead of the origin or around it.
+        // The bounding sphere is in front of the origin of the ray or contains it.
         let ahead = along.le(L::zero()) | from_center.length_squared().le(radius2);
         let near = wanted & across.length_squared().le(radius2) & ahead;
         if near.none() {
@@ -327,9 +328,10 @@ impl<S: Float> Compounds<S> {
     /// surface is nearer. The function steps along each line through `ends`, the sorted ends of the
     /// parts' spans.
     ///
-    /// Coincident faces have the same angle to the line. Two ends therefore coincide only if each
-    /// is within the tie (tolerance) of the other. Otherwise the wide tie of a grazing face would
-    /// absorb other faces.
+    /// Two ends coincide only if each is within the tolerance (`tie`) of the other. The tolerance
+    /// along the line is wide at a face that the line grazes. Such a face would otherwise absorb
+    /// other faces. Coincident faces have equal tolerances, because their angles to the line are
+    /// equal.
     #[inline(always)]
     fn sweep_events<L: SimdFloat<Scalar = S>>(
         &self,
@@ -359,7 +361,7 @@ impl<S: Float> Compounds<S> {
                 hit.item = L::select(nearer, seen.tag, hit.item);
                 open = open.and_not(ahead);
             }
-            // All surfaces behind this end are farther than the hit.
+            // In these lanes all further surfaces are farther than the hit.
             open = open.and_not(gap & next.t.gt(hit.t));
             if open.none() {
                 return;
@@ -371,8 +373,9 @@ impl<S: Float> Compounds<S> {
 }
 
 impl<S: Float> Compounds<S> {
-    /// Replaces `hit` in the lanes in which a compound whose first part is in `range` is nearer.
-    /// The id of a part is `base` plus its number.
+    /// Replaces `hit` by the hit with a compound in the lanes in which the latter is nearer. Only
+    /// compounds whose first part is in `range` are tested. The id of a part is `base` plus its
+    /// number.
     #[inline(never)]
     pub fn closest<L: SimdFloat<Scalar = S>>(
         &self,
@@ -386,8 +389,8 @@ impl<S: Float> Compounds<S> {
         }
     }
 
-    /// Returns the lanes of `wanted` whose ray hits a compound, with its first part in `range`, at
-    /// a distance between 0 and `limit`.
+    /// Returns the lanes of `wanted` whose ray hits a compound at a distance between 0 and `limit`.
+    /// Only compounds whose first part is in `range` are tested.
     #[inline(never)]
     pub fn occluded<L: SimdFloat<Scalar = S>>(
         &self,
