@@ -1,5 +1,6 @@
-//! Synchronous progressive render in the caller's thread. Measurements use it, because its result
-//! does not depend on the times of snapshots.
+//! Synchronous progressive render, which returns to the caller after each allocation round.
+//! Measurements use it, because its samples do not depend on the moments at which a session would
+//! publish snapshots.
 
 use crate::render::schedule::{Schedule, Settings, Step, StoppedBy};
 
@@ -10,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// Progressive render on the calling thread, without a session.
+/// Progressive render that blocks the calling thread, without a background session.
 pub struct SyncRender {
     rendering: RenderState,
     schedule: Schedule,

@@ -24,16 +24,16 @@ pub struct Wave {
     pub replicate: usize,
     /// Tracing jobs of the wave, in any order.
     pub jobs: Vec<Job>,
-    /// `true` if each job ends with an estimate of its tile's error. Only waves of replicate B set
-    /// it, because the estimate needs equally many samples in both replicates (halves of the
-    /// samples).
+    /// `true` if each job ends with an estimate of its tile's error. Only waves of replicate B (the
+    /// second half of the samples) set it. The estimate needs equally many samples in both
+    /// replicates, and B is traced after A.
     pub estimate: bool,
 }
 
 impl Wave {
-    /// Keeps only the first jobs of the wave (a set of concurrent jobs), at least one, with about
-    /// `pixel_samples` samples over all pixels together. Shortens each job to at most `longest`
-    /// samples per pixel.
+    /// Cuts a piece from the wave (a set of concurrent jobs). Each job is shortened to at most
+    /// `longest` samples per pixel. Of these jobs the first are kept: as many as are needed for
+    /// `pixel_samples` samples over all pixels together, but at least one.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;

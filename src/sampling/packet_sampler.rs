@@ -43,21 +43,21 @@ pub struct SampleSettings {
     pub kind: SamplerKind,
 }
 
-/// Number of Sobol dimensions for the first reflect-or-transmit choices of a path, one dimension a
-/// choice. They are the last dimensions of the joint set: the first eight dimensions of a sample,
-/// which are stratified together.
+/// Number of Sobol dimensions for a path's first choices between reflection and transmission, one
+/// dimension for each choice. They are the last two dimensions of the joint set, which consists of
+/// the first eight dimensions of a sample, stratified together.
 const CHOICES: u32 = 2;
 
-/// Largest number of a path's surfaces at which the sampled direction uses the joint set (the first
-/// eight Sobol dimensions of a sample).
+/// Number of surfaces on a path, at most, at which the sampled direction uses the joint set (the
+/// first eight Sobol dimensions of a sample).
 const MAX_JOINT_LOBES: u32 = 2;
 
-/// Number of possible values of k if a packet has 2^k samples of each of its pixels: from 0 to log2
-/// of the widest packet.
+/// Number of ways in which a packet can be divided among pixels. A packet has 2^k samples of each
+/// of its pixels, with k from 0 to log2 of the widest packet.
 const PACKET_SHAPES: usize = MAX_WIDTH.ilog2() as usize + 1;
 
-/// Choice of the random positions that the camera rays of a picture need. Each position takes two
-/// dimensions of a sample's Sobol point, from dimension 0 on.
+/// Random positions that the camera rays of a picture use: in the pixel, on the lens, or both. Each
+/// position takes two dimensions of a sample's Sobol point, starting with dimension 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraDimensions {
     /// `true` if samples are distributed over the area of their pixel.
@@ -77,20 +77,20 @@ pub struct Sampler<L: SimdFloat> {
     lens: usize,
     /// First Sobol dimension of the direction sampled at a path's first surface.
     first_lobe: usize,
-    /// Number of a path's surfaces whose sampled directions use the joint set of Sobol dimensions.
-    /// Those of later surfaces use the padded sets.
+    /// Number of surfaces on a path at which the sampled direction uses the joint set (the first
+    /// eight Sobol dimensions). At later surfaces it uses the padded sets.
     joint_lobes: u32,
     /// Sobol points of the first indices: `low_bits[k][d]` holds the points 0..2^k in dimension d,
     /// repeated over the lanes. A packet with 2^k samples of each pixel uses them.
     low_bits: [[L::SimdU32; DIMENSIONS]; PACKET_SHAPES],
     /// Lane indices 0, 1, 2 and so on.
     ramp: L::SimdU32,
-    /// Hash constant of each Sobol dimension, so that dimensions are scrambled independently.
+    /// Hash constant of each Sobol dimension, by which each dimension is scrambled independently.
     dimension_salt: [u32; DIMENSIONS],
 }
 
-/// Sobol points of a block of successive sample indices. They do not depend on pixels, so that all
-/// packets with these indices share them.
+/// Sobol points of a block of successive sample indices. They do not depend on pixels; all packets
+/// with these indices therefore share them.
 pub struct SampleBlock<'a, L: SimdFloat> {
     sampler: &'a Sampler<L>,
     /// Sample index of each lane, within the sequence of its pixel.
@@ -130,7 +130,8 @@ impl<L: SimdFloat> Sampler<L> {
     pub fn block(&self, first: u32, count: usize) -> SampleBlock<'_, L> {
         debug_assert!(count.is_power_of_two() && count <= L::WIDTH);
         debug_assert!((first as usize).is_multiple_of(count));
-        // Points at aligned indices are the first point XOR constants.
+        // For a `first` that is a multiple of `count`, a power of two, Sobol point `first + i` is
+        // point `first` XOR point i.
         let low_bits = &self.low_bits[count.ilog2() as usize];
         let point = |d| L::SimdU32::splat(sobol::point(d, first)) ^ low_bits[d];
         let owen_prefix = array_from_fn(|d| owen_scramble_prefix(point(d)));
@@ -149,7 +150,8 @@ impl<L: SimdFloat> Sampler<L> {
 }
 
 impl<L: SimdFloat> SampleBlock<'_, L> {
-    /// Creates the sampler of a packet with samples of one pixel. `key` is its [`Sampler::key`].
+    /// Creates the sampler of a packet with samples of one pixel. `key` is the [`Sampler::key`] of
+    /// this pixel.
     #[inline(always)]
     pub fn for_pixel(&self, key: u32) -> PacketSampler<'_, L> {
         PacketSampler {
@@ -196,8 +198,9 @@ pub struct PacketSampler<'a, L: SimdFloat> {
 impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Returns the random numbers for the segment of each path after `generation` diffuse bounces.
     /// Each segment has numbers of its own for sampled directions and choices. The choices use only
-    /// padded sets (Sobol points with shuffled indices), because the first diffuse bounce uses the
-    /// last two of the first eight Sobol dimensions, which belong to choices before it.
+    /// padded sets (Sobol points with shuffled indices). The two Sobol dimensions for choices are
+    /// not reused here: the choices before the first diffuse bounce and the direction of that
+    /// bounce have used them.
     #[inline(always)]
     pub fn generation(&self, generation: u32) -> Self {
         let first_lobe = generation * PER_GENERATION;
@@ -246,10 +249,10 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     /// Returns two random numbers in [0, 1) for a point on emitter `light`, as seen from the
     /// surface that a path hits after `bounce` reflections.
     ///
-    /// They are the numbers of [`Self::lobe_2d`] at this surface with another scrambling. Both are
-    /// therefore stratified together with the position in the pixel and with the directions sampled
-    /// at earlier surfaces. They may share dimensions, because light from an emitter and reflected
-    /// light are added, never multiplied.
+    /// They use the dimensions of [`Self::lobe_2d`] at this surface, with another scrambling. Like
+    /// the numbers for the lobe they are stratified together with the position in the pixel and
+    /// with the directions sampled at earlier surfaces. Lobe and emitter may share dimensions,
+    /// because reflected light and light from an emitter are added, never multiplied.
     #[inline(always)]
     pub fn light_2d(&self, bounce: u32, light: u32) -> (L, L) {
         self.pair_2d(bounce, hash_scalar(light + 1))
@@ -264,7 +267,7 @@ impl<L: SimdFloat> PacketSampler<'_, L> {
     }
 
     /// Returns two random numbers in [0, 1) for the surface that a path hits after `bounce`
-    /// reflections. They have the dimensions of [`Self::lobe_2d`], scrambled with `salt`.
+    /// reflections. They use the dimensions of [`Self::lobe_2d`], scrambled with `salt`.
     #[inline(always)]
     fn pair_2d(&self, bounce: u32, salt: u32) -> (L, L) {
         let Sampler { first_lobe, joint_lobes, .. } = self.points.sampler;

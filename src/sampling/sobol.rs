@@ -6,13 +6,14 @@
 //! ones on its diagonal. Such a matrix permutes the first 2^m indices for every m, so that each
 //! pair is still a (0, 2)-sequence (Faure and Tezuka 2002, *Another Random Scrambling of Digital
 //! (t,s)-Sequences*). With the usual direction numbers (Joe and Kuo 2008) only the first pair is a
-//! (0, 2)-sequence. The image in a mirror depends on single pairs: the position in the pixel, and
-//! the direction in the lobe. docs/accuracy.md has the measured benefit.
+//! (0, 2)-sequence. This matters for images in a mirror, whose noise depends on two single pairs:
+//! one is the position in the pixel, and the other is the direction in the lobe. docs/accuracy.md
+//! has the measured benefit.
 //!
 //! The first columns of the matrices were found by search, one column after the other. The search
-//! minimised the errors of two estimates from 2^m randomly scrambled points. One is the volume on
-//! one side of a random plane that leans towards the axes of several pairs. The other is the mean
-//! of a smooth product over several pairs. Further columns are random.
+//! minimised the errors of two estimates from 2^m randomly scrambled points. One is the volume of a
+//! random half-space whose border is oblique to the axes of several pairs. The other is the mean of
+//! a smooth product over several pairs. The remaining columns are random.
 //!
 //! Values are stored with the first binary digit in bit 0, as the scrambling hash requires.
 
@@ -22,7 +23,8 @@ use crate::sampling::hash::hash_scalar;
 pub const DIMENSIONS: usize = 8;
 
 /// First columns of the bit matrices `M_1`, `M_2` and `M_3`, which permute the indices of the Sobol
-/// points in dimensions 2 to 7. They were found by a search. Bit r of a column is its row r.
+/// points in dimensions 2 to 7. They were found by a search. Each number is a column; its bit r is
+/// row r.
 const COLUMNS: [&[u32]; 3] = [
     &[1, 3, 4, 13, 22, 46, 65, 179, 390, 573, 1694, 2956, 5907],
     &[1, 2, 6, 15, 22, 33, 100, 158, 457, 810],
@@ -155,9 +157,9 @@ mod tests {
 
     /// Checks that scrambled points estimate the volumes of random half-spaces better than
     /// independent points. The limits are for the RMS error of scrambled points divided by that of
-    /// independent points. The half-spaces are those of the plane of dimensions 2 and 3 (named "the
-    /// lobe"), or those of the space of dimensions 0 to 3. In that plane the usual Sobol points
-    /// have the ratios 0.30 (64 points) and 0.23 (256 points).
+    /// independent points. The normal of a half-space lies in the plane of dimensions 2 and 3 ("the
+    /// lobe"), or it has components in all of the dimensions 0 to 3. For comparison: in the case
+    /// "the lobe" the usual Sobol points have the ratios 0.30 (64 points) and 0.23 (256 points).
     #[test]
     fn scrambled_points_estimate_half_spaces_better_than_random_points() {
         use crate::lanes::{SimdFloat, SimdU32};
@@ -223,8 +225,8 @@ mod tests {
         let count = 1u32 << m;
         let alike = |d: usize| {
             let first = digits(d, 0);
-            // The first 2^m points are a group under XOR, so that the distances from every point
-            // are the same.
+            // Point 0 is enough: the first 2^m points are a group under XOR, so that every point p
+            // has the same numbers of digits in common with the points q.
             (0..count).map(move |i| (digits(d, i) ^ first).leading_zeros()).collect::<Vec<u32>>()
         };
         let (a, b) = (alike(a), alike(b));
@@ -237,8 +239,9 @@ mod tests {
         levels.map(|(j, k)| component(j, k)).fold(0.0, f64::max)
     }
 
-    /// Checks the table of the worst pairs of Sobol dimensions in docs/accuracy.md. They are among
-    /// dimensions 4 to 7, which the second lobe of a material and the branch choices use.
+    /// Checks the table of the worst pairs of Sobol dimensions in docs/accuracy.md. The worst pairs
+    /// are among dimensions 4 to 7. Without a lens, these are used for the second sampled direction
+    /// of a path and for the choices between reflection and transmission.
     #[test]
     fn worst_pairs_of_dimensions_are_the_documented_ones() {
         for (m, worst, first_lobes) in [
@@ -259,8 +262,9 @@ mod tests {
         assert!((0..4).all(|pair| gain(2 * pair, 2 * pair + 1, 6) <= 2.0));
     }
 
-    /// Checks that the points of sixteen successive indices from a multiple of 16 on are the first
-    /// of them XOR sixteen constants. [`Sampler::block`] relies on this.
+    /// Checks the points of sixteen successive indices that begin at a multiple of 16. Each must be
+    /// the first of them XOR a constant, which is the same for every such run. [`Sampler::block`]
+    /// relies on this.
     #[test]
     fn aligned_points_are_one_point_and_constants() {
         for d in 0..DIMENSIONS {

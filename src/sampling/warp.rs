@@ -10,8 +10,8 @@ use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI, TAU};
 /// Maps the unit square to the unit disk with uniform density. Returns `(x, y, x^2 + y^2)`.
 ///
 /// Concentric squares become concentric circles, so that neighbouring points stay neighbours. An
-/// integrand with an edge across the disk needs as many samples as one with an edge across the
-/// square, and fewer if the edge is parallel to an axis.
+/// edge of the integrand across the disk therefore needs no more samples than an edge across the
+/// square. An edge parallel to an axis needs fewer samples than other edges.
 ///
 /// Shirley and Chiu 1997, *A Low Distortion Map Between Disk and Square*.
 #[inline(always)]
@@ -20,12 +20,13 @@ pub fn disk<L: SimdFloat>(u: L, v: L) -> (L, L, L) {
     let (a, b) = (centred(u), centred(v));
     let wide = a.abs().gt(b.abs());
     let (far, near) = (L::select(wide, a, b), L::select(wide, b, a));
-    // At the centre the angle is arbitrary.
+    // At the centre the angle is arbitrary; the lower limit of the divisor avoids 0 / 0.
     let (s, c) = sin_cos_eighth(near / far.abs().max(L::from_f64(1e-30)).copysign(far));
     (far * L::select(wide, c, s), far * L::select(wide, s, c), far * far)
 }
 
-/// Returns the coefficients `c` of a power series. The series is, with `first` as 1 and as 0:
+/// Returns the coefficients `c` of one of two power series. The first is for `first` = 1, the
+/// second for `first` = 0:
 ///
 /// - sin(pi x / 4) = x (`c[0]` + `c[1]` x^2 + `c[2]` x^4 + ...),
 /// - cos(pi x / 4) = `c[0]` + `c[1]` x^2 + `c[2]` x^4 + ...
@@ -62,13 +63,13 @@ fn polynomial<L: SimdFloat>(k: &[f64], x: L) -> L {
 /// Samples a direction uniformly in the cone with half-angle theta around z.
 ///
 /// `one_minus_cos` is 1 - cos(theta), in [0, 2]. For narrow cones, callers compute it as 2
-/// sin^2(theta / 2), which is more exact.
+/// sin^2(theta / 2), which has less cancellation.
 #[inline(always)]
 pub fn cone<L: SimdFloat>(u: L, v: L, one_minus_cos: L) -> Vec3<L> {
     let (x, y, r2) = disk(u, v);
     let drop = r2 * one_minus_cos;
-    // The map preserves ratios of areas between disk and sphere. The sine of the angle is r times
-    // `scale`.
+    // The map from disk to sphere preserves ratios of areas. The sine of the angle to z is `scale`
+    // times the radius of the point in the disk.
     let scale = (one_minus_cos * (L::from_f64(2.0) - drop)).max(L::zero()).sqrt();
     Vec3::new(x * scale, y * scale, L::one() - drop)
 }
@@ -124,8 +125,9 @@ fn azimuth<L: SimdFloat>(view: Vec3<L>) -> (L, L, L) {
 /// First, the slopes of any microfacet along x and y are sampled, in units of `alpha`. They are
 /// independent normal deviates with the variance 1/2, one computed from `u` and one from `v`. Then
 /// the component of the slope along the azimuth of the view is replaced by the slope that has the
-/// same quantile among the visible microfacets. At views near the normal this changes little, so
-/// that reflections of edges along the mirror's axes depend almost entirely on one random number.
+/// same quantile among the visible microfacets. For views near the normal, the replacement changes
+/// the slope little. Reflections of edges along the mirror's axes then depend almost entirely on
+/// one random number.
 #[inline(always)]
 pub fn beckmann_visible<L: SimdFloat>(
     u: L,
@@ -135,7 +137,8 @@ pub fn beckmann_visible<L: SimdFloat>(
     v_cavity: bool,
 ) -> Vec3<L> {
     let (sx, sy) = (erf_inverse(u), erf_inverse(v));
-    // The tangent of the view in the stretched space where alpha is 1, as a vector of length r.
+    // Tangent of the angle between view and normal, in the stretched space where alpha is 1. It is
+    // the length r of the vector (rx, ry), which points along the azimuth of the view.
     let scale = alpha / view.z.max(L::from_f64(1e-30));
     let (rx, ry) = (view.x * scale, view.y * scale);
     let r2 = rx.mul_add(rx, ry * ry);
@@ -154,7 +157,8 @@ pub fn beckmann_visible<L: SimdFloat>(
 
 /// Returns exp(x^2) erfc(x) for x >= 0, with a relative error of 5e-8.
 ///
-/// Its product with 1 + 1.5 x is a Chebyshev fit of degree 10 in (x - 2.5) / (x + 2.5).
+/// A Chebyshev fit of degree 10 in (x - 2.5) / (x + 2.5) approximates the function times (1 + 1.5
+/// x).
 #[inline(always)]
 fn scaled_erfc<L: SimdFloat>(x: L) -> L {
     const K: [f64; 11] = [
@@ -199,7 +203,7 @@ fn small_r_shift<L: SimdFloat>(rt: L, r2: L) -> L {
 /// all microfacets. The quantiles of x and t differ by 3e-5 at most.
 ///
 /// Slopes are along the view's azimuth, away from the view, in units of alpha. `r` is alpha
-/// tan(theta), where theta is the angle between view and surface normal. It is at most 1e6; values
+/// tan(theta), where theta is the angle between view and surface normal. `r` is at most 1e6; values
 /// below [`SMALL_R`] count as [`SMALL_R`].
 ///
 /// Among all microfacets, slopes have the density exp(-t^2) / sqrt(pi). Among the visible ones,
@@ -211,8 +215,8 @@ fn small_r_shift<L: SimdFloat>(rt: L, r2: L) -> L {
 /// The distribution function of visible slopes is erfc(-x) + r exp(-x^2) / sqrt(pi), up to
 /// constants. Newton's method inverts it. Below the median, it is applied to the logarithm of the
 /// function. Above, it is applied to the square root of the complement, because the derivative of
-/// the function falls to 0 at x = 1 / r. It starts at a value that is exact to first order in r. It
-/// takes two steps for r <= 2, else three.
+/// the function falls to 0 at x = 1 / r. The iteration starts at a value that is exact to first
+/// order in r. It takes two steps for r <= 2, else three.
 #[inline(always)]
 fn visible_slope<L: SimdFloat>(t: L, r: L, v_cavity: bool) -> L {
     let (one, two) = (L::one(), L::from_f64(2.0));
@@ -220,11 +224,11 @@ fn visible_slope<L: SimdFloat>(t: L, r: L, v_cavity: bool) -> L {
     let end = one / r;
     let r_root = r * L::from_f64(FRAC_1_PI.sqrt());
     let (scaled, gauss) = (scaled_erfc(end), (-(end * end)).exp());
-    // Twice Lambda, and erfc(1 / r).
+    // `lambda2` is twice Smith's Lambda, and `erfc_end` is erfc(1 / r).
     let (lambda2, erfc_end) = ((gauss * (r_root - scaled)).max(L::zero()), gauss * scaled);
     let tail = scaled_erfc(t.abs()) * (-(t * t)).exp();
     let negative = t.lt(L::zero());
-    // Twice the quantile of t, and twice its complement.
+    // `low` is twice the quantile of `t`, and `high` is twice the complement of the quantile.
     let (low, high) =
         (L::select(negative, tail, two - tail), L::select(negative, two - tail, tail));
     let (wanted_below, wanted_above, least) = if v_cavity {
@@ -260,8 +264,9 @@ fn visible_slope<L: SimdFloat>(t: L, r: L, v_cavity: bool) -> L {
         x = L::select(inexact, next, x);
     }
     if v_cavity {
-        // The terms of the distribution function cancel for a large r. The density is in
-        // proportion to 1 - r x then: exp(-x^2) is 1 within 1 / r^2.
+        // For a large r the terms of the distribution function cancel. Where both sides of the
+        // groove are visible, x is within 1 / r of 0; there exp(-x^2) is 1 up to 1 / r^2. The
+        // density is therefore in proportion to 1 - r x, and is inverted in closed form.
         let linear = (high * r * L::from_f64(PI.sqrt())).sqrt();
         x = L::select(r.gt(L::from_f64(24.0)), (end * (one - linear)).max(-end), x);
         // Only one side of the groove is visible.
@@ -274,8 +279,8 @@ fn visible_slope<L: SimdFloat>(t: L, r: L, v_cavity: bool) -> L {
 }
 
 /// Returns the inverse of the error function at 2 u - 1, for u in [0, 1). The relative error is at
-/// most 4e-7, in double precision 1.4e-7. At u = 0, where the inverse is infinite, the result is
-/// -4.7.
+/// most 4e-7 in single precision and 1.4e-7 in double precision. At u = 0, where the inverse is
+/// infinite, the result is -4.7.
 ///
 /// The form is that of Giles 2010, *Approximating the erfinv Function*, GPU Computing Gems, chapter
 /// 10: (2 u - 1) times a function of `w = -ln(1 - (2 u - 1)^2)`. The polynomials were fitted for
@@ -323,7 +328,7 @@ fn erf_inverse<L: SimdFloat>(u: L) -> L {
 /// Smith's G_1.
 ///
 /// Dupuy and Benyoub 2023, *Sampling Visible GGX Normals with Spherical Caps*. The spherical cap is
-/// sampled by the map from the disk.
+/// sampled by the concentric map of [`disk`].
 #[inline(always)]
 pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
     let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();
@@ -339,12 +344,13 @@ pub fn ggx_visible<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L>
 /// unit vector with a positive z. The density is that of [`beckmann_visible`], with the D of GGX.
 ///
 /// A point (s, s') of the unit disk stands for the microfacet with the slopes (s, s') / sqrt(1 -
-/// s^2 - s'^2), in units of alpha. All microfacets are uniform in the disk. Coordinate s is along
-/// the azimuth of the view and is scaled by half the chord of the disk at s'. Where both sides of
-/// the groove are visible, the visible microfacets have the distribution function s + sqrt(1 - s^2)
-/// tan(theta), up to a constant; theta is the angle between the stretched view and z. Where one
-/// side is visible, the function is twice that of all microfacets. Both functions are inverted in
-/// closed form: with s = sin(a) the first one is sin(a + theta) / cos(theta).
+/// s^2 - s'^2), in units of alpha. The points of all microfacets, visible or not, are uniform in
+/// the disk. Coordinate s is along the azimuth of the view. It is divided by half the chord of the
+/// disk at s'. Where both sides of the groove are visible, the visible microfacets have the
+/// distribution function s + sqrt(1 - s^2) tan(theta), up to a constant; theta is the angle between
+/// the stretched view and z. Where one side is visible, the function is twice that of all
+/// microfacets. Both functions have inverses in closed form: with s = sin(a), the first is sin(a +
+/// theta) / cos(theta).
 #[inline(always)]
 pub fn ggx_visible_v_cavity<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -> Vec3<L> {
     let stretched = Vec3::new(view.x * alpha, view.y * alpha, view.z).normalize();

@@ -14,8 +14,8 @@ pub struct AssetResolver {
     assets: Arc<Assets>,
 }
 
-/// Equality of resolvers: all are equal, so that scenes with the same description are equal even if
-/// their files are in different folders.
+/// Equality of resolvers: all are equal, so that scenes with the same description are equal
+/// wherever their mesh and image files are.
 impl PartialEq for AssetResolver {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -57,8 +57,8 @@ impl AssetResolver {
         self.assets.radiance_map(&self.folder().join(name))
     }
 
-    /// Returns `true` if the file `name` exists relative to the current folder, but not relative to
-    /// the folder of the scene file `scene`.
+    /// Returns `true` if the name `name` leads to a file from the current folder, and to no file or
+    /// another file from the folder of the scene file `scene`.
     pub(super) fn breaks_when_moved(&self, name: &str, scene: &Path) -> bool {
         let there = fs::canonicalize(folder_of(scene).join(name));
         fs::canonicalize(self.folder().join(name))

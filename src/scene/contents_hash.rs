@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 impl Scene {
     /// Returns the hash of the contents of the scene's meshes and images, in the order in which the
-    /// scene names them. Returns `None` if there are none. It covers the data that were read, so
-    /// that later changes of the files have no influence.
+    /// scene names them. Returns `None` if there are none. It covers the data as they were read;
+    /// later changes of the files have no influence.
     pub fn contents_hash(&self) -> Option<u64> {
         // A new field that may name files has to be added here.
         let Self {

@@ -2,14 +2,14 @@
 //!
 //! A client first sends a command and then raises the cancel flag of the running wave, a set of
 //! jobs that are traced concurrently. The worker (the rendering thread) first lowers the flag and
-//! then receives all commands. In any other order a command could arrive between the two steps, and
-//! wait for the end of a wave that nothing cancels. If several scenes are waiting, only the newest
-//! is compiled. A cancelled wave loses no samples: its remaining jobs are traced when the render
-//! resumes.
+//! then receives all commands. If the client or the worker reversed its two steps, the worker could
+//! lower the flag without receiving the command, which would then wait until the wave ends. If
+//! several scenes are waiting, only the newest is compiled. A cancelled wave loses no samples: its
+//! remaining jobs are traced when the render resumes.
 //!
 //! A scene that differs from the active one only in light weights (see [`Relighting`]) keeps the
 //! film, its samples and the schedule; only the noise is estimated again. Long waves are traced in
-//! pieces, so that clients see the picture improve. The samples do not depend on the pieces.
+//! pieces, so that clients see the picture improve. The pieces have no influence on the samples.
 //!
 //! No call blocks, except [`Session::with`] and [`Session::wait`].
 //!
@@ -88,7 +88,8 @@ pub struct Session {
 }
 
 impl Session {
-    /// Starts a session that traces with `threads` threads.
+    /// Starts a rendering thread that traces with a pool of `threads` threads (0: one per
+    /// processor).
     ///
     /// # Errors
     /// Returns an error for the user if a thread cannot be started.
@@ -123,8 +124,9 @@ impl Session {
         self.begin(|generation| Command::Resume(generation, scene, Box::new(checkpoint)))
     }
 
-    /// Encodes the render as a checkpoint between two pieces of work, and calls `task` with it on
-    /// the rendering thread. The argument is `None` if there is no picture yet.
+    /// Queues the encoding of the render as a checkpoint. The rendering thread encodes it between
+    /// two pieces of tracing work, and then calls `task` with it. The argument of `task` is `None`
+    /// if there is no picture yet.
     pub fn checkpoint(
         &self,
         provenance: Provenance,
@@ -145,7 +147,8 @@ impl Session {
         self.send(Command::Stop(stop));
     }
 
-    /// Sets the display transform of the picture whose noise is estimated. Samples are kept.
+    /// Sets the display transform for the noise estimate, which is the RMSE of the displayed
+    /// picture. Samples are kept.
     pub fn set_display(&self, display: Display) {
         self.send(Command::Display(display));
     }
@@ -176,10 +179,10 @@ impl Session {
         self.send(Command::View(view));
     }
 
-    /// Queues `task` and returns at once. The task runs on the rendering thread between two pieces
-    /// of work. It gets the state and the report of the render. It gets `None` if there is no film:
-    /// no scene has been set yet, or the scene cannot be rendered. Tasks that are still queued when
-    /// the session ends are dropped.
+    /// Queues `task` and returns at once. The rendering thread runs the task between two pieces of
+    /// tracing work. The argument of the task is the state and the report of the render. It is
+    /// `None` if there is no film: no scene has been set yet, or the scene cannot be rendered.
+    /// Tasks that are still queued when the session ends are dropped.
     pub fn submit(&self, task: impl FnOnce(Option<(&RenderState, &Report)>) + Send + 'static) {
         self.send(Command::Task(Box::new(task)));
     }
@@ -214,8 +217,9 @@ impl Session {
         let deadline = Instant::now() + limit;
         loop {
             match self.wakeup.recv_deadline(deadline) {
-                // A snapshot that replaces another between its message and `take` leaves a message
-                // without a snapshot.
+                // After the message of one snapshot is received, a second snapshot may replace the
+                // first one before `take`. The message of the second snapshot then finds no
+                // snapshot.
                 Ok(()) => match self.take() {
                     Some(snapshot) => return Some(snapshot),
                     None => continue,
@@ -226,13 +230,15 @@ impl Session {
         }
     }
 
-    /// Takes the latest snapshot. Returns `None` if it has been taken already.
+    /// Takes the latest snapshot. Returns `None` if it has been taken already, or if there is none
+    /// yet.
     pub fn take(&self) -> Option<Snapshot> {
         self.shared.slot.take()
     }
 
-    /// Sends a command to the rendering thread and cancels the first pass. `command` creates the
-    /// command from a new generation (number of a version of the scene). Returns the generation.
+    /// Sends a command to the rendering thread and cancels the first pass over the picture.
+    /// `command` creates the command from a new generation (number of a version of the scene).
+    /// Returns the generation.
     fn begin(&mut self, command: impl FnOnce(u64) -> Command) -> u64 {
         self.generations += 1;
         self.send(command(self.generations));

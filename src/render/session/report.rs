@@ -56,7 +56,8 @@ pub struct Report {
     /// whatever the stop criteria are. Each entry is `(lower estimate, upper estimate)`, or `None`
     /// before the first noise estimate.
     pub quality_seconds: [Option<(f64, f64)>; QUALITIES.len()],
-    /// Share of the render that is done, 0..=1. `None` if it cannot be estimated.
+    /// Share of the render that is done, 0..=1: elapsed time over expected total time, or the share
+    /// of samples if a plan divides the render among processes. `None` if it cannot be estimated.
     pub progress: Option<f64>,
     /// Number of samples that were NaN or negative and were replaced by black.
     pub bad_samples: u64,
@@ -67,7 +68,7 @@ pub struct Report {
     /// samples make these pixels too dark.
     pub saturated_pixels: u64,
     /// Number of samples (over all pixels) per second of tracing, measured over about the latest
-    /// second; 0 before it is known.
+    /// second; 0 before the first measurement.
     pub recent_samples_per_second: f64,
     /// Number of threads that trace rays.
     pub threads: usize,
@@ -79,8 +80,8 @@ pub struct Report {
 }
 
 impl Report {
-    /// Creates the report of a complete film. Its error is estimated for the picture with the light
-    /// weights `mix` and the display transform `display`.
+    /// Creates the report of a film that no session renders, such as a merged one. Its error is
+    /// estimated for the picture with the light weights `mix` and the display transform `display`.
     pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
         Self { noise: film.noise(mix, display), ..Self::of_samples(film) }
     }

@@ -30,14 +30,14 @@ pub struct Snapshot {
     /// group (lights that share one weight) in each pixel. The client applies the light weights.
     /// `None` if no picture is requested, or without a film.
     pub picture: Option<Thumbnail>,
-    /// Light weights of the scene in the report; empty without a film.
+    /// Light weights of the scene that the report describes; empty without a film.
     pub mix: LightWeights,
-    /// Light groups of the film. [`Snapshot::mix_for`] computes from them the light weights of a
-    /// scene whose lights alone were edited since. `None` without a film.
+    /// Light groups of the film. [`Snapshot::mix_for`] uses them to compute the light weights of a
+    /// newer scene in which only lights were edited. `None` without a film.
     pub lighting: Option<Arc<Relighting>>,
-    /// First hit of the camera ray through each pixel of the smaller image that [`View::raster`]
-    /// requests. `None` if none is requested, or without a scene. Before the first complete picture
-    /// it is also `None` if the tracing of these hits takes long.
+    /// First hits of camera rays, one for each pixel of the size that [`View::raster`] requests.
+    /// `None` if no size is requested, or without a scene. Before the first complete picture it is
+    /// also `None` if tracing the hits would delay that picture too much.
     pub first_hits: Option<Arc<FirstHitBuffer>>,
     /// Error and number of samples of each tile.
     pub tiles: Arc<TileMaps>,
@@ -95,8 +95,8 @@ pub(super) struct Frame {
 
 impl Frame {
     /// Creates a snapshot of `film`. `noise_codes` has the RMSE of each tile in 8-bit levels.
-    /// `downsample` keeps the smaller image of the previous snapshot, so that only changed tiles
-    /// are read again.
+    /// `downsample` keeps the downsampled picture of the previous snapshot, so that only changed
+    /// tiles are read again.
     pub fn snapshot(
         &self,
         film: &Film,
@@ -153,8 +153,8 @@ impl Slot {
         self.lock().is_none()
     }
 
-    /// Locks the slot of the latest snapshot. The lock is usable even if it is poisoned, because a
-    /// client that panicked with the lock has left a complete snapshot.
+    /// Locks the slot. A lock that was poisoned by a panic of another client is still usable,
+    /// because the slot always holds a complete snapshot or none.
     fn lock(&self) -> std::sync::MutexGuard<'_, Option<Snapshot>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -121,7 +121,8 @@ fn wait_ignores_messages_of_snapshots_already_taken() {
         let generation = session.set_scene(scene(128));
         let snapshot = session.wait(PATIENCE).expect("a snapshot in time");
         assert_eq!(snapshot.report.generation, generation);
-        // A late client takes only the last snapshot, and no other one follows.
+        // If this thread was late, `snapshot` is already that of the finished render; no other one
+        // follows.
         if !matches!(snapshot.report.state, State::Finished(_)) {
             wait_for(&session, |s| matches!(s.report.state, State::Finished(_)));
         }
@@ -129,8 +130,8 @@ fn wait_ignores_messages_of_snapshots_already_taken() {
 }
 
 /// Checks that `interrupt` ends the first pass of the expensive scene early: within 16 times the
-/// time of the coarse picture. The whole pass takes 64 times. Only one of five attempts must be in
-/// time, because other programs may delay an attempt.
+/// time of the coarse picture. Without an interrupt the pass takes 64 times that time. Only one of
+/// five attempts must be in time, because other programs may delay an attempt.
 fn assert_first_pass_is_cancelled(interrupt: impl Fn(Session)) {
     let mut attempts = Vec::new();
     for _ in 0..5 {
@@ -167,7 +168,7 @@ fn pause_stops_tracing_and_loses_no_sample() {
     wait_for(&session, |s| s.report.samples > 0);
     session.pause();
     let paused = wait_for(&session, |s| s.report.state == State::Paused);
-    // The number of samples before the pause depends on the load of the machine.
+    // The load of the machine determines how many samples were traced before the pause.
     let spp = 64 * (paused.report.spp.max / 64 + 1);
     session.set_stop(Stop { spp: Some(spp), ..Stop::default() });
     std::thread::sleep(Duration::from_millis(30));

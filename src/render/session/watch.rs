@@ -17,13 +17,13 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Interval at which the watched film files are checked.
 const POLL: Duration = Duration::from_secs(1);
-/// Pause after a check of the watched files, as a multiple of the check's duration. Reading thereby
-/// takes at most a third of the time.
+/// Smallest pause between two checks of the watched files, as a multiple of the duration of the
+/// first check. With 2, checks take at most a third of the time.
 const REST: u32 = 2;
 
 /// Function that a client queues to run on the thread of the watch session. Its argument is the
-/// film, its header and its report; `None` without a film. The header has the metadata of the
-/// picture and its display transform.
+/// film, the film's header and the report on the film; `None` without a film. The header has the
+/// metadata of the picture and its display transform.
 type Task = Box<dyn FnOnce(Option<(&Film, &FilmFileHeader, &Report)>) + Send>;
 
 enum Command {
@@ -35,23 +35,28 @@ enum Command {
 /// State of the film files that a watch session shows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WatchReport {
-    /// State of each film file, and of the shards (parts of the render) without a file; the most
-    /// urgent comes first. The ages of files are rounded down, to seconds in the first minute and
+    /// State of each film file, and of the shards (parts of the render) that no file holds. They
+    /// are sorted by state: refused, missing, late, running, complete. The age of a file is the
+    /// time since its last modification. It is rounded down, to seconds in the first minute and
     /// then to minutes.
     pub shards: Vec<WatchedShards>,
-    /// `[number of complete shards, number of all shards of the plan]`. The base, which holds the
-    /// samples that the plan started from, counts as a shard. `None` without a plan.
+    /// `[number of complete shards, number of all shards]`, where a plan divides the render into
+    /// shards. The base, which holds the samples that the plan started from, counts as a shard.
+    /// `None` without a plan.
     pub complete: Option<[usize; 2]>,
-    /// Share of the plan's samples that the picture holds, 0..=1. `None` without a plan.
+    /// Number of samples in the picture divided by that of the whole plan, which divides the render
+    /// into shards; 0..=1. `None` without a plan or a film.
     pub progress: Option<f64>,
     /// Noise target of the plan: RMSE of the displayed picture in 8-bit levels. `None` without a
     /// plan.
     pub target_codes: Option<f64>,
-    /// Width and height of the picture in pixels. `None` before the first film.
+    /// Width and height of the picture in pixels, from the film files or else from the plan. `None`
+    /// if there are neither.
     pub size: Option<[u32; 2]>,
-    /// Display transform of the film files.
+    /// Display transform of the film files, or that of the plan before the first film.
     pub display: Display,
-    /// Path of the scene file from which the films were rendered; empty before the first film.
+    /// Path of the scene file from which the films are rendered, as the film files or else the plan
+    /// state it. Empty if there are neither.
     pub source: String,
 }
 
@@ -93,19 +98,19 @@ impl WatchSession {
         Ok(Self { commands, slot, wakeup })
     }
 
-    /// Sets the contents of snapshots that the client requests.
+    /// Sets the contents of snapshots: the size of the picture, and the pixel to probe.
     pub fn set_view(&self, view: View) {
         self.send(Command::View(view));
     }
 
-    /// Sets the display transform of pictures and noise estimates, instead of that of the film
+    /// Sets the display transform of pictures and noise estimates. It replaces the one in the film
     /// files.
     pub fn set_display(&self, display: Display) {
         self.send(Command::Display(display));
     }
 
-    /// Queues `task` to run on the thread of the watch session. Its argument is the film, its
-    /// header and its report; `None` without a film.
+    /// Queues `task` to run on the thread of the watch session. Its argument is the film, the
+    /// film's header and the report on the film; `None` without a film.
     pub fn submit(
         &self,
         task: impl FnOnce(Option<(&Film, &FilmFileHeader, &Report)>) + Send + 'static,
@@ -129,7 +134,8 @@ impl WatchSession {
     }
 
     fn send(&self, command: Command) {
-        // The thread ends only after this handle, or by a panic, which closes `wakeup`.
+        // Sending fails only if the thread has panicked, which `has_ended` reports. Otherwise the
+        // thread runs until this handle is dropped.
         let _ = self.commands.send(command);
     }
 }
@@ -140,8 +146,8 @@ struct Worker {
     slot: Arc<Slot>,
     notify: Sender<()>,
     view: View,
-    /// Display transform that the client has set in place of that of the film files. `None` if it
-    /// has set none.
+    /// Display transform that the client has set; it replaces the one in the film files. `None` if
+    /// the client has set none.
     display: Option<Display>,
     /// Report and noise estimates of the film that is shown. `None` without a film.
     shown: Option<Shown>,
@@ -170,7 +176,8 @@ impl Worker {
             if due <= Instant::now() {
                 let start = Instant::now();
                 if self.films.poll() {
-                    // Equal counts in two sums do not mean equal samples.
+                    // The cache finds changed tiles by their sample counts. It is dropped, because
+                    // equal counts in two sums of films do not mean equal samples.
                     self.downsample = None;
                     self.estimate();
                     self.publish();
@@ -221,7 +228,8 @@ impl Worker {
         let (Some(film), Some(header)) = (self.films.film(), self.films.header()) else { return };
         let display = self.display.unwrap_or(header.display);
         let estimator = Estimator::new(film.scales(), &header.weights, &display);
-        // A checkpoint may hold more samples of A than of B.
+        // `tile_so_far` permits that A and B (the halves of the samples) have different counts, as
+        // they may have in a checkpoint.
         let noise = |tile| film.tile(tile).and_then(|tile| estimator.tile_so_far(tile));
         let tiles: Vec<Option<TileNoise>> =
             self.pool.install(|| (0..film.tile_count()).into_par_iter().map(noise).collect());

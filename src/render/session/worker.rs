@@ -24,7 +24,8 @@ pub(super) struct Worker {
     newest: Option<Arc<Scene>>,
     /// `true` if the render of the newest scene has not been started yet.
     pending: bool,
-    /// `true` if the newest scene must start with an empty film, even if samples could be reused.
+    /// `true` if the newest scene must start with an empty film, even if samples of the active
+    /// render could be reused.
     restart: bool,
     /// Scene to show and checkpoint whose render is to be continued. `None` if there is nothing to
     /// continue.
@@ -32,8 +33,8 @@ pub(super) struct Worker {
     tasks: Vec<Task>,
     checkpoints: Vec<(Provenance, CheckpointTask)>,
     paused: bool,
-    /// Active render; `Ok(None)` if there is none. The error is the reason for which the newest
-    /// scene cannot be rendered.
+    /// Active render; `Ok(None)` if there is none. The error states why the newest scene cannot be
+    /// rendered.
     work: Result<Option<ActiveRender>, String>,
     /// State of the session after the latest piece of work.
     state: State,
@@ -79,8 +80,8 @@ impl Worker {
     /// Receives all queued commands of the client. Waits for one if there is no work. Returns
     /// `Break` if the session ends.
     fn listen(&mut self) -> ControlFlow<()> {
-        // The flags are lowered before commands are received. The module's documentation explains
-        // the order.
+        // The flags are lowered before commands are received. The documentation of the module
+        // `session` explains why.
         self.context.shared.cancel_wave.swap(false, Ordering::AcqRel);
         self.context.shared.cancel_first_pass.swap(false, Ordering::AcqRel);
         if self.idle {

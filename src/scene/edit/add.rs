@@ -89,9 +89,9 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     Edit::checked(next, subject, format!("add {kind}"))
 }
 
-/// Returns transform steps that place `shape`, which has no position key, upright on the point
-/// `base` and scale the longest side of its bounding box to `size`. The list is empty if the shape
-/// has no bounds.
+/// Returns transform steps that place `shape`, which has no key for its position, upright on the
+/// point `base` and scale the longest side of its bounding box to `size`. The list is empty if the
+/// shape has no bounds.
 fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     // The axis of the canonical cylinder is z; meshes and compounds have y up, as scenes do.
     let mut steps = match shape {
@@ -109,9 +109,9 @@ fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
 }
 
 /// Returns the length of a new object in scene units, rounded to one significant digit. It is 0.6
-/// times the median length of the solids, the objects that are not flat. This median is limited to
-/// 0.01 to 1 times R, the radius of the scene's bounding sphere. Without solids the length is 0.15
-/// R, in an empty scene 0.6.
+/// times the median length of the solids, the objects that are not flat. The median is limited to
+/// the range from 0.01 R to R, where R is the radius of the scene's bounding sphere. If there are
+/// no solids, the length is 0.15 R. In an empty scene it is 0.6.
 fn usual_size(scene: &Scene) -> f64 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let solid = |object: &Object| {
@@ -143,8 +143,8 @@ fn face_camera(shape: &mut Shape, scene: &Scene) {
 }
 
 /// Adds a light of the kind `kind` above the scene, to the right or left of the camera: on the side
-/// with fewer lights. At the centre of the scene it is as bright as a light without falloff with
-/// the intensity 1; half as bright if another light is on.
+/// with fewer lights. At the centre of the scene it is as bright as a light of intensity 1 without
+/// falloff. It is half as bright as that if another light is on.
 ///
 /// # Errors
 /// Fails if there is no such kind.
@@ -178,10 +178,11 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
         _ => "lamp",
     };
     light.name = free_light(scene, name);
-    // A second light adds to the first, so that it gets half the intensity.
+    // The new light adds to a light that is on already, and therefore gets half the intensity.
     light.intensity = if scene.lights.iter().any(|l| l.on) { 0.5 } else { 1.0 };
     if let Some(surface) = light.surface() {
-        // As bright in the middle of the scene as a light without falloff.
+        // The intensity makes the light as bright at the centre of the scene as a light without
+        // falloff.
         let squared = (from * (1.5 * radius)).length_squared();
         let seen = std::f64::consts::PI * surface.radius().powi(2);
         let factor = std::f64::consts::PI * squared / seen;
@@ -190,8 +191,9 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
     let physical = scene.lights.iter().all(|l| l.falloff == Falloff::InverseSquare);
     let mut note = None;
     if physical && !scene.lights.is_empty() && light.apex().is_some() {
-        // With the inverse square, as the other lights have, the brightness in the middle stays
-        // that of a light without falloff.
+        // All other lights have the inverse square falloff: the new one gets it, too. Its intensity
+        // is scaled so that the brightness at the centre of the scene stays that of a light without
+        // falloff.
         let squared = (from * (1.5 * radius)).length_squared();
         light.falloff = Falloff::InverseSquare;
         light.intensity = round_significant(light.intensity * std::f64::consts::PI * squared, 2);

@@ -50,9 +50,9 @@ pub fn bounds(scene: &Scene, subject: &Target) -> Option<BoundingSphere> {
     }
 }
 
-/// Returns the bounding sphere of all solids in the scene, the finite objects that are not flat.
-/// Without solids it is that of all finite objects; without these it is the unit sphere about the
-/// origin.
+/// Returns the bounding sphere of all solids in the scene, the finite objects that are not flat. If
+/// there are no solids, it is that of all finite objects. If there are no finite objects either, it
+/// is the unit sphere about the origin.
 pub fn scene_bounds(scene: &Scene) -> BoundingSphere {
     middle(scene).map_or(BoundingSphere { center: [0.0; 3], radius: 1.0 }, ball)
 }
@@ -87,8 +87,8 @@ pub fn step_length(scene: &Scene) -> f64 {
 
 /// Returns the distance from the eye to the pivot of camera movements, greater than 0. The pivot is
 /// the camera's target. For a camera with a direction it is the point of the view axis closest to
-/// the centre of [`scene_bounds`]. If this point is behind the eye or close to it, the distance is
-/// the radius of these bounds.
+/// the centre of [`scene_bounds`]. If this point is behind the eye or close to the eye, the
+/// distance is the radius of [`scene_bounds`].
 pub fn pivot_distance(scene: &Scene) -> f64 {
     let eye = DVec3::from_array(scene.camera.eye);
     if let Some(target) = scene.camera.target {

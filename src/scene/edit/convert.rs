@@ -35,12 +35,13 @@ const fn kind(name: &'static str, doc: &'static str) -> Field {
     Field::required(name, ValueType::Text, "", doc)
 }
 
-/// Field for the kind of a light. It is a row of the inspector, and no key of scene files.
+/// Field for the kind of a light. The inspector shows it as a row, but it is not a key of scene
+/// files.
 pub(super) const KIND: Field =
     Field::required("kind", ValueType::OneOf(LIGHT_KINDS), "", "Kind of light source.");
 
-/// Field for the choice between `target` and `direction` of a camera. It is a row of the inspector,
-/// and no key of scene files.
+/// Field for the choice between `target` and `direction` of a camera. The inspector shows it as a
+/// row, but it is not a key of scene files.
 pub(super) const AIM: Field = Field::required(
     "aim",
     ValueType::OneOf(&[
@@ -106,8 +107,8 @@ fn convert_shape(shape: &Shape, name: &str, scene: &Scene) -> Option<Shape> {
     let form = shape.form();
     let (base, size) = match form.bounds() {
         Some((low, high)) => {
-            // The bounding box of a rotated shape is larger than the shape: the size is that of the
-            // unrotated shape.
+            // The size is that of the bounding box before rotation, because the bounding box of a
+            // rotated shape is larger than the shape.
             let mut straight = shape.clone();
             straight.rotate_y(-rotation(shape));
             let (l, h) = straight.form().bounds().unwrap_or((low, high));
@@ -253,8 +254,8 @@ pub(super) fn switch_falloff(
     Ok(edit)
 }
 
-/// Multiplies the intensity of `light` by `factor`, unless the product is out of range. Returns a
-/// note with the old and the new intensity.
+/// Multiplies the intensity of `light` by `factor`. If the product is out of range, the intensity
+/// is kept. Returns a note with the old and the new intensity.
 fn refit(light: &mut Light, factor: f64) -> String {
     let fitted = round_significant(light.intensity * factor, 3);
     let old = light.intensity;
@@ -306,7 +307,8 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
         ("direction", Some(_), _) => {
             let view = camera.view().unwrap_or(DVec3::NEG_Z);
             if camera.lens_radius() > 0.0 && camera.focus.is_none() {
-                // The target is in focus.
+                // So far the target was in focus. A focus distance keeps it in focus without a
+                // target.
                 let distance = round_significant(camera.focus_depth(), 5);
                 camera.focus = Some(Focus::Distance(distance));
             }
@@ -326,7 +328,7 @@ fn switch_camera(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     }
 }
 
-/// Rounds `x` to about a millionth of `scale`, so that a rounded direction stays accurate.
+/// Rounds `x` to about a millionth of `scale`, so that a direction computed from it stays accurate.
 fn rounded(x: f64, scale: f64) -> f64 {
     rounded_to(x, crate::value::floor_log10(scale) - 6)
 }

@@ -12,14 +12,15 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{DefaultValue, Field, NumberRange, ValueType, floor_log10, rounded_to};
 use toml::Value;
 
-/// Changes the numbers of `key` by `steps` arrow steps. A whole number means coarse steps. Any
-/// other number means fine steps, a tenth each: 0.1 is one fine step forward, -0.3 is three fine
-/// steps back. `component` is the index of the number to change. `None` changes all numbers
-/// together; in a colour, it changes the brightness.
+/// Changes the numbers of `key` by `steps` arrow steps. If `steps` is a whole number, the steps are
+/// coarse. Otherwise `steps` counts fine steps in tenths: 0.1 is one fine step forward, -0.3 is
+/// three fine steps back. `component` is the index of the number to change. If it is `None`, all
+/// numbers change together; in a colour, the brightness changes.
 ///
-/// A coarse step changes sizes, intensities and roughness by about a tenth (a fine step by a
-/// hundredth), coordinates by [`step_length`], angles by 5 degrees, shares by 0.05. A key without
-/// numbers changes to the next or previous choice ([`toggle`]).
+/// A coarse step changes sizes, intensities and roughness by about a tenth, coordinates by
+/// [`step_length`], angles by 5 degrees, and fractions between 0 and 1 by 0.05. A fine step changes
+/// them by about a tenth of that. A key without numbers changes to the next or previous choice
+/// ([`toggle`]).
 ///
 /// The scene stays unchanged at the end of a range. It also stays unchanged if other keys forbid
 /// the new value; the edit's note then states the reason.
@@ -57,7 +58,8 @@ pub fn step(
             numbers.iter().enumerate().map(moved).collect()
         }
     };
-    // A direction of zeros is invalid: such a step is dropped.
+    // A step that would make all numbers of a direction 0 is dropped, because such a direction is
+    // invalid.
     let is_zero = matches!(field.takes, ValueType::Direction) && next.iter().all(|x| *x == 0.0);
     let next = if is_zero { numbers.clone() } else { next };
     let whole = matches!(field.takes, ValueType::Whole(_) | ValueType::Wholes(..));
