@@ -1,5 +1,6 @@
-//! Tests of recovery files on a real file system. Two instances in one process behave as two
-//! processes do, since a lock belongs to an open file.
+//! Tests of recovery files, which hold unsaved edits, on a real file system. Two `Recovery` values
+//! in one process behave like two processes, because a lock belongs to an open file and not to the
+//! process.
 
 use crate::scene::{Recovery, RecoveryFile, remove_stale, state_folder};
 use std::ffi::OsString;
@@ -40,7 +41,8 @@ fn recovery_file_is_found_after_its_process_ends() {
     let found = seeker.find();
     assert_eq!(texts(&found), ["three\r\nwithout end"]);
     assert_eq!((found.orphans[0].base, found.elsewhere), (Some(0xabc), false));
-    // A pending orphan is hidden from other sessions.
+    // An orphan is the recovery file of a process that was killed. While `found` holds an orphan,
+    // other processes do not find it.
     assert!(of(&path).find().elsewhere);
     drop(found);
     let mut heir = of(&path);
@@ -67,7 +69,7 @@ fn concurrent_sessions_write_separate_recovery_files() {
     let mut late = of(&path);
     late.keep("late", None).unwrap();
     assert!(late.path().unwrap().ends_with(".a.toml.unsaved-5"));
-    // Writing and removing one recovery file leaves those of other sessions alone.
+    // A process that writes or removes its recovery file leaves those of other processes alone.
     keepers[3].keep("3 again", None).unwrap();
     keepers.truncate(2);
     let found = of(&path).find();
@@ -93,7 +95,7 @@ fn deleted_recovery_file_is_written_again() {
     let mut found = texts(&found);
     found.sort_unstable();
     assert_eq!(found, ["other", "two"]);
-    // Forgetting removes only the session's own file.
+    // `forget` removes the recovery file only if this process has written it.
     let mut keeper = of(&folder.path().join("b.toml"));
     keeper.keep("one", None).unwrap();
     let hidden = keeper.path().unwrap().to_path_buf();
@@ -158,7 +160,7 @@ fn symbolic_links_share_recovery_and_planted_links_are_not_followed() {
 fn state_folder_is_used_if_the_scene_folder_is_not_writable() {
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("deep/state");
-    // The folder does not exist, so that it cannot be written.
+    // The folder does not exist; files cannot be written there.
     let gone = PathBuf::from("/proc/nowhere/a.toml");
     let with = |path: Option<&Path>| Recovery::new(path, "mirror/room.toml", Some(&state));
     let mut keeper = with(Some(&gone));
@@ -193,7 +195,7 @@ fn state_folder_follows_xdg_variables() {
         })
     };
     assert_eq!(with(Some("/s"), Some("/h")), Some("/s/zerkalo".into()));
-    // The specification requires relative paths to be ignored.
+    // The XDG specification requires that relative paths in these variables are ignored.
     assert_eq!(with(Some("s"), Some("/h")), Some("/h/.local/state/zerkalo".into()));
     assert_eq!(with(None, None), None);
 }
@@ -221,8 +223,8 @@ fn only_old_unlocked_temporary_files_are_removed() {
     remove_stale(&folder.path().join("nowhere"));
 }
 
-/// Checks that a recovery file of another user is not offered. Only the superuser can create one;
-/// for other users the test ends before that.
+/// Checks that a recovery file of another user is not offered. The test gives its own file to
+/// another user, which only the superuser may do. Without this right the test ends early.
 #[test]
 fn recovery_file_of_another_user_is_not_offered() {
     use std::os::unix::fs::chown;

@@ -7,7 +7,8 @@ use crate::value::{DefaultValue, Description, Field, ValueType};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Returns the valid keys of `T`, which serde lists in the error about an unknown key.
+/// Returns the valid keys of `T`. They are taken from the error message in which serde lists the
+/// valid keys after it has found an unknown one.
 fn keys_of<T: DeserializeOwned>() -> Vec<String> {
     let error = match toml::from_str::<T>("\"no such key\" = 0") {
         Ok(_) => panic!("an unknown key was taken"),
@@ -62,8 +63,8 @@ fn inner(fields: &[Field], name: &str) -> &'static [Field] {
     }
 }
 
-/// Returns the documented keys of one kind of texture or bump map of a material. `key` is `texture`
-/// or `bump`; `kind` is its kind, such as `image`.
+/// Returns the documented keys of one kind of texture or bump map. `key` is the key of the
+/// material, `texture` or `bump`. `kind` is the kind of this texture or bump map, such as `image`.
 fn texture(key: &str, kind: &str) -> &'static [Field] {
     inner(inner(crate::material::FIELDS, key), kind)
 }
@@ -230,7 +231,7 @@ fn every_shape_number_is_range_checked() {
                         .collect()
                 }
                 ValueType::Direction => vec![vec![0.0; 3].into()],
-                // Errors in parts are tested below.
+                // The errors in parts of compounds are tested by `errors_in_parts_name_the_part`.
                 ValueType::Tables(_) => continue,
                 ValueType::Text | ValueType::Choice(_) => continue,
                 other => panic!("{key}.{} takes {other:?}: test it", field.name),
@@ -294,7 +295,8 @@ fn errors_in_parts_name_the_part() {
         assert_eq!(faults[0].0, format!("union.of.1.{key}"), "{part}");
         assert!(faults[0].1.contains(words), "{part}: {faults:?}");
     }
-    // A half-space is no part of a union unless an intersection or difference bounds it.
+    // A plane as a part stands for a half-space. A union rejects it, because the union would be
+    // unbounded; an intersection or a difference with a bounded part accepts it.
     let plane = "{ shape.plane = { point = [0, 0, 0], normal = [0, 1, 0] } }";
     let faults = faults_of(plane);
     assert!(faults.len() == 1 && faults[0].0 == "union.of", "{faults:?}");

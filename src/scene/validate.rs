@@ -54,7 +54,7 @@ pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<Stri
 struct Problems<'a> {
     scene: &'a Scene,
     found: Vec<Problem>,
-    /// Number of further problems of the scene, which are only counted.
+    /// Number of problems found after the first [`MAX_REPORTED`]. They are counted but not stored.
     more: usize,
 }
 
@@ -79,14 +79,15 @@ impl Problems<'_> {
         }
     }
 
-    /// Returns `true` if no further problem can be stored. The caller then drops one problem, which
-    /// is counted here.
+    /// Returns `true` if no further problem can be stored. The caller must then drop the problem
+    /// that it was about to add; the problem is already counted in `more`.
     fn is_full(&mut self) -> bool {
         self.is_full_with(0)
     }
 
-    /// Returns `true` if no problem can be stored in addition to the stored ones and `others` more.
-    /// The caller then drops one problem, which is counted here.
+    /// Returns `true` if no further problem can be stored after the stored ones and the next
+    /// `others` problems. The caller must then drop one problem, which is already counted in
+    /// `more`.
     fn is_full_with(&mut self, others: usize) -> bool {
         let is_full = self.found.len() + others >= MAX_REPORTED;
         self.more += usize::from(is_full);

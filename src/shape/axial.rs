@@ -34,9 +34,10 @@ pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
     around_axis(unit(axis).unwrap_or(DVec3::Y))
 }
 
-/// Returns the errors of `checks`, and those of a solid around the axis from `base` to `top`: an
-/// axis of length 0, and coordinates that are too large relative to `sizes` or the length of the
-/// axis. `sizes` are pairs `(key, value)`. `name` is the key of `top` in scene files.
+/// Returns the errors of `checks` and those of the axis from `base` to `top`. A length of 0 is an
+/// error. Coordinates that are too large relative to the length of the axis, or to a value in
+/// `sizes`, are errors. `sizes` are pairs `(key, value)`. `name` is the key of `top` in scene
+/// files.
 pub(super) fn axis_faults(
     checks: Validator,
     [base, top]: [[f64; 3]; 2],
@@ -90,7 +91,8 @@ mod tests {
             let r = s.max(1.0);
             assert!((low - DVec3::new(1.0 - r, -r, 0.0)).length() < 1e-15, "{s}: {low}");
             assert!((high - DVec3::new(1.0 + r, r, 1.0)).length() < 1e-15, "{s}: {high}");
-            // The image of a rim point at z = 1 is at distance `s` from the axis.
+            // A point of the rim at z = 1 is mapped to the distance `s` from the axis. If `s` is
+            // greater than 1, this rim is the canonical base, because the base is the wider end.
             let Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit: m, top_radius: top }) =
                 form
             else {

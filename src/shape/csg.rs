@@ -131,9 +131,10 @@ compounds! {
 ]";
 }
 
-/// Returns the example parts of a new compound. The first is a block that stands on `base` and is
-/// nine tenths of `size`. The second is a ball that protrudes from the block at its upper right
-/// near corner.
+/// Returns the example parts of a new compound that fills a box. `base` is the centre of the lower
+/// side of this box, and `size` is its size. The first part is a block that stands on `base` and
+/// has nine tenths of `size`. The second is a ball that protrudes from the upper right near corner
+/// of the block.
 fn fitted_to(base: DVec3, size: DVec3) -> [Shape; 2] {
     let block = Cuboid::fitted_to(base, size * 0.9);
     let radius = 0.4 * size.min_element();

@@ -16,7 +16,7 @@ description! {
         file: String = "";
         /// Normals used for shading: curved triangles or flat ones.
         normals: Normals = "smooth";
-        // Content of the file, once the file was searched.
+        // Content of the file, or the error of reading it. `None` until the file has been loaded.
         skip content: Option<Result<Arc<Mesh>, AssetError>>;
     }
 }
@@ -43,8 +43,8 @@ static PLACEHOLDER: LazyLock<Arc<Mesh>> = LazyLock::new(|| {
             corners.push(DVec3::from(corner));
         }
     }
-    // The edges of the icosahedron have length 2. Every three corners that are pairwise neighbours
-    // form a triangle.
+    // The edges of the icosahedron have the squared length 4; all other pairs of corners have a
+    // squared distance above 10. Every three corners that are pairwise neighbours form a triangle.
     let near = |a: usize, b: usize| corners[a].distance_squared(corners[b]) < 4.1;
     let mut triangles = Vec::new();
     for a in 0..12 {

@@ -26,10 +26,10 @@ pub(super) use by_corner_and_rotation;
 
 /// Returns a convex solid over a horizontal polygon (a prism, a pyramid, or a frustum).
 ///
-/// `base` is the list of the polygon's corners as (x, z) offsets from `corner`, in order around it.
-/// `top_over_base` is the size of the top relative to the base, from 0 (an apex) to 1 (upright
-/// sides). `rotation` is the angle in degrees about the vertical through the base's centroid,
-/// counter-clockwise seen from above.
+/// `base` is the list of the polygon's corners in order along its boundary, as (x, z) offsets from
+/// `corner`. `top_over_base` is the ratio of the side lengths of top and base, from 0 (an apex) to
+/// 1 (upright sides). `rotation` is the angle in degrees about the vertical through the base's
+/// centroid, counter-clockwise seen from above.
 ///
 /// The normals of the sides are computed from the base and the height instead of from differences
 /// of corners, so that they keep full precision with a tiny top or far from the origin.
@@ -43,8 +43,9 @@ pub(super) fn prismoid(
     let centroid = base.iter().sum::<DVec2>() / base.len() as f64;
     let (sin, cos) = sin_cos_degrees(rotation);
     let turned = |v: DVec2| DVec2::new(v.x * cos + v.y * sin, v.y * cos - v.x * sin);
-    // (b - c) + c is exact, but (b + corner - c) + c is rounded: a cube without rotation keeps its
-    // corner.
+    // The corners `b` and the centroid `c` are relative to `corner`, which is added last. Without a
+    // rotation (b - c) + c is then exact, and a cube keeps its corners. If `corner` were added to
+    // both first, the sum would be rounded.
     let corner_at = |scale: f64, b: DVec2, y: f64| {
         let offset = centroid + turned(b - centroid) * scale;
         corner + DVec3::new(offset.x, y, offset.y)
@@ -66,7 +67,8 @@ pub(super) fn prismoid(
         let across = (end - start).perp().normalize();
         let apothem = across.dot(start - centroid);
         let outward = turned(across * apothem.signum());
-        // At height y the side is `apothem (1 - (1 - top_over_base) y / height)` from the axis.
+        // At height y the distance of the side from the axis is
+        // `apothem (1 - (1 - top_over_base) y / height)`.
         let up = apothem.abs() * (1.0 - top_over_base) / height;
         let normal = DVec3::new(outward.x, up, outward.y).normalize();
         faces.push(through(corners[i], normal));
@@ -157,7 +159,8 @@ mod tests {
     fn rotation_is_counter_clockwise_from_above() {
         let prism = |rotation| Prism { corner: [0.0; 3], side: 1.0, height: 1.0, rotation }.form();
         let h = 0.75f64.sqrt();
-        // The centroid is (0.5, -h / 3); the third vertex points away, then to the left.
+        // The centroid is (0.5, -h / 3). Without a rotation the third vertex points away from the
+        // viewer (to -z); after a rotation by 90 degrees it points to the left (to -x).
         assert!(has_corner(&prism(0.0), 0.5, 0.0, -h));
         assert!(has_corner(&prism(90.0), 0.5 - 2.0 / 3.0 * h, 0.0, -h / 3.0));
         assert!(has_corner(&prism(180.0), 0.5, 0.0, h / 3.0));

@@ -5,9 +5,9 @@ use crate::shape::{EXAMPLES, Shape};
 use glam::{DAffine3, DQuat, DVec3};
 use std::f64::consts::FRAC_PI_4;
 
-/// Checks that a ray from above hits every kind of shape, and that the opposite ray misses. The ray
-/// points to the centre of the bounding box or, for a shape with a hole, to a point between the
-/// centre and a side.
+/// Checks that a ray from above hits every kind of shape, and that the ray in the opposite
+/// direction from the same origin misses. The ray points to the centre of the bounding box. If the
+/// shape has a hole, the ray points to a point between the centre and a side.
 #[test]
 fn ray_from_above_hits_every_kind() {
     for (key, _) in EXAMPLES {
@@ -17,7 +17,7 @@ fn ray_from_above_hits_every_kind() {
         let (low, high) = form.bounds().unwrap_or((base, base));
         let middle = (low + high) / 2.0;
         if *key == "rectangle" {
-            // The rectangle is upright: it is hit from its front only.
+            // The rectangle is upright; its ray comes from the front instead of from above.
             let front = middle + DVec3::Z;
             assert_eq!(form.cast(front, DVec3::NEG_Z), Some(1.0));
             assert_eq!(form.cast(front, DVec3::Z), None);

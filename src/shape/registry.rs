@@ -55,9 +55,9 @@ pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
     if angle > 180.0 { rounded_to(angle - 360.0, -6) } else { angle }
 }
 
-/// Expands to the keys of the shape kind `$kind`, for the table of kinds. A compound has parts of
-/// every kind, so that its keys refer to this table. They are therefore in a static, `$fields`: a
-/// constant cannot refer to itself.
+/// Expands to the keys of the shape kind `$kind`, for the table of kinds. The keys of a compound
+/// are the static `$fields`. They refer to the table of kinds itself, because the parts of a
+/// compound can be of any kind. A constant cannot refer to itself, but a static can.
 macro_rules! keys {
     ($kind:ident) => {
         $kind::FIELDS
@@ -80,8 +80,8 @@ macro_rules! kinds {
             )+
         }
 
-        // A static instead of a constant, because the table refers to itself: parts of compounds
-        // have shapes.
+        // A static instead of a constant, because the table refers to itself through the keys of
+        // compounds: their parts are shapes of any kind in this table.
         pub(super) static KIND_TABLE: [Field; [$($key),+].len()] = [
             $(Field::required($key, ValueType::Table(keys!($kind $($fields)?)), "", $kind::DOC),)+
         ];
@@ -188,8 +188,8 @@ impl FieldValue for Shape {
 }
 
 impl Shape {
-    /// Returns the first of the points that determine the shape's position; the origin if there is
-    /// none.
+    /// Returns the position of the shape: the first of its anchor points, or the origin if it has
+    /// none. Moving all anchor points by a vector moves the shape by that vector.
     pub fn position(&self) -> DVec3 {
         self.clone()
             .anchor_points_mut()

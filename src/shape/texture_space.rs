@@ -33,8 +33,8 @@ impl TextureSpace {
         Self { shape_from_texture, corners: corners.into(), default_mapping }
     }
 
-    /// Returns `true` if the shape itself defines texture coordinates. A mesh does if its file has
-    /// them, and a flat shape with edges does.
+    /// Returns `true` if the shape itself defines texture coordinates. A mesh defines them if its
+    /// file has them. A flat shape defines them if it is bounded; an infinite plane does not.
     pub fn has_uv(&self) -> bool {
         let [low, high] = self.corners;
         match self.default_mapping {
@@ -72,7 +72,8 @@ pub(super) fn around_axis(y: DVec3) -> DMat3 {
 }
 
 /// Returns orthonormal axes with the unit normal `z` of a plane as z axis. The y axis points as far
-/// up as possible; on a horizontal plane that faces up, it points away from the viewer.
+/// up as possible. On a horizontal plane the y axis points away from the viewer if the plane faces
+/// up, and towards the viewer if the plane faces down.
 pub(super) fn on_plane(z: DVec3) -> DMat3 {
     let up = if z.y.abs() > 0.999 { DVec3::NEG_Z * z.y.signum() } else { DVec3::Y };
     let x = up.cross(z).normalize();

@@ -158,17 +158,18 @@ impl FieldValue for Vec<TransformOp> {
     }
 }
 
-/// Returns Rodrigues' rotation about the unit vector `axis`, exact at quarter turns about the
-/// coordinate axes.
+/// Returns the rotation by `degrees` about the unit vector `axis` (Rodrigues' formula). Quarter
+/// turns about the coordinate axes are exact.
 fn rotation(axis: DVec3, degrees: f64) -> DAffine3 {
     let (sin, cos) = sin_cos_degrees(degrees);
     let rotated = |v: DVec3| v * cos + axis.cross(v) * sin + axis * (axis.dot(v) * (1.0 - cos));
     DAffine3::from_mat3(DMat3::from_cols(rotated(DVec3::X), rotated(DVec3::Y), rotated(DVec3::Z)))
 }
 
-/// Returns `true` if an affine map can be inverted with usable precision. Such a map is finite. The
-/// largest absolute element of its matrix is within 1e-12..=1e12. The product of this element and
-/// the largest absolute element of the inverse is at most 1e12.
+/// Returns `true` if an affine map can be inverted with usable precision. Three conditions must
+/// hold. The map is finite. The largest absolute element `m` of its matrix is within 1e-12..=1e12.
+/// The product of `m` and the largest absolute element of the inverse is at most 1e12, which leaves
+/// about 4 of the 16 decimal digits of `f64`.
 fn is_well_conditioned(map: &DAffine3) -> bool {
     let linear = map.matrix3;
     let largest = linear.to_cols_array().iter().fold(0.0f64, |m, x| m.max(x.abs()));
@@ -184,9 +185,10 @@ pub fn compose(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |map, step| step.map() * map)
 }
 
-/// Returns an error if the composition of `steps` places `shape` badly: it flattens the shape,
-/// stretches it out of range, moves it beyond the largest coordinate, or makes it too small for its
-/// distance from the origin. Otherwise returns `None`. Each single step must be valid.
+/// Returns an error if the composition of `steps` is not usable for `shape`. It must not flatten
+/// the shape, stretch it out of range, or move it beyond the largest coordinate. The shape must not
+/// become too small for its distance from the origin. Returns `None` if there is no error. Each
+/// single step must be valid.
 pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<ValidationError> {
     if steps.is_empty() {
         return None;

@@ -1,4 +1,4 @@
-//! Canonical tapered cylinder:
+//! Canonical tapered cylinder, with radius 1 at z = 0 and radius s at z = 1:
 //!   x^2 + y^2 <= (1 + (s - 1) z)^2, 0 <= z <= 1
 
 use crate::primitive::Form;

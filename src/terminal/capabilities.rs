@@ -48,7 +48,8 @@ pub struct Capabilities {
     pub background: Option<[u8; 3]>,
     /// `true` if the terminal supports kitty's graphics protocol.
     pub kitty_graphics: bool,
-    /// `true` if kitty's images can be placed by Unicode placeholders, as tmux requires.
+    /// `true` if the terminal supports Unicode placeholders: characters whose cells show an image
+    /// of kitty's protocol. Inside of tmux, images need placeholders.
     pub placeholders: bool,
     /// `true` if the terminal supports sixel images.
     pub sixel: bool,
@@ -58,12 +59,12 @@ pub struct Capabilities {
     pub sixel_px: Option<[u16; 2]>,
     /// Width and height of a terminal cell in pixels. `None` if the terminal has not replied.
     pub cell_px: Option<[u16; 2]>,
-    /// Time from the first request to the terminal's first reply. Inside a multiplexer, the
-    /// multiplexer replies. `None` if the terminal has not replied.
+    /// Time from the first request to the first reply. Inside of a multiplexer, the multiplexer
+    /// itself replies and not the terminal. `None` if no reply has arrived.
     pub round_trip: Option<Duration>,
-    /// Time from a request to the reply of the terminal outside of the multiplexer. The multiplexer
-    /// passes such requests through. `None` if the time was not measured or the multiplexer passes
-    /// no requests through.
+    /// Round-trip time to the terminal outside of the multiplexer, measured by a request that the
+    /// multiplexer passes on. `None` if the time was not measured or the multiplexer passes no
+    /// requests on.
     pub passthrough: Option<Duration>,
 }
 

@@ -1,9 +1,9 @@
 //! Query of the terminal's capabilities (colours, graphics protocols, sizes), before the first
 //! frame.
 //!
-//! All requests are sent in one write. Terminals reply in the order of the requests. The last
-//! request is for the device attributes, to which every terminal replies. The query ends with this
-//! reply. Replies that come after the timeout are ignored by later readers.
+//! All requests are sent in one write, and terminals reply in the order of the requests. The last
+//! request is for the device attributes, to which every terminal replies. The reply to it ends the
+//! query. If replies come after the timeout, later readers ignore them.
 
 use crate::terminal::capabilities::{Capabilities, Environment, Multiplexer};
 use crate::terminal::cells::Colors;
@@ -23,26 +23,31 @@ const CHECK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Request of the device attributes (DA1), to which every terminal replies.
 const ATTRIBUTES: &str = "\x1b[c";
-/// Requests of the capability query, separated here by semicolons: set a 24-bit colour, request the
-/// current colour (DECRQSS), and restore the default colours; name and version; background colour;
-/// support of mode 2026; test of kitty's protocol by an image that is not shown; largest number of
-/// colours of sixel images; their largest size; size of a cell.
+/// Requests of the capability query, in this order:
+/// - a 24-bit colour is set, the current colour is requested (DECRQSS), and the default is restored
+/// - name and version of the terminal (XTVERSION)
+/// - background colour (OSC 11)
+/// - support of synchronised updates (mode 2026)
+/// - test of kitty's graphics protocol by an image that is not shown
+/// - largest number of colours of a sixel image
+/// - largest width and height of a sixel image
+/// - width and height of a cell in pixels
 const REQUESTS: &str = "\x1b[48;2;1;2;3m\x1bP$qm\x1b\\\x1b[0m\x1b[>q\x1b]11;?\x1b\\\x1b[?2026$p\
                          \x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\\x1b[?1;1;0S\x1b[?2;1;0S\x1b[16t";
-/// Requests that tmux passes through to the terminal outside of it: test of kitty's protocol by an
-/// image that is not shown; name and version.
+/// Requests that tmux passes on to the terminal outside of tmux. The first tests kitty's graphics
+/// protocol by an image that is not shown. The second is for the name and version of the terminal.
 const REQUESTS_THROUGH_TMUX: &str = "\x1bPtmux;\x1b\x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\x1b\\\x1b\\\
                                       \x1bPtmux;\x1b\x1b[>q\x1b\\";
 /// First version of the terminal kitty that supports Unicode placeholders: `[major, minor]`.
 const PLACEHOLDERS_SINCE: [u32; 2] = [0, 28];
-/// Colour with red 1, green 2, blue 3 in the DECRQSS replies of terminals with 24-bit colour.
+/// Forms in which terminals with 24-bit colour report red 1, green 2, blue 3 in a reply to DECRQSS.
 const TRUE_COLOR: [&str; 3] = ["2::1:2:3", "2:1:2:3", "2;1;2;3"];
 /// Number of the terminal's private mode for synchronised updates.
 const SYNCHRONISED: u16 = 2026;
 
 /// Returns the request of the cursor position. A terminal replies when it has processed all earlier
-/// bytes. Inside of the multiplexer `through`, the request is wrapped so that the terminal outside
-/// of the multiplexer replies.
+/// bytes. If `through` is a multiplexer, the request is wrapped: the multiplexer then passes it on
+/// to the terminal outside, and this terminal replies.
 pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
     match through {
         None => "\x1b[6n",
@@ -55,8 +60,9 @@ pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
 /// multiplexer over SSH. Keys that are pressed meanwhile are kept in `input`. `is_ending` returns
 /// `true` if the query should stop.
 ///
-/// Inside of a local tmux, the terminal outside may never reply. The query does not wait for these
-/// replies; the caller passes late ones to [`Capabilities::learn`].
+/// Inside of a local tmux, some requests are passed on to the terminal outside of tmux, which may
+/// never reply. The query does not wait for replies of this terminal. The caller passes those that
+/// arrive after the query to [`Capabilities::learn`].
 ///
 /// # Errors
 /// Fails if the terminal is closed.

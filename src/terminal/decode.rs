@@ -10,8 +10,9 @@
 //!   string. The decoder passes ESC on only together with a byte that proves a sequence.
 //! - `ESC O c` (SS3), `ESC [ [ c` (Linux console) and `ESC [ M b x y` (X10 mouse) have further
 //!   bytes after the byte that `vte` takes for the final one.
-//! - Pasted text may hold any bytes, and it may pause. Only its end sequence ends it. After a pause
-//!   Escape and Ctrl-C end it too, in case that the end sequence was lost.
+//! - Pasted text may hold any bytes and may arrive with pauses. Its end sequence (`ESC [ 201 ~`)
+//!   ends the paste. After a pause the key Escape or Ctrl-C ends the paste too, because the end
+//!   sequence may have been lost.
 //! - `vte` discards the data of APC strings (`ESC _`), in which kitty replies. The decoder passes
 //!   them on as DCS strings (`ESC P`).
 //! - `vte` ends a DCS string at the byte 9C, which is also part of UTF-8 characters such as Ü.
@@ -24,7 +25,7 @@ use crate::terminal::{Event, Key, Reply};
 use std::time::Duration;
 
 /// Longest pause after the first two bytes of an escape sequence (`ESC [`, `ESC O`, …). After a
-/// longer pause they are a key pressed with Alt.
+/// longer pause the two bytes are decoded as a key pressed with Alt.
 const INTRODUCER_WAIT: Duration = Duration::from_millis(500);
 /// Longest pause inside of an escape sequence, except for its first two bytes and for pasted text.
 const SEQUENCE_WAIT: Duration = Duration::from_secs(2);
@@ -53,7 +54,8 @@ enum State {
     /// State inside of a UTF-8 character of several bytes.
     Character,
     Escape,
-    /// State after ESC and this byte, which begin a sequence or are a key pressed with Alt.
+    /// State after ESC and this byte. Both together either begin a sequence or are a key pressed
+    /// with Alt.
     Introducer(u8),
     /// State after `ESC O` and a number, which gives the modifiers of the key that follows.
     SingleShift(u16),
@@ -151,7 +153,8 @@ impl Decoder {
                 let is_complete = self.interpreter.is_character_complete;
                 self.state = if is_complete { State::Ground } else { State::Character };
             }
-            // The UTF-8 character is incomplete.
+            // `byte` does not continue the UTF-8 character, which is incomplete and produces no
+            // key.
             (State::Character, _) => {
                 self.restart();
                 self.byte(byte);
@@ -272,7 +275,8 @@ impl Decoder {
     }
 
     fn paste(&mut self, byte: u8) {
-        // Skipped bytes are still examined for the end of the paste.
+        // Bytes of the paste after the first `MAX_PASTE` are skipped. The latest of them are kept
+        // here only to recognise the end sequence.
         if self.taken.len() >= MAX_PASTE + PASTE_END.len() {
             self.taken.remove(MAX_PASTE);
         }
@@ -288,8 +292,9 @@ impl Decoder {
         self.complete(Some(Event::Paste(text)));
     }
 
-    /// Reports the pasted text so far, after a pause in it. If there was a pause before, and the
-    /// last byte is Escape or Ctrl-C, the paste ends with this key.
+    /// Reports the pasted text so far. The caller calls this after a pause in the paste. If this is
+    /// not the first pause, and the last byte before it is Escape or Ctrl-C, the paste ends and
+    /// this key is reported too.
     fn pause_paste(&mut self) {
         let is_paused = self.state == State::PausedPaste;
         let key = self.taken.pop_if(|last| is_paused && [ESC, ETX].contains(last));
@@ -317,8 +322,9 @@ impl Decoder {
     }
 }
 
-/// Returns `true` if `bytes` can only be the rest of a reply whose ESC was read alone. `bytes` is
-/// the result of one read; typed characters would arrive in several reads.
+/// Returns `true` if `bytes`, the result of one read, can only be a reply of the terminal without
+/// its first byte. This byte, an ESC, was read alone before. Typed characters would not arrive in
+/// one read.
 fn is_reply_without_escape(bytes: &[u8]) -> bool {
     matches!(
         bytes,

@@ -6,9 +6,9 @@
 /// Logarithmic mapping of a range of positive numbers to the colours of a colour map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// Lower end of the range of numbers, which is dark unless the scale is reversed.
+    /// Lower end of the range of numbers. It is shown dark, or bright if the scale is reversed.
     pub low: f64,
-    /// Upper end of the range of numbers, which is bright unless the scale is reversed.
+    /// Upper end of the range of numbers. It is shown bright, or dark if the scale is reversed.
     pub high: f64,
     /// `true` if the scale is reversed: `low` is then bright.
     pub reversed: bool,
@@ -61,8 +61,8 @@ pub fn magnitude(part: f64) -> [u8; 3] {
 /// False colour of a difference of 0.
 const DIFFERENCE_MIDDLE: [u8; 3] = [24, 24, 27];
 
-/// Returns the false colour of `part`, a signed difference: blue for -1 (darker), nearly black for
-/// 0, orange for 1 (brighter). Other values are clamped.
+/// Returns the false colour of a signed difference. If `part` is -1 (darker), it is blue. If `part`
+/// is 0, it is nearly black. If `part` is 1 (brighter), it is orange. Other values are clamped.
 pub fn difference(part: f64) -> [u8; 3] {
     const LESS: [u8; 3] = [96, 178, 255];
     const MORE: [u8; 3] = [255, 152, 64];
@@ -76,8 +76,9 @@ pub fn difference(part: f64) -> [u8; 3] {
 
 /// Returns the false colour of the object with number `id`. Consecutive numbers have distant hues.
 pub fn object_color(id: u32) -> [u8; 3] {
-    // The hue advances by the golden angle, so that no hue is repeated. Lightness and chroma take
-    // turns, so that colours of similar hue differ as well.
+    // The hue advances by the golden angle from one number to the next, so that no hue is repeated.
+    // Three pairs of lightness and chroma are used in turn, so that objects of similar hue differ
+    // as well.
     let hue = (f64::from(id) * 0.618_033_988_749_895).fract() * std::f64::consts::TAU;
     let lightness = [0.74, 0.58, 0.86][id as usize % 3];
     let chroma = [0.13, 0.15, 0.09][id as usize % 3];
@@ -139,7 +140,7 @@ mod tests {
         assert_eq!([log.part(0.1), log.part(100.0)], [0.0, 1.0]);
         let none = Scale::logarithmic([]);
         assert_eq!((none.low, none.high), (1.0, 10.0));
-        // A scale over a single value shows it bright.
+        // If all values are equal, the scale shows them bright.
         assert_eq!(Scale::logarithmic([4.0]).part(4.0), 1.0);
     }
 
@@ -164,7 +165,8 @@ mod tests {
 
     #[test]
     fn object_colors_are_distinguishable() {
-        // Checked for any two of the first 12 numbers, and for any two consecutive numbers.
+        // The colours of any two of the first 12 numbers must differ. Those of two consecutive
+        // numbers must differ more.
         let distance = |a, b| Oklab::of(object_color(a)).distance(Oklab::of(object_color(b)));
         for a in 0..12 {
             for b in 0..a {

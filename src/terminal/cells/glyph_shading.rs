@@ -84,7 +84,7 @@ pub fn pair(upper: [u8; 3], lower: [u8; 3]) -> PictureCell {
     let target = [upper, lower].map(Oklab::of);
     let [a, b] = [upper, lower].map(linear);
     let shade = SHADED.nearest([0, 1, 2].map(|c| code(0.5 * (a[c] + b[c]))));
-    // For similar halves a half block cannot gain enough.
+    // If the halves have similar colours, a half block gains too little over a shading glyph.
     if target[0].distance(target[1]) < HALVES_GAIN {
         return CELLS[shade];
     }

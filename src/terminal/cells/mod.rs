@@ -36,7 +36,7 @@ impl Colors {
     /// All sets of colours, in the order in which the colour key cycles through them.
     pub const ALL: [Self; 4] = [Self::True, Self::Indexed, Self::Sixteen, Self::Mono];
 
-    /// Returns the name of the set of colours that users see.
+    /// Returns the name of this set of colours, as it is displayed to users.
     pub fn name(self) -> &'static str {
         match self {
             Self::True => "24-bit colour",
@@ -140,8 +140,8 @@ pub struct PictureCells {
 
 impl PictureCells {
     /// Converts `raster` for a terminal with `colors`. `settled` is `true` if the picture will not
-    /// change soon. In 256 colours a settled picture is dithered. A changing picture is not,
-    /// because dithering would make it flicker.
+    /// change without user input. In 256 colours only a settled picture is dithered, because
+    /// dithering would make a changing picture flicker.
     ///
     /// The last row of cells is half empty if the raster has an odd number of rows.
     pub fn new(raster: &Raster, colors: Colors, settled: bool) -> Self {

@@ -75,8 +75,8 @@ mod tests {
         assert!(worst < tolerance, "{got:?}, not {:?}", [l, a, b]);
     }
 
-    /// Checks the conversion from XYZ to OKLab against the pairs in its publication, which are
-    /// rounded to three places there.
+    /// Checks the conversion from XYZ to OKLab against the pairs of colours in the publication of
+    /// OKLab, which gives them rounded to three places.
     #[test]
     fn oklab_matches_published_pairs() {
         // Linear sRGB from CIE XYZ at D65 (IEC 61966-2-1).

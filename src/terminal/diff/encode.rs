@@ -61,7 +61,8 @@ impl Encoder {
         self.set(out, pen);
         out.extend(symbol.as_bytes());
         let width = symbol.width() as u16;
-        // Terminals differ in the cursor position after the last column and after wide characters.
+        // After the last column and after wide characters the cursor position depends on the
+        // terminal. It is treated as unknown then.
         self.cursor = (width == 1 && x + 1 < self.columns).then_some((x + 1, y));
     }
 
@@ -113,12 +114,13 @@ impl Encoder {
         };
         let [upper, lower] = halves;
         let is_flat = upper == lower;
-        // The default colour of the foreground differs from that of the background, so that they
-        // cannot be exchanged.
+        // The default colours of foreground and background are both `Color::Reset`, but they look
+        // different. A half with a default colour can therefore not change between foreground and
+        // background.
         let is_explicit = upper != Color::Reset && lower != Color::Reset;
         let candidates: &[(&str, Pen)] = match (is_explicit, is_flat) {
-            // A full block is never used: in some fonts it leaves an edge of the background
-            // uncovered.
+            // A full block is replaced by a space, because the full block of some fonts leaves an
+            // edge of the background uncovered.
             (true, true) => &[(" ", pen(self.pen.fg, upper))],
             (true, false) => &[("▀", pen(upper, lower)), ("▄", pen(lower, upper))],
             (false, _) if symbol == " " => &[(" ", pen(self.pen.fg, bg))],
@@ -126,7 +128,7 @@ impl Encoder {
         };
         let changes = |(symbol, pen): &(&str, Pen)| {
             let colors = usize::from(pen.fg != self.pen.fg) + usize::from(pen.bg != self.pen.bg);
-            // A colour needs far more bytes than a glyph, so colours are weighted by 16.
+            // The weight is 16, because a change of colour needs up to 17 bytes and a glyph 1 to 3.
             16 * colors + symbol.len()
         };
         candidates.iter().min_by_key(|candidate| changes(candidate)).copied().unwrap_or(plain)
@@ -143,7 +145,7 @@ impl Encoder {
             for (attribute, _, reset) in ATTRIBUTES {
                 if removed.contains(attribute) {
                     codes.push(reset.to_string());
-                    // One parameter can reset several attributes.
+                    // One parameter can reset several attributes: 22 resets both bold and dim.
                     let affected = ATTRIBUTES.iter().filter(|(_, _, other)| *other == reset);
                     affected.for_each(|(attribute, _, _)| reset_too |= *attribute);
                 }
@@ -254,7 +256,8 @@ mod tests {
 
     fn any_cell() -> impl Strategy<Value = Cell> {
         let symbol = prop_oneof![Just("▀"), Just("▄"), Just("█"), Just(" "), Just("a"), Just("é")];
-        // Bold and dim are not combined: terminals differ in it, and the dashboard does not use it.
+        // Bold and dim are not combined, because terminals show the combination differently and the
+        // dashboard does not use it.
         let weight =
             prop_oneof![Just(Modifier::empty()), Just(Modifier::BOLD), Just(Modifier::DIM)];
         let style = prop_oneof![
@@ -310,7 +313,8 @@ mod tests {
             parser.process(&out);
             for y in 0..rows {
                 for x in 0..columns {
-                    // The reference is the cell sent alone, with its own symbol and pen.
+                    // The reference is a second emulated terminal that receives only this cell,
+                    // with the cell's own symbol and pen.
                     let cell = &expected[(x, y)];
                     let mut alone = vt100::Parser::new(high, wide, 0);
                     let mut bytes = Vec::new();

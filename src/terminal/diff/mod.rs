@@ -37,8 +37,8 @@ pub struct TargetFrame<'a> {
     /// For each cell of the picture's area, row by row, `true` if the cell shows the picture, and
     /// `false` if text covers it.
     pub uncovered: &'a [bool],
-    /// Number of the shown picture. It increases when the picture changes for another reason than
-    /// additional samples, such as an edit or a camera movement.
+    /// Number of the shown picture. It increases when an edit, a camera movement or another action
+    /// changes what the picture shows. Additional samples do not increase it.
     pub subject: u64,
     /// Number that increases when the picture may have changed for any reason, such as additional
     /// samples.
@@ -66,8 +66,8 @@ pub struct Pending {
     pub text: bool,
     /// `true` if visible differences of the picture remain to be sent.
     pub visible: bool,
-    /// Earliest time at which differences of the picture below the threshold of visibility are
-    /// sent. `None` if there are none.
+    /// Earliest time at which picture differences below the threshold of visibility may be sent.
+    /// `None` if there are no such differences.
     pub hidden: Option<Duration>,
 }
 
@@ -86,7 +86,8 @@ pub struct FrameDiff {
     /// one colour). A picture is new after an edit or a camera movement.
     fresh: bool,
     /// Number of samples per pixel at which the next full comparison of the picture is due. A full
-    /// comparison considers all cells; the others consider only cells that still differ visibly.
+    /// comparison considers all cells. The comparisons between two full ones consider only cells
+    /// that still differ visibly from the target frame.
     next_samples: f64,
     version: u64,
     /// Time at which the version of the target frame's picture last changed.
@@ -105,10 +106,10 @@ impl FrameDiff {
         self.encoder.moved();
     }
 
-    /// Appends the bytes of the next frame, within the limits of `allowance`, to `out` and returns
-    /// a summary of the frame. Appends nothing if there are no differences. OKLab differences up to
-    /// `threshold` are treated as invisible: they are sent only when the connection is otherwise
-    /// idle.
+    /// Appends the bytes of the next frame to `out`, within the limits of `allowance`, and returns
+    /// a summary of the frame. Appends nothing if the terminal shows `target` already. OKLab
+    /// differences up to `threshold` are treated as invisible: they are sent only when the
+    /// connection is otherwise idle.
     pub fn frame(
         &mut self,
         target: &TargetFrame,
@@ -266,8 +267,8 @@ impl FrameDiff {
     }
 
     /// Encodes as many cells of `order` as fit into `room` bytes, the largest differences first.
-    /// `order` lists the difference and the index of each cell of the rectangle `area`; `cell(i)`
-    /// returns the cell with index i.
+    /// `order` has a pair `(difference, index)` for each cell to send; the index is that of the
+    /// cell in the rectangle `area`. `cell(i)` returns the contents of the cell with index i.
     fn fitting<'a>(
         &self,
         area: Rect,
@@ -291,7 +292,9 @@ impl FrameDiff {
         };
         let mut best = Part { bytes: Vec::new(), encoder: self.encoder.clone(), cells: Vec::new() };
         let mut count = order.len();
-        // Half of the cells need more than half of the bytes, so the estimate is never too small.
+        // The estimate assumes the same number of bytes for each cell. Fewer cells lie farther
+        // apart and need more bytes each, so that the true number of cells that fit is rarely
+        // larger.
         while count > 0 {
             let part = encoded(count);
             if part.bytes.len() <= room {
@@ -300,7 +303,7 @@ impl FrameDiff {
             }
             count = (count * room / part.bytes.len()).min(count - 1);
         }
-        // A second estimate uses the room that is left.
+        // If more than a tenth of `room` is left, a second estimate tries to use it.
         if best.cells.len() < order.len() && 10 * best.bytes.len() < 9 * room {
             let estimate = best.cells.len() * room / best.bytes.len().max(1);
             let part = encoded((estimate - estimate / 50).clamp(best.cells.len(), order.len()));

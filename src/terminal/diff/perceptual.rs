@@ -21,8 +21,8 @@ struct CellColors {
     /// Colours of the upper and the lower half of the cell that the terminal shows. `None` if
     /// unknown.
     shown: Option<[Oklab; 2]>,
-    /// `true` if this cell is included in the comparison of visible differences. It becomes `false`
-    /// when the cell is sent exactly or its difference becomes invisible, and `true` again at the
+    /// `true` if the difference of this cell may count as visible. The value becomes `false` when
+    /// the cell is sent exactly or its difference becomes invisible. It becomes `true` again at the
     /// next full comparison.
     counts: bool,
     /// OKLab difference between target and shown cell; 0 if they are equal.
@@ -58,9 +58,10 @@ impl PerceptualDiff {
         }
     }
 
-    /// Compares the shown cells with the target, and marks the visible differences: those above
-    /// `threshold`. `is_due` is `true` for a full comparison, which considers all cells. Otherwise
-    /// the difference of a cell is marked only if `counts` of this cell is `true`.
+    /// Compares the shown cells with the target frame and marks the cells with a visible
+    /// difference, that is, one above `threshold`. If `is_due` is `true`, this is a full
+    /// comparison, which considers all cells. Otherwise it considers only cells whose `counts` is
+    /// `true`.
     pub fn compare(&mut self, target: &TargetFrame, shown: &Buffer, is_due: bool, threshold: f32) {
         for (index, cell_colors) in self.cells.iter_mut().enumerate() {
             let cell_position = position(self.area, index);
@@ -84,8 +85,8 @@ impl PerceptualDiff {
                 cell_colors.shown.map_or(UNKNOWN, |shown| difference(shown, cell_colors.look));
             cell_colors.counts &= cell_colors.error > threshold;
             cell_colors.visible = cell_colors.counts;
-            // Cells that differ but have equal colours get a positive error, so that they are sent
-            // last.
+            // Cells that differ in their contents but not in their colours get the smallest
+            // positive error, so that they are sent last.
             cell_colors.error = cell_colors.error.max(f32::MIN_POSITIVE);
         }
     }
@@ -134,9 +135,10 @@ impl PerceptualDiff {
 
     /// Creates a mosaic of the target: an image of blocks of `side` x `side` half cells, each block
     /// of one colour. A half cell is the upper or lower half of a cell. Returns `(cells,
-    /// improved)`. `cells` are all cells of the mosaic; cells without a visible difference are
-    /// those of the target. `improved` has `(gain, index)` for each cell that is closer to the
-    /// target than the shown cell. The gain is the decrease in OKLab distance from the target.
+    /// improved)`. `cells` has all cells of the picture; only those with a visible difference show
+    /// the mosaic, and the others are those of the target. `improved` has `(gain, index)` for each
+    /// mosaic cell that is closer to the target than the cell on the terminal. The gain is the
+    /// decrease in OKLab distance from the target.
     pub fn coarse(&self, target: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
         let rows = usize::from(self.area.height);

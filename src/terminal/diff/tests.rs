@@ -208,7 +208,8 @@ fn invisible_differences_wait_for_idle_time() {
     assert_eq!(fixture.frame(100, within(20_000)).1, b"");
     let Pending { visible, hidden, .. } = fixture.diff.pending();
     assert_eq!((visible, hidden), (false, Some(ms(100) + IDLE)));
-    // After `IDLE` without change, invisible differences are sent in slices.
+    // After `IDLE` without a change of the picture, invisible differences are sent in slices of at
+    // most half of the byte budget.
     let (frame, bytes) = fixture.frame(2200, within(4000));
     assert!(frame.flushed > 500 && frame.flushed <= 2000 && bytes.len() <= 2000, "{frame:?}");
     // Invisible differences of a settled picture are sent at once, if the budget permits
@@ -226,7 +227,8 @@ fn cells_are_compared_after_enough_new_samples() {
     let mut fixture = Fixture::new();
     fixture.samples = 16.0;
     fixture.frame(0, within(20_000));
-    // With only 6 % more samples even a visible difference is not sent.
+    // With only 6 % more samples even a visible difference is not sent, because the next comparison
+    // is due after 19 % more (a factor of 2^(1/4)).
     fixture.samples = 17.0;
     fixture.paint(|x, y| [8 * x as u8, 20 * y as u8, 150]);
     assert_eq!(fixture.frame(50, within(20_000)).1, b"");
@@ -234,7 +236,7 @@ fn cells_are_compared_after_enough_new_samples() {
     fixture.samples = 20.0;
     fixture.frame(100, within(20_000));
     assert_eq!(fixture.exact(), 240);
-    // A picture of a new subject is sent at once.
+    // A new number in `subject` means a new picture, which is compared and sent at once.
     fixture.subject += 1;
     fixture.samples = 1.0;
     fixture.paint(|x, y| [8 * x as u8, 20 * y as u8, 250]);
@@ -250,7 +252,7 @@ fn new_picture_appears_as_mosaic_first() {
     fixture.paint(|x, y| [255 - 8 * x as u8, 200 - 20 * y as u8, 20]);
     let (_, bytes) = fixture.frame(50, within(1200));
     assert!(bytes.len() <= 1200, "{}", bytes.len());
-    // Every cell is near its target, although not exact.
+    // Every cell has nearly the target's colour, although not exactly.
     for at in PICTURE.positions() {
         let cell = fixture.parser.screen().cell(at.y, at.x).unwrap();
         let vt100::Color::Rgb(r, ..) = cell.bgcolor() else { panic!("{at} has no colour") };
@@ -270,7 +272,8 @@ fn uncovered_picture_is_sent_again() {
         fixture.say(row, "       overlay      ");
         range.for_each(|at| fixture.uncovered[at] = false);
     }
-    // The mask covers exactly the cells of the text: columns 0 to 17 of the picture's rows 2 and 3.
+    // `uncovered` becomes `false` for exactly the cells of the text: columns 0 to 17 of the
+    // picture's rows 2 and 3.
     let mask: Vec<_> = (0..240).map(|at| !(2..4).contains(&(at / 30)) || at % 30 >= 18).collect();
     fixture.uncovered = mask;
     fixture.frame(50, within(20_000));
