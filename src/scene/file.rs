@@ -38,7 +38,7 @@ pub enum SaveError {
     Changed(PathBuf),
     /// Error: a file with this path exists, and overwriting was not requested.
     Exists(PathBuf),
-    /// The scene file cannot be written.
+    /// Error: the scene file cannot be written.
     Failed {
         /// Path of the scene file.
         path: PathBuf,
@@ -97,7 +97,8 @@ impl SceneFile {
     }
 
     /// Creates a scene from `text`, the unsaved edits in a recovery file. `path` is the scene file
-    /// that was edited. It has other content now; saving replaces that.
+    /// that was edited. The present content of the file differs from `text`, and stays until the
+    /// edits are saved.
     ///
     /// # Errors
     /// Returns the errors of [`Scene::parse`].

@@ -7,7 +7,7 @@ use crate::scene::{Object, Scene, TransformOp};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Largest estimated memory of all scenes in the history [bytes].
+/// Largest estimated memory of all scenes to which undo can return [bytes].
 const MAX_BYTES: usize = 64 << 20;
 /// Largest number of edits that can be undone.
 const MAX_STEPS: usize = 10_000;
@@ -23,7 +23,8 @@ pub struct History {
     /// Scenes to which redo returns: one for each undone step, as it was after the step. The step
     /// to redo next is the last entry.
     future: Vec<HistoryEntry>,
-    /// `true` during a gesture (a drag, a held key): its next step is merged with its previous one.
+    /// `true` during a gesture (a drag, a held key): the next step of the gesture is merged with
+    /// the previous step.
     open: bool,
     saved: Arc<Scene>,
 }
@@ -67,7 +68,7 @@ impl History {
         let before = std::mem::replace(&mut self.now, scene);
         self.open = held;
         if grows {
-            // A gesture that returns to the scene at its start leaves no step.
+            // A gesture that returns to the scene from which it started leaves no step.
             if self.past.back().is_some_and(|last| *last.scene == *self.now) {
                 self.now = self.past.pop_back().map_or(before, |last| last.scene);
                 self.open = false;
@@ -108,7 +109,8 @@ impl History {
         self.open = false;
     }
 
-    /// Returns `true` if the current scene equals the saved one, even if steps lie between them.
+    /// Returns `true` if the current scene equals the saved one, even if edits were made and
+    /// reverted since saving.
     pub fn is_saved(&self) -> bool {
         Arc::ptr_eq(&self.saved, &self.now) || *self.saved == *self.now
     }
@@ -118,7 +120,8 @@ impl History {
         *self = Self::new(scene);
     }
 
-    /// Drops the oldest steps until the undo history is within its memory limit.
+    /// Drops the oldest steps until the undo history is within its limits of memory and of steps.
+    /// The latest step is always kept.
     fn forget(&mut self) {
         let mut total: usize = self.past.iter().map(|entry| entry.bytes).sum();
         while self.past.len() > 1 && (total > MAX_BYTES || self.past.len() > MAX_STEPS) {

@@ -94,11 +94,11 @@ impl Scene {
     }
 }
 
-/// Returns an error if a material may reflect more light than it receives: if the weights of its
+/// Returns a warning if a material may reflect more light than it receives: if the weights of its
 /// diffuse, highlight, reflection and transmission parts may add up to more than 1. Otherwise
-/// returns `None`. The error is `(key, phrase)`: the key that it refers to, and a statement of the
-/// sum. A Cook-Torrance highlight is the reflection of a light, so that only the larger weight of
-/// highlight and reflection is added.
+/// returns `None`. The warning is `(key, phrase)`: the key that it refers to, and a statement of
+/// the sum. A Cook-Torrance highlight and the reflection stand for the same mirror reflection, of
+/// lights and of surfaces. Only the larger of their two weights is therefore added.
 fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     let mirrored = match m.highlight {
         Highlight::Phong => m.specular + m.reflection,
@@ -106,7 +106,8 @@ fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     };
     let f0 = m.metal.map(|metal| metal.f0()).or(m.f0).unwrap_or(Color::WHITE).largest();
     let passed = match m.fresnel_mode() {
-        // A dielectric divides the same light into F and 1 - F: the larger weight bounds the sum.
+        // A dielectric reflects the share F of the light and transmits 1 - F. The larger of the two
+        // weights is therefore an upper bound.
         Fresnel::Dielectric => mirrored.max(m.transmission),
         _ => mirrored * f0 + m.transmission,
     };

@@ -1,4 +1,4 @@
-//! Recovery files: unsaved edits on disk, as vim's swap files.
+//! Recovery files: unsaved edits on disk, similar to the swap files of vim.
 //!
 //! The text that saving would write is kept in a hidden file beside the scene. It is replaced
 //! atomically, and removed when the scene is saved or closed deliberately. The process that writes
@@ -18,14 +18,15 @@ use std::time::{Duration, SystemTime};
 use tempfile::NamedTempFile;
 
 /// Largest number of recovery files of one scene in one folder, from crashed or concurrent
-/// sessions.
+/// processes.
 const MAX_FILES: u32 = 9;
 /// Beginning of the first line of a recovery file. The fingerprint (hash) of the scene file
 /// follows.
 const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
 /// Word in the first line of a recovery file in place of the fingerprint, if the scene has no file.
 const NO_FILE: &str = "none";
-/// Age after which an unlocked temporary file of a killed process is removed.
+/// Time since the last modification of an unlocked temporary file from which the file is taken to
+/// be that of a killed process, and removed.
 const STALE_AFTER: Duration = Duration::from_secs(60);
 
 /// Writer and finder of the recovery files of one scene.
@@ -95,7 +96,8 @@ impl Recovery {
         let mut beside = None;
         let stem = match path {
             Some(path) => {
-                // Every path to the same file gives the same name.
+                // The path is made canonical, so that every path to the same file gives the same
+                // name.
                 let canonical = fs::canonicalize(path).or_else(|_| std::path::absolute(path));
                 let canonical = canonical.unwrap_or_else(|_| path.to_path_buf());
                 let name = canonical.file_name().unwrap_or(OsStr::new("scene")).to_os_string();
@@ -289,9 +291,10 @@ enum Found {
 /// cannot be read.
 fn read_orphan(path: &Path) -> io::Result<Found> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    // Another process may replace the file after it was opened here: then the new file is read.
+    // If another process replaces the file after it was opened here, the loop opens the new file.
     for _ in 0..5 {
-        // The type is checked before opening, because symbolic links are not followed.
+        // The type is checked before opening, so that the target of a symbolic link is never
+        // opened.
         match fs::symlink_metadata(path) {
             Ok(metadata) if !metadata.is_file() => {
                 return Err(io::Error::other("it is not a regular file"));

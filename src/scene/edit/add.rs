@@ -178,7 +178,7 @@ pub fn add_light(scene: &Scene, kind: &str) -> Result<Edit, EditError> {
         _ => "lamp",
     };
     light.name = free_light(scene, name);
-    // The new light adds to a light that is on already, and therefore gets half the intensity.
+    // If a light is on already, the new light adds to it, and therefore gets half the intensity.
     light.intensity = if scene.lights.iter().any(|l| l.on) { 0.5 } else { 1.0 };
     if let Some(surface) = light.surface() {
         // The intensity makes the light as bright at the centre of the scene as a light without

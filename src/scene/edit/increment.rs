@@ -76,8 +76,8 @@ pub fn step(
 }
 
 /// Changes `key` to the next choice, or to the previous one if `forward` is `false`, cyclically.
-/// The value of `key` is a word of a list, a switch, a kind such as that of a light, or the
-/// material of an object. For an optional key, "no value" is one of the choices.
+/// The value of `key` may be a word of a list, a switch (`true` or `false`), a kind such as that of
+/// a light, or the material of an object. For an optional key, "no value" is one of the choices.
 ///
 /// # Errors
 /// Fails if there is no such key, or it has no choices.
@@ -176,14 +176,14 @@ impl StepCount {
 #[derive(Clone, Copy)]
 enum StepRule {
     /// Step to the next rung (1, 1.1, 1.2 ... 9, times a power of ten), about a tenth larger or
-    /// smaller. Between 0 and `floor` there are no rungs.
+    /// smaller. Between 0 and `floor` there are no rungs: the step up from 0 leads to `floor`.
     Rungs { floor: f64, range: NumberRange },
     /// Step by `unit`; a fine step is a tenth of it.
     Units { unit: f64, range: NumberRange },
     /// Step by 5 degrees, or by 0.5 in fine steps.
     Degrees { range: NumberRange },
-    /// Step of one component of a direction by 0.05 times the largest power of ten that is not
-    /// above the magnitude of the largest component. A fine step is a tenth of it.
+    /// Step of one component of a direction by 0.05 p, where p is the largest power of ten up to
+    /// the magnitude of the largest component. A fine step is a tenth of it.
     Direction,
     /// Step to the next rung (1, 1.1, 1.2 ... 9, times a power of ten) of the magnitude; the sign
     /// is kept.
@@ -211,11 +211,12 @@ impl StepRule {
                 } else if field.name == "offset" {
                     Self::Units { unit: 0.05, range }
                 } else if field.name == "height" {
-                    // Height of a bump map: at most a hundredth of the size of the surface.
+                    // Height of a bump map. The step is small, because useful heights are at most a
+                    // hundredth of the size of the surface.
                     Self::Units { unit: 0.005, range }
                 } else if matches!(field.name, "roughness" | "alpha") {
-                    // The step from 0 gives the smallest value that is visible at the far end of a
-                    // room.
+                    // The step up from 0 leads to 0.001, the smallest value whose blur is visible
+                    // at the far end of a room.
                     Self::Rungs { floor: 0.001, range }
                 } else if range == NumberRange::SHARE || range == NumberRange::COEFFICIENT {
                     Self::Units { unit: 0.05, range }
@@ -254,8 +255,8 @@ impl StepRule {
             Self::Units { unit, range } => within(added(x, unit, count), range, x),
             Self::Degrees { range } => {
                 let moved = added(x, 5.0, count);
-                // An opening angle cannot have the ends of its range: steps stop 0.5 degrees before
-                // them.
+                // The range of an opening angle excludes its ends. Steps stop a fine step of 0.5
+                // degrees before them.
                 let ends = NumberRange::closed(range.low + 0.5, range.high - 0.5);
                 if range.low.is_finite() { within(moved, ends, x) } else { moved }
             }
@@ -309,8 +310,8 @@ fn doubled(x: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> 
     within(moved, range, x)
 }
 
-/// Rungs: round numbers between 1 and 10 to which coarse steps lead, in hundredths. They are about
-/// a tenth apart and include every digit from 1.00 to 9.00.
+/// Rungs: round numbers between 1 and 10 to which coarse steps lead, in hundredths. Successive
+/// rungs differ by about a tenth. The whole numbers from 1 to 9 are among them.
 const RUNGS: [i64; 23] = [
     100, 110, 120, 130, 140, 160, 180, 200, 220, 250, 280, 300, 330, 360, 400, 450, 500, 550, 600,
     650, 700, 800, 900,
@@ -328,7 +329,8 @@ fn fine_width(hundredths: i64) -> i64 {
 
 /// Returns the number that is `steps` rungs (round numbers such as 1, 1.1, 1.2) above `x`, or below
 /// it for negative `steps`. `x` is at least 0. Between 0 and `floor` there are no round numbers.
-/// The result is always a round number or an end of `range`, so that steps up and down are inverse.
+/// The result is always a round number or an end of `range`; steps up and down therefore undo each
+/// other.
 fn next_nice(x: f64, floor: f64, range: NumberRange, StepCount { steps, fine }: StepCount) -> f64 {
     let up = steps > 0;
     let mut x = x;
@@ -350,7 +352,7 @@ fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
     let e = floor_log10(x);
     let scale = format!("1e{}", 2 - e).parse().unwrap_or(1.0);
     let mantissa = x * scale;
-    // Scaling rounds a number on a rung to slightly beside that rung.
+    // Rounding errors of the scaling may move a number slightly off its rung.
     let nearest = mantissa.round();
     let on_rung = (mantissa - nearest).abs() < 1e-6;
     let below = if on_rung { nearest as i64 } else { mantissa.floor() as i64 };
@@ -362,7 +364,7 @@ fn nice_step(x: f64, up: bool, fine: bool) -> f64 {
         (false, true) => {
             let reach = if on_rung { below - 1 } else { below };
             let width = fine_width(reach.max(100));
-            // The rung below 1.00 is 9.95 of the next lower decade.
+            // Below 1.00, the next rung of fine steps is 9.95 times the next lower power of ten.
             if reach < 100 {
                 return rounded_to(9.95 * 10f64.powi(e - 1), e - 3);
             } else {
@@ -389,14 +391,14 @@ fn brightened(channels: &[f64], range: NumberRange, count: StepCount) -> Vec<f64
     if largest == 0.0 {
         return vec![next; channels.len()];
     }
-    // Black would lose the hue: the darkest step stays above it.
+    // Black has no hue. The brightness of the darkest step is therefore above 0.
     let next = if next <= 0.0 { largest.min(0.005) } else { next };
     channels.iter().map(|x| rounded_to(x * next / largest, floor_log10(next) - 3)).collect()
 }
 
 /// Returns a picture size with width and height changed together by `count` arrow steps. A coarse
-/// step doubles or halves them, a fine step changes the width by 16 pixels. Their ratio is kept as
-/// far as whole numbers allow.
+/// step doubles or halves them, a fine step changes the width by 16 pixels. The aspect ratio is
+/// kept as far as whole numbers allow.
 fn resized(sides: &[f64], range: NumberRange, count: StepCount) -> Vec<f64> {
     let width = sides[0];
     let next = match count.fine {

@@ -7,12 +7,11 @@ use crate::scene::edit::{Edit, EditError, Target};
 use crate::value::{floor_log10, round_significant, rounded_to};
 use glam::DVec3;
 
-/// Radius of the lens to which a pinhole is opened, as a fraction of the distance of the plane in
-/// focus. It is large enough that objects at infinity, or at twice that distance, are visibly
-/// blurred.
+/// Radius of the lens to which a pinhole is opened, as a fraction of the distance from the eye to
+/// the plane in focus. With 0.02, objects at twice that distance and farther are visibly blurred.
 const FIRST_RADIUS: f64 = 0.02;
-/// Radius below which a lens becomes a pinhole, as a fraction of the distance of the plane in
-/// focus.
+/// Radius below which a lens becomes a pinhole, as a fraction of the distance from the eye to the
+/// plane in focus.
 const LAST_RADIUS: f64 = 5e-4;
 /// Smallest and largest f-number to which [`change_aperture`] leads.
 const F_NUMBERS: [f64; 2] = [0.1, 1000.0];
@@ -35,8 +34,9 @@ pub fn focus_on(scene: &Scene, point: [f64; 3]) -> Result<Edit, EditError> {
 }
 
 /// Opens the camera's lens by `stops`; negative stops close it. One stop doubles the area of the
-/// lens. A pinhole opens to a lens of a fiftieth of the distance of the plane in focus; a lens that
-/// is closed far enough becomes a pinhole. A camera without a plane in focus gets one.
+/// lens. A pinhole opens to a lens whose radius is a fiftieth of the distance from the eye to the
+/// plane in focus. A lens with a given radius becomes a pinhole if it is closed far enough. A
+/// camera without a plane in focus gets one.
 ///
 /// # Errors
 /// Returns the first validation error of the edited scene.
@@ -75,9 +75,9 @@ fn edited(scene: &Scene, camera: Camera, label: &str) -> Result<Edit, EditError>
     Edit::checked(next, Target::Camera, format!("{label} of the camera"))
 }
 
-/// Converts the camera's aperture or its focus to the kind `name`. `key` is the key of the one to
-/// convert. The picture stays the same, except for rounding. A pinhole whose aperture is converted
-/// becomes a lens.
+/// Converts the camera's aperture or its focus to the kind `name`. `key` states which of them: it
+/// is `aperture` or `focus`. The picture stays the same, except for rounding. A pinhole, however,
+/// becomes a lens if its aperture is converted.
 pub(super) fn switch(camera: &mut Camera, scene: &Scene, key: &str, name: &str) {
     let seen = Scene { camera: camera.clone(), ..scene.clone() };
     let distance = camera.focus_depth();

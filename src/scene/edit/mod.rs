@@ -94,7 +94,7 @@ impl EditError {
 
 impl Edit {
     /// Creates the edit to `scene` if it is valid; otherwise returns the first validation error.
-    /// `subject` is selected after the edit, and `label` names it in the undo history.
+    /// `subject` is selected after the edit. `label` is the name of the edit in the undo history.
     fn checked(mut scene: Scene, subject: Target, label: String) -> Result<Self, EditError> {
         scene.resolve();
         match scene.faults().into_iter().next() {

@@ -6,8 +6,8 @@ use crate::scene::format::suggest::nearest;
 use crate::value::{Color, Field, ValueType, number, sanitized, truncated};
 use toml::Value;
 
-/// Parses `text` as a value of `field`. Ranges are checked by the validation of the edited scene.
-/// Only numbers that the value's type cannot hold are errors here.
+/// Parses `text` as a value of `field`. A whole number must be in its range. The ranges of other
+/// numbers are checked later, by the validation of the edited scene.
 pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
     let text = text.trim();
     let wrong = || {
@@ -65,7 +65,8 @@ pub(super) fn parse(field: &Field, text: &str) -> Result<Value, EditError> {
 }
 
 /// Returns the index in `words` of the word that equals `text`, or else of the only word that
-/// starts with `text`. Case is ignored. Returns `None` if no word does, or more than one.
+/// starts with `text`. Case is ignored. Returns `None` if no word or more than one word starts with
+/// `text`.
 pub(super) fn choose(text: &str, words: &[&str]) -> Option<usize> {
     let text = text.to_lowercase();
     if let Some(at) = words.iter().position(|word| word.to_lowercase() == text) {
@@ -133,7 +134,7 @@ fn digits(part: &str) -> bool {
 }
 
 /// Formats a value of the type `takes`: numbers with the shortest digits, lists without brackets. A
-/// colour is formatted as `#rrggbb` if that is exact and shorter.
+/// colour is formatted as `#rrggbb` if that is exact, and shorter than its three numbers.
 pub(super) fn show(takes: ValueType, value: &Value) -> String {
     if let (ValueType::Color(_), Some(color)) = (takes, color(value)) {
         let channels = join(&color.0.map(number));

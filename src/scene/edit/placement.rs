@@ -40,8 +40,8 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
             let direction = if down { DVec3::NEG_Y } else { DVec3::Y };
             others.iter().filter_map(move |form| {
                 let t = form.cast(from, direction)?;
-                // Rounding removes the error of a difference of two heights, which would leave a
-                // gap.
+                // This sum has a rounding error, which would leave a gap. Rounding to 13 digits
+                // removes the error.
                 Some(round_significant(from.y + direction.y * t, 13))
             })
         });
@@ -55,7 +55,7 @@ pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError
     };
     let mut next = scene.clone();
     let dropped = &mut next.objects[*index];
-    // Further passes remove the gap that rounding leaves in the first one.
+    // The second and third pass remove the gap that rounding leaves after the first one.
     for _ in 0..3 {
         let lowest = dropped.form().bounds().map_or(support_height, |(low, _)| low.y);
         lift(dropped, support_height - lowest);
@@ -88,16 +88,16 @@ fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let corners = form.corners();
     let near = 1e-9 * (high - low).max_element();
     let lowest = corners.iter().filter(|c| c.y - low.y <= near).map(|c| flat(*c));
-    // Corners are moved slightly inwards, so that neighbours that only touch the object give no
-    // support.
+    // Corners are moved slightly inwards, so that others that only touch the sides of the object do
+    // not count as support.
     support_points.extend(lowest.map(|c| middle + (c - middle) * (1.0 - 1e-6)));
     support_points
 }
 
-/// Returns a position for a new object as the centre of its underside. `size` has the object's
-/// lengths along x, y and z. The position is on a surface, in a place that is free of other objects
-/// and as near as possible to the middle of the camera's view. Places that the camera sees are
-/// preferred.
+/// Returns a position for a new object: the point for the centre of its underside. `size` has the
+/// object's lengths along x, y and z. The position is on a surface, in a place that is free of
+/// other objects and as near as possible to the middle of the camera's view. Places that the camera
+/// sees are preferred.
 pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
     let BoundingSphere { radius, .. } = scene_bounds(scene);
     let eye = DVec3::from_array(scene.camera.eye);
@@ -177,9 +177,8 @@ fn overlap(a: Extent, b: Extent) -> bool {
     a.0.cmplt(b.1).all() && b.0.cmplt(a.1).all()
 }
 
-/// Returns `true` if `point` is visible in a picture of `size` pixels, apart from occlusion by
-/// objects, and is not close to an edge. A margin of 7.5 % of the width or height at each edge is
-/// excluded.
+/// Returns `true` if `point` is inside a picture of `size` pixels, and farther from each edge than
+/// 7.5 % of the width or height. Occlusion by objects is not considered.
 fn in_view(camera: &Camera, size: [u32; 2], point: DVec3) -> bool {
     let [right, up, forward] = camera.frame();
     let to = point - DVec3::from_array(camera.eye);

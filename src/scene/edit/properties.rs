@@ -13,7 +13,8 @@ use toml::{Table, Value};
 /// Word that a property accepts as its value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// Text of the word. The name of a material may contain any character that files allow.
+    /// Text of the word. If it is the name of a material, it may contain any character that files
+    /// allow.
     pub name: String,
     /// Description of the word; may be empty.
     pub doc: String,
@@ -73,8 +74,9 @@ pub struct Property {
     pub default: Option<String>,
 }
 
-/// Returns the properties of `subject` in the order of its field table. The properties of an
-/// object's material are not included; they belong to the target [`Target::material`].
+/// Returns the properties of `subject` in the order of the table that lists its keys. The
+/// properties of an object's material are not included; they belong to the target
+/// [`Target::material`].
 ///
 /// # Errors
 /// Fails if the scene has no such target.
@@ -93,7 +95,8 @@ pub fn rows(scene: &Scene, subject: &Target) -> Result<Vec<Property>, EditError>
     for field in fields(subject) {
         let is_environment = values.contains_key("environment");
         if !has_size && (field.name == "unit" || field.name == "visible" && !is_environment) {
-            // Only lights with a size have a unit; only they and environments are visible.
+            // Only lights with a size have the key `unit`. Only these lights and environments have
+            // the key `visible`.
             continue;
         }
         if let Some(kind) = virtual_kind

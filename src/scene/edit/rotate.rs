@@ -54,8 +54,8 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
 }
 
 /// Rotates the object about the vertical through its centre, by the steps `rotate_y` and
-/// `translate` at the end of its transform. Steps of these kinds at the end are replaced. Steps
-/// without effect are removed.
+/// `translate` at the end of its transform. If the transform already ends with such steps, they are
+/// replaced. Steps without effect are removed.
 fn turn_by_steps(object: &mut Object, degrees: f64) {
     let (angle, shift, own_len) = match object.transform[..] {
         [.., TransformOp::RotateY(angle), TransformOp::Translate(shift)] => (angle, shift, 2),
@@ -140,7 +140,8 @@ mod tests {
                     assert!((a - b).length() < 1e-5, "{}: {a} {b}", kind.name);
                     let half = turn(&start, &Target::Object(0), 180.0).unwrap().scene;
                     let c = middle(&half.objects[0]);
-                    // The bounding box of an irregular object does not rotate with the object.
+                    // The bounding box of an irregular object gets another centre when the object
+                    // rotates.
                     let uneven = ["prism", "union", "intersection", "difference"];
                     let slack = if uneven.contains(&kind.name) { 0.5 } else { 1e-5 };
                     assert!((a - c).length() < slack, "{}: {a} {c}", kind.name);

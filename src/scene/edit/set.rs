@@ -13,8 +13,9 @@ use crate::value::{DefaultValue, Field, ValueType};
 use toml::{Table, Value};
 
 /// Sets `key` of `subject` to the value in `text`. Keys are those of its
-/// [`Property`](crate::scene::edit::Property) rows. Empty text removes `key`: an optional key then
-/// has its default, and a transform loses the step.
+/// [`Property`](crate::scene::edit::Property) rows. If `text` is empty, `key` is removed. An
+/// optional key then has its default. If `key` is a step of a transform, the step is removed from
+/// the list.
 ///
 /// # Errors
 /// Returns the reason and the accepted values, if `text` cannot be parsed or the edited scene would
@@ -77,7 +78,8 @@ pub fn set_component(
         return Err(EditError::new(&format!("{key} has no number {}", component + 1), ""));
     }
     let text = text.trim();
-    // The whole list is parsed again, so that its rules and errors apply to the number.
+    // The whole list is parsed again, so that the rules and error messages for lists apply to the
+    // new number, too.
     let parts: Vec<_> = list
         .iter()
         .enumerate()
@@ -124,8 +126,9 @@ pub(super) fn replace(
     Ok(finish(scene, subject, key, values)?.with_note(note))
 }
 
-/// Removes `key` from `values`, so that it has its default; a step of a transform is removed from
-/// the list. `values` has the present values of the keys of `subject`. `field` describes the key.
+/// Removes `key` from `values`; the key then has its default. If `key` is a step of a transform,
+/// the step is removed from the list. `values` has the present values of the keys of `subject`.
+/// `field` describes the key.
 fn clear(
     scene: &Scene,
     subject: &Target,

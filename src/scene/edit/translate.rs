@@ -9,10 +9,10 @@ use glam::DVec3;
 
 /// Moves an object, a light, the current camera or a stored camera by the vector `by`, in scene
 /// units. If an object has no transform, the coordinates in its shape change. Otherwise, or if its
-/// shape has no coordinates (a mesh), a translation moves it as the last step of its transform. A
-/// directional light changes its direction: it is treated as a lamp that moves by `by` and stays
-/// aimed at the origin. The lamp's distance from the origin is three times the radius of the
-/// scene's bounding sphere.
+/// shape has no coordinates (a mesh), a translation by `by` is added as the last step of its
+/// transform, or added to a translation that is the last step. A directional light changes its
+/// direction: it is treated as a lamp that moves by `by` and stays aimed at the origin. The lamp's
+/// distance from the origin is three times the radius of the scene's bounding sphere.
 ///
 /// # Errors
 /// Fails for targets that cannot be moved, and for new coordinates beyond the largest valid one.
@@ -83,7 +83,8 @@ fn move_light(light: &mut Light, by: [f64; 3], scene: &Scene) {
         let reach = 3.0 * scene_bounds(scene).radius;
         let lamp = -unit(*direction).unwrap_or(DVec3::NEG_Y) * reach;
         let lamp = lamp + DVec3::from_array(by);
-        // A lamp at the centre has no direction towards it: the light stays unchanged.
+        // If the lamp is at the origin, it has no direction towards the origin. The light then
+        // stays unchanged.
         if let Some(aimed) = unit(-lamp) {
             *direction = aimed.map(|x| rounded_to(x, -4)).to_array();
         }

@@ -7,8 +7,8 @@ use toml_edit::{DocumentMut, Item, Table};
 /// if an empty line separates it from its table.
 #[derive(Default)]
 pub(crate) struct CommentKeeper {
-    /// One pair for each removed table with such a comment above it: `(ordinal number of the table
-    /// in the file, comment)`.
+    /// One pair for each removed table with a comment that stays: `(ordinal number of the table in
+    /// the file, comment)`.
     comments: Vec<(isize, String)>,
 }
 
@@ -35,7 +35,8 @@ impl CommentKeeper {
         }
     }
 
-    /// Restores each recorded comment above the next remaining table, or at the end of the file.
+    /// Restores each recorded comment above the first remaining table after the removed one, or at
+    /// the end of the file.
     pub(crate) fn put_back(self, document: &mut DocumentMut) {
         let mut comments = self.comments;
         comments.sort_by_key(|(position, _)| -position);
@@ -123,7 +124,8 @@ pub(crate) fn in_order(tables: &mut [Table], from: &[Option<usize>]) {
     let Some(top) = tables.iter().position(|t| t.position() == first && first.is_some()) else {
         return;
     };
-    // The comment at the top of the file stays there.
+    // An empty line may separate a comment from the first table. This comment stays at the top when
+    // the table moves.
     let (separate, table_comment) = split(prefix(&tables[top]));
     let (separate, table_comment) = (separate.to_string(), table_comment.to_string());
     if top > 0 && separate.contains('#') {

@@ -122,8 +122,8 @@ pub(crate) fn leaf(value: &Value) -> toml_edit::Value {
     }
 }
 
-/// Returns `number` with the shortest digits that are read back exactly. An exponent replaces many
-/// zeros.
+/// Returns `number` with the shortest digits that are read back exactly. Very large and very small
+/// numbers have an exponent.
 fn float(number: f64) -> toml_edit::Value {
     let size = number.abs();
     let zeros = number.is_finite() && size != 0.0 && !(1e-5..1e16).contains(&size);

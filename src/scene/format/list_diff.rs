@@ -10,8 +10,8 @@ use toml::Value;
 ///
 /// - an old entry of the same name,
 /// - an old entry that is equal to it,
-/// - an old entry between the origins of its neighbours, if neither entry has a name or only the
-///   names differ.
+/// - an old entry between the origins of the previous and the next new entry that have one, if only
+///   the names differ or neither entry has a name.
 ///
 /// The time is n log n for n entries.
 pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
@@ -23,7 +23,8 @@ pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     for (origin, entry) in from.iter_mut().zip(new).filter(|(origin, _)| origin.is_none()) {
         *origin = free.take_equal(entry);
     }
-    // Index of the next origin behind each entry.
+    // For each new entry: the origin of the next entry behind it that has one, or else the length
+    // of `old`.
     let mut next = vec![old.len(); new.len()];
     for j in (1..new.len()).rev() {
         next[j - 1] = from[j].unwrap_or(next[j]);
@@ -143,7 +144,7 @@ fn hash_value(value: &Value, hasher: &mut DefaultHasher) {
     match value {
         Value::String(text) => text.hash(hasher),
         Value::Integer(number) => number.hash(hasher),
-        // -0 is equal to 0.
+        // Because -0 equals 0, both must have the same hash. Adding 0 converts -0 to 0.
         Value::Float(number) => (number + 0.0).to_bits().hash(hasher),
         Value::Boolean(is_set) => is_set.hash(hasher),
         Value::Datetime(time) => time.to_string().hash(hasher),

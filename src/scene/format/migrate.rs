@@ -72,9 +72,9 @@ struct Conflict {
 }
 
 /// Replaces the former words in `root` by the current ones and returns them. A former word is a key
-/// or value that was renamed since an earlier version of the scene format. Its byte range is kept.
-/// `root` is the parsed `part` of the file with the name `file` and the text `text`. Adds an error
-/// to `errors` for each table that has a key under both names.
+/// or value that was renamed since an earlier version of the scene format. The current word gets
+/// the byte range of the former one. `root` is the parsed `part` of the file with the name `file`
+/// and the text `text`. Adds an error to `errors` for each table that has a key under both names.
 pub(crate) fn migrate(
     (file, text): (&str, &str),
     root: &mut DeTable,

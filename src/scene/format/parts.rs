@@ -1,13 +1,13 @@
 //! Parts of a scene file. Only one part is parsed at a time, as a TOML document of its own, because
-//! a parsed document takes some hundred times the memory of its text.
+//! a parsed document takes about a hundred times the memory of its text.
 //!
 //! A part consists of whole `[[object]]` sections, or of everything else in the file.
 
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Length in bytes from which a part of a scene file ends before the next `[[object]]`. Files up to
-/// this length have one part.
+/// Smallest length in bytes of a part of a scene file. Once a part has this length, the next
+/// `[[object]]` begins a new one. Files up to this length have one part.
 pub(crate) const PART_BYTES: usize = 256 << 10;
 
 /// Part of a scene file that is parsed as a TOML document of its own.
@@ -68,7 +68,8 @@ impl Part {
 /// Divides a file into parts. The first part has everything except the objects; each other part has
 /// consecutive objects. A part of objects has at least `part_bytes` bytes, unless the file ends or
 /// a section follows that is no object. Returns a single part if the file has at most `part_bytes`
-/// bytes, has no objects, or continues an object after another section.
+/// bytes or no objects. Also returns a single part if a table of an object, such as
+/// `[object.shape]`, follows a section of another kind.
 pub(crate) fn split(text: &str, part_bytes: usize) -> Vec<Part> {
     let sections = sections(text);
     let objects = sections.iter().filter(|(_, header)| *header == Header::Object).count();
@@ -173,7 +174,8 @@ fn end_of_string(bytes: &[u8], at: usize) -> usize {
             b'\\' if quote == b'"' => at += 1,
             b'\n' if marks == 1 => return at,
             _ if is_quoted(at, marks) => {
-                // A string of several lines may end with one or two quotation marks of its own.
+                // The content of a multi-line string may end with one or two quotation marks,
+                // before the three that close it.
                 let more = if marks == 3 {
                     (3..5).take_while(|n| is_quoted(at, n + 1)).count()
                 } else {

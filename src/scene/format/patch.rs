@@ -1,11 +1,10 @@
 //! Patches of the text of a scene file by the difference between two scenes.
 //!
 //! Scenes are compared as trees of TOML values; text of equal values is not touched. A key that is
-//! not in the text has its default; it is written only when its value differs from that.
+//! not in the text has its default; it is written only when its value differs from the default.
 //!
-//! An edit knows the path of the key that it changes, which would need no comparison. But saving
-//! has no such path: undo, redo and recovered edits restore whole scenes, and one save covers any
-//! number of them.
+//! The comparison is needed because saving does not know which keys have changed. Undo, redo and
+//! recovery of edits restore whole scenes, and one save covers any number of edits.
 
 use crate::scene::format::comments::CommentKeeper;
 use crate::scene::format::emit::{color, fresh, fresh_entry, leaf};
@@ -21,7 +20,8 @@ pub(crate) fn rewrite(document: &mut DocumentMut, old: &toml::Table, new: &toml:
     rewriter.table(document.as_table_mut(), true, old, new, &Keys::Fixed(schema::FIELDS));
     rewriter.keeper.put_back(document);
     if document.as_table().iter().all(|(_, item)| is_nothing(item)) {
-        // A file without any key is not a scene: the size of the picture is written.
+        // A file without any key is not a valid scene. At least the size of the picture is
+        // therefore written.
         if let Some(size) = new.get("film").and_then(|film| film.get("size")) {
             let mut film = toml_edit::Table::new();
             film.insert("size", Item::Value(leaf(size)));
@@ -100,8 +100,9 @@ impl Rewriter {
                 _ => {}
             }
         }
-        // A new key takes over the comments of the only removed key: a shape of another kind
-        // replaces a shape, a direction replaces a target.
+        // If exactly one key was removed, the first new key takes over its comments. Examples are
+        // the key of a shape that was converted to another kind, and `direction` in place of
+        // `target`.
         let successor =
             if removed.len() == 1 { added.first().map(|(key, ..)| key.clone()) } else { None };
         for key in removed {
@@ -226,8 +227,8 @@ impl Rewriter {
 }
 
 /// Finds the inner tables of `table` that were renamed between `old` and `new`, renames them in
-/// place and keeps their comments. A name that only `old` has was changed to a name that only `new`
-/// has if both have the same values. Returns `old` with the new names.
+/// place and keeps their comments. Two tables with equal values are a renamed one if one name is
+/// only in `old` and the other only in `new`. Returns `old` with the new names.
 fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
     let mut renamed = old.clone();
     for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {
@@ -248,9 +249,10 @@ fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> to
     renamed
 }
 
-/// Removes the comment after the last entry of `list` and its comma, and returns it. Callers set
-/// `followed` to `true` if they append another entry, before which they write the comment. If
-/// `followed` is `false` or there is no such comment, returns an empty string and changes nothing.
+/// Removes the comment after the last comma of `list`, which follows the last entry, and returns
+/// the comment. Callers set `followed` to `true` if they append another entry, before which they
+/// write the comment. If `followed` is `false` or there is no such comment, returns an empty string
+/// and changes nothing.
 fn comment_of_the_last(list: &mut toml_edit::Array, followed: bool) -> String {
     let trailing = list.trailing().as_str().unwrap_or_default();
     match trailing.rfind('\n') {

@@ -99,7 +99,8 @@ impl<'a> SourceScene<'a> {
         };
         match source.read_parts()? {
             Reading::Done => {}
-            // Objects that stand outside of `[[object]]` sections belong to the same list.
+            // The file also lists objects outside of `[[object]]` sections. They belong to the same
+            // list; the file is therefore parsed again as a whole.
             Reading::NotInParts => {
                 return Self::parse_parts(text, name, resolver, vec![Part::whole(text)]);
             }
@@ -266,12 +267,14 @@ mod tests {
     /// Parses the scene `text` twice: in parts of one object each, and as a whole. Returns the two
     /// results in this order.
     fn both(text: &str, name: &str) -> [Result<Scene, SceneErrors>; 2] {
-        // Meshes are equal only if they were read once.
+        // Both parses use the same cache of assets, because meshes compare as equal only if the
+        // file was read once.
         let assets = Arc::default();
         let parse = |parts: Vec<Part>| {
             let resolver = AssetResolver::new(Path::new(name), Arc::clone(&assets));
             let source = SourceScene::parse_parts(text, name, resolver, parts)?;
-            // Warnings become part of the result.
+            // The warnings are compared, too: each becomes the name of an additional object in the
+            // scene.
             let warnings: Vec<_> = source.warnings().iter().map(ToString::to_string).collect();
             let mut scene = source.scene;
             scene.objects.extend(warnings.into_iter().map(|name| Object { name, ..ball() }));

@@ -1,5 +1,5 @@
-//! Schema validation of a scene file against the field tables: unknown keys, values of a wrong
-//! type, missing keys. One pass finds all errors.
+//! Schema validation of a scene file against the tables that list its keys and their types: unknown
+//! keys, values of a wrong type, missing keys. One pass finds all errors.
 
 use crate::scene::diagnostic::{Diagnostic, FirstDiagnostics};
 use crate::scene::format::parts::Part;

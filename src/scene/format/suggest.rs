@@ -1,12 +1,12 @@
 //! Suggestions for mistyped words ("Did you mean"): the nearest known word.
 
-/// Returns the word of `words` most similar to `given`. Returns `None` if `given` is not likely to
-/// be a typing error of it.
+/// Returns the word of `words` most similar to `given`. Returns `None` if `given` is unlikely to be
+/// that word with typing errors.
 pub(crate) fn nearest<'a>(
     given: &str,
     words: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
-    // Such a text is far longer than any key and no typing error.
+    // A text of this length is far longer than any key, and is no typing error.
     if given.len() > 100 {
         return None;
     }
