@@ -63,11 +63,12 @@ impl Key {
 pub enum MouseKind {
     /// Press of a mouse button.
     Press(Button),
-    /// Movement of the mouse while a button was pressed.
+    /// Movement of the mouse while this button is pressed.
     Drag(Button),
     /// Release of a mouse button.
     Release(Button),
-    /// The wheel was turned by this number of ticks: positive away from the user, negative towards.
+    /// The wheel was turned by this number of ticks: positive if away from the user, negative if
+    /// towards the user.
     Scroll(i32),
 }
 
@@ -91,8 +92,8 @@ pub struct Mouse {
     pub column: u16,
     /// Row of the cell under the pointer, counted from 0.
     pub row: u16,
-    /// `true` if Control or Alt is pressed. Terminals do not report Shift, which they use
-    /// themselves.
+    /// `true` if Control or Alt is pressed. Shift does not count, because most terminals use it
+    /// themselves, for example to select text.
     pub modified: bool,
 }
 

@@ -1,5 +1,5 @@
-//! Reader of all terminal input: keys, mouse events, pasted text and replies. A timeout ends an
-//! escape sequence that is not complete.
+//! Reader of all terminal input: keys, mouse events, pasted text and replies. If the rest of an
+//! escape sequence does not arrive in time, the reader ends the sequence.
 
 use crate::terminal::decode::Decoder;
 use crate::terminal::{Environment, Event};
@@ -32,7 +32,8 @@ pub struct InputReader {
 }
 
 impl InputReader {
-    /// Creates a reader of stdin. `environment` describes its terminal.
+    /// Creates a reader of stdin. `environment` describes the terminal, in particular if it is
+    /// connected by SSH.
     pub fn new(environment: &Environment) -> Self {
         let wait = if environment.ssh.is_some() { ESCAPE_WAIT_OVER_SSH } else { ESCAPE_WAIT };
         Self {

@@ -1,9 +1,9 @@
-//! Restoration of the terminal if the program ends without running its own restoration: an
-//! allocation that fails in a library, SIGKILL, a fault of the processor.
+//! Restoration of the terminal if the program ends without restoring it. Examples are SIGKILL, an
+//! allocation in a library that fails and aborts, and a processor exception.
 //!
-//! A helper process, a shell that runs a script, waits at the other end of a pipe, which closes
-//! when the program ends. Signal handlers cannot replace it: after the handler of SIGABRT returns,
-//! the process ends at once.
+//! A helper process, a shell that runs a script, reads from a pipe. The pipe closes when the
+//! program ends. Signal handlers of the program cannot replace the helper process: SIGKILL has no
+//! handler, and after the handler of SIGABRT returns, the process ends at once.
 
 use crate::terminal::LEAVE;
 use rustix::termios::{InputModes, LocalModes, OutputModes, Termios};
@@ -12,10 +12,10 @@ use std::os::unix::process::CommandExt;
 use std::process::{Child, ChildStdin, Command, Stdio};
 
 /// Script of the helper process, a shell that restores the terminal if the program is killed. `$0`
-/// is [`LEAVE`]; the other arguments are those of `stty`. When the program ends regularly, it sends
-/// a line to the script, which then exits. Otherwise the script restores the terminal modes, but
-/// only if output is still unprocessed (`-opost`), as in full-screen use. If it is processed, the
-/// user's shell has set modes of its own.
+/// is [`LEAVE`]; the other arguments are those of `stty`. When the program ends normally, it sends
+/// a line to the script, which then exits. Otherwise the script restores the terminal. It sets the
+/// terminal modes only if output processing is still off (`-opost`), as in full-screen use. If
+/// output processing is on, the user's shell has already set its own modes.
 const PROGRAM: &str = "\
 trap '' INT QUIT TERM HUP TSTP TTIN TTOU
 read -r _ && exit
@@ -42,7 +42,8 @@ impl Restorer {
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
-            // A process group of its own: keys such as Ctrl-C and Ctrl-Z do not reach it.
+            // The helper process has a process group of its own, so that keys such as Ctrl-C and
+            // Ctrl-Z do not send it signals.
             .process_group(0)
             .spawn()?;
         let messages = shell.stdin.take().ok_or(io::ErrorKind::BrokenPipe)?;
@@ -50,8 +51,8 @@ impl Restorer {
     }
 }
 
-/// Returns the arguments of POSIX `stty` that set the modes which raw mode changes to their values
-/// in `modes`: `echo` for a mode that is set, `-echo` for one that is not.
+/// Returns the arguments with which POSIX `stty` restores all modes that raw mode changes. Each
+/// mode gets its value in `modes`: `echo` if the mode `echo` is set there, `-echo` if it is not.
 fn stty_arguments(modes: &Termios) -> Vec<String> {
     let inputs = [
         ("ignbrk", InputModes::IGNBRK),

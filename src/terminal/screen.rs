@@ -44,8 +44,8 @@ pub static ENTER: LazyLock<String> = LazyLock::new(|| {
     out
 });
 
-/// Bytes that restore the terminal: the end of an incomplete frame, default colours and attributes,
-/// and the inverse of [`ENTER`] in the opposite order.
+/// Bytes that restore the terminal. They first end a frame (synchronised update) that was cut off
+/// and reset colours and attributes. Then they undo the parts of [`ENTER`] in the opposite order.
 pub static LEAVE: LazyLock<String> = LazyLock::new(|| {
     let mut out = String::new();
     append(&mut out, EndSynchronizedUpdate);
@@ -61,13 +61,13 @@ pub(crate) fn append(out: &mut String, command: impl Command) {
     command.write_ansi(out).expect("a `String` takes any text");
 }
 
-/// Longest time that restoration of the terminal waits until a slow terminal has read the frame
-/// that is being written.
+/// Longest time for which restoration of the terminal waits for a slow terminal that is still
+/// reading a frame.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Full-screen use of the terminal. Dropping this value restores the terminal, as does a panic in
-/// any thread. If the process ends in another way, a helper process (`Restorer`) restores it, if
-/// one could be started.
+/// Full-screen use of the terminal. The terminal is restored when this value is dropped, or when
+/// any thread panics. If the process ends in another way, a helper process (`Restorer`) restores
+/// the terminal, unless this helper could not be started.
 pub struct Screen {
     tty: Arc<Tty>,
     /// Channel that receives a message when [`Tty::leave`] has restored the terminal, for example
@@ -116,8 +116,9 @@ fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Sets raw mode. crossterm stores the terminal modes that it finds, and restores them when raw
-/// mode ends. `modes_before` is therefore set first, in case that a shell has set other modes.
+/// Sets raw mode. crossterm stores the terminal modes that it finds here, and restores them when
+/// raw mode ends. While the program was suspended, a shell may have changed the modes.
+/// `modes_before` is therefore set first, so that crossterm stores these modes.
 fn set_raw_mode(modes_before: &Termios) -> io::Result<()> {
     uninterrupted(terminal::disable_raw_mode)?;
     uninterrupted(|| Ok(tcsetattr(io::stdin(), OptionalActions::Now, modes_before)?))?;
@@ -148,7 +149,8 @@ impl Screen {
             leaving,
             exit_sequence: Mutex::default(),
         });
-        // Prepared here, because a panic hook should do little.
+        // `LEAVE` is computed here and not in the panic hook, because a panic hook should do
+        // little.
         LazyLock::force(&LEAVE);
         let screen = Self { tty, left, restorer: None };
         let tty = Arc::clone(&screen.tty);
@@ -176,7 +178,8 @@ impl Drop for Screen {
 }
 
 impl Tty {
-    /// Writes `bytes` to the terminal in one call. Does nothing while the terminal is restored.
+    /// Writes `bytes` to the terminal in one call. Does nothing while full-screen use is suspended
+    /// or after its end.
     ///
     /// # Errors
     /// Fails if the terminal is closed.
@@ -190,7 +193,7 @@ impl Tty {
     }
 
     /// Sets the bytes that are sent before [`LEAVE`] when the terminal is restored. They replace
-    /// those of an earlier call.
+    /// the bytes of an earlier call.
     pub fn set_exit_sequence(&self, bytes: &[u8]) {
         let mut exit_sequence = self.exit_sequence.lock().unwrap_or_else(PoisonError::into_inner);
         exit_sequence.clear();
@@ -289,8 +292,8 @@ mod tests {
         (Screen::over(Box::new(out.clone()), None).unwrap(), out, turn)
     }
 
-    /// Returns the expected output of a screen. Each character of `parts` stands for a part of it:
-    /// `[` for [`ENTER`], `]` for [`LEAVE`], any other character for itself.
+    /// Returns the expected output of a screen. Each character of `parts` stands for a part of the
+    /// output: `[` for [`ENTER`], `]` for [`LEAVE`], any other character for itself.
     fn expected(parts: &str) -> String {
         parts.replace(']', "LEAVE").replace('[', &ENTER).replace("LEAVE", &LEAVE)
     }
@@ -344,11 +347,13 @@ mod tests {
             let modes = text.split("\x1b[?").skip(1).filter_map(|mode| mode.split_once(end));
             modes.map(|(mode, _)| mode.to_string()).collect()
         };
-        // The cursor is the only mode that is on outside full-screen use.
+        // Visibility of the cursor is the only mode that `ENTER` resets and `LEAVE` sets. It is
+        // left out here and checked below.
         let mut set = modes(&ENTER, 'h');
         set.retain(|mode| !mode.contains('l'));
         let mut reset = modes(&LEAVE, 'l');
-        // Each frame sets and resets mode 2026. `LEAVE` resets it for a frame that was cut off.
+        // Each frame sets and resets mode 2026 (synchronised update). `LEAVE` resets it too,
+        // because the last frame may have been cut off.
         reset.retain(|mode| !mode.contains('h') && mode != "2026");
         reset.reverse();
         assert_eq!(set, ["1049", "2004", "1002", "1006"]);

@@ -40,7 +40,7 @@ impl Interpreter {
 impl Perform for Interpreter {
     fn print(&mut self, c: char) {
         self.is_character_complete = true;
-        // The parser passes a replacement character for invalid UTF-8, which is no key.
+        // For invalid UTF-8 the parser passes a replacement character. It produces no key.
         if let Some(key) = character(c).filter(|_| c != char::REPLACEMENT_CHARACTER) {
             self.press(key);
         }
@@ -103,7 +103,7 @@ fn character(c: char) -> Option<Key> {
 
 /// Interprets a control sequence. `params` are its parameters with their subparameters,
 /// `intermediates` its private marker and intermediate bytes, and `last` its final byte. Returns
-/// `None` for unknown keys and mouse reports.
+/// `None` if the sequence is an unknown key or an unknown mouse report.
 fn control_sequence(params: &[&[u16]], intermediates: &[u8], last: char) -> Option<Event> {
     let numbers: Vec<_> = params.iter().map(|param| param[0]).collect();
     let reply = match (intermediates, last, &numbers[..]) {
@@ -173,8 +173,8 @@ pub fn console_key(last: u8) -> Option<Event> {
     (b'A'..=b'E').contains(&last).then(|| Event::Key(Key::plain(Code::F(last - b'A' + 1))))
 }
 
-/// Interprets an X10 mouse report: `bytes` are the three bytes for button, column and row after
-/// `ESC [ M`. Returns `None` if the report is not valid.
+/// Interprets an X10 mouse report. `bytes` are the three bytes after `ESC [ M`, for button, column
+/// and row, each with 32 added. Returns `None` if the report is not valid.
 pub fn x10_mouse(bytes: &[u8]) -> Option<Event> {
     let [button, column, row] =
         bytes.iter().map(|b| b.checked_sub(32).map(u16::from)).collect::<Option<Vec<_>>>()?[..]
@@ -203,8 +203,8 @@ fn named(last: char) -> Option<Code> {
     })
 }
 
-/// Adds modifiers to a key. `modifiers` is 1 plus the bits 1 for Shift, 2 for Alt and 4 for
-/// Control.
+/// Adds modifiers to a key. `modifiers` is 1 plus the sum of the pressed modifiers: 1 for Shift, 2
+/// for Alt, 4 for Control.
 fn modified(key: Key, modifiers: u16) -> Key {
     let bits = modifiers.saturating_sub(1);
     let is_character = matches!(key.code, Code::Char(_));
@@ -221,9 +221,10 @@ fn modified(key: Key, modifiers: u16) -> Key {
     }
 }
 
-/// Interprets a mouse report. `button` is the number of the button, 0 to 2, plus the bits 4 for
-/// Shift, 8 for Alt, 16 for Control, 32 for motion and 64 for the wheel. `column` and `row` count
-/// from 1. Returns `None` for an unknown button.
+/// Interprets a mouse report. `button` is a number from 0 to 2 plus bits: 4 for Shift, 8 for Alt,
+/// 16 for Control, 32 for motion and 64 for the wheel. The number is that of the button; for the
+/// wheel it is the direction. `column` and `row` count from 1. Returns `None` for an unknown
+/// button.
 fn mouse(button: u16, [column, row]: [u16; 2], is_release: bool) -> Option<Mouse> {
     let pressed = match button & 0b11 {
         0 => Button::Left,

@@ -1,5 +1,5 @@
-//! Tests of the decoding of terminal input: keys and replies in any order, divided anywhere. No key
-//! is lost and none is invented.
+//! Tests of the decoding of terminal input: keys and replies in any order, divided between reads at
+//! any byte. No key is lost, and no reply is decoded as a key.
 
 use crate::terminal::cells::Colors;
 use crate::terminal::event::{Button, Code, MouseKind};
@@ -62,8 +62,8 @@ const KEYS: &[(&str, &str)] = &[
     ("\x1b[27;5;97~", "Ctrl-a"),
 ];
 
-/// Replies of terminals to requests of this and of other programs. Some decoders lose or invent
-/// keys on them.
+/// Replies of terminals to requests of this program and of other programs. Some other decoders lose
+/// keys after these replies or decode the replies as keys.
 const REPLIES: &[&str] = &[
     "\x1b[?2026;2$y",
     "\x1b[?2026;0$y",
@@ -174,7 +174,8 @@ fn replies_set_capabilities() {
         ..Capabilities::from_environment(Environment::default())
     };
     assert_eq!(capabilities, expected);
-    // Placeholders depend on the terminal outside tmux, which is the second to report its version.
+    // Inside of tmux, tmux reports its version first and the terminal outside of tmux second. The
+    // second version decides if images can be placed by placeholders.
     let multiplexer = Some(Multiplexer::Tmux);
     for (version, expected) in [
         ("tmux 3.3a", false),
@@ -229,7 +230,8 @@ fn lone_escape_is_a_key_after_timeout() {
     assert_eq!(decoder.patience(), Some(WAIT));
     assert_eq!(keys(&decoder.give_up()), ["Esc"]);
     assert_eq!(decoder.patience(), None);
-    // A key typed afterwards is decoded as a key of its own.
+    // After an ESC that was reported as the key Escape, the next typed characters are decoded as
+    // keys of their own.
     for next in ["[", "]", "q", "O", "P", "_", "]]]", "[["] {
         assert_eq!(decoder.take(b"\x1b"), []);
         assert_eq!(keys(&decoder.give_up()), ["Esc"]);
@@ -279,7 +281,7 @@ fn pasted_text_produces_no_keys() {
     let pasted = all_at_once(&format!("\x1b[200~{text}\x1b[201~x"));
     assert_eq!(pasted[0], Event::Paste(text.to_string()));
     assert_eq!(keys(&pasted[1..]), ["x"]);
-    // A longer paste is truncated.
+    // A paste longer than 1 MiB is truncated.
     let long = "m".repeat(3 << 20);
     let pasted = all_at_once(&format!("\x1b[200~{long}\x1b[201~x"));
     assert!(matches!(&pasted[0], Event::Paste(kept) if kept.len() == 1 << 20));
@@ -292,7 +294,7 @@ fn paste_with_a_pause_stays_a_paste() {
     let paste = |text: &str| Event::Paste(text.into());
     assert_eq!(decoder.take(b"\x1b[200~half"), []);
     assert_eq!(decoder.give_up(), [paste("half")]);
-    // The connection may be silent for any time.
+    // After a pause the decoder waits for the rest of the paste without limit.
     assert_eq!(decoder.patience(), None);
     assert_eq!(decoder.take(b"]]]\x03dq\x1b["), []);
     assert!(decoder.patience().is_some());
@@ -307,7 +309,7 @@ fn escape_and_interrupt_end_a_paste_without_end() {
     for (byte, key) in [(b"\x1b", "Esc"), (b"\x03", "Ctrl-c")] {
         let mut decoder = Decoder::new(WAIT);
         decoder.take(b"\x1b[200~half");
-        // Before a pause they are pasted text.
+        // Before the first pause, the bytes of Escape and Ctrl-C are part of the pasted text.
         assert_eq!(decoder.take(byte), []);
         assert!(matches!(&decoder.give_up()[..], [Event::Paste(_)]), "{key}");
         assert_eq!(decoder.take(b"q"), []);
@@ -315,7 +317,7 @@ fn escape_and_interrupt_end_a_paste_without_end() {
         assert_eq!(decoder.take(byte), []);
         assert_eq!(keys(&decoder.give_up()), [key]);
         assert_eq!(keys(&decoder.take(b"q")), ["q"], "{key}");
-        // The end that comes late after all is no key.
+        // If the end sequence of the paste arrives after all, it produces no key.
         assert_eq!(keys(&decoder.take(b"\x1b[201~q")), ["q"], "{key}");
     }
 }
@@ -340,8 +342,8 @@ fn reply_flood_hides_no_key() {
     assert_eq!(keys(&decoder.take(b"\x07q")), ["q"]);
 }
 
-/// Strategy for a key or a reply. The two values are its bytes, and the name of the key; the name
-/// is `None` for a reply.
+/// Strategy for a key or a reply, as `(bytes, name)`. `name` is the name of the key, or `None` for
+/// a reply.
 fn key_or_reply() -> impl Strategy<Value = (&'static str, Option<&'static str>)> {
     prop_oneof![
         select(KEYS).prop_map(|(bytes, name)| (bytes, Some(name))),

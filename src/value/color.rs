@@ -3,8 +3,8 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 
-/// Linear RGB colour: red, green, blue, without an upper bound. In scene files `[r, g, b]` (linear)
-/// or `"#rrggbb"` (sRGB).
+/// Linear RGB colour (red, green, blue) without an upper bound. Scene files have `[r, g, b]`
+/// (linear) or `"#rrggbb"` (sRGB).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Color(pub [f64; 3]);
 
@@ -27,7 +27,7 @@ impl Color {
     /// Parses an sRGB colour `#rrggbb`; `None` if `text` has another form.
     pub fn from_hex(text: &str) -> Option<Self> {
         let digits = text.strip_prefix('#')?;
-        // `from_str_radix` accepts a sign.
+        // All characters are checked here, because `from_str_radix` would also accept a sign.
         if digits.len() != 6 || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
             return None;
         }

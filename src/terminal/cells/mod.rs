@@ -139,8 +139,8 @@ pub struct PictureCells {
 }
 
 impl PictureCells {
-    /// Converts `raster` for a terminal with `colors`. `settled` is `true` if the picture will not
-    /// change without user input. In 256 colours only a settled picture is dithered, because
+    /// Converts `raster` for a terminal with `colors`. `settled` is `true` if the picture changes
+    /// rarely or only by user input. In 256 colours only a settled picture is dithered, because
     /// dithering would make a changing picture flicker.
     ///
     /// The last row of cells is half empty if the raster has an odd number of rows.

@@ -45,7 +45,7 @@ pub struct TargetFrame<'a> {
     pub version: u64,
     /// Number of samples per pixel of the picture in this frame.
     pub samples: f64,
-    /// `true` if the picture will not change without user input.
+    /// `true` if the picture changes rarely or only by user input.
     pub settled: bool,
 }
 

@@ -24,17 +24,17 @@ pub struct FramesInFlight {
 }
 
 impl FramesInFlight {
-    /// Adds a frame of `bytes` bytes that was sent at the time `sent`. `picture` is `true` if it
-    /// contains cells of the picture.
+    /// Adds a frame of `bytes` bytes that was sent at the time `sent`. `picture` is `true` if the
+    /// frame contains cells of the picture.
     pub fn add(&mut self, sent: Duration, bytes: usize, picture: bool) {
         let alone = self.queue.is_empty();
         self.queue.push_back(InFlight { sent, bytes, picture, alone });
     }
 
-    /// Records an acknowledgement by the terminal at the time `at`. Removes the oldest frame in
-    /// flight, to which it belongs. Returns `(frame, times)`: the removed frame, and `[time of
-    /// sending, time of acknowledgement]` of the frame acknowledged before it. `times` is `None`
-    /// for the first frame. Returns `None` if no frame is in flight.
+    /// Records an acknowledgement by the terminal at the time `at`. It belongs to the oldest frame
+    /// in flight, which is removed. Returns `(frame, times)`. `frame` is the removed frame. `times`
+    /// is `[time of sending, time of acknowledgement]` of the frame that was acknowledged before;
+    /// it is `None` for the first frame. Returns `None` if no frame is in flight.
     pub fn on_ack(&mut self, at: Duration) -> Option<(InFlight, Option<[Duration; 2]>)> {
         let frame = self.queue.pop_front()?;
         Some((frame, self.last_acked.replace([frame.sent, at])))

@@ -23,8 +23,9 @@ pub struct InitialLink {
 
 impl InitialLink {
     /// Derives the state from `terminal`, the capabilities of the terminal. `queue` is `true` if
-    /// the kernel reports the length of the connection's TCP send queue. `rate` is a fixed rate
-    /// from the user, in bytes per second, in place of a measured one.
+    /// the kernel reports the length of the connection's TCP send queue. If `rate` is given, frames
+    /// are sent at this fixed rate, in bytes per second; if it is `None`, the rate is measured
+    /// where possible.
     pub fn of(terminal: &Capabilities, queue: bool, rate: Option<f64>) -> Self {
         let fallback = if queue { PacingMode::SendQueue } else { PacingMode::FixedRate };
         let multiplexer = terminal.environment.multiplexer;

@@ -1,12 +1,13 @@
 //! Flow control: measures the rate of the connection to the terminal and limits the size of the
 //! next frame.
 //!
-//! An SSH connection accepts a megabyte at once, and the terminal shows it many seconds later.
-//! After each frame the program therefore requests the cursor position. The reply acknowledges the
-//! frame and gives the round trip and the rate. A frame holds at most what the connection carries
-//! in 100 ms, and only a few frames are in flight. If only a multiplexer replies, or no program at
-//! all, the length of the kernel's TCP send queue is measured instead. If the kernel does not
-//! report this length, bytes are sent at a fixed rate.
+//! A slow SSH connection accepts a megabyte at once, but the terminal shows it only many seconds
+//! later. After each frame the program therefore requests the cursor position. The reply
+//! acknowledges the frame, and its time gives the round trip and the rate. A frame holds at most
+//! what the connection carries in 100 ms, and only a few frames are in flight. The program cannot
+//! rely on replies if they come from a multiplexer or do not come at all. It then measures the
+//! length of the kernel's TCP send queue instead. If the kernel does not report this length, bytes
+//! are sent at a fixed rate.
 //!
 //! The module does no I/O and reads no clock: times and byte counts are arguments.
 
@@ -28,8 +29,8 @@ pub use tcp_send_queue::TcpSendQueue;
 pub const FRAME_INTERVAL: Duration = Duration::from_millis(33);
 /// Shortest interval between frames with text only, over an SSH connection and without user input.
 pub const TEXT_INTERVAL: Duration = Duration::from_millis(500);
-/// Target duration of the transmission of a frame: at the current rate, it determines the frame's
-/// byte budget.
+/// Time in which the connection should transmit a frame. Multiplied by the current rate, it gives
+/// the byte budget of the frame.
 const FRAME_SPAN: Duration = Duration::from_millis(100);
 /// Byte budgets of a frame that is sent to the terminal: `[smallest, initial, largest]`. The
 /// initial one applies before the first measurement of the rate.
@@ -39,8 +40,8 @@ const MAX_IN_FLIGHT: usize = 6;
 /// Largest sum of bytes of the frames in flight that contain only text. Frames with cells of the
 /// picture do not count.
 const MAX_TEXT: usize = 1500;
-/// Size of a frame in bytes below which its acknowledgement may raise the measured rate, but not
-/// lower it: the time of a small frame is mostly latency.
+/// Size in bytes below which a frame is small. The time of a small frame is mostly latency. Its
+/// acknowledgement may therefore raise the measured rate, but not lower it.
 const SMALL: usize = 1000;
 /// Time after which the acknowledgement of a frame is treated as lost.
 const LOST_AFTER: Duration = Duration::from_secs(3);
@@ -60,10 +61,12 @@ const QUEUE_INTERVAL: Duration = Duration::from_millis(20);
 const STALLED_INTERVAL: Duration = Duration::from_millis(500);
 /// Assumed round trip to the terminal before the first measurement.
 const DEFAULT_ROUND_TRIP: Duration = Duration::from_millis(100);
-/// Time without input from the terminal after which the connection is treated as silent.
+/// Time after which the connection is treated as silent, if bytes wait for transmission, none is
+/// transmitted, and no user input arrives.
 const SILENT_AFTER: Duration = Duration::from_secs(30);
-/// Longest interval between two acknowledgements that belong to the same measurement of the rate.
-/// The connection may have delayed the first one, so that it alone would give a wrong rate.
+/// Longest interval between two acknowledgements that are combined into one measurement of the
+/// rate. If the connection has delayed the first one, both arrive almost together, and the second
+/// alone would give too high a rate.
 const ACKS_TOGETHER: Duration = Duration::from_millis(20);
 /// Assumed rate of a connection that cannot be measured, in bytes per second.
 pub const DEFAULT_RATE: f64 = 30e3;
@@ -122,12 +125,13 @@ pub struct FlowControl {
     round_trip_at: Duration,
     /// Half of the connection's rate at the last measurement of the round trip, in bytes per
     /// second. With [`PacingMode::SendQueue`], a rate below this value causes a new measurement of
-    /// the round trip. The round trip may have become longer: too few frames in flight then reduce
-    /// the rate.
+    /// the round trip. If the round trip has become longer, the limit of the send queue is too low
+    /// for it, and this lowers the rate.
     doubtful_rate: f64,
     in_flight: FramesInFlight,
     losses: u32,
-    /// Time at which the last period of user activity began.
+    /// Time at which the last period of user activity began. The user counts as active for
+    /// [`ACTIVE_TIME`] after each input.
     active_since: Duration,
     /// Time at which the last period of user activity ends.
     active_until: Duration,
@@ -136,11 +140,11 @@ pub struct FlowControl {
     /// without an acknowledgement request.
     free_at: Duration,
     /// Estimated time at which the connection will have transmitted all frames with an
-    /// acknowledgement request, so that it is idle.
+    /// acknowledgement request. From this time on it is idle.
     clear_at: Duration,
     /// Earliest time at which a frame may again contain refinement: cells whose differences are
-    /// below the threshold of visibility. Refinement is delayed so that it uses only a quarter of
-    /// the connection's rate.
+    /// below the threshold of visibility. The delay limits refinement to a quarter of the
+    /// connection's rate (`REFINEMENT_SHARE`).
     pub(crate) refine_at: Duration,
     send_queue: SendQueueEstimate,
     /// Last measurement of the connection's rate by acknowledgements; `None` before the first one.
@@ -148,13 +152,14 @@ pub struct FlowControl {
 }
 
 /// Measurement of the connection's rate: a number of bytes, the time of their last acknowledgement,
-/// and bounds of the time at which their transmission began.
+/// and bounds of the time at which a reply to the first of these bytes would have arrived.
 #[derive(Clone, Copy, Debug)]
 struct AckSample {
     earliest_start: Duration,
     latest_start: Duration,
-    /// Time at which the frame before these bytes was sent. `None` if there is no such frame, or if
-    /// it was acknowledged before the transmission of these bytes can have begun.
+    /// Time at which the frame before these bytes was sent. `None` if there is no such frame. Also
+    /// `None` if its acknowledgement arrived before a reply to these bytes was possible; the
+    /// connection was then idle between that frame and these bytes.
     sent_from: Option<Duration>,
     at: Duration,
     bytes: usize,
@@ -183,8 +188,8 @@ impl FlowControl {
         (self.mode != PacingMode::Unlimited).then_some(status)
     }
 
-    /// Returns the OKLab distance above which a difference counts as visible. It is larger for
-    /// slower connections.
+    /// Returns the OKLab distance above which a difference counts as visible. Slower connections
+    /// have a larger threshold, so that fewer cells are sent.
     pub fn threshold(&self) -> f32 {
         match self.mode {
             PacingMode::Unlimited => 0.0,
@@ -232,9 +237,10 @@ impl FlowControl {
         self.send_queue.next_at(if is_stalled { STALLED_INTERVAL } else { QUEUE_INTERVAL })
     }
 
-    /// Returns the time from which the connection is treated as silent, if no input arrives before.
-    /// `blocked_since` is the start of a write to the terminal that has not returned. Returns
-    /// `None` if no bytes are known to be waiting for transmission.
+    /// Returns the time from which the connection is treated as silent, unless bytes are
+    /// transmitted or input arrives before that time. `blocked_since` is the start of a write to
+    /// the terminal that has not returned. Returns `None` if no bytes are known to be waiting for
+    /// transmission.
     pub fn silent_at(&self, blocked_since: Option<Duration>) -> Option<Duration> {
         let is_measured = self.mode == PacingMode::SendQueue;
         let stalled_since = self.send_queue.stalled_since().filter(|_| is_measured);
@@ -243,8 +249,8 @@ impl FlowControl {
     }
 
     /// Returns the limits of a frame that may be sent at the time `now`. Returns `None` if no frame
-    /// may be sent yet. `answers` is `true` if the frame shows the effect of user input; it may
-    /// then be sent before the usual interval between frames is over.
+    /// may be sent yet. If the frame shows the effect of user input, `answers` is `true`, and the
+    /// usual interval between frames is not required.
     pub fn allowance(&self, now: Duration, answers: bool) -> Option<FrameBudget> {
         // While the round trip is measured, a frame is small, so that its transmission adds little
         // time.
@@ -324,7 +330,8 @@ impl FlowControl {
     /// `true` if another frame may now be permitted, and `false` if no reply was awaited.
     pub fn on_ack(&mut self, at: Duration) -> bool {
         if let Some(mode) = self.suspended_mode.take() {
-            // Replies come again after an interruption, such as a train in a tunnel.
+            // Replies come again after an interruption of the connection, for example of mobile
+            // data in a tunnel.
             self.mode = mode;
             self.rate = self.rate.min(self.start.fixed_rate);
             self.in_flight = FramesInFlight::default();
@@ -343,9 +350,11 @@ impl FlowControl {
         }
         let known = self.round_trip.filter(|least| *least <= elapsed);
         self.round_trip = self.round_trip.map(|least| least.min(elapsed));
-        // The transmission of a frame began 0.9 to 1 round trips before a reply to its first byte
-        // would have come, but not before the previous acknowledgement. A reply that comes sooner
-        // than a round trip shows only that the round trip was measured too long.
+        // The rate follows from the bytes of a frame and the time in which replies to them could
+        // arrive. This time ends with the acknowledgement. It begins 0.9 to 1 round trips after the
+        // frame was sent, when a reply to its first byte could arrive, but not before the previous
+        // acknowledgement. If the acknowledgement comes sooner than the known round trip, this
+        // round trip was measured too long and is not used.
         let idle_start =
             |round_trips: f64| frame.sent + known.unwrap_or_default().mul_f64(round_trips);
         let previous = last_acked.filter(|[_, acked_at]| *acked_at > idle_start(0.9));
@@ -366,14 +375,17 @@ impl FlowControl {
             },
         };
         self.ack_sample = Some(sample);
-        // Acknowledgements that were held back come faster than the frames were sent.
+        // If the connection held back the first of two acknowledgements, they arrive closer
+        // together than the frames were sent. The longest possible time is therefore at least the
+        // time between the sending of both frames.
         let sending = sample.sent_from.map(|from| frame.sent.saturating_sub(from));
         let longest = at.saturating_sub(sample.earliest_start).max(sending.unwrap_or_default());
         let shortest = at.saturating_sub(sample.latest_start);
         let rate = |span: Duration| {
             sample.bytes as f64 / span.max(Duration::from_millis(10)).as_secs_f64()
         };
-        // A rate between both bounds is confirmed.
+        // The measurement gives a lower and an upper bound of the rate. The known rate is kept if
+        // it is between them; otherwise the nearer bound replaces it.
         let rate = self.rate.clamp(rate(longest), rate(shortest.min(longest)));
         // The time of a small frame is mostly latency. It can prove a connection fast, but not
         // slow.
@@ -479,7 +491,8 @@ impl FlowControl {
                     && answers
                     && self.last_frame.is_some_and(|at| at < self.active_since);
                 let extra = if is_first { self.budget() as f64 } else { 0.0 };
-                // While the user is active, less than a frame waits, so that input waits for less.
+                // While the user is active, the limit is lower by half of a frame, so that the
+                // effect of an input waits for fewer bytes.
                 let spare = if now < self.active_until { self.budget() as f64 / 2.0 } else { 0.0 };
                 self.send_queue.bytes < self.max_queue() + extra - spare
             }
@@ -498,17 +511,18 @@ impl FlowControl {
         (self.rate * time.as_secs_f64()).max(BUDGET[0])
     }
 
-    /// Returns the number of frames in flight that keeps the connection busy: one frame in
-    /// transmission, and those that fit into a round trip.
+    /// Returns the number of frames in flight with which the connection is always busy: one frame
+    /// in transmission, and as many as the connection transmits in one round trip.
     fn target_in_flight(&self) -> usize {
         let round_trips =
             self.round_trip.unwrap_or_default().as_secs_f64() / FRAME_SPAN.as_secs_f64();
         (1 + round_trips.round() as usize).clamp(2, MAX_IN_FLIGHT)
     }
 
-    /// Returns `true` if the next frame should measure the round trip. There are two cases. The
-    /// rate, measured by the TCP send queue, has fallen by half since the last measurement of the
-    /// round trip. Or this measurement is too old or missing, and the user is not active.
+    /// Returns `true` if the next frame should measure the round trip. There are two cases. First,
+    /// the rate, measured by the TCP send queue, has fallen by half since the last measurement of
+    /// the round trip. Second, there is no measurement of the round trip from the last 30 s
+    /// ([`ROUND_TRIP_INTERVAL`]), and the user is not active.
     fn needs_round_trip(&self, now: Duration) -> bool {
         let is_known = self.round_trip.is_some() && now < self.round_trip_at + ROUND_TRIP_INTERVAL;
         let is_measurable = matches!(self.mode, PacingMode::AckClocked(_) | PacingMode::SendQueue);

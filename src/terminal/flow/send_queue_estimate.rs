@@ -4,13 +4,14 @@
 use std::time::Duration;
 
 /// Time after sending a frame in which the TCP send queue is not measured. Another process, such as
-/// `sshd`, passes the bytes on, so that they may not have reached the queue.
+/// `sshd`, passes the bytes of the frame on, and during this time they may not have reached the
+/// queue.
 const SETTLING: Duration = Duration::from_millis(10);
-/// Time after sending bytes at which the TCP send queue is first measured, if the round trip is
-/// unknown. A queue that is empty sooner may not have received the bytes yet.
+/// Time after the start of a busy period in which measurements of the TCP send queue are ignored,
+/// if the round trip is unknown. A queue that is empty so soon may not have received the bytes yet.
 const BELIEVED_AFTER: Duration = Duration::from_millis(50);
-/// Shortest time over which the rate is measured, from the number of bytes that leave the TCP send
-/// queue in this time.
+/// Shortest time over which the rate is measured. The rate is the number of bytes that leave the
+/// TCP send queue in this time, divided by the time.
 const SAMPLE: Duration = Duration::from_millis(100);
 
 /// Estimate of the TCP send queue's length and of the rate at which bytes leave it.
@@ -25,9 +26,9 @@ pub struct SendQueueEstimate {
     /// Time at which the last frame was sent.
     sent_at: Duration,
     busy: Option<Busy>,
-    /// Last measurement of the rate, if the queue became empty before the measurement was long
-    /// enough. The next frames may continue it. The pair is `(time at which the measurement began,
-    /// total number of bytes that had left the queue until then)`.
+    /// Last measurement of the rate, if the queue became empty before the measurement had lasted
+    /// for [`SAMPLE`]. The next busy period may continue it. The pair is `(time at which the
+    /// measurement began, total number of bytes that had left the queue until then)`.
     short_sample: Option<(Duration, f64)>,
 }
 
@@ -35,8 +36,10 @@ pub struct SendQueueEstimate {
 #[derive(Debug)]
 struct Busy {
     since: Duration,
-    /// Beginning of the measurement of the rate over the whole busy period. It may be in an earlier
-    /// busy period. The pair is `(time, total number of bytes that had left the queue until then)`.
+    /// Beginning of the measurement of the rate over the whole busy period. If the previous busy
+    /// period was too short for a measurement and began less than [`SAMPLE`] before this one, it is
+    /// the beginning of the previous one. The pair is `(time, total number of bytes that had left
+    /// the queue until then)`.
     whole: (Duration, f64),
     /// Size in bytes of the only frame that was sent in the busy period; `None` for several frames.
     alone: Option<usize>,
@@ -57,8 +60,8 @@ struct Busy {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct QueueSample {
     /// Round trip of a frame that was the only one sent in a busy period of the queue. The pair is
-    /// `(time from sending it until the queue was empty, its size in bytes)`. `None` if no round
-    /// trip was measured.
+    /// `(time from sending the frame until the queue was empty, size of the frame in bytes)`.
+    /// `None` if no round trip was measured.
     pub round_trip: Option<(Duration, usize)>,
     /// Rate at which bytes left the send queue, in bytes per second; `None` if it was not measured.
     pub rate: Option<f64>,
@@ -124,7 +127,8 @@ impl SendQueueEstimate {
             self.bytes = bytes as f64;
             return QueueSample::default();
         };
-        // Before this time no acknowledgement can have come.
+        // Before `filled_at` the other host cannot have acknowledged any bytes of this busy period.
+        // Earlier measurements are therefore ignored.
         let filled_at = busy.since + round_trip.map_or(BELIEVED_AFTER, |time| time.mul_f64(0.9));
         if now < filled_at {
             return QueueSample::default();
@@ -137,9 +141,9 @@ impl SendQueueEstimate {
             busy.most_drained = drained;
         }
         busy.is_full |= self.bytes >= limit;
-        // Rate since the beginning of the period, which stalls lower but do not raise. The bytes of
-        // a short time prove no rate: a relay, or the buffers of the other host, may have taken
-        // them at once.
+        // Rate over the whole busy period. Pauses of the connection lower it but cannot raise it.
+        // Less than `SAMPLE` gives no rate, because a relay, or the buffers of the other host, may
+        // have taken the first bytes at once.
         let (start, before) = busy.whole;
         let span = now.saturating_sub(start);
         let whole = (span >= SAMPLE).then(|| (drained - before) / span.as_secs_f64());

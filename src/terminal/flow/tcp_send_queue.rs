@@ -13,8 +13,8 @@ pub struct TcpSendQueue {
 }
 
 impl TcpSendQueue {
-    /// Finds the connection that `ssh_connection` describes, the value of `SSH_CONNECTION`. Returns
-    /// `None` if the kernel does not list it.
+    /// Finds the TCP connection of SSH. `ssh_connection` is the value of the environment variable
+    /// `SSH_CONNECTION`, which has its addresses. Returns `None` if the kernel does not list it.
     pub fn find(ssh_connection: &str) -> Option<Self> {
         let queue = Self::parse(ssh_connection)?;
         queue.bytes().is_some().then_some(queue)
@@ -34,7 +34,8 @@ impl TcpSendQueue {
         let fields: Vec<_> = text.split_whitespace().collect();
         let [client, client_port, server, server_port] = fields[..] else { return None };
         let address = |ip: &str, port: &str| {
-            // Addresses in the table have no scope such as `%eth0`.
+            // An IPv6 address in `SSH_CONNECTION` may have a scope such as `%eth0`. Addresses in
+            // the kernel's table have none.
             let ip: IpAddr = ip.split('%').next()?.parse().ok()?;
             Some(SocketAddr::new(ip.to_canonical(), port.parse().ok()?))
         };
@@ -109,7 +110,7 @@ mod tests {
         let remote = listener.local_addr().unwrap();
         let text = format!("{} {} {} {}", remote.ip(), remote.port(), from.ip(), from.port());
         let Some(queue) = TcpSendQueue::find(&text) else {
-            // Some containers hide the table.
+            // Some containers hide the kernel's table `/proc/net/tcp`.
             assert!(!std::path::Path::new("/proc/net/tcp").exists(), "{text} is not bytes_of");
             return;
         };

@@ -27,9 +27,9 @@ impl Wire {
 }
 
 /// Sends frames of the size that flow control permits, for `seconds`. If `is_active` is `true`,
-/// user input is recorded every 50 ms. Returns two results for the second half of this time: the
-/// share of the connection's rate that was used, and the longest time for which bytes waited to be
-/// transmitted.
+/// user input is recorded every 50 ms. Returns `(share, wait)` for the second half of this time.
+/// `share` is the ratio of the bytes sent to those that the connection could transmit. `wait` is
+/// the longest time from the sending of a frame to the end of its transmission.
 fn saturate(
     flow: &mut FlowControl,
     wire: &mut Wire,
@@ -72,7 +72,8 @@ fn rate_is_measured_and_connection_kept_busy() {
         let rate_found = flow.reading().unwrap().rate;
         let what =
             format!("{rate} B/s, {round_trip} ms: {rate_found:.0}, busy {busy:.2}, {waited:?}");
-        // Frame size and interval are limited, so the fastest connections are not filled.
+        // The byte budget and the interval of frames are limited, so that frames cannot fill the
+        // fastest of these connections.
         let expected = (BUDGET[2] / 0.033 / rate).min(1.0);
         assert!(busy > 0.6 * expected, "{what}");
         assert!(rate_found > 0.6 * rate.min(8e6) && rate_found < 1.6 * rate, "{what}");
@@ -90,8 +91,8 @@ fn input_waits_for_one_frame_only() {
     flow.record_input(now);
     flow.in_flight = FramesInFlight::default();
     flow.sent(now, 9000, true, 0);
-    // The effect of one key may be sent while that frame is in flight, but not the effect of the
-    // next key.
+    // While that frame of 9000 bytes is in flight, a frame with the effect of one key may be sent,
+    // but not one with the effect of the next key.
     assert!(flow.allowance(now + ms(40), false).is_none());
     let effect = flow.allowance(now + ms(1), true).unwrap();
     assert!(effect.picture);
@@ -111,7 +112,7 @@ fn first_effect_of_input_does_not_wait_for_earlier_frames() {
     flow.record_input(now);
     assert!(flow.allowance(now, true).unwrap().picture);
     flow.sent(now, 8000, true, 0);
-    // The effect of the next input waits.
+    // The frame with the effect of the next input waits for those in flight.
     flow.record_input(ms(110));
     assert!(!flow.allowance(ms(110), true).is_some_and(|allowance| allowance.picture));
 }
@@ -144,7 +145,7 @@ fn lost_replies_stop_requests_and_late_ones_resume_them() {
     let reading = flow.reading().unwrap();
     assert_eq!((reading.mode, reading.rate), (PacingMode::FixedRate, DEFAULT_RATE));
     assert_eq!(flow.ack_request(), None);
-    // Frames are still sent, at the fixed rate.
+    // Without replies, frames are still sent, at the fixed rate.
     let mut sent = 0;
     for _ in 0..10_000 {
         now += ms(1);
@@ -214,10 +215,11 @@ impl MeasuredWire {
         self.frames.iter().map(in_queue).sum::<f64>().ceil() as usize
     }
 
-    /// Simulates a dashboard that sends frames for `seconds`, beginning at the second `from`.
-    /// `wants(time, limit)` returns the number of bytes that the dashboard sends; `time` is in
-    /// milliseconds, and `limit` is the permitted number of bytes. Returns the longest time for
-    /// which bytes waited to be transmitted, in the last quarter of the simulated time.
+    /// Simulates a dashboard that sends frames for `seconds`, beginning `from` seconds after the
+    /// start of the simulation. `wants(time, limit)` returns the number of bytes that the dashboard
+    /// sends; `time` is in milliseconds, and `limit` is the permitted number of bytes. Returns the
+    /// longest time for which bytes waited to be transmitted, in the last quarter of the simulated
+    /// time.
     fn run(
         &mut self,
         flow: &mut FlowControl,
@@ -256,8 +258,9 @@ fn send_queue_holds_a_round_trip_and_a_frame() {
         let found = flow.reading().unwrap().rate;
         let what = format!("{rate} B/s, {round_trip} ms: {found:.0} B/s, {waited:?}");
         assert!((0.85..1.2).contains(&(found / rate)), "{what}");
-        // A frame of 0.1 s follows one that waits for at most the excess of the estimated round
-        // trip and the interval of measurements.
+        // At most two frames of 0.1 s wait: one in the queue, and the new one. Another 0.1 s is
+        // allowed for the error of the estimated round trip and for the interval between
+        // measurements.
         assert!(waited < ms(300), "{what}");
     }
 }
@@ -268,7 +271,7 @@ fn rate_stays_true_after_convergence() {
         let mut flow = FlowControl::new(start(PacingMode::SendQueue));
         let mut wire = MeasuredWire::new(rate, round_trip);
         wire.run(&mut flow, 0, 30, |_, permitted| permitted);
-        // Small frames, which have not reached the queue when it is measured next.
+        // Every 450 ms one or two small frames are sent. They do not fill the connection.
         wire.run(
             &mut flow,
             30,
@@ -280,7 +283,7 @@ fn rate_stays_true_after_convergence() {
         let found = flow.reading().unwrap().rate;
         assert!((0.7..1.2).contains(&(found / rate)), "{found:.0} of {rate}");
     }
-    // Acknowledgements that come together prove no rate.
+    // Two acknowledgements that arrive at the same time prove no rate.
     let mut flow = FlowControl::new(start(PacingMode::AckClocked(None)));
     let mut wire = Wire { rate: 125e3, round_trip: ms(100), free_at: Duration::ZERO };
     saturate(&mut flow, &mut wire, 40, false);
@@ -313,7 +316,7 @@ fn late_replies_prove_no_rate() {
         };
         for i in 10..30 {
             let at = |after| ms(3000 * i + after);
-            // The measurement of the round trip takes four times the time.
+            // The reply that measures the round trip arrives after four times the true round trip.
             flow.round_trip_at = Duration::ZERO;
             flow.sent(at(0), 500, false, 0);
             flow.on_ack(at(4 * round_trip));
@@ -336,8 +339,8 @@ fn late_replies_prove_no_rate() {
     }
 }
 
-/// Checks the estimated rate of the connection behind a relay that accepts bytes at once, up to its
-/// buffer, and sends them at the rate of the connection.
+/// Checks the estimated rate of the connection behind a relay. The relay accepts bytes at once
+/// until its buffer is full, and sends them at the rate of the connection.
 #[test]
 fn rate_is_true_behind_a_relay_that_buffers() {
     const RELAYED: f64 = 8e3;
@@ -400,12 +403,14 @@ fn connection_without_acknowledgements_becomes_silent() {
         flow.measures_at(now),
         Some(flow.send_queue.measured_at.unwrap() + STALLED_INTERVAL)
     );
-    // Input and acknowledgements are signs of life.
+    // Input delays the time at which the connection is treated as silent. When all bytes are
+    // acknowledged, there is no such time.
     flow.record_input(now);
     assert!(flow.silent_at(None).unwrap() > now);
     flow.held_back(now, Some(0));
     assert_eq!(flow.silent_at(None), None);
-    // Without acknowledgements a write that does not return is the only sign.
+    // At a fixed rate, without acknowledgements, only a write that does not return shows that the
+    // connection is silent.
     let flow = FlowControl::new(start(PacingMode::FixedRate));
     assert_eq!(flow.silent_at(Some(ms(7))), Some(ms(7) + SILENT_AFTER));
 }

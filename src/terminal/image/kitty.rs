@@ -58,8 +58,8 @@ pub fn max_rows() -> u16 {
     MARKS.iter().map(|[first, last]| (last - first + 1) as u16).sum()
 }
 
-/// Returns the text of each cell in row `row` of the image. The text encodes the row. The terminal
-/// counts the columns from the left.
+/// Returns the text of each cell in row `row` of the image. The text encodes the row but not the
+/// column, which the terminal finds by counting from the left.
 pub fn placeholder(row: u16) -> String {
     let mark = MARKS.iter().flat_map(|[first, last]| *first..=*last).nth(usize::from(row));
     [Some(PLACEHOLDER), mark.and_then(char::from_u32)].into_iter().flatten().collect()
@@ -67,19 +67,20 @@ pub fn placeholder(row: u16) -> String {
 
 /// Returns the bytes that show the image file `png` in the cells `place`. If `stretched` or
 /// `through_tmux` is `true`, the terminal scales the image to the size of these cells. If
-/// `through_tmux` is `true`, tmux passes the bytes on to the terminal outside of it, which shows
-/// the image in the cells that contain placeholders.
+/// `through_tmux` is `true`, tmux passes the bytes on to the terminal outside of tmux. This
+/// terminal then shows the image in the cells that contain placeholders.
 pub fn transfer(png: &[u8], place: Rect, stretched: bool, through_tmux: bool) -> Transfer {
     let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
     let letters = STANDARD.encode(png);
     let remove = format!("\x1b_Ga=d,d=I,i={IMAGE},q=2\x1b\\");
-    // An incomplete image is ended by an empty last chunk. The terminal then discards it as
-    // invalid.
+    // If only a part of the image was sent, an empty last chunk (`m=0`) ends the transfer. The
+    // terminal then discards the incomplete image as invalid.
     let give_up = "\x1b_Gm=0,q=2;\x1b\\".to_string();
     let remove = [give_up, remove].map(wrap).concat().into_bytes();
     let mut transfer = Transfer { remove, ..Transfer::default() };
     let Rect { x, y, width, height } = place;
-    // The image appears at the cursor when the terminal has received its last chunk.
+    // The image appears at the position that the cursor has when the terminal receives the last
+    // chunk.
     let cursor = match through_tmux {
         true => String::new(),
         false => MoveTo(x, y).to_string(),

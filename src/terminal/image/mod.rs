@@ -23,8 +23,8 @@ pub use transfer::Transfer;
 const SIXEL_PX: usize = 1000;
 /// Assumed width and height of a cell in pixels if the terminal does not report them.
 const CELL_PX: [u16; 2] = [8, 16];
-/// Estimated number of bytes per pixel of an encoded image. It limits the size of an image before
-/// the image is encoded.
+/// Estimated number of bytes per pixel of an encoded image. It gives the size to which an image is
+/// scaled down before it is encoded, so that it keeps the limit of bytes.
 const BYTES_PER_PIXEL: f64 = 1.6;
 
 /// Protocol by which images are shown in the terminal.
@@ -53,8 +53,8 @@ pub struct ImageViewport {
     /// Largest width and height of a sixel image in pixels. `None` if the terminal reports no
     /// limit.
     pub sixel_px: Option<[u16; 2]>,
-    /// Approximate largest size of the encoded image in bytes, so that it is sent in a few seconds.
-    /// A larger image is scaled down. `None` means no limit.
+    /// Approximate largest number of bytes of the encoded image. The limit is chosen so that the
+    /// image is sent in a few seconds. A larger image is scaled down. `None` means no limit.
     pub max_bytes: Option<f64>,
 }
 
@@ -71,8 +71,8 @@ pub struct ViewerImage {
     pub protocol: Protocol,
     /// Cells that the image covers, fully or in part.
     pub place: Rect,
-    /// Half blocks that show the image. With an image protocol they fill only the cells that the
-    /// image covers fully.
+    /// Half blocks that show the image. If the image is also shown by an image protocol, the half
+    /// blocks fill only the cells that the image covers fully.
     pub raster: Raster,
     /// Bytes that show the image by the protocol. Empty for [`Protocol::Blocks`].
     pub transfer: Transfer,
@@ -86,7 +86,8 @@ impl Protocol {
             Some(Multiplexer::Tmux) if terminal.kitty_graphics && terminal.placeholders => {
                 Self::KittyThroughTmux
             }
-            // This includes tmux: a tmux that reports sixel shows sixel images itself.
+            // This case includes tmux, because a tmux that reports support of sixel shows sixel
+            // images itself.
             _ if terminal.sixel && terminal.cell_px.is_some() => {
                 Self::Sixel(terminal.sixel_colors.unwrap_or(256).clamp(2, 256))
             }
@@ -106,8 +107,9 @@ impl Protocol {
 }
 
 impl ImageViewport {
-    /// Returns two sizes in pixels, each as width and height: that of the largest image that fits
-    /// on the screen, and that of a cell. With half blocks, a pixel is one half of a cell.
+    /// Returns two sizes in pixels as `[width, height]`: first the largest size of an image on the
+    /// screen, then the size of a cell. If the image is shown by half blocks, a pixel is half of a
+    /// cell.
     fn px(&self) -> ([usize; 2], [usize; 2]) {
         let cell = match self.protocol {
             Protocol::Blocks => [1, 2],
@@ -179,8 +181,8 @@ impl ViewerImage {
         let raster = match viewport.protocol {
             Protocol::Blocks => Raster { width: shown[0], height: shown[1], pixels: small },
             _ => {
-                // Half blocks fill only cells that the image will cover completely. In other cells
-                // they would remain visible beside the image.
+                // Half blocks fill only cells that the image will cover completely. In cells at the
+                // edges of the image they would remain visible beside the image.
                 let covered = [0, 1].map(|i| (shown[i] / cell[i]).max(1));
                 let halves = [covered[0].min(shown[0]), (2 * covered[1]).min(shown[1])];
                 let pixels = shrunk(&small, shown, halves);
@@ -191,9 +193,10 @@ impl ViewerImage {
         Ok(Self { screen, size, shown, protocol, place, raster, transfer })
     }
 
-    /// Returns two values for the cells in row `row` of `place`: their text, and the index of their
-    /// foreground colour. These placeholders make the terminal draw the image that was sent to it.
-    /// Returns `None` if the protocol draws the image without placeholders.
+    /// Returns `(text, color)` for the cells in row `row` of `place`. The text is a placeholder,
+    /// and `color` is the index of its foreground colour. In place of such cells the terminal draws
+    /// the image that was sent to it. Returns `None` if the protocol draws the image without
+    /// placeholders.
     pub fn placeholder(&self, row: u16) -> Option<(String, u8)> {
         let has_placeholders = self.protocol == Protocol::KittyThroughTmux;
         has_placeholders.then(|| (kitty::placeholder(row), kitty::IMAGE))

@@ -3,8 +3,9 @@
 use crate::film::box_means;
 use crate::terminal::cells::{code, linear};
 
-/// Downscales an image of size `from` (columns, rows) to the size `to`, which is not larger. The
-/// value of a new pixel is the mean, in linear light, of the area of the image that it covers.
+/// Downscales an image of size `from` (columns, rows) to the size `to`, which is not larger than
+/// `from`. A new pixel covers an area of the old image. Its value is the mean of this area in
+/// linear light.
 pub fn shrunk(pixels: &[[u8; 3]], from: [usize; 2], to: [usize; 2]) -> Vec<[u8; 3]> {
     if from == to || pixels.is_empty() {
         return pixels.to_vec();

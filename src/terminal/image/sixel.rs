@@ -9,9 +9,10 @@ use ratatui::layout::Rect;
 /// its own, and xterm keeps at most 16 images.
 const MAX_STRIPS: u16 = 16;
 
-/// Returns the bytes that show the image `pixels` at `place`, in rows of `width` pixels.
-/// `cell_height` is the height of a cell in pixels. `colors` is the largest number of colours of a
-/// strip (one or more rows of cells). Other output can be sent between strips.
+/// Returns the bytes that show an image at `place`. `pixels` are the pixels of the image in rows of
+/// `width`. `cell_height` is the height of a cell in pixels. The image is sent in strips of one or
+/// more rows of cells; `colors` is the largest number of colours of a strip. Other output can be
+/// sent between strips.
 ///
 /// # Errors
 /// Fails if the image is empty.
@@ -56,7 +57,8 @@ mod tests {
             assert!(sixel.starts_with("\x1bP") && sixel.ends_with("\x1b\\"));
             let image = SixelImage::decode(sixel.as_bytes()).unwrap();
             assert_eq!(image.width, width);
-            // Sixel encodes six rows at a time. Rows below the end of the strip are transparent.
+            // Sixel encodes six rows of pixels at a time. The rows of the last six that are below
+            // the strip are transparent.
             let drawn = image.pixels[..].chunks_exact(4).filter(|pixel| pixel[3] > 0);
             shown.extend(drawn.map(|p| [p[0], p[1], p[2]]));
         }

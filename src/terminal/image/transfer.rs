@@ -11,25 +11,25 @@ pub struct Transfer {
     /// Offsets between escape sequences, in ascending order, at which other output may be sent. The
     /// last offset is the length of `bytes`.
     pub stops: Vec<usize>,
-    /// `true` if the image's escape sequence may be divided at any byte, and ended early by ST
-    /// (string terminator).
+    /// `true` if the escape sequences of the image may be divided at any byte, and ended early by
+    /// ST (string terminator). Other output may follow only after such an end.
     pub divisible: bool,
     /// Bytes that remove the image from the screen, even if only a part of it was sent.
     pub remove: Vec<u8>,
-    /// `true` if the image overwrites the cells that it covers. They must be drawn again after the
-    /// image is removed.
+    /// `true` if the image overwrites the cells that it covers. These cells must be drawn again
+    /// after the image is removed.
     pub destroys: bool,
 }
 
 impl Transfer {
-    /// Returns two values: the range of the image's bytes to send next, and `true` if it ends
-    /// inside of an escape sequence. The caller must then send the remainder of the sequence before
-    /// any other output. `sent` is the number of bytes sent before. `room` is the number of bytes
-    /// that may be sent now.
+    /// Returns `(range, is_open)`. `range` is the range of the image's bytes to send next.
+    /// `is_open` is `true` if the range ends inside of an escape sequence. The caller must then
+    /// send the remainder of this sequence, or end it by ST, before any other output. `sent` is the
+    /// number of bytes sent before. `room` is the number of bytes that may be sent now.
     ///
-    /// The range holds as many complete sequences as fit into `room`. If not even one fits, the
-    /// result depends on [`Self::divisible`]: a divisible sequence is cut after `room` bytes (at
-    /// least 1); an indivisible one is returned whole and exceeds `room`.
+    /// The range holds as many complete sequences as fit into `room`. If not even one sequence
+    /// fits, the result depends on [`Self::divisible`]. A divisible sequence is cut after `room`
+    /// bytes (at least 1). An indivisible one is returned whole and exceeds `room`.
     pub fn slice(&self, sent: usize, room: usize) -> (Range<usize>, bool) {
         let room = room.max(usize::from(self.divisible));
         let later_stops = &self.stops[self.stops.partition_point(|stop| *stop <= sent)..];
