@@ -1,5 +1,5 @@
-//! Reported truncation bias of `max_depth` and `min_throughput`, against pictures without these
-//! limits.
+//! Truncation bias that the program reports for `max_depth` and `min_throughput`. It is compared
+//! with the difference from pictures without these limits.
 
 use crate::common;
 use crate::support;
@@ -14,14 +14,14 @@ use zerkalo::world::{self, AnyWorld, Precision};
 
 const SAMPLES: u32 = 4;
 
-/// Bias that the program reports for a limit of paths.
+/// Truncation bias that the program reports for one of the limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Bias {
     /// The program reports no bias for the limit.
     Zero,
-    /// The bias is at most this radiance, if surfaces have unit radiance.
+    /// The bias is at most this radiance, if the brightest surface has unit radiance.
     AtMost(f64),
-    /// The program reports a bias, but no bound of it.
+    /// The program reports a bias without an upper bound.
     Unbounded,
 }
 
@@ -53,7 +53,7 @@ fn random(seed: u64) -> (Scene, f64) {
         (n.direction() * 6.0).to_array(),
     );
     for i in 0..2 * objects {
-        // Parts of compounds have materials of the second half.
+        // The first half of the materials is for objects, the second half for parts of compounds.
         let mut lines = vec![
             format!("color = [{:?}, {:?}, 0.9]", n.unit(), n.unit()),
             format!("specular = {:?}", [0.0, 0.5][n.below(2)]),
@@ -86,7 +86,7 @@ fn random(seed: u64) -> (Scene, f64) {
     }
     for i in 0..objects {
         let (_, example) = EXAMPLES[n.below(EXAMPLES.len())];
-        // Parts get the materials of the second half.
+        // Parts of a compound get materials of the second half, other than the object's own.
         let part_key = format!("material = \"m{}\", shape.", objects + i);
         let example = example.replacen("{ shape.", &format!("{{ {part_key}"), 1);
         let example = example.replace("knot.ply", "stone.obj");
@@ -101,7 +101,8 @@ fn random(seed: u64) -> (Scene, f64) {
         .unwrap();
     }
     let scene = parsed(&text);
-    // Ambient light, half as much from the light, and a highlight.
+    // The sum of three bounds: ambient light 1, diffuse reflection of the light of intensity 0.5,
+    // and a highlight with the coefficient 0.5 of the same light.
     (scene, 1.0 + 0.5 + 0.25)
 }
 
@@ -109,9 +110,9 @@ fn values(scene: &Scene) -> Vec<f64> {
     values_and_rounding(scene).0
 }
 
-/// Returns the values of a scene's picture, and the largest error by which the film rounds them.
-/// The film's scale, and with it the rounding, depends on the largest radiance that paths of the
-/// greatest depth can carry.
+/// Returns the values of a scene's picture, and the largest error of the film's fixed-point
+/// rounding. The film's scale depends on the largest radiance that paths of the greatest depth can
+/// carry. A change of the depth limit therefore changes the rounding, too.
 fn values_and_rounding(scene: &Scene) -> (Vec<f64>, f64) {
     let rendering = rendered(scene, 3, Precision::Single, SAMPLES);
     let rounding = rendering.film.scales().iter().map(|scale| 0.5 / scale).sum();
@@ -122,7 +123,7 @@ fn max_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Returns the scene with a larger `max_depth`.
+/// Returns the scene with `max_depth` more than doubled.
 fn deeper(scene: &Scene) -> Scene {
     let mut deeper = scene.clone();
     deeper.trace.max_depth = 2 * scene.trace.max_depth + 7;
@@ -176,8 +177,8 @@ fn reported_truncation_bias_holds_in_many_scenes() {
     checked(400..6000);
 }
 
-/// Checks a single glass ball. Light can stay inside of it because of bumps, and because of
-/// rounding at its silhouette.
+/// Checks that the depth bias of a single glass ball is reported without a bound. Bumps, and
+/// rounding at the silhouette, can keep light inside the ball for any number of reflections.
 #[test]
 fn single_glass_ball_has_unbounded_depth_bias() {
     let text = |more: &str, camera: &str| {
@@ -198,8 +199,9 @@ fn single_glass_ball_has_unbounded_depth_bias() {
         difference > 0.01 && reported_bias(&bumped, "max_depth") == Bias::Unbounded,
         "{difference}"
     );
-    // The silhouette is at cos = 1/5 from the axis. There rounding decides if light leaves the
-    // ball.
+    // The eye is at the distance 5 from the centre of a unit ball. The angle between the directions
+    // from the centre to the eye and to the silhouette has the cosine 1/5. At the silhouette,
+    // rounding decides whether light leaves the ball.
     let mut numbers = Numbers::new(4);
     let (mut cut, rounds) = (0, 240);
     for round in 0..rounds {
@@ -223,7 +225,8 @@ fn single_glass_ball_has_unbounded_depth_bias() {
     assert!(cut > rounds as u32 / 10, "rounding at the silhouette is reported, but does not occur");
 }
 
-/// Checks a single flat or convex mirror, which a path hits once at any angle.
+/// Checks that no depth bias is reported for a single flat or convex mirror. A path that leaves it
+/// cannot hit it again.
 #[test]
 fn single_mirror_has_no_depth_bias() {
     let mut numbers = Numbers::new(9);
@@ -248,7 +251,8 @@ fn single_mirror_has_no_depth_bias() {
         if reported_bias(&scene, "max_depth") != Bias::Zero {
             continue;
         }
-        // Grazing view along the surface.
+        // In every second round the camera looks at a corner of the bounds, so that some rays graze
+        // the surface.
         if round % 2 == 1
             && let Some((low, high)) = scene.objects[0].form().bounds()
         {

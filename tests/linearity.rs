@@ -1,7 +1,9 @@
 //! Invariances of pictures, and effects of the limits of tracing.
 //!
-//! - The invariances are those under changes of light weights, of the unit of light, and of place.
-//! - The limits are ray types, depth, smallest throughput, horizon, and the cap on samples of glossy tiles.
+//! - The pictures are invariant under a change of light weights, of the unit of light, and of the
+//!   position of the whole scene.
+//! - The limits are ray types, depth, smallest throughput, horizon, and the cap on samples of
+//!   glossy tiles.
 
 use crate::support;
 
@@ -27,7 +29,7 @@ fn values(scene: &Scene, precision: Precision) -> Vec<f64> {
     picture(&rendered(scene, 4, precision, 8), Replicates::Both).concat()
 }
 
-/// Returns the largest difference between two pictures, relative to the largest value.
+/// Returns the largest difference between two pictures, divided by the largest value of both.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let largest = a.iter().chain(b).fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -162,7 +164,7 @@ fn translated(scene: &Scene, by: [f64; 3]) -> Scene {
 #[test]
 fn translation_by_a_million_units_does_not_change_the_picture() {
     let by = [1e6, -1e6, 3e6];
-    // Coordinates that keep all bits under the translation.
+    // These coordinates are multiples of a power of two that stay exact under the translation.
     let dyadic = parsed(
         r#"
 [film]
@@ -193,13 +195,17 @@ shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
         let there = rendered(&translated(&dyadic, by), 4, precision, 8).film.bytes();
         assert!(here == there, "{precision:?}");
     }
-    // Other coordinates are rounded to 2^-32 of a unit, which is visible in double precision. Single precision
-    // hides it, unless a number is so close to the middle between two that it is rounded to the other one (a
-    // coefficient of a thin ellipsoid in extents.toml: 2.7e-8). A sample at an edge may change sides: near the
-    // horizon of a checked floor (gallery-glass.toml) one in ten thousand does, so a five-hundredth of its
-    // pixels may differ, by at most one sample each. In all other scenes none does. The picture of a lamp in a
-    // rough mirror changes more, because the lobe is steep where the lamp is small: 7.6e-8 of the light in
-    // lamp-and-mirror.toml.
+    // Other coordinates are rounded to 2^-32 of a unit, which is visible in double precision.
+    // Single precision hides this, unless a number is so close to the middle between two floats
+    // that it is rounded to the other one. This happens to a coefficient of a thin ellipsoid in
+    // extents.toml (2.7e-8).
+    //
+    // A sample at an edge may change sides. Near the horizon of the checked floor of
+    // gallery-glass.toml one sample in ten thousand does. One in 500 of its pixels may therefore
+    // differ, by at most one sample each. In all other scenes no sample changes sides.
+    //
+    // The picture of a lamp in a rough mirror changes more than others, because the lobe is steep
+    // where the lamp is small: 7.6e-8 of the light in lamp-and-mirror.toml.
     for (name, scene) in all_shipped() {
         let scene = sized(scene, SIZE);
         for precision in PRECISIONS {
@@ -244,7 +250,7 @@ fn ray_types_add_shadows_and_reflections() {
         unreflected.trace.max_depth = 0;
         assert_eq!(primary.trace.ray_types, RayTypes::Primary);
         let [lit, shadowed, reflected] = [&primary, &shadows, &full].map(|s| values(s, precision));
-        // Shadows only remove light, reflections only add it.
+        // Shadows can only make a pixel darker, and reflections can only make it brighter.
         assert!(shadowed.iter().zip(&lit).all(|(s, l)| s <= l));
         assert!(shadowed.iter().zip(&reflected).all(|(s, r)| s <= r));
         assert!(difference(&shadowed, &lit) > 0.1 && difference(&shadowed, &reflected) > 0.1);
@@ -258,7 +264,7 @@ fn ray_types_add_shadows_and_reflections() {
     assert!(!has(&Scene { lights: Vec::new(), ..shadows }, "shadows only"));
 }
 
-/// Checks the bound of the bias by a limit of depth. Paths deeper than K surfaces add at most
+/// Checks that the bias of a depth limit is bounded. Paths of more than K reflections add at most
 /// rho^(K+1) / (1 - rho) of the radiance of the brightest surface.
 #[test]
 fn depth_limits_paths_and_its_bias_is_bounded() {
@@ -269,7 +275,8 @@ fn depth_limits_paths_and_its_bias_is_bounded() {
         scene
     };
     let all = values(&with_depth(400), Precision::Double);
-    // Surfaces reflect at most 0.8 + 0.2, and highlights of 0.2 x 0.8.
+    // A surface reflects at most 0.8 from the lamp and 0.2 from the ambient light. Its highlight
+    // adds at most 0.2 x 0.8. The sum is less than 1.2.
     let brightest = 1.2;
     let mut before = 0.0;
     for depth in [0, 1, 2, 5, 17, 60] {
@@ -298,7 +305,7 @@ fn min_throughput_limits_paths_and_its_bias_is_bounded() {
     };
     let all = values(&with_least(0.0), Precision::Double);
     for least in [0.95, 0.89, 0.5, 0.01] {
-        // Paths of up to this depth have at least the weight `least`.
+        // Paths up to this depth have a throughput of at least `least`; deeper paths have less.
         let depth = (f64::ln(least) / RHO.ln()).floor() as u32;
         let mut by_depth = with_least(0.0);
         by_depth.trace.max_depth = depth;
@@ -324,11 +331,13 @@ fn horizon_folds_or_absorbs_rays() {
                 ..absorb.trace
             }
         );
-        // Rays above the surface are the same: absorption only removes light.
+        // Rays above the surface are equal in both scenes. Rays below it are lost only with
+        // absorption.
         let [folded, absorbed] = [&fold, &absorb].map(|s| values(s, precision));
         assert!(absorbed.iter().zip(&folded).all(|(absorbed, folded)| absorbed <= folded));
         assert!(difference(&folded, &absorbed) > 0.2);
-        // Folding conserves energy under a constant background: ice and the reflected sky.
+        // Folding conserves energy: with only the ice under a constant white background, every
+        // pixel has radiance 1.
         let mut sky = fold.clone();
         sky.objects.truncate(1);
         sky.background.color = Color([1.0; 3]);
@@ -350,7 +359,7 @@ fn rays_per_pixel_caps_glossy_tiles() {
             rendering.film.touched().map(|(_, tile)| tile.counts().iter().sum()).collect();
         let capped = counts.iter().filter(|n| **n == 16).count();
         assert!(capped > counts.len() / 2, "adaptive {adaptive}: {counts:?}");
-        // Other tiles have no glossy lobe and get more samples; none falls short of the cap.
+        // Tiles without a glossy lobe have no cap and get more than 16 samples. No tile gets fewer.
         assert!(counts.iter().all(|n| *n >= 16), "adaptive {adaptive}: {counts:?}");
         let uncapped =
             follow(&mut begin(&scene, 1, Precision::Auto), settings(adaptive, 0, stop), &pool(2));

@@ -1,4 +1,4 @@
-//! Small valid files of every format, which together contain everything that the readers parse.
+//! Small valid files of every format. Together they contain every feature that the readers support.
 
 use image::{DynamicImage, ImageFormat};
 use std::io::Cursor;
@@ -111,8 +111,8 @@ pub fn stl() -> Vec<Vec<u8>> {
     vec![text.into(), bytes]
 }
 
-/// Returns the JSON description and the buffer of a glTF file. `uri` is the entry that locates the
-/// buffer.
+/// Returns the JSON description and the buffer of a glTF file. `uri` is a JSON entry with the
+/// buffer's location, or empty.
 fn description(uri: &str) -> (String, Vec<u8>) {
     let (points, triangles) = ball(4, 6);
     let mut buffer = Vec::new();
@@ -236,12 +236,13 @@ pub fn toml() -> Vec<Vec<u8>> {
         .filter(|p| p.extension().is_some_and(|e| e == "toml"))
         .collect();
     paths.sort();
-    // Long files would only find the same errors more slowly.
+    // Longer files would find the same errors as short ones, but more slowly.
     let texts = paths.iter().map(|p| std::fs::read(p).unwrap()).filter(|t| t.len() < 20_000);
     texts.collect()
 }
 
-/// Returns plan files: one made from a pilot, and one for a second round.
+/// Returns two plan files (a plan divides a render among several processes). The first plan was
+/// made from a trial render, and the second one refines an earlier plan.
 pub fn plan() -> Vec<Vec<u8>> {
     let tile = |(base, end, glossy): (u32, u32, bool)| PlannedTile {
         base,
@@ -279,7 +280,7 @@ pub fn plan() -> Vec<Vec<u8>> {
     [plan(None, 8), plan(Some(12), 40)].map(|plan| plan.text().into_bytes()).into()
 }
 
-/// Returns the lines of a plan file up to its checksum, with a correct checksum.
+/// Returns the text of a plan file before its checksum line, with the correct checksum appended.
 pub fn repaired_plan(bytes: &[u8]) -> Vec<u8> {
     let end = bytes.windows(9).rposition(|w| w == b"checksum ").unwrap_or(bytes.len());
     let mut out = bytes[..end].to_vec();
@@ -288,7 +289,8 @@ pub fn repaired_plan(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Returns a film file with correct checksums of its chunks, as far as it has chunks.
+/// Returns a film file in which the checksum of every complete chunk is correct. The bytes from the
+/// first incomplete chunk on are unchanged.
 pub fn repair_film(bytes: &[u8]) -> Vec<u8> {
     const START: usize = 12;
     let mut out = bytes.to_vec();

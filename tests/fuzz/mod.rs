@@ -19,10 +19,11 @@ use zerkalo::render::{Checkpoint, Options, SampleInputs};
 use zerkalo::sampling::{SampleSettings, SamplerKind};
 use zerkalo::scene::Scene;
 
-/// Number of mutations of the files of each format.
+/// Number of mutations that are read for each format.
 const CASES: u64 = 5_000;
 
-/// Longest time for reading one file, as the shortest of five attempts.
+/// Longest allowed time for reading one file. The time is the shortest of up to five attempts,
+/// because other programs may slow down one of them.
 const LONGEST: Duration = Duration::from_secs(1);
 
 /// Largest peak memory of the whole test, in KiB.
@@ -48,13 +49,14 @@ fn read_mutations(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> 
         let other = &seeds[random.below(seeds.len())];
         let mut bytes = random.mutated(seed, other);
         if name == "png" && case % 4 != 0 {
-            // Otherwise the checksums would hide almost all other errors.
+            // With a wrong checksum, the reader would refuse the file before it parses the mutated
+            // data.
             files::repair_png(&mut bytes);
         }
         let begin = Instant::now();
         accepted += u64::from(read(&bytes));
         let mut spent = begin.elapsed();
-        // Other programs may have taken the time.
+        // Other programs may have taken processor time in the first attempt.
         for _ in 0..4 {
             if spent < LONGEST {
                 break;
@@ -70,14 +72,14 @@ fn read_mutations(name: &str, seeds: &[Vec<u8>], mut read: impl FnMut(&[u8]) -> 
     accepted
 }
 
-/// Checks that some mutations are accepted and some are not, so that also the checks after the
-/// first are tested.
+/// Checks that some mutations are accepted and some are refused. If none were accepted, the first
+/// check in the reader might refuse all of them, and later checks would not be tested.
 fn assert_mixed(accepted: u64) {
     assert!(accepted > CASES / 50 && accepted < CASES, "{accepted} of {CASES} were accepted");
 }
 
-/// Writes a new file at `path` in place of the old one. If the old one were truncated instead, ext4
-/// would write it to the disk when it is closed, which takes longer than the test.
+/// Writes a new file at `path` in place of the old one. If the old file were truncated instead,
+/// ext4 would flush it to the disk at closing, which takes longer than the rest of the test.
 fn write(path: &Path, bytes: &[u8]) {
     // Before the first case there is no file.
     let _ = std::fs::remove_file(path);
@@ -168,7 +170,7 @@ fn jpeg() {
 #[test]
 fn toml() {
     let seeds = files::toml();
-    // In the folder of the meshes that some scenes name.
+    // The path is in the folder `scenes`, because some scenes refer to meshes relative to it.
     let name = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/a.toml");
     assert_mixed(read_mutations("toml", &seeds, |bytes| {
         std::str::from_utf8(bytes).is_ok_and(|text| Scene::parse(text, name).is_ok())
@@ -180,7 +182,7 @@ fn plan() {
     let mut parsed = Vec::new();
     let accepted = read_mutations("plan", &files::plan(), |bytes| {
         let repaired = files::repaired_plan(bytes);
-        // Half of the files keep their wrong checksum, as files that were damaged on the way do.
+        // Half of the files keep their wrong checksum, like files that are damaged in a transfer.
         let bytes = if bytes.len() % 2 == 0 { &repaired } else { bytes };
         let plan = Plan::parse(Path::new("a.plan"), bytes);
         parsed.extend(plan.clone().ok().filter(|_| parsed.len() < 100));
@@ -190,7 +192,8 @@ fn plan() {
     for plan in parsed {
         let again = Plan::parse(Path::new("a.plan"), plan.text().as_bytes()).unwrap();
         assert_eq!(again, plan);
-        // Every sample of an accepted plan belongs to one shard.
+        // Every sample of an accepted plan belongs to one shard (part of the render for one
+        // process).
         let shards = plan.settings.shards.min(50);
         let ranges = (0..=shards).map(|shard| plan.ranges(shard));
         let samples: u64 = ranges.flatten().map(|range| range.len() as u64).sum();
@@ -291,7 +294,8 @@ fn film_files_with_repaired_checksums() {
             && let Ok(scene) = Scene::parse(&inputs.scene, "a.toml")
         {
             continued += 1;
-            // Ends at once, so that a mutated allocation round does not trace for hours.
+            // The target of 2 samples per pixel is already met and ends the render at once. A
+            // mutated allocation round could trace for hours.
             let mut session = session(2);
             session.continue_from(Arc::new(scene), checkpoint);
             session.with(|_, _| ());

@@ -73,7 +73,7 @@ impl Random {
                 out.splice(at..at, piece.iter().copied());
             }
             7 => {
-                // A binary number becomes an extreme one.
+                // Four bytes become an extreme integer, or the bits of NaN or infinity.
                 let value = [0, 1, -1, i32::MAX, i32::MIN, 0x7fc0_0000, 0x7f80_0000, 65_536];
                 let value: i32 = value[self.below(8)];
                 for (slot, byte) in out[at..].iter_mut().zip(value.to_le_bytes()) {

@@ -24,7 +24,8 @@ fn same3<A: SimdFloat, B: SimdFloat>(a: Vec3<A>, b: Vec3<B>, lane: usize) -> boo
     (0..3).all(|i| same(a[i], b[i]))
 }
 
-/// Compares packets of `L` with rays of its scalar type, in the aggregate of all `forms`.
+/// Compares packets of the SIMD type `L` with single rays of its scalar type `S`. Both intersect an
+/// aggregate (list, or BVH if `tree` is `true`) of all `forms`.
 fn compare<L: SimdFloat<Scalar = S>, S: Float + SimdFloat<Scalar = S>>(
     name: &str,
     forms: &[Form],
@@ -84,9 +85,9 @@ fn packets_and_single_rays_give_the_same_bits() {
     }
 }
 
-/// Compares packets with single rays among forms of all kinds in one place. The lanes of a packet
-/// hit different primitives, and coincident surfaces tie. The winner of a tie must not depend on
-/// the other lanes.
+/// Compares packets with single rays among primitives of all kinds at the same place. The lanes of
+/// a packet hit different primitives, and each bounded primitive occurs twice, so that equal
+/// distances occur. The winner of a tie must not depend on the other lanes.
 #[test]
 fn packets_and_single_rays_agree_among_all_kinds() {
     let mut all: Vec<Form> = forms().into_iter().map(|f| f.1).collect();

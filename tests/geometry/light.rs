@@ -32,8 +32,9 @@ fn closed_form_01_a_point_light_on_a_plane() {
     let mut numbers = Numbers::new(1);
     let (lines, points): (Vec<_>, Vec<_>) =
         (0..20_000).map(|_| to_ground(&mut numbers, 45.0)).unzip();
-    // Shadow rays start 8 roundings of the largest coordinate (50) above the ground. They are
-    // nearer to the lamp at height 3 by as much, and its light falls off with the square.
+    // Shadow rays start above the ground, at 8 times the rounding error of the largest coordinate
+    // (50). By this offset they are nearer to the lamp at the height 3, and its light falls off
+    // with the square of the distance.
     let lifted = |rounding: f64| 2.0 * 8.0 * rounding * 50.0 / 3.0;
     for (precision, rounding) in
         [(Precision::Double, f64::EPSILON), (Precision::Single, f64::from(f32::EPSILON))]
@@ -76,18 +77,19 @@ fn closed_form_01_the_shadow_has_straight_edges() {
     let mut expected = Vec::new();
     while lines.len() < 100_000 {
         let p = DVec3::new(numbers.between(-3.0, 3.0), 0.0, numbers.between(-3.0, 3.0));
-        // Point of the segment to the light at the height 1.
+        // Point at the height 1 on the segment to the light, relative to the rectangle's centre.
         let crossing = p + (light - p) * 0.25 - DVec3::new(0.2, 1.0, 0.1);
         let (a, b) = (crossing.dot(across).abs() - 1.5, crossing.dot(up).abs() - 1.0);
         let beyond = a.max(b);
         if beyond.abs() < 1e-12 {
             continue;
         }
-        // Half of the points are close to an edge.
+        // Half of the points away from the edges are skipped, so that points close to an edge are
+        // twice as frequent.
         if numbers.bits() & 1 == 0 && beyond.abs() > 0.01 {
             continue;
         }
-        // Camera rays start below the rectangle.
+        // Camera rays start below the rectangle, so that it does not hide the ground.
         lines.push((p + DVec3::Y * 0.5, DVec3::NEG_Y));
         expected.push(beyond > 0.0);
     }

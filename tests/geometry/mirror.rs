@@ -1,4 +1,5 @@
-//! Perfect mirrors against the view of the mirrored camera: the image of P is P - 2 (n.P - d) n.
+//! Perfect mirrors against the view from the mirrored camera. The image of a point P in the plane
+//! n.X = d is P - 2 (n.P - d) n.
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, Traced, closest, scene};
@@ -44,7 +45,8 @@ shape.platform = { center = [0.0, 0.0, 1.5], size = [8.0, 6.0] }
 
 #[test]
 fn closed_form_02_a_mirror_shows_the_mirrored_view() {
-    // The tilted mirror is behind everything, so that no object is behind its plane.
+    // The tilted mirror is behind all objects. No object is behind its plane, where the mirrored
+    // view would show it.
     let normal = DVec3::new(0.1, -0.15, 1.0).normalize();
     let center = DVec3::new(0.0, 1.5, -2.4);
     let mirror = format!(
@@ -98,7 +100,8 @@ fn closed_form_02_a_mirror_shows_the_mirrored_view() {
                 );
             }
         }
-        // In single precision a ray may pass the other side of an edge or of a shadow.
+        // In single precision a ray may pass an edge of an object or of a shadow on the other side
+        // than in the mirrored view.
         assert!(wrong as f64 <= share * seen.len() as f64, "{precision:?}: {wrong} rays differ");
         assert!(object_hits > 5_000 && object_hits < seen.len(), "{object_hits} of {}", seen.len());
     }

@@ -25,7 +25,7 @@ fn geometry<L: SimdFloat>(form: &Form) -> Aggregate<L> {
     Aggregate::new(std::slice::from_ref(form))
 }
 
-/// Returns the height of the point `p` above the surface of the torus.
+/// Returns the distance of the point `p` from the surface of the torus; it is negative inside.
 fn height(p: DVec3, tube: f64) -> f64 {
     (p.x.hypot(p.z) - 1.0).hypot(p.y) - tube
 }
@@ -71,8 +71,8 @@ fn quartic((origin, d): Line, tube: f64) -> ([f64; 5], f64) {
     ([k * k - 4.0 * c, -8.0 * b, 2.0 * k - 4.0 * a, 0.0, 1.0], start)
 }
 
-/// Returns a random line near the torus: through its bounding box, or along a tangent slightly
-/// above or below the surface.
+/// Returns a random line near the torus. Half of the lines pass through a random surface point in
+/// any direction. The others are tangents, shifted slightly above or below the surface.
 fn line(numbers: &mut Numbers, tube: f64) -> Line {
     let angles = [numbers.between(0.0, 2.0 * PI), numbers.between(0.0, 2.0 * PI)];
     let outward = DVec3::new(angles[0].cos(), 0.0, angles[0].sin());
@@ -88,8 +88,8 @@ fn line(numbers: &mut Numbers, tube: f64) -> Line {
     (on_surface + normal * above - tangent * far, tangent)
 }
 
-/// Checks that every hit is on the surface, and is the first root of the quartic except where
-/// rounding decides.
+/// Checks that every hit is on the surface. Also checks that it is the first root of the quartic,
+/// except for grazing lines and origins near the surface, where rounding decides.
 fn hits_are_roots<L: SimdFloat>(tube: f64, count: usize) {
     let geometry = geometry::<L>(&torus(tube));
     let mut numbers = Numbers::new(17);
@@ -101,7 +101,8 @@ fn hits_are_roots<L: SimdFloat>(tube: f64, count: usize) {
         .collect();
     let (mut compared, mut seen) = (0, 0);
     for (line, hit) in lines.iter().zip(closest(&geometry, &lines)) {
-        // The kernel expects directions of unit length; other code rounds them.
+        // The tested directions are rounded and have unit length only approximately. The
+        // intersection code expects unit length.
         let room = 64.0 * L::EPSILON * (1.0 + line.0.length());
         let (coefficients, start) = quartic((line.0, line.1.normalize()), tube);
         let point_at = |s: f64| line.0 + line.1.normalize() * (start + s);
@@ -114,7 +115,8 @@ fn hits_are_roots<L: SimdFloat>(tube: f64, count: usize) {
             let on_surface = height(hit.point, tube).abs();
             assert!(on_surface <= 16.0 * L::EPSILON, "{tube} {}: {line:?} {hit:?}", L::NAME);
         }
-        // Coefficients of thin tubes lose digits by 1 / tube.
+        // The coefficients of the quartic of a thin tube have a relative error that grows with 1 /
+        // tube.
         let margin = room + 1e-13 / tube;
         let unsure =
             roots(&derivative).into_iter().any(|s| height(point_at(s), tube).abs() <= margin)
@@ -130,7 +132,9 @@ fn hits_are_roots<L: SimdFloat>(tube: f64, count: usize) {
         };
         let normal = hit.normal.dot(line.1).abs();
         let apart = (hit.t - (start + first)).abs();
-        // A root moves by the height's error over the slope, at most by its root.
+        // The root moves by the error of the height, divided by the cosine at the surface. Near a
+        // double root the cosine vanishes, and the root moves at most by the square root of the
+        // error.
         let allowed = (2.0 * margin / normal.max(1e-9)).min(8.0 * margin.sqrt());
         assert!(apart <= allowed, "{tube} {}: {line:?} {hit:?} {apart} > {allowed}", L::NAME);
     }
@@ -160,7 +164,8 @@ fn torus_hits_do_not_depend_on_other_lanes() {
     assert_eq!(double, bits(closest(&geometry::<f64>(&form), &lines)));
 }
 
-/// Returns the distances of all hits along each line from outside, in order.
+/// Returns the distances of all hits along each line, in ascending order. The lines start outside
+/// of the object.
 fn all_hits<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<f64>> {
     let mut out = vec![Vec::new(); lines.len()];
     for (hits, (origin, d)) in out.iter_mut().zip(lines) {
@@ -207,7 +212,8 @@ fn torus_volume_and_projected_area_match_closed_forms() {
     }
 }
 
-/// Checks that shadow rays from the inner side of the hole to its other side are blocked.
+/// Checks that a shadow ray from the inner side of the ring across the hole is blocked by the
+/// opposite side.
 #[test]
 fn torus_casts_shadows_on_itself() {
     let form = torus(0.3);
@@ -219,8 +225,8 @@ fn torus_casts_shadows_on_itself() {
     assert_eq!(blocked(&geometry::<Double>(&form), &rays, 10.0), [true, false, false]);
 }
 
-/// Checks that rays that leave the surface, offset by the height of their precision, hit it again
-/// only from inside of a bend.
+/// Checks rays that start on the outside of the ring, offset from the surface by the ray offset of
+/// their precision. They must not hit the surface again near their start.
 #[test]
 fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
     fn check<L: SimdFloat>(tube: f64) {
@@ -250,8 +256,8 @@ fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
     }
 }
 
-/// Checks compounds of a torus with a ball and a half-space. Each point between surfaces is on the
-/// side that its parts define.
+/// Checks compounds (CSG) of a torus, a ball and a half-space. The middle of each interval between
+/// two hits is inside exactly if the set operation on the parts says so.
 #[test]
 fn torus_in_compounds_has_two_intervals() {
     let contains = |part: usize, p: DVec3| match part {
@@ -303,8 +309,8 @@ fn torus_in_compounds_has_two_intervals() {
     assert!(several > 30, "{several}");
 }
 
-/// Checks a torus under any map. Its bounds touch the image of the surface, its clearance is at
-/// most the distance of its points, and normals exist where rays hit.
+/// Checks a torus under three affine maps. Its bounds touch the image of the surface, its clearance
+/// is at most the distance of its points, and normals exist where rays hit.
 #[test]
 fn torus_bounds_clearance_and_normals_agree_with_its_points() {
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);

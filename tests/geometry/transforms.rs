@@ -1,5 +1,5 @@
-//! Transformed objects against their definition: a point is on the image if its original is on the
-//! object.
+//! Transformed objects against the definition of a transform: a point is on the transformed object
+//! if its inverse image is on the original object.
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, bounding_sphere, closest, every_kind, scene};
@@ -59,7 +59,8 @@ fn transformed_objects_are_hit_at_images_of_original_hits() {
                 let point = map.transform_point3(truth.point);
                 let normals: DMat3 = map.matrix3.inverse().transpose();
                 let normal = (normals * truth.normal).normalize();
-                // Rounding of all lengths involved, over the cosine.
+                // The tolerance is the rounding error of all lengths involved, divided by the
+                // cosine at the surface.
                 let lengths = radius + center.length() + got.t;
                 let tolerance = 1e-12 * lengths / normal.dot(d).abs();
                 assert!(

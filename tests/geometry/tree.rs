@@ -7,8 +7,8 @@ use glam::{DAffine3, DQuat, DVec3};
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single};
 use zerkalo::primitive::{Acceleration, Aggregate, Form, SphereForm};
 
-/// Returns `count` random forms of every kind. They are crowded in the ball of radius 10, or on a
-/// lattice, where many faces are in common planes.
+/// Returns `count` random primitives of every kind, crowded in a cube of half-width 10. In half of
+/// the cases they are on a lattice, where many faces are coplanar.
 fn crowd(numbers: &mut Numbers, count: usize) -> Vec<Form> {
     let kinds = forms();
     let lattice = numbers.below(2) == 0;
@@ -106,8 +106,8 @@ fn trees_boxes_and_lists_give_identical_hits() {
     }
 }
 
-/// Compares rays past the outermost points of spheres, where the rounding of the sphere test
-/// decides.
+/// Compares rays that graze the outermost points of spheres along an axis. There the rounding of
+/// the sphere test decides whether a ray hits.
 #[test]
 fn tree_and_list_agree_at_limbs() {
     let mut numbers = Numbers::new(77);

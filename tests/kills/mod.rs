@@ -25,15 +25,16 @@ use zerkalo::terminal::{ENTER, LEAVE};
 
 /// Number of programs that are started and ended.
 const RUNS: usize = 200;
-/// Number of concurrent programs per processor. A program with its tracing threads must process
-/// keys as fast as they are typed.
+/// Number of concurrent programs per processor. It is limited because each program also traces with
+/// several threads, and must still process keys as fast as they are typed.
 const RUNS_PER_PROCESSOR: usize = 4;
-/// Period of runs in which one run of each kind of end is followed by a start that recovers the
-/// edits.
+/// Number of consecutive runs of which four are followed by a recovery: one run for each cause of
+/// the end. In a recovery the program is started again and restores the unsaved edits.
 const RECOVERY_PERIOD: usize = 20;
-/// Smallest age of an edit that must not be lost by SIGKILL.
+/// Smallest time from an edit's key press to SIGKILL after which the edit must not be lost.
 const KEPT_AFTER: Duration = Duration::from_secs(2);
-/// Smallest age of a key press whose edit must not be lost if the program ends in another way.
+/// Smallest time from an edit's key press to any other end of the program after which the edit must
+/// not be lost.
 const READ_AFTER: Duration = Duration::from_millis(300);
 
 /// Cause of the program's end.
@@ -48,8 +49,8 @@ enum End {
 const ENDS: [End; 4] = [End::Term, End::Hup, End::Kill, End::Closed];
 
 impl End {
-    /// Returns two values: the exit status, if the program can set it, and the smallest age of
-    /// edits that must be kept.
+    /// Returns two values: the expected exit status, or `None` for SIGKILL, and the smallest time
+    /// from the key press of an edit to the program's end after which the edit must be kept.
     fn consequences(self) -> (Option<u32>, Duration) {
         match self {
             Self::Term => (Some(143), READ_AFTER),
@@ -73,12 +74,13 @@ impl Plan {
     fn of(number: usize) -> Self {
         let mut numbers = Numbers::new(0x5eed_0000 + number as u64);
         let end = ENDS[number % ENDS.len()];
-        // Edits must be two seconds old to be checked after SIGKILL.
+        // The test checks edits only if they are two seconds old at SIGKILL, so that these runs
+        // last longer.
         let [shortest, longest] = if end == End::Kill { [1.0, 4.5] } else { [0.0, 1.6] };
         let moment = numbers.between(shortest, longest);
         // Half of the runs never save, because saved edits do not test recovery.
         let saves = numbers.below(2) == 0;
-        // Fast and slow typing.
+        // Mean pause between two keys in seconds: fast and slow typing.
         let pause = [0.03, 0.12, 0.5][numbers.below(3)];
         let mut time = 0.0;
         let mut keys = Vec::new();
@@ -96,10 +98,12 @@ impl Plan {
     }
 }
 
-/// Stalls of the machine: start of a short sleep, and the time by which it took too long.
+/// Stalls of the machine: the start of each short sleep that lasted too long, and the excess of its
+/// duration.
 static STALLS: Mutex<Vec<(Instant, Duration)>> = Mutex::new(Vec::new());
 
-/// Measures short sleeps until `over` is `true`, and records stalls of the machine.
+/// Measures short sleeps until `over` is `true`. Records a stall of the machine if a sleep lasts
+/// more than twice as long as requested.
 fn watch_for_stalls(over: &AtomicBool) {
     let nap = Duration::from_millis(20);
     while !over.load(Ordering::Relaxed) {
@@ -117,21 +121,23 @@ fn watch_for_stalls(over: &AtomicBool) {
 fn stall_allowance(start: Instant) -> Duration {
     let stalls = STALLS.lock().unwrap();
     let longest = stalls.iter().filter(|(at, _)| *at >= start).map(|(_, excess)| *excess).max();
-    // An edit passes through several threads before it is kept.
+    // An edit passes through several threads until it is written, and each may be delayed by a
+    // stall.
     4 * longest.unwrap_or_default()
 }
 
-/// Executes the run `number`. Returns the age of the oldest lost edit.
+/// Executes the run `number`. Returns the time from the key press of the oldest lost edit to the
+/// program's end, or 0 if no edit is lost.
 ///
 /// # Errors
-/// Fails if a file is damaged, an old edit is lost, or the terminal is not restored.
+/// Fails if a file is damaged, an edit that must be kept is lost, or the terminal is not restored.
 fn run(number: usize) -> Result<Duration, String> {
     let plan = Plan::of(number);
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let scene = folder.path().join("scene.toml");
     fs::write(&scene, SCENE).map_err(|error| error.to_string())?;
     let mut pty = Pty::open(folder.path());
-    // The first frame ends with a reset of its colours.
+    // The first picture counts as shown when 2000 bytes have followed the sequences of `ENTER`.
     pty.wait_for("first picture", |bytes| bytes.len() > ENTER.len() + 2000)?;
     let start = Instant::now();
     let mut sent = Vec::new();
@@ -184,7 +190,8 @@ fn run(number: usize) -> Result<Duration, String> {
     Ok(sent.get(state).map_or(Duration::ZERO, |(at, _)| ended_at - *at))
 }
 
-/// Checks that the terminal is in its original state, and that no control sequences follow.
+/// Checks that the output leaves the alternate screen and sends no control sequences afterwards,
+/// and that the terminal has its original modes.
 fn check_terminal(bytes: &[u8], restored: bool) -> Result<(), String> {
     let left = find(bytes, LEAVE.as_bytes()).ok_or("the terminal was not left")?;
     let after = &bytes[left + LEAVE.len()..];
@@ -200,7 +207,8 @@ fn check_terminal(bytes: &[u8], restored: bool) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks that every file in `folder` is complete and has one of the contents that it may have.
+/// Checks that every file in `folder` is complete. The scene file must have its original text or a
+/// text that was saved.
 fn check_files(folder: &Path, states: &[String], keys: &[usize]) -> Result<(), String> {
     let text = fs::read_to_string(folder.join("scene.toml")).map_err(|error| error.to_string())?;
     let saved = |(i, key): (usize, &usize)| (*key == SAVE).then(|| &states[i + 1]);
@@ -216,7 +224,8 @@ fn check_files(folder: &Path, states: &[String], keys: &[usize]) -> Result<(), S
             "scene.toml" | ".scene.toml.unsaved" => true,
             _ if name.ends_with(".png") => is_whole_png(&bytes),
             _ if name.ends_with(".exr") => read_exr(&path).is_ok(),
-            // A temporary file; the next start removes it.
+            // The program may be killed while it writes a temporary file. The next start removes
+            // the file.
             _ => name.starts_with(".zerkalo-") && name.ends_with(".tmp"),
         };
         if !is_sound {
@@ -234,8 +243,8 @@ fn is_whole_png(bytes: &[u8]) -> bool {
     reader.next_frame(&mut pixels).is_ok() && reader.finish().is_ok()
 }
 
-/// Returns the text of the scene at the next start: that with the recovered edits, or else that of
-/// the file.
+/// Returns the text of the scene that the next start would show: the recovered edits if there are
+/// any, otherwise the scene file.
 fn effective(scene: &Path) -> Result<String, String> {
     let mut recovery = Recovery::new(Some(scene), "", None).find();
     if recovery.elsewhere || !recovery.unreadable.is_empty() || recovery.orphans.len() > 1 {
@@ -247,7 +256,8 @@ fn effective(scene: &Path) -> Result<String, String> {
     }
 }
 
-/// Starts another program, which offers the unsaved edits. Recovers and saves them.
+/// Starts the program again, which offers to restore the unsaved edits. Accepts the offer and saves
+/// the edits.
 fn recover(folder: &Path, kept: &str) -> Result<(), String> {
     let scene = folder.join("scene.toml");
     let is_saved = || fs::read_to_string(&scene).is_ok_and(|text| text == kept);
@@ -327,8 +337,8 @@ fn random_ends_damage_no_file_and_lose_no_old_edit() {
     );
 }
 
-/// Checks an export that is still running when the terminal is lost. Its result is printed after
-/// stdout is gone.
+/// Checks the end of the program if the terminal is lost while an export is still running. The
+/// program then prints the result of the export to a closed stdout.
 #[test]
 fn lost_terminal_during_an_export_ends_with_status_of_sighup() {
     for _ in 0..4 {

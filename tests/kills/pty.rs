@@ -1,5 +1,5 @@
-//! Pseudo-terminal with few replies. It can be closed like a lost connection, and several can run
-//! concurrently.
+//! Pseudo-terminal that replies to one kind of request only. It can be closed like a lost
+//! connection, and several can run concurrently.
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
 use std::io::{Read, Write};
@@ -128,7 +128,8 @@ impl Pty {
     /// Closes the master end of the terminal, as a lost connection does.
     pub fn hang_up(&mut self) {
         self.closing.store(true, Ordering::Release);
-        // The help makes output, which wakes the reader.
+        // The key `?` opens the help. Its output wakes the reader thread, which then sees
+        // `closing`.
         self.send(b"?");
         if let Some(reader) = self.reader.take() {
             reader.join().expect("the reader ends");
@@ -153,7 +154,8 @@ impl Pty {
         }
     }
 
-    /// Returns all output of the program, and `true` if the modes of the terminal are restored.
+    /// Returns all output of the program, and `true` if the modes of the terminal are those before
+    /// the program's start.
     pub fn afterwards(mut self) -> (Vec<u8>, bool) {
         let restored = self.master.as_deref().is_some_and(|master| modes(master) == self.modes);
         // Closing the last slave end closes the terminal and the output.

@@ -1,4 +1,5 @@
-//! Expected states of a scene after key presses, computed without the program.
+//! Expected texts of a scene file after key presses, computed by the dashboard's model without
+//! running the program.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -41,8 +42,8 @@ material = "mirror"
 shape.rectangle = { center = [0.0, 1.0, -1.0], size = [4.0, 2.0], normal = [0.0, 0.0, 1.0] }
 "#;
 
-/// Keys that a test presses: the name of each, and the bytes that a keyboard sends. Their edits do
-/// not depend on time.
+/// Keys that a test presses: the name of each, and the bytes that a terminal sends for it. The
+/// effect of each key on the scene is independent of the time between keys.
 pub const KEYS: [(&str, &[u8]); 10] = [
     ("'", b"'"),
     (";", b";"),
@@ -58,7 +59,8 @@ pub const KEYS: [(&str, &[u8]); 10] = [
 /// Index in `KEYS` of the key that saves the scene.
 pub const SAVE: usize = 7;
 
-/// Returns the text of the saved file after each prefix of `keys`, from none to all.
+/// Returns the text that a save would write after each prefix of `keys`. The first text is that
+/// before any key, the last that after all keys.
 pub fn states(keys: &[usize]) -> Vec<String> {
     let path = PathBuf::from("scene.toml");
     let mut document = Document::parse(SCENE.to_string(), "scene.toml").expect("a scene");

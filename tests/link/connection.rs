@@ -6,7 +6,8 @@ use std::time::Duration;
 use zerkalo::terminal::diff::{FrameDiff, TargetFrame};
 use zerkalo::terminal::flow::{FRAME_INTERVAL, FlowControl, InitialLink, PacingMode};
 
-/// Simulated connection and terminal, with the program's flow control and frame difference.
+/// Simulated connection and terminal, driven by the program's own flow control and frame
+/// difference.
 pub struct Connection {
     pub flow: FlowControl,
     pub diff: FrameDiff,
@@ -21,16 +22,17 @@ pub struct Connection {
     replies: VecDeque<Duration>,
     /// `true` if the terminal replies to requests.
     pub is_replying: bool,
-    /// Frames in the kernel's send queue: start and end of their transmission, and number of bytes.
-    /// A frame leaves the queue one round trip after its transmission.
+    /// Frames in the kernel's send queue: the start and the end of the transmission of each, and
+    /// its number of bytes. The bytes of a frame leave the queue one round trip after their
+    /// transmission, when they are acknowledged.
     queue: VecDeque<(Duration, Duration, usize)>,
     /// `true` if the next frame shows the effect of user input.
     is_answering: bool,
     pub sent: Vec<Sent>,
     /// `true` if the user presses keys all the time.
     pub is_user_active: bool,
-    /// Two durations: the time during which the terminal differed visibly from the target, and the
-    /// part of it during which the connection was busy.
+    /// Two durations. The first is the time during which the terminal differed visibly from the
+    /// target frame, and the second the part of this time in which the connection was busy.
     pub waited: [Duration; 2],
 }
 
@@ -46,14 +48,14 @@ pub struct Sent {
 const STEP: Duration = Duration::from_millis(1);
 
 impl Connection {
-    /// Creates a connection of `rate` bytes per second. `round_trip` is its round-trip time without
-    /// traffic.
+    /// Creates a connection of `rate` bytes per second to a terminal that replies. `round_trip` is
+    /// the round-trip time while the connection is idle.
     pub fn new(size: [u16; 2], rate: f64, round_trip: Duration) -> Self {
         Self::with_mode(size, rate, round_trip, PacingMode::AckClocked(None))
     }
 
-    /// Creates a connection whose frames are paced by `mode`. In the mode without replies, the
-    /// program does not know the round trip.
+    /// Creates a connection whose frames are paced by `mode`. If `mode` is `SendQueue`, the
+    /// terminal does not reply, and the program does not know the round-trip time.
     pub fn with_mode(
         [columns, rows]: [u16; 2],
         rate: f64,
@@ -90,7 +92,7 @@ impl Connection {
     /// Simulates the duration `time`, during which `target` is the frame to be shown.
     pub fn pass(&mut self, target: &TargetFrame, time: Duration) {
         let end = self.now + time;
-        // Frames are not checked more often than the frame interval.
+        // Frames are computed at most once in a frame interval.
         let mut next = self.now;
         while self.now < end {
             self.now += STEP;
@@ -128,8 +130,9 @@ impl Connection {
         }
     }
 
-    /// Simulates a key press while the terminal shows `old`; the effect of the key is `new`.
-    /// Returns the time until the first kilobyte of the first frame with the effect arrives.
+    /// Simulates a key press. The terminal shows `old` before it, and `new` is the target frame
+    /// with its effect. Returns the time from the key press until the first kilobyte of the first
+    /// new frame arrives.
     pub fn press(&mut self, old: &TargetFrame, new: &TargetFrame) -> Duration {
         let pressed = self.now;
         self.pass(old, self.one_way);

@@ -1,4 +1,4 @@
-//! Bytes on a connection, and errors of the screen, while a picture converges to its end.
+//! Bytes that a connection transmits, and errors of the screen, while a picture converges.
 
 use crate::link::connection::Connection;
 use crate::link::picture::{SCREEN, Work};
@@ -51,11 +51,12 @@ const ROUND_TRIP: Duration = Duration::from_millis(100);
 struct Figures {
     frames: usize,
     total: usize,
-    /// Number of bytes that were sent for invisible differences.
+    /// Number of bytes that were sent for differences too small to be visible.
     flushed: usize,
     first_64: usize,
     largest: usize,
-    /// Mean OKLab error of the screen at the end of each wave.
+    /// Mean over all waves (sets of concurrent jobs) of the screen's OKLab error at the end of the
+    /// wave.
     mean_error: f64,
     /// Seconds from the end of the last wave until the screen shows the picture exactly.
     exact_after: f64,
@@ -65,8 +66,8 @@ struct Figures {
     busy: f64,
 }
 
-/// Renders a scene wave by wave. The next wave starts as soon as no visible difference waits to be
-/// sent.
+/// Renders a scene wave by wave (set of concurrent jobs). The next wave starts when no visible
+/// difference and no text waits to be sent.
 fn converge(scene: &Scene) -> Figures {
     let mut work = Work::new(scene, SPP);
     let mut connection = Connection::new(SCREEN, RATE, ROUND_TRIP);
@@ -161,8 +162,8 @@ fn frames_are_deterministic() {
     assert_eq!(first, second);
 }
 
-/// Checks that the first frame after an edit shows the new picture everywhere, if necessary as a
-/// mosaic.
+/// Checks that the first frame after an edit covers the whole picture. If the byte limit of a frame
+/// requires it, the frame shows a mosaic of larger cells.
 #[test]
 fn new_picture_shows_in_its_first_frame() {
     let scene = support::shipped("mirror-room.toml");
@@ -187,8 +188,8 @@ fn new_picture_shows_in_its_first_frame() {
     assert!(first.bytes <= first.budget && after < 0.6 * before, "{before} {after}");
 }
 
-/// Checks that the connection is busy while visible differences wait, and that user input waits for
-/// at most one frame.
+/// Checks that the connection is busy for at least 60 % of the time in which visible differences
+/// wait. Also checks that no frame is so long that user input would wait for more than 0.15 s.
 #[test]
 fn connection_is_busy_while_differences_wait() {
     let scenes = ["mirror-room.toml", "viewpoint-left.toml"].map(support::shipped);
@@ -211,9 +212,10 @@ fn connection_is_busy_while_differences_wait() {
     }
 }
 
-/// Checks key presses while the effects of earlier ones are being sent. The median of the latency
-/// has a bound: the round trip, 0.1 s for the frame before, 0.05 s for the excess of the measured
-/// round trip, and the time of a kilobyte. At 1 Mbit/s the bound is the goal of 0.25 s.
+/// Checks the latency of key presses while the effects of earlier ones are being sent. The bound of
+/// the median is the sum of the round trip, 0.1 s for the frame in transmission, 0.05 s for the
+/// error of the measured round trip, and the time of a kilobyte. At 1 Mbit/s this is the goal of
+/// 0.25 s.
 #[test]
 fn keys_wait_for_one_frame_only() {
     use zerkalo::terminal::flow::PacingMode::{AckClocked, SendQueue};

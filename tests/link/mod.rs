@@ -1,5 +1,5 @@
-//! Bytes that a converging picture takes on a simulated connection, and the error of the screen.
-//! Time is simulated.
+//! Tests on a simulated connection with simulated time: the bytes that a converging picture takes,
+//! and the error of the screen.
 
 mod connection;
 mod figures;

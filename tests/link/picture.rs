@@ -13,7 +13,7 @@ use zerkalo::terminal::diff::TargetFrame;
 use zerkalo::world::Precision;
 
 pub const SCREEN: [u16; 2] = [160, 45];
-/// Area of the picture on the screen: all rows but the last.
+/// Area of the picture on the screen: all rows except the last one, which shows text.
 const PICTURE: Rect = Rect { x: 0, y: 0, width: SCREEN[0], height: SCREEN[1] - 1 };
 
 /// Picture that converges. Its first wave has one sample per half cell (upper or lower half of a

@@ -89,7 +89,8 @@ fn bytes(session: &Session) -> Vec<u8> {
     session.with(|rendering, _| rendering.film.bytes()).unwrap()
 }
 
-/// Returns the scene with changed colours and intensities of lights. Every light group remains.
+/// Returns the scene with changed colours and intensities of lights. No light is switched off, so
+/// that the film keeps all light groups.
 fn relit() -> Scene {
     let mut scene = scene();
     scene.ambient.color = Color([0.3, 0.1, 0.0]);
@@ -106,7 +107,7 @@ fn relit_picture_equals_fresh_render() {
     let expected = finish(&mut fresh, &relit());
     let film = bytes(&fresh);
 
-    // After finishing, and at any moment before.
+    // The lights change after the first render has finished, or at some moment during it.
     for wait_us in [None, Some(0), Some(300), Some(3000), Some(9000)] {
         let mut session = session(spp(64), false);
         let first = match wait_us {
@@ -138,16 +139,17 @@ fn light_changes_keep_samples() {
     let newer = relit();
     let mix = before.mix_for(&newer).expect("the film serves the scene");
     let generation = session.set_scene(Arc::new(newer.clone()));
-    // All later snapshots have all the samples.
+    // All snapshots after the light change have all samples of the first render.
     let after = wait(&session, |s| {
         assert_eq!(s.report.samples, before.report.samples);
         s.report.generation == generation && s.report.noise.is_some()
     });
-    // The client's relit old snapshot equals the new snapshot.
+    // The old snapshot, mixed by the client with the new light weights, equals the new snapshot.
     assert_eq!(after.mix, mix);
     assert_eq!(before.picture.unwrap().mixed(&mix), after.picture.unwrap().mixed(&after.mix));
     assert_eq!(after.first_hits, before.first_hits);
-    // A name, an unused material, a depth limit that no path reaches.
+    // Edits without effect on the picture: a light's name, an unused material, and a cap of rays
+    // per pixel that is not reached.
     let mut renamed = newer.clone();
     renamed.lights[0].name = "sun".to_string();
     renamed.materials.insert("spare".to_string(), renamed.materials["red"].clone());
@@ -182,10 +184,10 @@ fn noisy_light_change_resumes_finished_session() {
     .report;
     assert!(report.samples > dim.samples, "the target was not met: {:?}", dim.noise);
     assert!(report.noise.unwrap().rmse_codes <= 0.15);
-    // The estimate is that of the current film, computed from scratch.
+    // The reported estimate equals the one that the current film gives if it is computed anew.
     let film = session.with(|r, _| r.film.noise(&r.mix, &Display::default())).unwrap().unwrap();
     assert_eq!(report.noise.unwrap(), film);
-    // Less noise again: the session stays finished.
+    // With the first lights the noise is lower again, so that the session stays finished.
     let back = finish(&mut session, &scene()).report;
     assert_eq!(back.samples, report.samples);
     assert!(back.noise.unwrap().rmse_codes < 0.15);
@@ -201,11 +203,11 @@ fn switched_off_light_keeps_group_until_restart() {
     let off = finish(&mut session, &dark);
     assert_eq!((off.report.samples, groups(&session)), (before.samples, Some(4)));
     assert_eq!(off.mix.weights[2], [0.0; 3]);
-    // A new film has another number of groups.
+    // The new film has no group for the light that is off.
     let generation = session.restart();
     resting(&session, generation);
     assert_eq!(groups(&session), Some(3));
-    // A light without a group needs new samples to be switched on.
+    // If the light without a group is switched on, the render restarts with a new film.
     let on = session.set_scene(Arc::new(scene()));
     resting(&session, on);
     assert_eq!(groups(&session), Some(4));
@@ -229,7 +231,7 @@ fn stop_display_and_threads_change_keeps_samples() {
     assert_eq!(more.state, State::Finished(StoppedBy::Spp));
     assert!(bytes(&session) == bytes(&plain));
 
-    // A stop criterion that is already met changes nothing.
+    // A stop criterion that is already met ends the render without new samples.
     session.set_stop(noise(1000.0));
     let met = |s: &Snapshot| s.report.state == State::Finished(StoppedBy::Noise);
     assert_eq!(wait(&session, met).report.samples, more.samples);
@@ -239,7 +241,7 @@ fn stop_display_and_threads_change_keeps_samples() {
     let expected = session.with(move |r, _| r.film.noise(&r.mix, &display)).unwrap();
     let judged = wait(&session, |s| s.report.noise == expected);
     assert_eq!(judged.report.samples, more.samples);
-    // It also applies to later scenes.
+    // The new display transform also applies to scenes that are set later.
     let mut moved = scene();
     moved.camera.eye[0] = 0.1;
     let moved = finish(&mut session, &moved).report;
@@ -262,7 +264,7 @@ fn submitted_tasks_always_run_without_waiting() {
     for _ in 0..50 {
         assert_eq!(answers.recv_timeout(PATIENCE).unwrap(), Some(generation));
     }
-    // The pinned picture and the probe, at the same moment.
+    // The picture of the snapshot and the probed pixel must agree with the film of the same moment.
     session.set_view(View { raster: Some([20, 14]), probe: Some([50, 40]) });
     session.set_stop(spp(16));
     let end = resting(&session, generation);
@@ -287,7 +289,8 @@ fn submitted_tasks_always_run_without_waiting() {
     assert_eq!((end.tiles.noise_codes.len(), end.tiles.spp.len()), (35, 35));
 }
 
-/// Returns the scene of a wall whose colour and distance identify the scene by its number.
+/// Returns the scene of a wall. The colour and the distance of the wall identify the scene's
+/// `number`, modulo 50.
 fn wall(number: u64) -> Scene {
     let mut scene = scene();
     scene.lights.clear();
@@ -306,7 +309,8 @@ fn snapshot_picture_features_and_generation_match() {
     let (mut a, mut b) = (session(Stop::default(), true), session(spp(8), true));
     let mut seen = 0;
     for number in 1..=20_000u64 {
-        // A busy machine completes fewer of the pictures before the next scene.
+        // On a busy machine fewer scenes get a picture before the next one replaces them, so that
+        // more scenes are needed.
         if number > 200 && seen > 20 {
             break;
         }
@@ -322,7 +326,8 @@ fn snapshot_picture_features_and_generation_match() {
             };
             let red = picture.mixed(&snapshot.mix)[0][0];
             assert!((red - 0.01 * (number % 50 + 1) as f32).abs() < 1e-5, "{number}: {red}");
-            // On a busy machine the first picture may lack them.
+            // On a busy machine the first snapshot of a scene may have a picture but no first hits
+            // yet.
             let Some(hits) = snapshot.first_hits else { continue };
             assert_eq!((hits.columns, hits.rows), (picture.cols, picture.rows));
             let hit = hits.at(hits.columns / 2, 2).unwrap();

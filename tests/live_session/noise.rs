@@ -22,9 +22,10 @@ fn codes(session: &Session) -> (Vec<[f64; 3]>, f64) {
     session.with(move |r, _| (read(r), noise(r))).unwrap()
 }
 
-/// Checks the noise estimate after lights are dimmed and brightened during an adaptive render. Over
-/// several seeds the estimated error for the new light weights equals the true one, as it does for
-/// a fresh render. The reference is a fresh render with another seed.
+/// Checks the noise estimate after lights are dimmed and brightened in a finished adaptive render.
+/// The true error is the difference from a fresh render with another seed. On average over several
+/// seeds the estimated error equals the true one, both for the new light weights and for a fresh
+/// render with the new lights.
 #[test]
 fn noise_estimate_after_light_change_is_accurate() {
     let mut bright = scene();

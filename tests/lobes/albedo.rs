@@ -1,4 +1,4 @@
-//! Albedo of Cook-Torrance in a white furnace (test 23 of extremes).
+//! Albedo of Cook-Torrance in a white furnace (test 23 of the tests of extreme inputs).
 
 use crate::common::report::{precision, report};
 use crate::lobes::setup::*;
@@ -26,7 +26,7 @@ fn albedo<L: SimdFloat>(lobe: Lobe, masking: Masking, alpha: f64, degrees: f64) 
     material.alpha = Some(alpha);
     let (mut sum, count) = (0.0, 1 << 16);
     each_reflection::<L>(&material, (incident, n), true, Numbers::sobol(9), count, |_, w| {
-        // Visible normals bound the weight.
+        // With sampling of visible normals, the weight of a sample is at most 1.
         assert!((0.0..=1.0).contains(&w[0]) && w[0] == w[1] && w[1] == w[2], "{w:?}");
         sum += w[0];
     });

@@ -1,5 +1,5 @@
 //! Chi-square tests of sampled directions against the integrated density of their lobe (test 22 of
-//! extremes).
+//! the tests of extreme inputs).
 
 use crate::common::report::{precision, report};
 use crate::lobes::setup::*;
@@ -11,13 +11,14 @@ use zerkalo::material::{Bsdf, Lobe, Material, ReflectionLobe};
 const ALPHAS: [f64; 5] = [1e-3, 0.05, 0.3, 1.0, 2.0];
 const DEGREES: [f64; 4] = [0.0, 60.0, 85.0, 89.9];
 const GRID: [usize; 2] = [16, 24];
-/// Number of points per bin and coordinate of the midpoint rule that integrates densities.
-/// Densities with a discontinuity take eight times as many.
+/// Number of points per bin and coordinate in the midpoint rule that integrates densities. Cells
+/// with a discontinuity of the density are divided into eight times as many points per coordinate.
 const FINE: usize = 8;
 const COUNT: u32 = 100_000;
 
-/// Coordinates in [0, 1]^2 for directions, fitted to a lobe so that its bins are neither empty nor
-/// full. They follow from geometry alone, without the lobe's density.
+/// Map between directions and coordinates in [0, 1]^2. The map is fitted to a lobe so that no bin
+/// is nearly empty or contains nearly all directions. It follows from geometry alone, without the
+/// lobe's density.
 struct Chart {
     view: Vector,
     n: Vector,
@@ -27,9 +28,9 @@ struct Chart {
 }
 
 impl Chart {
-    /// Returns two values for a surface with the normal `h`: the direction of the reflected or
-    /// transmitted ray, and its solid angle per solid angle of `h`. Returns `None` for total
-    /// internal reflection.
+    /// Returns two values for a microfacet with the normal `h`: the direction of the reflected or
+    /// transmitted ray, and the solid angle of the ray per solid angle of `h`. Returns `None` for
+    /// total internal reflection.
     fn leaving(&self, h: Vector) -> Option<(Vector, f64)> {
         let vh = dot(self.view, h);
         let mirror = combine(&[(2.0 * vh, h), (-1.0, self.view)]);
@@ -68,8 +69,8 @@ impl Chart {
         unit(combine(&[(1f64.copysign(dot(h, self.n)), h)]))
     }
 
-    /// Returns `true` if the transmitted ray of a sample exists: the microfacet does not reflect totally,
-    /// and the ray is behind the surface.
+    /// Returns `true` if the transmitted ray of a sample exists: the microfacet does not reflect
+    /// totally, and the ray is behind the surface.
     fn exists(&self, crossing: &Crossing) -> bool {
         if !matches!(self.spread, ReflectionLobe::MicrofacetDistribution(_)) {
             // The density includes rays in front of the surface.
@@ -113,8 +114,8 @@ impl Chart {
         }
     }
 
-    /// Returns the direction at the coordinates `p` and `q`, and the solid angle per area there, in
-    /// steradians.
+    /// Returns the direction at the coordinates `p` and `q`. Also returns the solid angle per unit
+    /// area of the coordinates there, in steradians.
     fn direction(&self, [p, q]: [f64; 2]) -> (Vector, f64) {
         let (sin, cos) = (TAU * q).sin_cos();
         match self.spread {
@@ -143,7 +144,8 @@ impl Chart {
                 if self.through.is_some() && dot(d, self.n) >= 0.0 {
                     return (d, 0.0);
                 }
-                // Slopes: alpha^2 pi d(r^2) dq, d(r^2) = 2 dp / (1 - p)^3; facets: cos^3 per slope.
+                // An area dp dq covers alpha^2 pi d(r^2) dq in slope space, with d(r^2) = 2 dp / (1
+                // - p)^3. The solid angle of facet normals per area in slope space is cos^3.
                 let slopes = facets.alpha.powi(2) * PI * 2.0 / (1.0 - p).powi(3);
                 (d, per_facet * dot(h, self.n).powi(3) * slopes)
             }
@@ -175,7 +177,8 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
         };
         density * solid_angle / (w * h) as f64
     };
-    // Facets that face away from the viewer reflect nothing: the density is discontinuous there.
+    // Facets that face away from the viewer reflect nothing. The density jumps at the boundary of
+    // the visible facets.
     let visible = |i: usize, j: usize| {
         let p = (i as f64).min(w as f64 - 1e-6);
         chart.direction([p / w as f64, j as f64 / h as f64]).1 > 0.0
@@ -200,8 +203,8 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
     shares
 }
 
-/// Returns the coordinates for a lobe seen at an angle, and the expected fraction of directions in
-/// each bin.
+/// Returns the map (coordinates) for a lobe seen at an angle, and the expected fraction of
+/// directions in each bin.
 fn expectation(material: &Material, degrees: f64, through: Option<Sides>) -> (Chart, Vec<f64>) {
     let n = tilted_normal();
     let view = at_angle(n, degrees.to_radians(), 0.7);
@@ -211,8 +214,8 @@ fn expectation(material: &Material, degrees: f64, through: Option<Sides>) -> (Ch
     (chart, shares)
 }
 
-/// Returns the p-value of sampled directions of the material `drawn` against the expected fractions
-/// `shares`.
+/// Returns the p-value of a chi-square test: directions sampled from the material `drawn` against
+/// the expected fractions `shares`.
 fn p_value<L: SimdFloat>(drawn: &Material, (chart, shares): &(Chart, Vec<f64>), seed: u64) -> f64 {
     let (view, n) = (chart.view, chart.n);
     let mut counts = vec![0u64; shares.len()];
@@ -309,8 +312,9 @@ fn extreme_22_chi_square() {
 }
 
 /// Checks reflected directions in single precision. At 89.9 degrees a half vector has an error of
-/// 2e-5: a fiftieth of the narrowest lobe's alpha, and of a bin. The error is negligible from alpha
-/// 0.05 on, and up to 60 degrees.
+/// 2e-5, which is a fiftieth of the smallest alpha and of the width of its bins. The error is
+/// negligible if alpha is at least 0.05, or if the angle is at most 60 degrees; only these cases
+/// are tested.
 #[test]
 fn extreme_22_chi_square_in_single_precision() {
     let mut cases = cases();
@@ -324,7 +328,7 @@ fn transmitted_directions_have_the_stated_density() {
 }
 
 /// Checks transmitted directions in single precision. At alpha 0.001 the errors of half vectors are
-/// as large as bins; such narrow lobes are left out.
+/// as large as bins, so that only larger alphas are tested.
 #[test]
 fn transmitted_directions_have_the_stated_density_in_single_precision() {
     let mut cases = transmitted_cases();
@@ -332,7 +336,8 @@ fn transmitted_directions_have_the_stated_density_in_single_precision() {
     check_cases::<f32, Single>(&cases);
 }
 
-/// Checks the power of the test: it rejects an alpha that is 5 % too large in every lobe.
+/// Checks the power of the test: in every lobe it rejects directions sampled with an alpha that is
+/// 5 % too large.
 #[test]
 fn chi_square_rejects_wrong_alpha() {
     for (material, degrees, through) in cases().into_iter().chain(transmitted_cases()) {

@@ -52,8 +52,8 @@ pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
     }
 }
 
-/// Half-space that cuts a lobe about the normal: its inward normal, and the fraction of the lobe
-/// inside.
+/// Half-space that cuts a lobe whose axis is the surface normal: the inward normal of the
+/// half-space, and the fraction of the lobe inside of it.
 struct Edge {
     inward: Vector,
     share: f64,
@@ -71,8 +71,9 @@ fn edge(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, delta: f64, phi: f6
     Edge { inward: combine(&[(delta.sin(), n), (delta.cos(), e)]), share }
 }
 
-/// Returns `count` half-spaces at all angles, chosen by the golden ratio in two dimensions. `reach`
-/// is the largest angle of the lobe in radians.
+/// Returns `count` half-spaces of different orientations, spread evenly by a two-dimensional golden
+/// ratio sequence. `reach` is the largest angle between the lobe's axis and its directions, in
+/// radians.
 fn edges(spread: &ReflectionLobe<f64>, n: Vector, theta: f64, reach: f64, count: u32) -> Vec<Edge> {
     (0..count)
         .map(|i| {
@@ -107,8 +108,8 @@ fn worst_z<L: SimdFloat>(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge]) 
     edges.iter().zip(&inside).map(z).fold(0.0, f64::max)
 }
 
-/// Returns the root mean square error of fractions that are estimated with `count` Sobol points, a
-/// separate set for each edge.
+/// Returns the root mean square error of fractions of a lobe in half-spaces. Each is estimated with
+/// its own set of `count` Sobol points.
 fn rmse(lobe: Lobe, roughness: f64, n: Vector, edges: &[Edge], count: u32) -> f64 {
     let material = reflector(lobe, Masking::VCavity, roughness);
     let incident = combine(&[(-1.0, n)]);
@@ -138,10 +139,10 @@ fn spread_of(lobe: Lobe, roughness: f64) -> ReflectionLobe<f64> {
     Bsdf::new(&material, true).reflection.unwrap().1
 }
 
-/// Checks the fraction of a cone lobe in a half-space, and its limit for narrow cones, over all
-/// half-angles and in both precisions. Single precision rotates a direction by half a rounding,
-/// 6e-8, which is a fraction of 2e-6 of the cone of 0.01. Narrower cones are limited by the axis of
-/// a rotated frame; only a normal along z is precise enough for them.
+/// Checks the fraction of a cone lobe in a half-space for all half-angles and in both precisions.
+/// Single precision rotates a direction by half a rounding, 6e-8. This changes the fraction by a
+/// few millionths at the half-angle 0.01. For narrower cones the rounding of the rotated axis
+/// limits the precision. They are tested with a normal along z only, which is exact.
 #[test]
 fn extreme_19_cone_in_a_half_space() {
     let mut worst = [0f64; 2];
@@ -179,8 +180,8 @@ fn extreme_19_the_error_falls_faster_than_that_of_random_numbers() {
     report(19, "double", &format!("slope {flattest:.2} or steeper"));
 }
 
-/// Checks the limit of the fraction for narrow cones: it is the fraction of the flat disc, within
-/// theta^2 / 18.
+/// Checks that the fraction of a narrow cone in a half-space is that of a flat disc, within theta^2
+/// / 18.
 #[test]
 fn closed_form_04_the_narrow_cone_is_a_disc() {
     for theta in [2e-3, 1e-2, 0.1] {
@@ -221,8 +222,8 @@ fn extreme_20_square_in_a_half_space() {
     report(20, "single", &format!("{:.1} sigma at most", worst[1]));
 }
 
-/// Checks the density of directions to a uniform point of the square, 1 / (side^2 cos^3). It
-/// integrates to 1 and is larger towards the corners.
+/// Checks the density of directions to a uniform point of the square at unit distance, 1 / (side^2
+/// cos^3). It integrates to 1 and is larger towards the corners than in the middle.
 #[test]
 fn closed_form_05_density_of_the_square() {
     for side in [0.01, 0.5, 3.0] {
@@ -245,8 +246,8 @@ fn closed_form_05_density_of_the_square() {
     }
 }
 
-/// Returns the largest difference between the responses of square and cone to an edge at tan theta
-/// = 0.2, over all edges.
+/// Returns the largest difference, over all edges, between the fractions of two lobes within an
+/// edge. The lobes are a square of the side `side` and a cone with tan theta = 0.2.
 fn largest_difference(side: f64) -> f64 {
     let theta = 0.2f64.atan();
     let mut largest: f64 = 0.0;
@@ -260,9 +261,9 @@ fn largest_difference(side: f64) -> f64 {
     largest
 }
 
-/// Checks that the square lobe with the area of the cone is nearer to the cone lobe than other
-/// usual choices. The reference values are rounded ones for a flat disc, from which the cone
-/// differs by 0.002 at this angle.
+/// Compares four sizes of the square lobe with the cone lobe. The square with the area of the cone
+/// differs least. The reference values are rounded ones for a flat disc, which differs from the
+/// cone by 0.002 at this angle.
 #[test]
 fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
     let r = 0.2;
@@ -279,8 +280,8 @@ fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
     assert!((side - PI.sqrt() * r).abs() < 1e-15);
 }
 
-/// Compares square and cone by sampled lobes: their responses to one edge, by 65,536 Sobol points
-/// each.
+/// Compares the square lobe and the cone lobe by sampled directions. The fraction of each lobe
+/// within an edge is estimated with 65,536 Sobol points.
 #[test]
 fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
     let (r, n) = (0.2f64, tilted_normal());
@@ -316,9 +317,9 @@ fn closed_form_06_the_lobes_differ_as_their_formulas_do() {
     assert!((0.020..0.025).contains(&largest), "{largest}");
 }
 
-/// Checks a lobe half below the surface, seen at 89.999 degrees. If directions below the horizon
-/// are mirrored up, it keeps all light. If they are absorbed, it loses the fraction of the closed
-/// forms.
+/// Checks a lobe about half of which is below the surface, because it is seen at 89.999 degrees. If
+/// directions below the horizon are mirrored up, the lobe keeps all light. If they are absorbed, it
+/// loses the fraction that the closed form gives.
 #[test]
 fn extreme_21_lobe_at_the_horizon() {
     horizon::<f64>(1e-12);
@@ -342,7 +343,8 @@ fn horizon<L: SimdFloat>(tolerance: f64) {
             material.reflection = rho;
             let share = match spread_of(lobe, roughness) {
                 ReflectionLobe::Square { side } => {
-                    // The square is aligned with the frame about the kernel's mirror direction.
+                    // The square is aligned with the frame about the mirror direction as the
+                    // program computes it.
                     let kernel = Vec3::<L>::of(incident).reflect(Vec3::of(n)).normalize();
                     let frame = Frame::around(kernel);
                     let up = [frame.t, frame.b].map(|v| dot(v.lane(0).map(Float::to_f64), n));
