@@ -30,6 +30,15 @@ fn wait_for_signals(id: u32, set: &str, condition: impl Fn(u64) -> bool) {
     }
 }
 
+/// Waits until there is a file at `path`.
+pub fn wait_for_file(path: &Path) {
+    let end = Instant::now() + PATIENCE;
+    while !path.exists() {
+        assert!(Instant::now() < end, "there is no {}", path.display());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
 /// Starts the program and waits until it handles SIGTERM and SIGINT.
 pub fn spawn(desk: &Desk, args: &[&str]) -> Child {
     let mut command = desk.command(args);

@@ -3,7 +3,7 @@
 use super::life::signal;
 use super::*;
 use std::os::unix::fs::PermissionsExt;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use zerkalo::scene::BUILT_IN;
 use zerkalo::terminal::{ENTER, LEAVE};
 
@@ -90,20 +90,24 @@ fn rapid_resizing_is_debounced() {
     let fixture = Fixture::with_room();
     let mut terminal = fixture.open(&["room.toml"], [120, 36]);
     wait_for_picture(&terminal);
+    let start = Instant::now();
     for i in 0..40 {
         terminal.resize([60 + i, 20 + i / 4]);
         std::thread::sleep(Duration::from_millis(5));
     }
     terminal.resize([80, 24]);
+    let elapsed = start.elapsed();
     terminal.wait_for("a picture for 80 columns", |screen| {
         (800..1100).contains(&picture_cells(screen)).then_some(())
     });
     terminal.send("q");
     let (status, bytes) = terminal.end();
     assert_eq!(status, 0);
-    // Each applied size clears the screen; forty sizes are merged into few.
+    // Each applied size clears the screen; forty sizes are merged into few. A size takes effect
+    // after 90 ms without a change: a busy machine may pause that long between two changes.
+    let pauses = elapsed.as_millis() as usize / 90;
     let clear_count = bytes.matches("\x1b[2J").count();
-    assert!((2..12).contains(&clear_count), "{clear_count} times");
+    assert!((2..12 + pauses).contains(&clear_count), "{clear_count} times in {elapsed:?}");
 }
 
 #[test]
