@@ -30,7 +30,7 @@ fn killed_and_resumed_render_equals_an_uninterrupted_one() {
     let keep = ["--checkpoint", "part.zk", "--resume", "part.zk", "--checkpoint-interval", "0.02"];
     let mut resumed = 0;
     for kill in 0..4 * KILLS {
-        // A busy machine may start the program too late for a checkpoint: the next rounds are longer.
+        // A busy machine may start the program too late for a checkpoint. Later rounds wait longer.
         let round = kill / KILLS;
         if round > 0 && resumed > 2 {
             break;

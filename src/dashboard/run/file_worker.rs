@@ -364,7 +364,10 @@ mod tests {
         assert_eq!(files.shared.get().unwrap().document().scene(), &scene);
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL + CHECK_INTERVAL / 2);
         assert!(quiet.is_err(), "{quiet:?}");
-        fs::write(&path, format!("{}\n# more\n", starter())).unwrap();
+        // A renamed file is complete at every moment.
+        let other = folder.path().join("b.toml");
+        fs::write(&other, format!("{}\n# more\n", starter())).unwrap();
+        fs::rename(&other, &path).unwrap();
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL);
         assert!(quiet.is_err(), "reported once: {quiet:?}");
