@@ -50,7 +50,8 @@ const APERTURES: &[Field] = &[
         "f_number",
         ValueType::Number(NumberRange::closed(0.01, 1e9)),
         "",
-        "Focal length divided by the lens diameter: picture on film of 36 x 24 mm, scene units of 1 m.",
+        "Focal length divided by the diameter of the lens, for film of 36 x 24 mm and scene units of \
+         1 m.",
     ),
 ];
 

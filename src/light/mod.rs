@@ -41,10 +41,10 @@ description! {
         environment: Option<Environment>, or "another kind is needed";
         /// Colour, by which the intensity is multiplied.
         color: Color = [1.0, 1.0, 1.0], in LIGHT;
-        /// Radiance or power of a sphere, rectangle or disk, by `unit`. Factor of the radiance of
-        /// an environment. Radiant intensity [W/sr] of a point, or of a spot inside its inner cone,
-        /// with falloff `inverse-square`. With `none`, and for a directional light, the brightness
-        /// of a white matt surface that faces the light.
+        /// Sphere, rectangle or disk: radiance or power, as `unit` says. Environment: factor of its
+        /// radiance. Point or spot: radiant intensity [W/sr], of a spot inside its inner cone, if
+        /// `falloff` is `inverse-square`. Directional light, or point or spot without falloff: the
+        /// brightness of a white matt surface that faces the light.
         intensity: f64 = 1.0, in LIGHT "W/(sr m²), W, W/sr, or irradiance / π";
         /// Unit of the intensity of a sphere, rectangle or disk.
         unit: LightUnit = "radiance";

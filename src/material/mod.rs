@@ -40,17 +40,18 @@ description! {
         exponent: f64 = 32.0, in closed(0.0, 1e9);
         /// Formula of the highlights that lights make on the surface.
         highlight: Highlight = "phong";
-        /// Weight k_r of the traced reflection; not energy-conserving with the other coefficients.
+        /// Weight k_r of the traced reflection. It does not reduce the other coefficients: their sum
+        /// may exceed 1.
         reflection: f64 = 0.0, in COEFFICIENT;
-        /// Weight k_t of the transmitted light, not energy-conserving with the other coefficients;
-        /// 0 is opaque.
+        /// Weight k_t of the transmitted light; 0 is opaque. It does not reduce the other
+        /// coefficients: their sum may exceed 1.
         transmission: f64 = 0.0, in COEFFICIENT;
         /// Index of refraction n inside of the solid; outside of all solids it is 1.
         ior: f64 = 1.5, in closed(0.1, 1e4);
-        /// Share of the light in each channel that is left after `attenuation_distance` inside of a
-        /// solid with `transmission`, by Beer's law; white absorbs nothing.
+        /// Transmittance of each channel over the distance `attenuation_distance` inside of a solid
+        /// with `transmission`, by Beer's law; white absorbs nothing.
         attenuation_color: Color = [1.0, 1.0, 1.0], in SHARE;
-        /// Distance inside of a solid after which `attenuation_color` is left of white light.
+        /// Distance inside of a solid over which the transmittance is `attenuation_color`.
         attenuation_distance: f64 = 1.0, in SIZE;
         /// Tangent of the half-angle of the cone of reflected and of transmitted rays, not a
         /// microfacet alpha; 0 is a perfect mirror and clear glass.
@@ -74,9 +75,9 @@ description! {
         emission: f64 = 0.0, in LIGHT "W/(sr m²)";
         /// Colour of the emitted light; multiplies `emission`.
         emission_color: Color = [1.0, 1.0, 1.0], in LIGHT;
-        /// The back of a surface has the same material as its front; otherwise the back is black:
-        /// only `transmission` remains there, and total internal reflection unless `fresnel` is
-        /// `dielectric`.
+        /// `true`: the back of a surface has the same material as its front. `false`: the back is
+        /// black. Only its `transmission` remains, and total internal reflection unless `fresnel`
+        /// is `dielectric`.
         two_sided: bool = true;
         /// Texture that multiplies `color`.
         texture: Option<Texture>, or "a uniform colour";
@@ -131,7 +132,7 @@ choices! {
         Constant = "constant",
         /// Schlick's approximation
         Schlick = "schlick",
-        /// Fresnel's equations for the index of refraction that F0 stands for
+        /// Fresnel's equations for the index of refraction that gives the reflectance F0
         Exact = "exact",
         /// Fresnel's equations for `ior`: `reflection` weighs the share F that is reflected,
         /// `transmission` the share 1 - F that is not

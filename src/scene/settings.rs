@@ -36,8 +36,8 @@ description! {
         /// Largest number of diffuse bounces of a path; 0: no indirect diffuse light. Ambient light
         /// stands for further bounces.
         max_diffuse_depth: u32 = 0, in closed(0.0, 100.0) "bounces";
-        /// Mirrors reflect and glass transmits after a diffuse bounce, too; false leaves this light
-        /// out.
+        /// Caustics: after a diffuse bounce, too, mirrors reflect and glass transmits light. `false`
+        /// leaves this light out.
         caustics: bool = true;
         /// Smallest throughput of a path; a path with less ends.
         min_throughput: f64 = 0.0, in SHARE;
