@@ -1,8 +1,8 @@
-//! Declaration of the tables of scene files, each in one place.
+//! Macros that declare the tables of scene files.
 //!
-//! [`description!`] generates a struct from the declaration, with its serde implementation, its
-//! defaults, its table of fields and the checks of its ranges. [`choices!`] does this for a fixed
-//! set of words.
+//! [`description!`] generates a struct from one declaration, with its serde implementation, its
+//! defaults, its table of fields and the checks of its value ranges. [`choices!`] generates an enum
+//! for a key that accepts a fixed set of words.
 
 use crate::value::{Color, Field, NumberRange, ValidationError, Validator, ValueType};
 
@@ -50,7 +50,8 @@ pub(crate) fn is_absent(value: &impl FieldValue) -> bool {
     value.is_absent()
 }
 
-/// Returns `doc`, the text of a doc comment as `#[doc]` gives it, without the leading space.
+/// Returns the text of a doc comment without its leading space. `doc` is the text as the attribute
+/// `#[doc]` holds it.
 pub(crate) const fn doc_text(doc: &'static str) -> &'static str {
     doc.split_at(1).1
 }
@@ -225,7 +226,7 @@ pub(crate) use choices;
 ///         center: [f64; 3], in COORDINATE "scene units";
 ///         /// A key with a default, written as in a scene file.
 ///         rotation: f64 = 0.0, in closed(-180.0, 180.0) "degrees";
-/// A key that may be left out, with a phrase for the result of leaving it out.
+///         /// A key that may be left out, with a phrase for the result of leaving it out.
 ///         alpha: Option<f64>, or "roughness / (2 √2)", in SHARE;
 ///         /// A value type other than that of the Rust type.
 ///         normal: [f64; 3], as Direction;
@@ -236,9 +237,10 @@ pub(crate) use choices;
 /// ```
 ///
 /// Ranges are those of [`NumberRange`]. If every key may be left out, the struct is declared as
-/// `Example: Default` and gets the declared defaults. Otherwise a default has to be that of the
-/// Rust type, unless it is declared as `up: [f64; 3] => "up" "[0.0, 1.0, 0.0]"`: the function that
-/// serde calls, and its result as TOML.
+/// `Example: Default` and gets the declared defaults. If some key is required, a default of another
+/// key must equal the default of its Rust type. Any other default is declared in the form
+/// `up: [f64; 3] => "up" "[0.0, 1.0, 0.0]"`, with the function that serde calls and the result of
+/// this function as TOML.
 macro_rules! description {
     ($(#[doc = $doc:literal])+ pub struct $name:ident: Default { $($fields:tt)+ }) => {
         $crate::value::description!(@struct any all [$($doc)+] [] $name $($fields)+);
@@ -249,8 +251,9 @@ macro_rules! description {
     };
 
     // One of `$per_field` and `$whole` is `all`, the other is `any`. As conditions of `cfg_attr`,
-    // `all()` is true and `any()` is false. They select the source of serde's defaults: the Rust
-    // type of each field, or the `Default` of the struct.
+    // `all()` is true and `any()` is false. If `$per_field` is `all`, serde takes the default of
+    // each field from the field's Rust type. If `$whole` is `all`, serde takes all defaults from
+    // the `Default` of the struct.
     (
         @struct $per_field:ident $whole:ident [$($doc:literal)+] [$($derived:ident)?] $name:ident
         $(

@@ -2,12 +2,13 @@
 
 use glam::DVec3;
 
-/// Smallest magnitude at which the largest component of a vector can be squared with full
-/// precision. The largest such magnitude is the reciprocal of this number.
+/// Magnitude of a vector's largest component below which the vector is scaled up before its length
+/// is computed, because the squares could underflow. Above the reciprocal of this number the vector
+/// is scaled down, because the squares could overflow.
 const MIN_EXACT: f64 = 1e-100;
 
-/// Scale factor for vectors whose squared length would lose precision: small vectors are multiplied
-/// by it, large ones divided. It is a power of two, 2^600, so that scaling is exact.
+/// Scale factor for vectors whose squared length would lose precision. Small vectors are multiplied
+/// by it, large ones are divided by it. It is a power of two, 2^600, so that scaling is exact.
 const RESCALE: f64 = f64::from_bits((1023 + 600) << 52);
 
 /// Returns `direction` scaled to length 1; `None` if its length is 0 or not finite.
@@ -38,7 +39,9 @@ mod tests {
                 assert_eq!(unit(scaled), Some(expected), "{v} x 2^{exponent}");
             }
         }
-        // Lengths other than powers of two are rounded within 1e-15.
+        // These lengths are not powers of two, so the length of the result is rounded. The first
+        // length is subnormal with 11 significant bits, so the result's direction is accurate only
+        // to 1e-3.
         for length in [1e-320, 1e-200, 1e-101, 1e101, 1e200, 1.7e308] {
             let found = unit([0.0, -length, length]).unwrap();
             assert!((found - DVec3::new(0.0, -0.5f64.sqrt(), 0.5f64.sqrt())).length() < 1e-3);

@@ -13,7 +13,8 @@ pub struct Field {
     pub takes: ValueType,
     /// Unit of the numbers in the value; empty if there is none.
     pub unit: &'static str,
-    /// Default value of the key, or the result of omitting it.
+    /// Default value of the key. If there is none, this field states that the key is required, or
+    /// what omitting it means.
     pub preset: DefaultValue,
     /// Help text of the key, one sentence.
     pub doc: &'static str,

@@ -7,7 +7,8 @@ pub fn rounded_to(x: f64, exponent: i32) -> f64 {
         return x;
     }
     let rounded = if exponent <= 0 {
-        // Decimal digits are exact only in decimal: 35 * 0.01 is not 0.35.
+        // Formatting rounds the decimal digits. Arithmetic with a negative power of ten would be
+        // inexact: 35 * 0.01 is not 0.35.
         format!("{x:.*}", exponent.unsigned_abs().min(340) as usize).parse().unwrap_or(x)
     } else {
         let unit = 10f64.powi(exponent.min(300));

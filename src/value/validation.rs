@@ -38,7 +38,7 @@ pub struct Validator {
 }
 
 impl Validator {
-    /// Creates a validator of a table with the keys `fields`, without errors.
+    /// Creates a validator for a table with the keys `fields`. It holds no errors yet.
     pub fn new(fields: &'static [Field]) -> Self {
         Self { fields, errors: Vec::new() }
     }
@@ -58,10 +58,10 @@ impl Validator {
         field.unwrap_or_else(|| panic!("no field `{name}` in its table"))
     }
 
-    /// Checks that no size or coordinate is more than 1e12 times as large as the smallest of
-    /// `sizes`. Beyond that ratio, double precision leaves less than four decimal digits for the
-    /// smallest size. `sizes` lists keys and their values. The check is skipped if there are errors
-    /// already.
+    /// Checks that no size or coordinate is more than 1e12 times as large as the smallest size.
+    /// Beyond that ratio, double precision leaves less than four decimal digits for the smallest
+    /// size. `sizes` holds the key and the value of each size. The check is skipped if earlier
+    /// checks found errors.
     pub fn ratio(mut self, sizes: &[(&str, f64)], coordinates: &[f64]) -> Self {
         let smallest = sizes.iter().copied().reduce(|a, b| if b.1 < a.1 { b } else { a });
         let largest = sizes

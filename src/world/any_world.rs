@@ -16,8 +16,8 @@ pub enum Precision {
     Single,
     /// Double precision: 53-bit significands, four or eight SIMD lanes.
     Double,
-    /// Single precision if it is accurate enough for the proportions of the scene, otherwise double
-    /// precision.
+    /// Single precision if its errors are too small to be visible in the picture of the scene,
+    /// otherwise double precision.
     #[default]
     Auto,
 }
@@ -104,8 +104,8 @@ impl AnyWorld {
         dispatch!(self, world => world.first_hit(points, hits))
     }
 
-    /// Returns the scale of each light group: the number of integer steps per unit of radiance in
-    /// the film, a power of two.
+    /// Returns the scale of each light group. The film stores radiance in integers; the scale is
+    /// the number of integer steps per unit of radiance, a power of two.
     pub fn group_scales(&self) -> Vec<f64> {
         dispatch!(self, world => world.scales.clone())
     }

@@ -35,8 +35,8 @@ pub(super) struct RecenteredGeometry {
     pub origin: DVec3,
     /// Geometry of each object in canonical form, with its transform applied.
     pub forms: Vec<Form>,
-    /// Largest magnitude of a coordinate of the camera's lens and of all shapes with finite bounds,
-    /// relative to the origin.
+    /// Largest absolute coordinate, relative to `origin`, of the camera's lens and of all shapes
+    /// with finite bounds.
     pub extent: f64,
 }
 
@@ -80,7 +80,8 @@ struct CompiledMaterials<'a, S> {
     materials: Vec<&'a Material>,
     /// BSDF of each of `materials`.
     bsdfs: Vec<Bsdf<S>>,
-    /// Indices into `materials`: one list for each object, one entry for each part of the object.
+    /// Indices into `materials`. The outer list has an entry for each object, the inner list has an
+    /// entry for each part of the object.
     of_object: Vec<Vec<u32>>,
 }
 
@@ -152,9 +153,10 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
     }
 }
 
-/// Height of emitters (lights with a size) above objects that they touch. The unit is the rounding
-/// error of the scene's extent. Rays that leave a surface start at half this height, so that they
-/// reach the emitter.
+/// Height of emitters (lights with a size) above the surfaces that they touch. The unit is the
+/// larger of two rounding errors: that of the scene's extent, and that of the coordinates in the
+/// scene file. Rays that leave a surface start at about half this height, which is below the
+/// emitter; they can therefore hit it.
 const EMITTER_LIFT: f64 = 16.0;
 
 /// Returns the distance by which lights with a size are moved off the surfaces that they touch; see
@@ -231,7 +233,8 @@ impl<S: Float> CompiledLights<S> {
         Self { groups, scales, sources, choice, emitters, environments, emission }
     }
 
-    /// Returns the target of the shadow rays (a point or a direction) to each light without a size.
+    /// Returns the target of shadow rays to each light without a size: the position of the light,
+    /// or the direction to it.
     fn targets(&self) -> Vec<LightTarget> {
         let vector = |v: &[S; 3]| DVec3::from(v.map(S::to_f64));
         let target_of_source = |source: &DeltaSource<S>| match &source.light.light {
@@ -330,7 +333,7 @@ fn start_region(scene: &Scene, camera: &PerspectiveCamera) -> StartRegion {
     let farthest_corner = corner_distances.into_iter().fold(0.0, f64::max);
     let near = scene.camera.near;
     let lens = camera.lens().map_or(0.0, |lens| {
-        // With room for the roundings of origins on the lens.
+        // The radius includes a margin for rounding errors of ray origins on the lens.
         let error = F32_RAY_ERROR * (lens.radius + camera.eye().abs().max_element());
         lens.blur(near) + error
     });
@@ -370,7 +373,8 @@ impl<L: SimdFloat> World<L> {
         let entered = nested_dielectrics
             .as_ref()
             .map_or(vec![false; bsdf_of.len()], NestedDielectrics::entered);
-        // Rays that start on a near plane may start inside a primitive.
+        // Without a near plane, camera rays start on the lens. With one, they start on the plane
+        // and thus possibly inside of a primitive; `start` is `None` then.
         let lens = BoundingSphere { center: camera.eye(), radius: camera.lens_radius() };
         let start = (scene.camera.near == 0.0).then_some(lens);
         let forms = primitives.iter().map(|id| &recentered.forms[id.form]);

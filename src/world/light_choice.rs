@@ -5,9 +5,9 @@
 //! of lights that are close to each other: consecutive lights in the order of a Morton curve. A set
 //! holds at most one light of each stratum, so that its lights are spread over the scene.
 //!
-//! The number of sets is a power of two. Successive samples of a pixel are stratified over the
-//! sets, as Sobol points are, so that as many samples as there are sets trace a shadow ray to every
-//! light once. With another number of sets the noise would be several times as large.
+//! The number of sets is a power of two, because successive samples of a pixel are stratified over
+//! the sets like Sobol points: with n sets, n successive samples together trace a shadow ray to
+//! every light once. If n were no power of two, the noise would be several times as large.
 //!
 //! The probabilities depend neither on the intensities of the lights nor on the surface point. All
 //! lights are in one light group, see [`LightGroups`](crate::world::LightGroups).
@@ -19,7 +19,7 @@ use crate::world::world::DeltaSource;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Smallest number of point lights in a scene whose paths choose a few of them per surface. With
+/// Smallest number of point lights in a scene for which paths choose a few lights per surface. With
 /// fewer lights, shadow rays go to every light. `benches/many-lights.sh` measures the cost of both.
 pub(super) const MIN_LIGHTS: usize = 16;
 
@@ -48,8 +48,8 @@ struct Stratum<S> {
     /// Sphere around the lights of the stratum (spatial group of lights).
     ball: BoundingSphere,
     /// Coordinates x, y and z of the stratum's lights, one light for each set (the lights to which
-    /// one path traces shadow rays at a surface). NaN for a set without a light of the stratum, so
-    /// that the test for a surface that faces the light fails.
+    /// one path traces shadow rays at a surface). If a set has no light of the stratum, its
+    /// coordinates are NaN; the test whether the surface faces the light then fails.
     positions: [Table<S>; 3],
     /// Irradiance of the stratum's lights (one for each set) at normal incidence, if it is the same
     /// at every distance. 0 for lights whose irradiance decreases with the square of the distance.
@@ -209,8 +209,8 @@ impl<S: Float> ChosenSets<'_, S> {
     }
 
     /// Returns the emission (colour times intensity) of each lane's chosen light in the stratum
-    /// number `stratum`; 1 for a light with a light group of its own, whose emission is applied to
-    /// the film's sums.
+    /// number `stratum` (a spatial group of lights). The emission is 1 if the lights' samples are
+    /// not multiplied by an emission.
     #[inline(always)]
     pub fn emission<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
         self.gather(&self.choice.strata[stratum].emission)
@@ -234,7 +234,7 @@ fn ball(points: impl Iterator<Item = DVec3> + Clone) -> BoundingSphere {
     let high = points.clone().reduce(DVec3::max).unwrap_or_default();
     let center = 0.5 * (low + high);
     let radius = points.map(|point| point.distance(center)).fold(0.0, f64::max);
-    // With room for roundings.
+    // The radius has a margin for rounding errors.
     BoundingSphere { center, radius: radius * (1.0 + 1e-12) }
 }
 

@@ -11,8 +11,8 @@ use crate::world::culling::light_projection::{LightProjection, ProjectedBounds};
 /// the light. If more primitives overlap the cell, those closest to the light are kept.
 const MAX_PER_CELL: usize = 16;
 
-/// Value of [`Entry::exempt_item`] for a primitive that can occlude shadow rays from its own
-/// outside. Rays are tested against such a primitive in any case.
+/// Value of [`Entry::exempt_item`] for a primitive that is not exempt from any test. It can occlude
+/// even shadow rays that start on its own outside, so all rays are tested against it.
 const NO_ITEM: u32 = u32::MAX;
 
 /// Light buffer: lists of the primitives that can occlude one light. Each list belongs to a cell: a
@@ -127,7 +127,8 @@ impl<S: Float> LightBuffer<S> {
         }
         let mut end = 0;
         let cell = |(count, complete_to): (&usize, &S)| {
-            // `end` grows when the entries are distributed.
+            // The field `end` equals `first` until the entries are distributed below. Each new
+            // entry of the cell increases it by one.
             let cell = Cell { first: end, end, complete_to: *complete_to };
             end += *count as u32;
             cell
@@ -240,8 +241,9 @@ mod tests {
         };
         let mut count = 0;
         for round in 0..3000 {
-            // Groups of start points: in space, close together, far apart and far away; on the
-            // outside of one ball, or of two balls.
+            // Groups of start points. In the first four rounds out of six they are on a sphere with
+            // a radius from 0.01 to 10,000 around a random point. In the fifth they are on the
+            // outside of one ball, in the sixth on the outside of two balls.
             let (middle, spread) = (random.point(7.0), [0.01, 1.0, 10.0, 1e4, 0.0, 0.0][round % 6]);
             let pair = [0; 2].map(|_| (random.unit() * balls.len() as f64) as usize);
             let ball_of = |lane: usize| if round % 6 == 4 { pair[0] } else { pair[lane % 2] };
@@ -303,7 +305,8 @@ mod tests {
         }
     }
 
-    /// Checks that rays through cells of the light buffer whose lists are full traverse the BVH.
+    /// Checks that rays traverse the BVH if their cell of the light buffer has a full list of
+    /// occluders, and if they start farther from the light than the list is complete.
     #[test]
     fn light_buffer_falls_back_to_bvh_behind_full_cells() {
         let mut random = Random(4);
@@ -340,7 +343,8 @@ mod tests {
             buffer.occluded(&geometry, &ray, start, t_max, active, geometry.all())
         };
         assert!(occluded(false).all());
-        // `starts_outside` is trusted without a test.
+        // A ray with `starts_outside` is not tested against its own primitive, even if it starts
+        // inside.
         assert!(occluded(true).none());
     }
 

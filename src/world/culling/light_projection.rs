@@ -15,7 +15,8 @@ const MAX_TANGENT: f64 = 3.0;
 /// Projection of points, as seen from a light, onto one or more faces. A projected point has two
 /// coordinates on its face, each from 0 to 1.
 pub(crate) enum LightProjection<S> {
-    /// Projection from a point light among the primitives onto the six faces of a cube around it.
+    /// Projection onto the six faces of a cube around a point light, for a light that has
+    /// primitives on several sides.
     CubeMap,
     /// Projection from a point light that has all primitives on one side. The third axis is the
     /// view direction. `low` and `scale` map coordinates on the face to 0..=1.
@@ -31,15 +32,16 @@ impl<S: Float> LightProjection<S> {
         if matches!(self, Self::CubeMap) { 6 } else { 1 }
     }
 
-    /// Returns two values for each ray: the index of the light buffer's cell that contains the
-    /// ray's origin as seen from the light, and the depth of the origin (see `near` of the buffer's
-    /// entries). Points outside of the projection get an arbitrary cell. `limit` is the distance
+    /// Returns two values for each ray: the index of the light buffer's cell onto which the ray's
+    /// origin is projected, and the depth of the origin (see the field `near` of the buffer's
+    /// entries). Origins outside of the projection get an arbitrary cell. `limit` is the distance
     /// between origin and light. `side` is the number of cells along a side of a face.
     #[inline(always)]
     pub fn lookup<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>, limit: L, side: usize) -> (L, L) {
         let side = L::from_f64(side as f64);
-        // The sum of this number and a number below 2^22 (in double precision 2^51) has no fraction
-        // bits.
+        // Adding this number to a smaller one and subtracting it again rounds the smaller one to an
+        // integer, because the sum has no fraction bits. The smaller number must be below 2^22 in
+        // single precision, 2^51 in double precision.
         let rounder = L::from_f64(1.5 / L::EPSILON);
         let half = L::from_f64(0.5);
         let cell_index = |x: L| {
@@ -114,8 +116,8 @@ pub(crate) struct ProjectedBounds<S> {
 }
 
 impl<S: Float> ProjectedBounds<S> {
-    /// Chooses a projection for a light and projects the spheres `balls`. For a point light, their
-    /// centres are relative to the light.
+    /// Chooses a projection for a light and projects the spheres `balls`. If the light is a point
+    /// light, the centres of the spheres are relative to it.
     pub fn new(target: &LightTarget, balls: &[BoundingSphere]) -> Self {
         let (projection, rects) = match target {
             LightTarget::Direction(direction) => orthographic(*direction, balls),
@@ -127,8 +129,9 @@ impl<S: Float> ProjectedBounds<S> {
     }
 }
 
-/// Returns the smallest and the largest x / z over the points of a sphere with z > 0. `x` and `z`
-/// are the coordinates of its centre. Returns `None` if the sphere has no such points.
+/// Returns the smallest and the largest quotient x / z of those points of a sphere that have z > 0.
+/// `x` and `z` are the coordinates of the sphere's centre. Returns `None` if no point of the sphere
+/// has z > 0.
 fn tangent_range(x: f64, z: f64, radius: f64) -> Option<(f64, f64)> {
     let distance = x.hypot(z);
     if distance <= radius {
@@ -241,7 +244,7 @@ pub(crate) mod tests {
                 [DVec3::ZERO, DVec3::new(30.0, -9.0, 4.0), DVec3::Y * 20.0][round % 3];
             let center = random.point(5.0) + light_offset;
             let ball = BoundingSphere { center, radius: 0.2 + 2.0 * random.unit() };
-            // A second ball, so that the first does not fill the projection.
+            // A second ball keeps the first from filling the whole projection.
             let balls =
                 [ball, BoundingSphere { center: center + DVec3::new(0.5, 1.0, 0.7), radius: 0.1 }];
             let (projection, rects) = match round / 3 % 3 {
@@ -273,8 +276,8 @@ pub(crate) mod tests {
         check_points_of_ball::<Single>(1e-4);
     }
 
-    /// Checks that every direction gets a valid cell. Directions for which a projection divides by
-    /// zero get an arbitrary one.
+    /// Checks that every direction gets a valid cell. A direction for which the projection divides
+    /// by zero gets an arbitrary cell.
     #[test]
     fn light_projection_has_a_cell_for_every_direction() {
         let balls = [BoundingSphere { center: DVec3::NEG_Y * 5.0, radius: 1.0 }];

@@ -17,14 +17,16 @@ pub(crate) struct ScreenBounds {
 /// \[pixels\].
 const MARGIN_PX: f64 = 0.25;
 
-/// Largest error of a ray's position on the picture plane at unit distance, relative to the
-/// distance from the centre of the plane: eight rounding errors in single precision.
+/// Largest relative error of the point at which a ray crosses the plane at unit distance from the
+/// eye. The error is relative to the distance of this point from the centre of the plane. The value
+/// is eight rounding errors in single precision.
 const MAX_SLANT_ERROR: f64 = 5e-7;
 
 impl ScreenBounds {
     /// Returns the bounds, in the picture \[pixels\], of the projected corners of an object's
-    /// bounding box. They are infinite if the object has no bounding box, or if a corner is not in
-    /// front of the eye. With a lens, they are wider by the largest blur of a point in the box.
+    /// bounding box. The bounds are infinite if the object has no bounding box, or if a corner is
+    /// not in front of the eye. If the camera has a lens, the bounds are wider by the largest blur
+    /// of a point in the box.
     pub fn project(form: &Form, camera: &PerspectiveCamera) -> Self {
         let infinite = Self { low: [f64::NEG_INFINITY; 2], high: [f64::INFINITY; 2] };
         let Some((low, high)) = form.bounds() else { return infinite };
@@ -45,8 +47,9 @@ impl ScreenBounds {
                 return infinite;
             }
             (nearest, farthest) = (nearest.min(depth - ray_error), farthest.max(depth + ray_error));
-            // If a point at distance l from the origin of the picture plane is displaced by
-            // `ray_error`, its projection moves by at most (1 + l) ray_error / (depth - ray_error).
+            // The projection of the corner onto the plane at unit distance has the distance l
+            // (`length`) from the eye. If the corner is displaced by `ray_error`, its projection
+            // moves by at most (1 + l) ray_error / (depth - ray_error).
             let length = from_eye.length() / depth;
             let plane_error =
                 (1.0 + length) * ray_error / (depth - ray_error) + MAX_SLANT_ERROR * length;
@@ -56,8 +59,9 @@ impl ScreenBounds {
             out.high = std::array::from_fn(|axis| out.high[axis].max(position[axis] + margin));
         }
         if let Some(lens) = camera.lens() {
-            // Blur divided by depth, on the picture plane: r |1 / z - 1 / f|. It is largest at one
-            // end of the interval of depths.
+            // On the plane at unit distance from the eye, the blur of a point at depth z is r |1 /
+            // z - 1 / f|, for the lens radius r and the focus distance f. The blur is largest at
+            // one end of the interval of depths.
             let blur = [nearest, farthest].map(|depth| lens.blur(depth) / depth);
             let margin = blur[0].max(blur[1]) * (1.0 + F32_RAY_ERROR) / camera.pixel();
             out.low = out.low.map(|x| x - margin);
@@ -124,8 +128,8 @@ impl ScreenGrid {
     }
 
     /// Returns the ids of the primitives that camera rays through the rectangle with corner
-    /// `origin` and size `extent` \[pixels\] can hit, in ascending order. Returns `None` if they, or
-    /// those of one cell, are more than [`MAX_PER_CELL`].
+    /// `origin` and size `extent` \[pixels\] can hit, in ascending order. Returns `None` if there
+    /// are more than [`MAX_PER_CELL`] of them, or if one of the cells has more than that.
     pub fn candidates(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Vec<u32>> {
         let span = |axis: usize, count: usize| {
             let end = (origin[axis] + extent[axis]).div_ceil(CELL_PX);

@@ -88,8 +88,9 @@ impl CullingMode {
 
 /// Returns one value for each of the objects `forms`: `true` for a convex solid that rays hit only
 /// from outside. Paths are inside of a solid only if they start there or are transmitted. `start`
-/// is a sphere that contains the origins of all camera rays; `None` if they start on a near plane,
-/// which no sphere bounds. `entered` is `true` for each object whose surface transmits.
+/// is a sphere that contains the origins of all camera rays. If `start` is `None`, camera rays may
+/// start anywhere, and all values are `false`. `entered` is `true` for each object whose surface
+/// transmits.
 pub(crate) fn outside_only<'a>(
     forms: impl Iterator<Item = &'a Form>,
     start: Option<BoundingSphere>,
@@ -170,7 +171,9 @@ impl FrustumCuller {
         };
         let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(visible_part).collect();
         let primary = geometry.select(|item| parts[item as usize].is_some());
-        // `true` if `occludes` holds for the light and one of the visible parts.
+        // Selects the primitives for which `occludes` is `true` together with the visible part of
+        // at least one primitive. `occludes` tests if a primitive can occlude one light from such a
+        // part.
         let occluders_of = |occludes: &dyn Fn(&BoundingVolume, &BoundingSphere) -> bool| {
             geometry.select(|item| {
                 let item = item as usize;

@@ -139,8 +139,7 @@ pub(crate) struct CoincidentQuery<L: SimdFloat> {
 }
 
 impl<L: SimdFloat> CoincidentState<L> {
-    /// Returns the state of rays that start at the same points on coincident surfaces in the
-    /// opposite directions.
+    /// Returns the state of rays that start at the same points but run in the opposite directions.
     pub fn reversed(&self) -> Self {
         Self { axis: -self.axis, layer: -self.layer, ..*self }
     }
@@ -320,8 +319,8 @@ impl<S: Float> Contacts<S> {
                 if near.none() {
                     continue;
                 }
-                // The search ray runs along the normal through the point. Its result does not
-                // depend on the angle of the path's ray.
+                // The search ray runs along the surface normal through the start point, so that the
+                // result does not depend on the angle at which the path leaves.
                 let tie = contact.tie(rounding);
                 let origin = coincident.axis.mul_add(-tie, coincident.point);
                 let limit = L::select(near, tie + tie, L::from_f64(-1.0));

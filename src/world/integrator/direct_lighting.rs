@@ -10,9 +10,9 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 use std::f64::consts::FRAC_1_PI;
 
-/// Adds reflected ambient light and reflected light of all sources to the radiance in `out`. Lanes
-/// in `bouncing` get no ambient light, which approximates indirect light: their diffuse bounces
-/// compute indirect light. `media` are the media of the paths; `None` in worlds without
+/// Adds reflected ambient light and reflected light of all sources to the radiance in `out`.
+/// Ambient light approximates indirect light. Lanes in `bouncing` get none, because their diffuse
+/// bounces compute the indirect light. `media` are the media of the paths; `None` in worlds without
 /// transmission.
 #[inline(always)]
 pub(crate) fn direct_lighting<L: SimdFloat, const SIMPLE: bool>(

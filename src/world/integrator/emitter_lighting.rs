@@ -33,8 +33,8 @@ pub(crate) fn power_heuristic<L: SimdFloat>(p: L, q: L) -> L {
     L::one() / (ratio * ratio + L::one())
 }
 
-/// Adds the radiance of the visible lights with a size that the rays of `lanes` reach before the
-/// distance `t_max` to `out`. `media` are the media of the paths; `None` in worlds without
+/// Adds to `out` the radiance of the visible lights with a size that the rays of `lanes` reach
+/// before the distance `t_max`. `media` are the media of the paths; `None` in worlds without
 /// transmission.
 #[inline(never)]
 pub(crate) fn visible_emitters<L: SimdFloat>(
@@ -69,7 +69,7 @@ pub(crate) fn visible_emitters<L: SimdFloat>(
     }
 }
 
-/// Adds the radiance that emissive surfaces emit at the hit points of `path` to `out`.
+/// Adds to `out` the radiance that emissive surfaces emit at the hit points of `path`.
 #[inline(never)]
 pub(crate) fn surface_emission<L: SimdFloat>(
     world: &World<L>,
@@ -97,7 +97,7 @@ pub(crate) fn surface_emission<L: SimdFloat>(
 pub(crate) struct ReflectingLobes<L: SimdFloat> {
     /// Lanes whose reflected rays the integrator follows.
     pub lanes: L::Mask,
-    /// Fraction of the light that the surface reflects instead of transmitting it, by lane.
+    /// Fraction of the light that the surface reflects rather than transmits, by lane.
     pub share: L,
 }
 
@@ -206,9 +206,10 @@ pub(crate) fn sample_emitter<L: SimdFloat>(
     }
 }
 
-/// Returns two values for the reflection lobe of BSDF `index`: its value \[1/sr\] for light from
-/// `direction` times the cosine of this direction, and the density \[1/sr\] with which the
-/// reflected ray is sampled in it. `incident` are the directions of the incoming rays.
+/// Returns two values for the reflection lobe of the BSDF number `index`. The first is the value
+/// \[1/sr\] of the lobe for light from `direction`, times the cosine of the angle of incidence. The
+/// second is the density \[1/sr\] with which reflected rays are sampled in `direction`. `incident`
+/// are the directions of the incoming rays.
 #[inline(never)]
 pub(crate) fn lobe_value<L: SimdFloat>(
     world: &World<L>,
@@ -229,15 +230,17 @@ pub(crate) fn lobe_value<L: SimdFloat>(
     if !world.smooth {
         return (value, density);
     }
-    // Reflected rays that point into the surface are mirrored out of it.
+    // Sampled rays that point into the surface are mirrored out of it. The values of `direction`
+    // therefore include those of its mirror image.
     let height = direction.dot(interaction.geometric);
     let mirrored = interaction.geometric.mul_add(height * L::from_f64(-2.0), direction);
     let (mirrored_value, mirrored_density) = evaluate(mirrored);
     (value + mirrored_value, density + mirrored_density)
 }
 
-/// Returns the density \[1/sr\] with which BSDF `index` samples the `direction` of the reflected
-/// ray for the incoming rays in direction `incident`. A mirror returns the largest finite number.
+/// Returns the density \[1/sr\] with which the BSDF number `index` samples reflected rays in
+/// `direction`, for incoming rays in direction `incident`. For a mirror it is the largest finite
+/// number.
 #[inline(always)]
 pub(crate) fn reflected_density<L: SimdFloat>(
     world: &World<L>,

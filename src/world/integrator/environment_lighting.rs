@@ -24,8 +24,8 @@ use std::f64::consts::FRAC_1_PI;
 pub(crate) const ENVIRONMENT_SALT: u32 = 1 << 30;
 
 /// Adds the radiance of the visible environments to `out`, in `lanes`, whose rays hit no surface.
-/// `transmittance` is the fraction of light that the medium around the rays lets through; `None`
-/// means all.
+/// `transmittance` is the fraction of light that the medium around the rays lets through. If it is
+/// `None`, the medium lets all light through.
 pub(crate) fn visible_environments<L: SimdFloat>(
     world: &World<L>,
     path: &Path<L>,
@@ -49,8 +49,8 @@ pub(crate) fn visible_environments<L: SimdFloat>(
 }
 
 /// Adds the light of all environments that surfaces reflect. `bounce` is the number of earlier
-/// surfaces of the path. `glossy` selects lanes with a glossy lobe, whose directions have a finite
-/// density.
+/// surfaces of the path. `glossy` selects lanes with a glossy lobe, which samples directions with a
+/// finite density; mirrors do not.
 #[inline(never)]
 pub(crate) fn environment_lighting<L: SimdFloat>(
     world: &World<L>,
@@ -109,8 +109,8 @@ pub(crate) fn environment_lighting<L: SimdFloat>(
 }
 
 /// Adds reflected light of the environment to `out`, in lanes whose shadow ray reaches the
-/// environment. `value` is the radiance reflected if nothing occludes the directions `wi`, from
-/// which the light arrives.
+/// environment. `wi` are the directions from which the light arrives. `value` is the reflected
+/// radiance if nothing occludes these directions.
 #[inline(always)]
 fn add<L: SimdFloat>(
     world: &World<L>,

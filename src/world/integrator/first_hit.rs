@@ -128,7 +128,7 @@ mod tests {
                 hits.iter().map(|s| s.reflects).collect::<Vec<_>>(),
                 [false, true, false, false, true]
             );
-            // Normals of back sides point to the eye.
+            // On the back of a surface, too, the normal points to the side of the eye.
             for hit in [hits[0], hits[1], hits[2]] {
                 let [x, y, z] = hit.normal;
                 assert!(x.abs() < 1e-5 && y.abs() < 1e-5 && (z - 1.0).abs() < 1e-5, "{hit:?}");

@@ -92,8 +92,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
     ) -> L::Mask {
         let throughput = path.throughput.component_mul(interaction.diffuse);
         let weight = throughput.max_element();
-        // A surface behind a coincident one is shaded from the lights, and has a bounce like
-        // others.
+        // A surface behind a coincident surface gets no light from lights directly, but it has a
+        // diffuse bounce like other surfaces.
         let lanes = interaction.has_bsdf & weight.gt(L::zero());
         if lanes.none() {
             return lanes;
@@ -136,7 +136,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
     /// sampled with `u` and `v`, uniform in [0, 1).
     fn start(&self, world: &World<L>, (u, v): (L, L)) -> Branch<L> {
         let direction = Frame::around(self.normal).to_world(cosine_hemisphere(u, v));
-        // The largest channel of the throughput becomes the sum of all weights.
+        // The throughput is divided by the probability of the choice, weight / sum. Its largest
+        // channel equals the weight, so it becomes the sum of all weights.
         let scale = self.sum / L::select(self.lanes, self.weight, L::one());
         let path = Path {
             ray: Ray { origin: self.origin, direction },
@@ -167,7 +168,7 @@ pub(crate) fn trace_generations<L: SimdFloat>(
     if let Some(nested_dielectrics) = &world.nested_dielectrics {
         nested_dielectrics.add_at_start(&ray, &mut start.media);
     }
-    // Largest number of surfaces after the first that reflect or transmit.
+    // Largest number of surfaces that a path of this generation can hit after its first surface.
     let mut depth = world.depth;
     for generation in 0..=limits.depth {
         let sampler = sampler.generation(generation);

@@ -15,7 +15,8 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     pub geometric: Vec3<L>,
     /// Hit points of the packet's rays.
     pub point: Vec3<L>,
-    /// Distance from the hit point along the geometric normal at which secondary rays start.
+    /// Lanes whose rays hit the front of the primitive: the side to which the primitive's normal
+    /// points.
     pub offset: L,
     /// Lanes whose rays hit the primitive from the side to which its own normal points.
     pub front: L::Mask,
@@ -84,8 +85,8 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.shaded = self.shaded | lanes;
     }
 
-    /// Returns `direction`, mirrored at the tangent plane of the geometric surface in lanes in
-    /// which it points into the surface.
+    /// Returns `direction`. In lanes in which it points into the geometric surface, it is mirrored
+    /// at the tangent plane of this surface.
     #[inline(always)]
     pub fn reflect_into_hemisphere(&self, direction: Vec3<L>) -> Vec3<L> {
         let height = direction.dot(self.geometric).min(L::zero());
@@ -159,14 +160,17 @@ fn interact_one<L: SimdFloat, const SIMPLE: bool>(
     lanes: L::Mask,
 ) -> SurfaceInteraction<L> {
     let surface = world.geometry.surface(item, hit.triangle, ray.at(hit.t));
-    // At a silhouette edge the surface closest to the rounded hit point may face away from the ray.
+    // At a silhouette edge, rounding of the hit point may select a face that points away from the
+    // ray. If rays hit the primitive only from outside, the hit counts as a hit on the front in any
+    // case.
     let outside_only = L::mask(world.outside_only[item as usize]);
     let front = outside_only | surface.normal.dot(ray.direction).lt(L::zero());
     let geometric = Vec3::select(front, surface.normal, -surface.normal);
     let index = world.bsdf_of[item as usize];
     let bsdf = &world.bsdfs[index as usize];
     let mut normal = geometric;
-    // Built at each use. A shared instance would be spilled to memory in worlds without textures.
+    // The points are built at each use, because a shared instance would be spilled to memory in
+    // worlds without textures.
     let shading_points = || ShadingPoints { item, triangle: hit.triangle, surface, lanes };
     if !SIMPLE && world.smooth {
         normal = shading_normal(world, &shading_points(), (front, geometric), ray.direction);

@@ -41,7 +41,8 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
         coincident: L::Mask,
     ) -> Self {
         let mut rough = L::mask(false);
-        // Without shadows, light reaches points that the rays do not see.
+        // If shadows are off, emitters also light points that cannot see them. Reflected rays do
+        // not find this light, so the two strategies cannot be combined.
         if world.has_emitters() && world.shadows {
             for (index, lanes) in interaction.bsdfs(hit.lanes) {
                 if let Some(transmission) = &world.bsdfs[index].transmission
@@ -55,11 +56,11 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
         Self { hit, reflecting, transmitting: reflecting & (hit.thin | !hit.outer) }
     }
 
-    /// Returns two values for light from `direction`: the value [1/sr] of the interfaces times the
-    /// cosine of the direction, and the density [1/sr] with which a ray is sampled in it. The ray
-    /// is the transmitted one if `behind` is `true`, otherwise the reflected one. In lanes where no
-    /// emitter points are sampled for this ray, the value is zero, and the density is the largest
-    /// finite number.
+    /// Returns two values for light from `direction`. The first is the value [1/sr] of the
+    /// interfaces, times the cosine of the angle of incidence. The second is the density [1/sr]
+    /// with which rays are sampled in `direction`: transmitted rays if `behind` is `true`,
+    /// otherwise reflected rays. In lanes where no emitter points are sampled for these rays, the
+    /// value is zero, and the density is the largest finite number.
     #[inline(never)]
     pub fn evaluate(
         &self,
@@ -87,7 +88,8 @@ impl<'a, L: SimdFloat> RoughInterface<'a, L> {
             };
             let (mut lobe, mut pdf) = evaluate(*direction);
             if world.smooth {
-                // Rays on the wrong side of the geometric surface are mirrored to the right one.
+                // Sampled rays on the wrong side of the geometric surface are mirrored to the right
+                // side. The value and the density therefore include those of the mirror image.
                 let height = direction.dot(interaction.geometric);
                 let mirrored =
                     interaction.geometric.mul_add(height * L::from_f64(-2.0), *direction);
@@ -124,8 +126,9 @@ pub(crate) fn interface_lighting<L: SimdFloat>(
         }
         counts.glossy = true;
         let media = Media { nested_dielectrics, stack };
-        // Radiance of light from the directions `wi`, sampled with a density, in the lanes whose
-        // shadow ray reaches the distance. `object` is the index of an emissive object.
+        // Returns the radiance that reaches the eye from the sampled directions `wi`, in the lanes
+        // whose shadow ray of length `distance` is not occluded. `density` is the density of the
+        // samples. `object` is the index of the emissive object that was sampled, if any.
         let mut lit_radiance = |(wi, distance): (Vec3<L>, L),
                                 (irradiance, density): (Vec3<L>, L),
                                 object: Option<usize>| {

@@ -225,8 +225,8 @@ impl<L: SimdFloat> NestedDielectrics<L> {
         self.priority_of.iter().map(|priority| *priority > 0).collect()
     }
 
-    /// Adds to `media` the transparent solids in which camera rays start: those whose boundary each
-    /// ray first hits from inside.
+    /// Adds to `media` the transparent solids in which camera rays start. In each lane, these are
+    /// the solids whose boundary the ray first hits from inside.
     #[inline(always)]
     pub fn add_at_start(&self, ray: &Ray<L>, media: &mut MediumStack<L>) {
         for (priority, solid) in &self.around_eye {

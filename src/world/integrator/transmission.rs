@@ -89,11 +89,12 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         out: &mut Radiance<L>,
     ) -> Counts {
         let mut counts = Counts::default();
-        // Reflected branches, traced after the transmitted branches of the same interface: entry i
-        // starts at interface i + 1. Branches are large: they are traced where they are stored. The
-        // literal leaves the unused bytes uninitialised.
+        // Reflected branches that are traced after the transmitted branches of the same interface.
+        // Entry i starts at interface i + 1. Branches are large, so they are traced where they are
+        // stored. The array literal leaves the bytes of unused entries uninitialised.
         let mut waiting: [Option<Branch<L>>; SPLIT_DEPTH] = [None, None];
-        // Number of entries up to the branch that is traced; 0 for `start`.
+        // Number of the entry of `waiting` whose branch is traced, counted from 1; 0 stands for
+        // `start`.
         let mut current = 0;
         loop {
             let (traced, deeper) = waiting.split_at_mut(current);
@@ -131,7 +132,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         (out, counts): (&mut Radiance<L>, &mut Counts),
     ) -> bool {
         let world = self.world;
-        // Paths and media are large: they are not copied.
+        // Paths and media are large, so they are borrowed instead of copied.
         let (path, media, active, bounce) =
             (&mut branch.path, &branch.media, branch.lanes, branch.bounce);
         counts.rays += u64::from(active.bits().count_ones());
@@ -331,7 +332,8 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let (mut layer, mut offset, mut coincident_lanes) =
             (L::zero(), interaction.offset, L::mask(false));
         if let Some(next) = behind {
-            // The surface that the rays left occludes all lights on the side of the rays.
+            // The surface that the rays have left is in front of the surface that they hit, and
+            // occludes all lights on the side of the rays.
             if self.world.shadows {
                 interaction.shade(next.lanes);
             }
@@ -535,7 +537,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
             uv,
             (interaction.reflecting, self.world.fold),
         );
-        // A suppressed boundary has no effect.
+        // Rays pass a suppressed boundary (inside of a solid with a higher priority) unchanged.
         let rough = lanes.and_not(hit.suppressed);
         let reflected_weight = path.throughput.component_mul(sample.reflected_weight);
         let transmitted = L::select(hit.suppressed, L::one(), sample.transmitted_weight);
