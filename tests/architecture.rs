@@ -1,5 +1,5 @@
-//! Guards of the map in ARCHITECTURE.md: the imports allowed between folders of `src`, and the folders in
-//! which each external crate may be used.
+//! Guards of the map in ARCHITECTURE.md: which folders of `src` import which others, and which
+//! folders use each external crate.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -123,16 +123,17 @@ const CRATES: &[(&str, &[&str])] = &[
     ("png", &["film"]),
     ("ratatui", &["dashboard", "terminal"]),
     ("rayon", &["render"]),
-    // In `scene` only in tests.
+    // `scene` uses rustix in tests only.
     ("rustix", &["render", "dashboard", "terminal", "process_memory", "scene", "disk"]),
     ("safe_arch", &["lanes"]),
     ("serde", &["command", "scene", "shape", "primitive", "material", "light", "camera", "value"]),
     ("serde_json", &["command"]),
     ("signal_hook", &["command", "dashboard"]),
     ("stl_io", &["asset"]),
-    // In `asset` only in tests.
+    // `asset` uses tempfile in tests only.
     ("tempfile", &["film", "disk", "command", "scene", "dashboard", "asset"]),
-    // In descriptions only in tests, which parse their examples.
+    // Folders of descriptions (`shape`, `material`, `light`, `camera`, `value`) use toml in tests
+    // only, which parse the documented examples.
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),
     ("tobj", &["asset"]),
     ("toml_edit", &["scene"]),

@@ -80,7 +80,8 @@ fn extreme_29_determinism() {
 
 #[test]
 fn extreme_29_sum_of_parts_does_not_depend_on_order() {
-    // Ranges of both replicates in each part. None is aligned to a packet, one is empty in A, one in B.
+    // Ranges of samples of both replicates in each part. No range is aligned to a packet. One range
+    // of replicate A and one of replicate B are empty.
     let parts: [[(u32, u32); 2]; 4] =
         [[(0, 3), (0, 13)], [(3, 18), (13, 1)], [(21, 0), (14, 16)], [(21, 9), (30, 0)]];
     for (name, scene) in scenes() {
@@ -187,7 +188,8 @@ fn film_does_not_depend_on_pixels_per_packet_in_any_scene() {
 #[test]
 fn interleaved_first_pass_equals_a_plain_wave() {
     let pool = pool(2);
-    // Wide enough that not all tiles of a row share packets; black in parts, and with a BVH.
+    // This scene is so wide that some tiles of a row share no packet. It is black in parts, and has
+    // a BVH.
     let wide = ("wide".to_string(), sized(shipped("reflecting-tracks.toml"), [300, 40]));
     for (name, scene) in scenes().into_iter().chain([wide]) {
         for precision in PRECISIONS {

@@ -61,7 +61,8 @@ const WHITE: &[&str] = &[
     "diffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\nfresnel = \"dielectric\"\nior = 1.5",
 ];
 
-/// Checks that white objects in a white environment are white, at every depth that the paths need.
+/// Checks that white objects in a white environment are white. The path depth is small and large,
+/// for glass large only.
 #[test]
 fn white_objects_in_a_white_environment_are_white() {
     let threshold = two_sided_z(1e-4 / (WHITE.len() * 3 * 2) as f64);
@@ -73,7 +74,8 @@ fn white_objects_in_a_white_environment_are_white() {
             for precision in [Precision::Single, Precision::Double] {
                 let scene = ball(material, &format!("max_depth = {depth}"), WHITE_SKY);
                 let [(mean, error), ..] = mean(&scene, 1, precision, 64);
-                // Paths in glass end at the depth; rounding of the film and of the image.
+                // Allowed bias: paths in glass that end at the depth limit lose light, and film and
+                // image round.
                 let bias = if material.contains("dielectric") { 1e-4 } else { 1e-6 };
                 assert!(
                     (mean - 1.0).abs() <= threshold * error + bias,
@@ -114,11 +116,12 @@ fn white_ball_in_a_white_environment_is_white_at_every_diffuse_depth() {
     }
 }
 
-/// Checks the light of one diffuse bounce between a floor and a wall that is 1 high, both endless,
-/// in a white environment. From the floor the wall has the form factor F = (1 - cos phi) / 2, where
-/// phi is the angle of its upper edge above the horizon. The wall sees the environment in half of
-/// its hemisphere, the floor in the share 1 - F. With the albedo rho the radiance of the floor is
-/// rho (1 - F) from the environment, and F rho^2 / 2 after one bounce.
+/// Checks the light of one diffuse bounce between a floor and a wall that is 1 high, both very
+/// long, in a white environment. As seen from a point of the floor, the upper edge of the wall is
+/// at the angle phi above the horizon, and the wall has the form factor F = (1 - cos phi) / 2. The
+/// wall sees the environment in half of its hemisphere, the floor in the share 1 - F. With the
+/// albedo rho the radiance of the floor is rho (1 - F) from the environment, and F rho^2 / 2 after
+/// one bounce.
 #[test]
 fn diffuse_bounce_between_floor_and_wall_in_an_environment_has_its_form_factor() {
     let rho = 0.8;
@@ -153,7 +156,8 @@ fn diffuse_bounce_between_floor_and_wall_in_an_environment_has_its_form_factor()
                 println!(
                     "{distance}, {bounces} bounces, {precision:?}: {mean}, {expected}, z {z:.2}"
                 );
-                // Floor and wall end at a distance of 500, which leaves out less than 1e-5.
+                // Floor and wall end at a distance of 500. The light of the parts beyond, less than
+                // 1e-5, is missing.
                 assert!(
                     (mean - expected).abs() <= threshold * error + 1e-5 && error < 1e-3,
                     "{distance}, {bounces}, {precision:?}: {mean} +- {error}, expected {expected}"
@@ -163,8 +167,8 @@ fn diffuse_bounce_between_floor_and_wall_in_an_environment_has_its_form_factor()
     }
 }
 
-/// Checks lobes that lose light. They lose the same share of a white environment as of a white
-/// background, whose light is not sampled.
+/// Checks lobes that lose light. They lose the same share of a white environment, whose light is
+/// sampled, as of a white background, which only rays find.
 #[test]
 fn lobes_reflect_a_white_environment_like_a_white_background() {
     let background = "[background]\ncolor = [1.0, 1.0, 1.0]";
@@ -316,7 +320,7 @@ fn hostile_environment_images_are_located_errors() {
         (header.to_string(), "cannot be read"),
         ("no image".to_string(), "no image of a known format"),
     ] {
-        // Another length, so that the cache of files notices the change.
+        // Each content has another length, by which the cache of files notices the change.
         fs::write(folder.path().join("sky.hdr"), content).unwrap();
         let error = error();
         assert!(error.contains(words), "{words}: {error}");

@@ -1,6 +1,6 @@
 //! Emissive objects in the reference tracer. For direct light, points are sampled uniformly over
-//! the area of a sphere, polygons or triangles. Other emission is found by rays that hit the
-//! object. There is no importance sampling.
+//! the area of emissive spheres, polygons and triangles. The emission of other shapes counts when a
+//! ray hits them. There is no importance sampling.
 
 use crate::agreement::compounds::Body;
 use crate::agreement::surfaces::Piece;
@@ -11,8 +11,8 @@ use std::f64::consts::PI;
 /// Surface of an emissive object from which points are sampled.
 pub enum Shine {
     Sphere(DVec3, f64),
-    /// Triangles: corners, counter-clockwise as seen from the front, and the sum of the areas of
-    /// the triangles up to this one.
+    /// Triangles. Each has its corners, counter-clockwise as seen from the front, and the sum of
+    /// the areas of all triangles up to and including itself.
     Triangles(Vec<([DVec3; 3], f64)>),
 }
 
@@ -66,7 +66,8 @@ impl Shine {
                 let chosen = numbers.unit() * area;
                 let found = triangles.iter().find(|(_, sum)| *sum > chosen);
                 let [a, b, c] = found.unwrap_or(&triangles[0]).0;
-                // A point of the parallelogram, turned into the triangle.
+                // A uniform point of the parallelogram. Points beyond its diagonal are mirrored
+                // into the triangle.
                 let (mut x, mut y) = (numbers.unit(), numbers.unit());
                 if x + y > 1.0 {
                     (x, y) = (1.0 - x, 1.0 - y);
@@ -77,7 +78,8 @@ impl Shine {
     }
 }
 
-/// Returns the scale of a map that keeps spheres spheres. Returns `None` for other maps.
+/// Returns the scale factor of a similarity, a map of spheres to spheres. Returns `None` for other
+/// maps.
 fn similarity(map: &DAffine3) -> Option<f64> {
     let m = map.matrix3;
     let scale = m.x_axis.length();

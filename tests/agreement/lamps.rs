@@ -15,8 +15,8 @@ pub enum Lamp {
     Disk { center: DVec3, radius: f64, normal: DVec3 },
 }
 
-/// Light that arrives from a point of a lamp: direction to the point, distance, and irradiance of a
-/// surface that faces it.
+/// Light that arrives from a point of a lamp: direction to the point, distance, and irradiance on a
+/// surface perpendicular to this direction.
 pub type Arrival = (DVec3, f64, f64);
 
 impl Lamp {
@@ -86,8 +86,9 @@ impl Lamp {
         }
     }
 
-    /// Samples a uniform random point of the lamp, of unit radiance, and returns its light at
-    /// `from`. Returns `None` if the point does not face `from`.
+    /// Samples a uniform random point of the lamp. Returns the light that arrives from it at `from`
+    /// if the lamp has unit radiance. Returns `None` if the front of the lamp at this point faces
+    /// away from `from`.
     pub fn sample(
         &self,
         from: DVec3,
@@ -97,7 +98,7 @@ impl Lamp {
         let (point, normal) = match self {
             Self::Sphere { center, radius } => {
                 let normal = numbers.direction();
-                // From the inside every point is seen.
+                // A sphere lamp also emits inwards: from inside, every point of it is visible.
                 let inside = from.distance(*center) < *radius;
                 (center + normal * *radius, if inside { -normal } else { normal })
             }

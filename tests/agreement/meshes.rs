@@ -22,8 +22,8 @@ pub struct Triangles {
     high: DVec3,
 }
 
-/// Returns the normals of the triangles' corners: means of the unit normals of adjacent triangles,
-/// weighted by angle and normalised.
+/// Returns the normals at the corners of all triangles. Each is the normalised sum of the unit
+/// normals of adjacent triangles, weighted by their angles at the corner.
 fn around(corners: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
     let key = |p: DVec3| p.to_array().map(|x| (x + 0.0).to_bits());
     let mut sums: HashMap<[u64; 3], DVec3> = HashMap::new();
@@ -73,7 +73,7 @@ impl Triangles {
     /// Returns distance, normal and index of every triangle that a line crosses.
     pub fn meet(&self, origin: DVec3, direction: DVec3) -> Vec<(f64, DVec3, usize)> {
         let (a, b) = ((self.low - origin) / direction, (self.high - origin) / direction);
-        // NaN for a line in a side of the box is ignored.
+        // If the line lies in the plane of a side of the box, a distance is NaN, which is ignored.
         if a.min(b).max_element() > a.max(b).min_element() {
             return Vec::new();
         }

@@ -28,8 +28,8 @@ const REFERENCE_SAMPLES: u32 = 96;
 /// Samples per pixel that the program traces in each replicate (half of the samples).
 pub(crate) const SAMPLES: u32 = 512;
 
-/// Smaller number of samples per pixel and replicate, for pictures in which more samples would find
-/// rare events.
+/// Smaller number of samples per pixel and replicate (half of the samples). It is for slow scenes,
+/// and for pictures with rare bright samples, some of which more samples would find.
 const FEW_SAMPLES: u32 = 128;
 
 /// Files of scenes whose pictures take seconds with [`SAMPLES`] samples.
@@ -131,7 +131,8 @@ fn shrunk(mut scene: Scene) -> Scene {
 #[test]
 fn deliberate_errors_are_detected() {
     let scene = |name| small(shipped(name));
-    // The smallest deviations here are 15 standard errors, three times the allowed one.
+    // Each of these errors shifts the picture by at least 15 standard errors, three times the
+    // allowed deviation.
     for (mutation, name, scene) in [
         (Mutation::ShadowOffset, "a small mirror room", shrunk(scene("mirror-room.toml"))),
         (Mutation::Absorb, "horizon-fold.toml", scene("horizon-fold.toml")),
@@ -160,7 +161,8 @@ fn deliberate_errors_are_detected() {
     let focused = compare::zoomed(&scene(name), [0.9, 1.5, -6.5], 6.0);
     let mutations = [Mutation::SquareLens, Mutation::UnfocusedLens];
     check_detection(&mutations, name, &focused, 16 * REFERENCE_SAMPLES);
-    // On the way out of glass the error of the index cancels that on the way in.
+    // The camera is inside of the glass. For rays that cross the glass, the error of the index on
+    // the way out would cancel that on the way in.
     let mut inside = scene("rough-glass.toml");
     inside.camera.eye = [0.1, 0.85, 0.1];
     let name = "rough-glass.toml from inside";
@@ -277,8 +279,8 @@ fn lenses_agree_with_reference_tracer() {
     }
 }
 
-/// Returns a scene with rough absorbing glass, as solid and as pane. The glass contains air and
-/// touches other glass. `keys` are further keys of its material.
+/// Returns a scene of objects of rough absorbing glass: a solid and a pane. The solid contains air
+/// and touches other glass. `keys` are further keys of the glass material.
 fn rough_glass(keys: &str) -> Scene {
     let text = format!(
         "[camera]
@@ -361,8 +363,8 @@ fn variances_agree_under_independent_random_numbers() {
     }
 }
 
-/// Checks one-sided panes and solids with every Fresnel mode, seen from both sides. Their backs
-/// transmit only.
+/// Checks one-sided panes and one-sided solids with every Fresnel mode, seen from both sides. The
+/// back of their surfaces must only transmit.
 #[test]
 fn one_sided_transparent_objects_reflect_on_their_front_only() {
     for law in ["constant", "schlick\"\nreflectance = \"#806040", "dielectric"] {

@@ -59,8 +59,8 @@ impl Pixels {
         low.lerp(pixel(0.0, 1.0).lerp(pixel(1.0, 1.0), part.x), part.y)
     }
 
-    /// Returns the linear colour at a point `uv`, in repeats of the image from its lower left
-    /// corner.
+    /// Returns the linear colour at the texture coordinates `uv`, which count repeats of the image
+    /// from its lower left corner.
     pub fn color(&self, uv: DVec2, wrap: Wrap, filter: Filter) -> DVec3 {
         let linear =
             |c: f64| if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
@@ -139,7 +139,8 @@ impl Canvas {
         Self { frame, default_mapping: usual }
     }
 
-    /// Returns the mapping of a texture placement, with its right, up and front vectors.
+    /// Returns the mapping that a texture placement selects, and the right, up and front vectors of
+    /// this mapping.
     fn view(&self, placement: &Placement) -> (Mapping, DMat3) {
         let mapping = match placement.mapping {
             Mapping::Auto => self.default_mapping,
@@ -159,8 +160,8 @@ impl Canvas {
     }
 }
 
-/// Returns the smallest and the largest coordinate of a simple shape's pieces and triangles along a
-/// direction.
+/// Returns the smallest and the largest coordinate along the direction `along`, over all pieces and
+/// mesh triangles of a simple shape.
 fn ends(leaf: &Leaf, along: DVec3) -> (f64, f64) {
     let corners = leaf.mesh.iter().flat_map(Triangles::points).map(|p| (p.dot(along), 0.0));
     let pieces = leaf.pieces.iter().flat_map(|piece| match piece {
@@ -173,7 +174,8 @@ fn ends(leaf: &Leaf, along: DVec3) -> (f64, f64) {
         Piece::Torus(center, axis, [ring, tube], _) => {
             vec![(center.dot(along), ring * axis.normalize().cross(along).length() + tube)]
         }
-        // The discs at its ends bound it.
+        // The discs at both ends of the cone's side are pieces, too. They contain its extreme
+        // points.
         Piece::Side(..) => Vec::new(),
     });
     corners
@@ -214,8 +216,8 @@ impl Spot<'_> {
             Mapping::Cylindrical => DVec2::new(turns, (from_low.y / size.y).clamp(RIM, 1.0 - RIM)),
             Mapping::Box => {
                 let n = view.transpose() * self.normal;
-                // From the lower left corner of a face, seen from outside; the later axis wins
-                // ties.
+                // Coordinates start at the lower left corner of a face of the box, as seen from
+                // outside. If two components of the normal are equal, the later axis counts.
                 let (back, p) = (high - seen, from_low);
                 match n.abs() {
                     a if a.z >= a.x.max(a.y) => {
@@ -225,13 +227,13 @@ impl Spot<'_> {
                     _ => DVec2::new(if n.x > 0.0 { back.z } else { p.z }, p.y),
                 }
             }
-            // Once around the ring, once around the tube.
+            // The image covers one turn around the ring (u) and one turn around the tube (v).
             Mapping::Uv if matches!(self.leaf.pieces[..], [Piece::Torus(..), _]) => {
                 let Piece::Torus(_, _, [ring, _], _) = self.leaf.pieces[0] else { unreachable!() };
                 let beyond = from_middle.x.hypot(from_middle.z) - ring;
                 DVec2::new(turns, 0.5 + from_middle.y.atan2(beyond) / TAU)
             }
-            // From edge to edge of a flat shape.
+            // The image extends from edge to edge of a flat shape.
             Mapping::Uv => from_low.truncate() / size.truncate(),
             Mapping::Planar | Mapping::Auto => from_low.truncate(),
         };
@@ -281,7 +283,8 @@ impl Tracer<'_> {
         let rise = |along: DVec3| {
             let forward_uv = spot.uv(&placement, spot.point + along * ASIDE);
             let mut step = forward_uv - spot.uv(&placement, spot.point - along * ASIDE);
-            // Coordinates jump by one repeat at the seam.
+            // At the seam of a mapping around an axis, u jumps by one repeat. The jump is
+            // subtracted.
             let turn = placement.scale[0];
             if step.x.abs() > 0.5 * turn {
                 step.x -= turn * step.x.signum();

@@ -8,8 +8,8 @@ use std::f64::consts::{PI, TAU};
 use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Material};
 use zerkalo::scene::BelowHorizon;
 
-/// Slope of microfacets below which surfaces are treated as mirrors. Highlights have at least this
-/// slope.
+/// Roughness alpha of microfacets below which surfaces are treated as mirrors. Highlights are
+/// computed with at least this alpha.
 const SMOOTHEST: f64 = 1e-3;
 
 /// Returns the Fresnel reflectance at cosine `c` between light and microfacet normal.
@@ -88,12 +88,12 @@ fn masking(material: &Material, ggx: bool, alpha: f64, n: DVec3, v: DVec3, l: DV
     }
 }
 
-/// Smallest roughness at which the light of a lamp that a lobe reflects is found by sampling points
-/// of the lamp.
+/// Smallest roughness of a lobe that finds the light of lamps by sampling points of the lamps.
+/// Narrower lobes find it by reflected rays.
 const WIDE: f64 = 0.12;
 
-/// Returns the value of the reflection lobe, with the cosine of the light. Returns `None` for lobes
-/// whose lamps are found by reflected rays: narrow ones, and square ones.
+/// Returns the value of the reflection lobe, multiplied by the cosine of the light's direction.
+/// Returns `None` for narrow lobes and for square lobes, which find lamps by reflected rays.
 pub fn wide_lobe(
     material: &Material,
     n: DVec3,
@@ -117,7 +117,7 @@ pub fn wide_lobe(
             Some(fresnel(material, v.dot((v + l).normalize())) * k)
         }
         Lobe::Beckmann | Lobe::Ggx => {
-            // The highlight of the same microfacets.
+            // The lobe has the formula of a Cook-Torrance highlight of the same microfacets.
             let (highlight_model, specular) = (Highlight::CookTorrance, material.reflection);
             let like = Material { highlight: highlight_model, specular, ..material.clone() };
             Some(highlight(&like, n, v, l))
@@ -244,9 +244,9 @@ pub fn facet_normal(material: &Material, alpha: f64, n: DVec3, numbers: &mut Num
 /// Indices of refraction in front of and behind a surface.
 pub type Indices = (f64, f64);
 
-/// Samples light that is refracted at a microfacet, without Fresnel's factor. Returns its direction,
-/// its weight, and the microfacet normal; `None` if the microfacet reflects totally, or if the refracted ray
-/// stays in front of the surface.
+/// Samples light that is refracted at a microfacet, without Fresnel's factor. Returns its
+/// direction, its weight and the microfacet normal. Returns `None` if the microfacet reflects
+/// totally, or if the refracted ray stays in front of the surface.
 pub fn refracted_at_facet(
     material: &Material,
     n: DVec3,
@@ -275,7 +275,8 @@ pub fn refracted_at_facet(
     };
     let d = facet_density(material.lobe == Lobe::Ggx, alpha, nh);
     let jacobian = |n_t: f64| n_t * n_t * lh / (n_i * vh - n_t * lh).powi(2);
-    // Walter et al. 2007, eq. 21 without the factor of radiance, times the cosine of the light.
+    // Walter et al. 2007, eq. 21, times the cosine of the light. The factor by which refraction
+    // changes radiance is left out.
     let f_cos = vh / nv * g * d * jacobian(n_t);
     let density = d
         * nh

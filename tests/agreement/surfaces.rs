@@ -18,13 +18,13 @@ pub enum Piece {
     Disc(DVec3, DVec3, f64),
     /// Side of a cone: start of the axis, its direction, its length, and the radii at both ends.
     Side(DVec3, DVec3, f64, [f64; 2]),
-    /// One half of a torus's crossings with a line: the first two or the last two. The values are
-    /// centre, axis, radii of ring and tube, and index of the first crossing.
+    /// Two of the up to four crossings of a torus with a line: the first two or the last two. The
+    /// values are centre, axis, radii of ring and tube, and index of the first crossing.
     Torus(DVec3, DVec3, [f64; 2], usize),
 }
 
-/// Crossing of a line with a piece: distance in lengths of the direction, and normal. `None` for a
-/// miss. Crossings behind the origin may be left out.
+/// Crossing of a line with a piece: distance in multiples of the direction's length, and normal.
+/// `None` for a miss. Crossings behind the origin may be left out.
 type Meeting = Option<(f64, DVec3)>;
 
 impl Piece {
@@ -115,7 +115,8 @@ impl Piece {
         }
     }
 
-    /// Returns `true` if a point is on the inner side of this piece of a convex solid's surface.
+    /// Returns `true` if a point is on the inner side of this piece of a solid's surface. Pieces
+    /// other than a torus belong to convex solids.
     pub fn is_behind(&self, point: DVec3) -> bool {
         match self {
             Self::Sphere(center, radius) => point.distance(*center) <= *radius,
@@ -139,8 +140,8 @@ fn above_torus(p: DVec3, axis: DVec3, [ring, tube]: [f64; 2]) -> f64 {
     ((p - axis * along).length() - ring).hypot(along) - tube
 }
 
-/// Returns the distances at which a line crosses a torus. They are changes of sign of `height`
-/// between small steps through a ball around the torus, refined by bisection.
+/// Returns the distances at which a line crosses a torus. The line is sampled in small steps
+/// through a ball around the torus. Where `height` changes its sign, bisection finds the crossing.
 fn torus_crossings(
     from_center: DVec3,
     direction: DVec3,
@@ -156,8 +157,8 @@ fn torus_crossings(
         return Vec::new();
     }
     let place = |i: usize| middle + half * (2.0 * i as f64 / STEPS as f64 - 1.0);
-    // The height is a distance: it keeps its sign over this number of steps. The factor covers
-    // rounding.
+    // The height is a distance to the torus, and keeps its sign while the line advances by less
+    // than that. This is the number of steps per unit of height. The factor 0.999 covers rounding.
     let steps_per_height = 0.999 * STEPS as f64 / (2.0 * half * length2.sqrt());
     let mut out = Vec::new();
     let mut before = height(place(0));

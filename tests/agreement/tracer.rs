@@ -75,7 +75,8 @@ pub struct Tracer<'a> {
     lamps: Vec<Option<Lamp>>,
     /// Emissive surface of each body; `None` for a body from which no points are sampled.
     shines: Vec<Option<Shine>>,
-    /// Transmitting material of each body; `None` for an opaque body and for a surface without a volume.
+    /// Transmitting material of each body; `None` for an opaque body and for a surface without a
+    /// volume.
     pub media: Vec<Option<&'a Material>>,
     /// Images of textures and bump maps, by file name.
     pub images: HashMap<String, Pixels>,
@@ -180,14 +181,16 @@ impl<'a> Tracer<'a> {
         let max_depth = if diffuse > 0 && !trace.caustics { 0 } else { trace.max_depth };
         let mut weight = DVec3::ONE;
         let mut radiance = DVec3::ZERO;
-        // `false` after a surface that got the light of lamps from their points.
+        // `false` after a surface whose light of lamps was found at sampled points: after a diffuse
+        // bounce, or after a wide lobe.
         let mut sees_lamps = diffuse == 0;
-        // `false` after a diffuse bounce: the direct light of its surface has the environments.
+        // `false` after a diffuse bounce, because the direct light of the surface contains the
+        // environments.
         let mut sees_sky = diffuse == 0;
         for bounce in 0.. {
             let hit = self.meet(origin, direction);
             let end = hit.as_ref().map_or(f64::INFINITY, |hit| hit.point.distance(origin));
-            // Lamps are outside of absorbing solids.
+            // Lamps are added before absorption, because they are outside of absorbing solids.
             if sees_lamps || self.mutation == Mutation::LampSeenTwice {
                 radiance += weight * self.glow(origin, direction, end);
             }
@@ -197,7 +200,8 @@ impl<'a> Tracer<'a> {
                 let sky = if sees_sky { self.sky(direction) } else { DVec3::ZERO };
                 return radiance + weight * (sky + DVec3::from(self.scene.background.color.0));
             };
-            // After a diffuse bounce: the direct light has the bodies of which points are sampled.
+            // After a diffuse bounce, only bodies from which no points are sampled are added. The
+            // direct light of the surface contains the others.
             if !hit.bare && (sees_sky || self.shines[hit.body].is_none()) {
                 own = DVec3::from(hit.material.emitted());
             }
@@ -276,7 +280,8 @@ impl<'a> Tracer<'a> {
             None => 0.0,
             Some(Aperture::Radius(radius)) => radius,
             Some(Aperture::FNumber(number)) => {
-                // Film of 36 x 24 mm behind the eye, seen under the view angle.
+                // The f-number belongs to a film of 36 x 24 mm that the camera sees under its view
+                // angle.
                 let (film, pixels) = match camera.view_angle {
                     ViewAngle::Vertical(_) => (0.024, height),
                     ViewAngle::Horizontal(_) => (0.036, width),
@@ -300,7 +305,7 @@ impl<'a> Tracer<'a> {
                 break right * (a * radius) + up * (b * radius);
             }
         };
-        // All rays of one point of the picture meet in the plane in focus.
+        // All rays through the same point of the picture meet in a point of the plane in focus.
         let mut onward = eye + toward * focus - (eye + on_lens);
         if self.mutation == Mutation::UnfocusedLens {
             onward = toward * focus;
@@ -353,7 +358,7 @@ impl<'a> Tracer<'a> {
         let lamps = self.scene.lights.iter().zip(&self.lamps).filter(|(l, _)| l.on && l.visible);
         let seen = lamps.filter_map(|(light, lamp)| {
             let lamp = lamp.as_ref()?;
-            // Lamps on a surface are in front of it.
+            // A lamp in the plane of a surface counts as in front of the surface.
             let t = lamp.meet(origin, direction)? * (1.0 - 1e-9);
             let radiance = lamp.radiance(light.unit) * light.intensity;
             (t < end).then_some(DVec3::from(light.color.0) * radiance)
@@ -397,8 +402,8 @@ impl<'a> Tracer<'a> {
         visible.map(|light| sky(light, direction)).sum()
     }
 
-    /// Returns the reflected direct light, and the light of one further diffuse bounce, after
-    /// `diffuse` such bounces.
+    /// Returns the reflected direct light plus the light of one more diffuse bounce. `diffuse` is
+    /// the number of diffuse bounces before it.
     fn lit(&self, hit: &Hit, view: DVec3, diffuse: u32, numbers: &mut Numbers) -> DVec3 {
         let trace = &self.scene.trace;
         let albedo = DVec3::from(hit.material.color.0) * hit.tint * hit.material.diffuse;
@@ -408,7 +413,8 @@ impl<'a> Tracer<'a> {
         let mut sum =
             self.shade(hit, view, !bounces || self.mutation == Mutation::AmbientTwice, numbers);
         if bounces {
-            // A point of the unit sphere that touches the surface.
+            // A uniform point of the unit sphere that touches the surface at the hit has a cosine
+            // distribution.
             let mut onward = (hit.seen + numbers.direction()).normalize_or(hit.seen);
             if self.mutation == Mutation::UniformBounce {
                 onward = numbers.direction();

@@ -21,8 +21,8 @@ type Next = (DVec3, DVec3);
 
 /// Continuation of a path at a transmitting surface.
 pub enum Way {
-    /// The path continues unchanged: another solid fills the space, so that the surface has no
-    /// effect.
+    /// The path continues unchanged. The surface has no effect, because another solid fills the
+    /// space on both sides.
     Straight,
     /// The path continues with this direction and throughput; `None` if it ends.
     On(Option<(DVec3, DVec3)>),
@@ -61,8 +61,8 @@ impl Tracer<'_> {
             .map(|(i, _, material)| (i, material))
     }
 
-    /// Returns the share of light that is left on the way from `origin` to `end`. Without `end`,
-    /// the way is infinite in `direction`.
+    /// Returns the share of light that is left on the way from `origin` to `end`. If `end` is
+    /// `None`, the way extends to infinity along `direction`.
     pub fn transmittance(&self, origin: DVec3, end: Option<DVec3>, direction: DVec3) -> DVec3 {
         let plain = |m: &Material| m.attenuation_color == Color::WHITE;
         if self.scene.trace.ray_types < RayTypes::Full || self.scene.materials.values().all(plain) {
@@ -153,7 +153,8 @@ impl Tracer<'_> {
         let p = r / (r + t);
         let (way, chance, side) =
             if numbers.unit() < p { (mirrored, p, 1.0) } else { (passed, 1.0 - p, -1.0) };
-        // Directions on the wrong side because of bumps are mirrored to the right one.
+        // Bump maps can give a direction on the wrong side of the surface. It is mirrored to the
+        // right side.
         let to = side * hit.normal;
         Way::On(way.map(|(d, k)| (d - 2.0 * d.dot(to).min(0.0) * to, k / chance)))
     }
@@ -192,7 +193,8 @@ impl Tracer<'_> {
             Material { fresnel: None, f0: None, metal: None, reflection: 1.0, ..material.clone() };
         let reflect_white =
             |numbers: &mut Numbers| reflect(&white, n, v, horizon, self.mutation, numbers);
-        // Cosine at the microfacet that reflects `v` to `l`, or at the surface.
+        // Cosine of the incident direction with the microfacet that reflects `v` to `l`. Without
+        // microfacets it is the cosine with the surface normal.
         let cosine = |l: DVec3| v.dot(if facets { (v + l).normalize() } else { n });
         let mirrored = reflect_white(numbers).and_then(|(l, weight)| {
             let (f, total) = self.reflectance(hit, cosine(l), indices);
@@ -218,7 +220,8 @@ impl Tracer<'_> {
             material.transmission * if total { 0.0 } else { left }
         };
         let passed = if facets && open {
-            // The reflected ray, mirrored to the other side.
+            // A pane of microfacets transmits like it reflects: the reflected ray is mirrored to
+            // the other side.
             reflect_white(numbers)
                 .map(|(l, weight)| (l - 2.0 * l.dot(n) * n, weight * k_t(cosine(l))))
         } else if facets {

@@ -79,7 +79,8 @@ fn signal_keeps_the_samples_and_another_target_continues_them() {
     assert_eq!(run.status, 143, "{}", run.err);
     let before = FilmReader::open(&desk.path("a.zk")).unwrap().read().unwrap().1.samples();
     assert!(before > 0);
-    // The target of the next sitting is reached already: the picture is that of the checkpoint.
+    // The resumed render has reached its noise target already. Its picture is that of the
+    // checkpoint.
     let done = desk.run(&args("200", &["--resume", "a.zk", "--checkpoint", "b.zk"]));
     assert_eq!(done.status, 0, "{}", done.err);
     let after = FilmReader::open(&desk.path("b.zk")).unwrap().read().unwrap().1.samples();
@@ -140,7 +141,7 @@ fn checkpoints_of_other_renders_are_refused_with_a_remedy() {
         assert!(!desk.path("b.png").exists(), "{more:?}");
     }
     assert!(fs::read(desk.path("a.zk")).unwrap() == bytes);
-    // Other light weights are no obstacle: the picture is that of a new render.
+    // A checkpoint can be resumed with other light weights. The picture is that of a new render.
     let relit = render("lit.toml", &["--size", "64x48", "--uniform", "--resume", "a.zk"]);
     assert_eq!(relit.status, 0, "{}", relit.err);
     assert!(relit.err.contains("the lights of the scene differ"), "{}", relit.err);
@@ -149,8 +150,8 @@ fn checkpoints_of_other_renders_are_refused_with_a_remedy() {
     assert!(relit == fs::read(desk.path("b.png")).unwrap(), "{}", anew.out);
 }
 
-/// Checks that the contents of mesh files are part of the identity of a scene, whose text contains
-/// only their names.
+/// Checks that the contents of mesh files are part of a scene's identity, although the text of the
+/// scene contains only the names of the files.
 #[test]
 fn changed_mesh_is_another_scene() {
     let desk = Desk::new();

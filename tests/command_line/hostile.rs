@@ -239,7 +239,7 @@ fn sizes_are_checked_before_allocation() {
             "{SCENE}\n[[object]]\nname = \"m\"\nmaterial = \"red\"\nshape.mesh = {{ file = \"{name}\" }}\n"
         );
         fs::write(desk.path("mesh.toml"), scene).unwrap();
-        // With this little memory only an early refusal can print its reason.
+        // The limit of 2 GB leaves memory for the message only if the mesh is refused early.
         let program = env!("CARGO_BIN_EXE_zerkalo");
         let mut command = Command::new("sh");
         command.arg("-c").arg(format!("ulimit -v 2000000; exec '{program}' check mesh.toml"));
@@ -249,8 +249,8 @@ fn sizes_are_checked_before_allocation() {
     }
 }
 
-/// Checks that a scene or mesh that does not fit into the address space is refused, at any limit.
-/// The message states the sum of the needed memory. No allocation may fail.
+/// Checks that a scene or mesh that does not fit into the address space is refused, at limits from
+/// 30 to 150 MB. The message states the sum of the needed memory. No allocation may fail.
 #[test]
 #[cfg(target_os = "linux")]
 fn scenes_and_meshes_that_do_not_fit_are_refused() {

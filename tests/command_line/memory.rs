@@ -1,5 +1,5 @@
-//! `zerkalo render --memory`: rendering in regions, whose picture equals that of a render as a
-//! whole; refusals; signals.
+//! `zerkalo render --memory`, which renders big pictures in regions, one after the other. The
+//! picture equals that of a render without regions. Further tests check refusals and signals.
 
 use super::*;
 
@@ -53,21 +53,22 @@ fn regions_equal_the_picture_as_a_whole() {
                 let stats: serde_json::Value = serde_json::from_slice(&stats).unwrap();
                 let peak = stats["peak_rss_bytes"].as_u64();
                 let cap = (least + more_memory) * 1_000_000;
-                // Other builds, such as those of tests, have larger programs; the memory of the
-                // scene is measured.
+                // This also holds in builds with a larger program, such as that of the tests: the
+                // memory of program and scene is measured.
                 assert!(peak.is_none_or(|peak| peak <= cap), "{memory}: {peak:?} bytes");
                 assert_eq!(stats["stopped_by"], "spp");
             }
-            // The least memory is rounded up by 2 MB at most, which holds up to a third of the film.
+            // The program rounds the least memory up, by at most 2 MB. These 2 MB hold up to a
+            // third of the film.
             let falls = counts.is_sorted_by(|fewer, more| fewer >= more);
             assert!(counts[0] > 2 && falls && counts[3] == 1, "{counts:?}");
         }
     }
 }
 
-/// Checks that a lack of memory first makes lights share a light group, before the picture is
-/// divided into regions. The samples of lights in one group contain the lights' colours, so that
-/// roundings differ.
+/// Checks that a lack of memory first puts all lights into one light group. Only then is the
+/// picture divided into regions. Samples of a shared group are multiplied by the lights' colours
+/// before they are added; the picture therefore differs by rounding.
 #[test]
 fn lights_are_merged_first() {
     let desk = Desk::new();

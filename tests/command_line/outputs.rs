@@ -89,14 +89,14 @@ fn stdout_is_a_target_of_results() {
     let args = ["--spp", "2", "--stats", "/dev/stdout"];
     let run = desk.render("a.png", &args);
     assert!(run.status == 0 && json(&run.out), "{} {}", run.out, run.err);
-    // Into a file: after the line about the picture, which stays.
+    // If stdout is a file, the statistics follow the line about the picture and do not replace it.
     let file = fs::File::create(desk.path("out.txt")).unwrap();
     let command = [&["render", "scene.toml", "-o", "a.png", "--size", "16x12"], &args[..]].concat();
     let run = Run::from(desk.command(&command).stdout(file).output().unwrap());
     assert_eq!(run.status, 0, "{}", run.err);
     let out = fs::read_to_string(desk.path("out.txt")).unwrap();
     assert!(out.starts_with("a.png") && json(&out), "{out}");
-    // `-` is a file name.
+    // `--stats -` writes to a file of the name `-`, not to stdout.
     let run = desk.render("a.png", &["--spp", "2", "--stats", "-"]);
     assert!(run.status == 0 && desk.path("-").exists(), "{}", run.err);
 }

@@ -84,8 +84,8 @@ fn cost(desk: &Desk, scene: &str) -> [f64; 3] {
     [number("total_seconds"), child_seconds() - before, number("peak_rss_bytes")]
 }
 
-/// Checks that an object of a scene takes at most a kilobyte besides its text. If the parsed form
-/// of the whole file were in memory, it would take 7 kB.
+/// Checks that an object of a scene takes at most a kilobyte besides its text. It would take 7 kB
+/// if the parsed form of the whole file were in memory at once.
 #[test]
 #[cfg(target_os = "linux")]
 fn object_takes_at_most_a_kilobyte_beyond_its_text() {
@@ -118,7 +118,8 @@ fn million_objects_and_triangles_take_linear_time_and_memory() {
     if !is_linear || costs[2][0] > 6.0 || costs[2][2] > 2e9 {
         faults.push(format!("spheres: more than linear, 6 s or 2 GB: {costs:.2?}"));
     }
-    // Tracing visits all copies; `check` reads and builds only.
+    // These scenes are checked by `zerkalo check`, which reads and compiles but does not trace.
+    // Tracing would visit all copies.
     let families: [Family; 4] = [
         ("coincident spheres", |_, count| coincident(count), 8.0),
         ("OBJ", |desk, count| mesh_scene(desk, obj(count)), 2.0),

@@ -1,4 +1,5 @@
-//! Division of a render among processes: plans, shards, merging.
+//! Division of a render among processes. A plan assigns samples to shards, each process traces a
+//! shard into a film file (a part), and `zerkalo merge` adds the parts.
 
 use crate::command_line::Desk;
 use std::fs;
@@ -18,8 +19,9 @@ fn refused(desk: &Desk, args: &[&str]) -> String {
     run.err
 }
 
-/// Plans a render of the scene in 64x48 pixels by `shards` processes. The files are `NAME.plan`,
-/// and `NAME-0.zk` with the samples of the pilot.
+/// Plans a render of the scene in 64x48 pixels by `shards` processes. Writes the files `NAME.plan`
+/// and `NAME-0.zk`. The latter has the samples of the pilot, a first render that the plan
+/// continues.
 pub fn plan(desk: &Desk, name: &str, shards: usize) {
     let (output, shards) = (format!("{name}.plan"), shards.to_string());
     let args = ["plan", "scene.toml", "-o", &output, "--size", "64x48"];
@@ -34,7 +36,8 @@ pub fn trace(desk: &Desk, name: &str, number: usize) -> String {
     part
 }
 
-/// Plans a render and traces all its shards. Returns the files of the pilot and of the shards.
+/// Plans a render and traces all its shards. Returns the names of the film files of the pilot (the
+/// first samples) and of the shards.
 pub fn traced(desk: &Desk, name: &str, shards: usize) -> Vec<String> {
     plan(desk, name, shards);
     let parts = (1..=shards).map(|number| trace(desk, name, number));
@@ -69,7 +72,7 @@ fn shards_merged_in_any_order_equal_one_run_of_the_plan() {
             assert!(png == one[0], "{shards} shards in order {order}: another PNG");
         }
         assert!(merge(&desk, &parts, "merged.exr") == one[1], "{shards} shards: another EXR");
-        // Parts can be merged in steps.
+        // Film files of shards (parts) can also be merged in several steps.
         let (first, rest) = parts.split_at(parts.len() / 2);
         let args = ["merge", "--partial", "-o", "half.zk"];
         done(&desk, &[&args[..], &first.iter().map(String::as_str).collect::<Vec<_>>()].concat());
@@ -138,7 +141,7 @@ fn repeated_shard_keeps_its_complete_part() {
     let args = ["render", "scene.toml", "--plan", "job.plan", "--shard", "1", "-o", &part];
     assert!(done(&desk, &args).contains("complete already"));
     assert!(fs::read(desk.path(&part)).unwrap() == before);
-    // A damaged part is traced again.
+    // A shard is traced again if its film file is damaged.
     fs::write(desk.path(&part), &before[..before.len() / 2]).unwrap();
     assert!(desk.run(&args).err.contains("the shard starts again"));
     assert!(fs::read(desk.path(&part)).unwrap() == before);
@@ -213,7 +216,8 @@ fn next_round_continues_the_merged_film() {
     let picture = merge(&desk, &next, "next.png");
     done(&desk, &["render", "scene.toml", "--plan", "next.plan", "-o", "one.png"]);
     assert!(fs::read(desk.path("one.png")).unwrap() == picture);
-    // Parts of both rounds cannot be mixed, and an incomplete film is no base.
+    // Film files of the first plan cannot be merged with those of the second one, and an incomplete
+    // film cannot be the start of a plan.
     let error = refused(&desk, &["merge", "-o", "a.png", "job-1.zk", "next-1.zk"]);
     assert!(error.contains("job-1.zk: it is the base of a plan and lacks shards"), "{error}");
     done(&desk, &["merge", "--partial", "-o", "part.zk", "job-0.zk", "job-1.zk"]);

@@ -12,8 +12,8 @@ pub fn signal(name: &str, id: u32) {
 /// Longest time that a test waits. Only a failing test reaches it.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Waits until `condition` is `true` for the signal set `set` of a process: a line of Linux's
-/// `/proc/PID/status`. On other systems, waits for a second.
+/// Waits until `condition` is `true` for a set of signals of a process. `set` is the name of the
+/// set's line in Linux's `/proc/PID/status`. On other systems, waits for a second.
 fn wait_for_signals(id: u32, set: &str, condition: impl Fn(u64) -> bool) {
     if cfg!(not(target_os = "linux")) {
         return std::thread::sleep(Duration::from_secs(1));
@@ -63,8 +63,8 @@ fn signal_saves_the_picture_so_far() {
     }
 }
 
-/// Checks that a second signal ends the program at once. After the first one alone it would write
-/// the picture at the end of the wave, minutes later.
+/// Checks that a second signal ends the program at once. After the first signal alone, the program
+/// would write the picture when the wave (the set of concurrent tracing jobs) ends, minutes later.
 #[test]
 fn second_signal_ends_a_long_wave_at_once() {
     let desk = Desk::new();
@@ -81,7 +81,8 @@ fn second_signal_ends_a_long_wave_at_once() {
     ];
     let child = spawn(&desk, &args);
     signal("INT", child.id());
-    // Two pending signals would be one.
+    // The first signal must be delivered before the second is sent, because two pending SIGINTs
+    // count as one.
     wait_for_signals(child.id(), "ShdPnd:", |pending| pending >> 1 & 1 == 0);
     signal("INT", child.id());
     let run = Run::from(child.wait_with_output().unwrap());

@@ -1,4 +1,5 @@
-//! Files that `zerkalo watch` reads: parts, checkpoints, and files that change, vanish or are damaged.
+//! Files that `zerkalo watch` reads: film files of shards (parts), checkpoints, and files that
+//! change, vanish or are damaged.
 
 use crate::command_line::Desk;
 use crate::command_line::shards::{done, merge, plan, trace, traced};
@@ -71,7 +72,8 @@ fn parts_are_added_as_they_appear() {
     };
     assert_eq!(entry(films.header().unwrap()), entry(merged.header()));
     assert!(entry(merged.header()).unwrap().1.starts_with("0-3 of 3, plan "));
-    // A file that vanishes leaves the sum; the names on the command line may come in any order.
+    // The samples of a file that is removed no longer count. The names on the command line may have
+    // any order.
     fs::remove_file(desk.path("job-2.zk")).unwrap();
     assert!(films.poll());
     let three = open(&desk, &["job-3.zk", "job-0.zk", "job-1.zk"]).unwrap();
@@ -85,7 +87,8 @@ fn unfinished_shards_are_running_and_then_late() {
     let desk = Desk::new();
     plan(&desk, "job", 2);
     trace(&desk, "job", 1);
-    // A part is unfinished if a signal has stopped its command; the format has a word for it.
+    // The film file of a shard is unfinished if a signal has stopped its render. Its PART chunk
+    // says so.
     let whole = FilmReader::open(&desk.path("job-1.zk")).unwrap().header().clone();
     let mut header = whole.clone();
     let text = String::from_utf8(header.chunks[b"PART"].clone()).unwrap();
@@ -108,11 +111,11 @@ fn unfinished_shards_are_running_and_then_late() {
     assert!(row.total.unwrap() > 0);
     let row = at(&films, 200);
     assert!(row.state == WatchedState::Late && row.age.unwrap().as_secs() >= 199, "{row:?}");
-    // A clock that is behind that of the writer.
+    // The clock of the reader is behind that of the writer: no age is negative.
     let early = films.shards(SystemTime::UNIX_EPOCH);
     assert!(early.iter().all(|row| row.age.is_none_or(|age| age.is_zero())));
     assert!(films.film().unwrap().bytes() == film(&desk, "job-0.zk").bytes());
-    // A complete part without its samples is not used.
+    // A film file of a shard is not used if it is marked complete but has no samples.
     header.chunks.insert(*b"PART", text.into_bytes());
     pieces[0] = header.encode();
     pieces.pop();
@@ -149,11 +152,11 @@ fn files_that_do_not_belong_together_are_refused_by_name() {
     fs::write(desk.path("cut.plan"), &plan[..plan.len() / 2]).unwrap();
     assert!(open(&desk, &["cut.plan"]).unwrap_err().contains("cut.plan: it is damaged"));
 
-    // A single checkpoint is watched, and keeps its samples.
+    // A single checkpoint can be watched. The displayed film has its samples.
     let single = open(&desk, &["a.zk"]).unwrap();
     assert!(single.film().unwrap().bytes() == film(&desk, "a.zk").bytes());
     assert_eq!((single.complete_shards(), states(&single).len()), (None, 1));
-    // Later, foreign files are left out.
+    // If a watched file is replaced by a file that does not belong to the plan, it is left out.
     let mut films = open(&desk, &["job.plan"]).unwrap();
     let whole = films.film().unwrap().bytes();
     let own = fs::read(desk.path("job-1.zk")).unwrap();
@@ -186,7 +189,8 @@ fn next_round_is_watched_with_the_merged_film_of_the_first() {
     let films = open(&desk, &["next.plan", "merged.zk"]).unwrap();
     assert_eq!(films.complete_shards(), Some([2, 3]));
     assert_eq!(states(&films)[0], ("2".to_string(), WatchedState::Missing));
-    // Without the base the picture is that of the shard alone.
+    // Without the base (the film that the plan continues) the picture has the samples of the shard
+    // only.
     let alone = open(&desk, &["next.plan"]).unwrap();
     assert!(alone.film().unwrap().bytes() == film(&desk, "next-1.zk").bytes());
 }

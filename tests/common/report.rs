@@ -1,5 +1,5 @@
-//! Cells of the table of extremes in docs/accuracy.md. A test prints its result once it has passed,
-//! and `benches/accuracy.sh extremes` collects the output.
+//! Output for the table of extremes (scenes at which renderers fail) in docs/accuracy.md. A test
+//! prints its result once it has passed, and `benches/accuracy.sh extremes` collects the output.
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 use zerkalo::lanes::SimdFloat;
@@ -15,6 +15,6 @@ pub fn precision<L: SimdFloat>() -> &'static str {
     if L::EPSILON < 1e-10 { "double" } else { "single" }
 }
 
-/// Text of the cell for an extreme that single precision cannot represent. `precision.rs` checks
-/// that `auto` selects double precision for it.
+/// Text of the cell for an extreme that single precision cannot represent. A test in `precision.rs`
+/// checks that `auto` selects double precision for such a scene.
 pub const LEFT_TO_DOUBLE: &str = "left to double";

@@ -30,8 +30,8 @@ pub fn scene(table: &Table, resolver: &AssetResolver) -> Option<Scene> {
 }
 
 /// Returns every key that the field tables define for the tables that `scene` contains, whether the
-/// scene sets it or not. A table in a list or under a name has its own keys. Tables and lists are
-/// included, and so are their members.
+/// scene sets the key or not. Elements of a list and named tables have keys of their own. A table
+/// or list is returned as a key, and so are its members.
 pub fn keys(scene: &Table) -> Vec<Key> {
     let mut out = Vec::new();
     walk(FIELDS, scene, &[], &mut out);

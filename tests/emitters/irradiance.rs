@@ -6,8 +6,8 @@ use glam::DVec3;
 use std::f64::consts::PI;
 use zerkalo::scene::Scene;
 
-/// Relative rounding errors that the comparison allows, in single and double precision. Lights are
-/// lifted off surfaces, and rays start above surfaces.
+/// Allowed relative rounding errors in single and double precision. They arise because lights are
+/// lifted off surfaces and rays start above surfaces.
 const ROUNDING: [f64; 2] = [1e-4, 1e-9];
 
 /// Creates the scene of a camera that looks at a white matt receiver at the origin, lit by a light
@@ -37,8 +37,8 @@ fn case(name: String, scene: Scene, irradiance: f64) -> (String, Scene, f64) {
 fn irradiance_of_a_sphere_light_is_the_closed_form() {
     let mut cases = Vec::new();
     for distance in [1.001, 1.1, 2.0, 10.0, 1000.0] {
-        // Angle between the normal and the centre; at 90 degrees the receiver is half below its
-        // horizon.
+        // Angle between the receiver's normal and the direction to the sphere's centre. At 90
+        // degrees half of the sphere is below the horizon of the receiver.
         for degrees in [0.0, 40.0, 80.0, 90.0, 95.0, 120.0f64] {
             let (sin, cos) = degrees.to_radians().sin_cos();
             let (normal, radius) = (DVec3::new(0.36, 0.48, 0.8), 0.5);
@@ -89,7 +89,7 @@ fn irradiance_of_a_rectangle_light_is_lamberts_formula() {
         (normal + across * 2.0, [2.0, 0.5]),
         (normal * 30.0 + across * 5.0, [1.0, 1.0]),
         (normal * 0.4 + across * 3.0, [4.0, 4.0]),
-        // Half below the horizon.
+        // Half of this light is below the receiver's horizon.
         (across * 0.7, [1.0, 0.6]),
         (normal * 2.0, [1e4, 1e4]),
     ] {
@@ -165,9 +165,9 @@ fn penumbra_of_a_straight_edge_is_the_visible_part_of_the_light() {
     check(&cases, 1 << 15, ROUNDING);
 }
 
-/// Checks that the light of a power of 1 W does not depend on the light's size. On a faraway sphere
-/// it has the irradiance of a point light of 1 / (4 pi) W/sr, and along the normal of a flat light
-/// that of 1 / pi W/sr.
+/// Checks that the irradiance by a light of 1 W does not depend on the light's size. A faraway
+/// sphere acts like a point light of 1 / (4 pi) W/sr. A flat light acts along its normal like a
+/// point light of 1 / pi W/sr.
 #[test]
 fn power_is_independent_of_the_size() {
     let mut cases = Vec::new();

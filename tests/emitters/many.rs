@@ -21,8 +21,8 @@ fn positions(count: usize, numbers: &mut Numbers) -> Vec<DVec3> {
     (0..count).map(position).collect()
 }
 
-/// Creates the scene of a white matt receiver at the origin that faces up, under lights of unit intensity. Every
-/// third light has no falloff.
+/// Creates the scene of a white matt receiver at the origin that faces up, under lights of unit
+/// intensity. Every third light has no falloff.
 fn receiver(lights: &[DVec3]) -> Scene {
     scene(&receiver_text(lights))
 }
@@ -63,8 +63,8 @@ fn irradiance_of_chosen_lights_is_the_sum_over_all_lights() {
     check(&cases, 1 << 15, [1e-4, 1e-9]);
 }
 
-/// Checks that the lights of which paths sample a few share one light group with the right mean. A
-/// spot light beside them has a group of its own.
+/// Checks many lights of which each path samples a few. They share one light group, which has the
+/// right mean. A spot light beside them has a group of its own.
 #[test]
 fn chosen_lights_have_one_light_group() {
     let lights = positions(40, &mut Numbers::new(7));

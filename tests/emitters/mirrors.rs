@@ -43,8 +43,8 @@ fn camera_and_mirror_see_visible_lights_only() {
 }
 
 /// Checks that a rough pane with a cone lobe transmits and reflects the fraction of the lobe's
-/// solid angle that the light covers. Points of the light are sampled: rays alone would find the
-/// smallest lights in a few of a million samples.
+/// solid angle that the light covers. Points of the light must be sampled, because reflected rays
+/// alone would hit the smallest lights in a few of a million samples.
 #[test]
 fn rough_panes_find_small_lights_on_both_sides() {
     let mut cases = Vec::new();

@@ -9,8 +9,8 @@ use std::fs;
 use zerkalo::lanes::{Double, Single};
 use zerkalo::scene::Scene;
 
-/// Relative rounding errors that the comparison allows, in single and double precision. Sampled
-/// points are lifted off their surface, and rays start above theirs.
+/// Allowed relative rounding errors in single and double precision. They arise because sampled
+/// points are lifted off the emitter and rays start above the receiver.
 const ROUNDING: [f64; 2] = [1e-4, 1e-9];
 
 /// Returns the scene of a camera that looks at a receiver at the origin. It has the materials
@@ -50,8 +50,8 @@ fn rectangle(center: DVec3, [width, depth]: [f64; 2]) -> (String, Vec<DVec3>) {
     (text, [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, z)| corner(x, z)).into())
 }
 
-/// Returns the 6 x 6 equal pieces of the rectangle with the given corners. As triangles they are
-/// 72.
+/// Returns the 6 x 6 equal pieces of the rectangle with the given corners, which a mesh divides
+/// into 72 triangles.
 fn pieces(corners: &[DVec3]) -> Vec<Vec<DVec3>> {
     let (u, v) = ((corners[1] - corners[0]) / 6.0, (corners[3] - corners[0]) / 6.0);
     let corner = |i: u32, j: u32| corners[0] + u * f64::from(i) + v * f64::from(j);
@@ -104,17 +104,17 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
             let many = mesh(&format!("pieces-{i}"), &pieces(&corners));
             case(format!("{material} pieces {i}"), DVec3::Y, object(material, &many), expected);
         }
-        // The same corners in the opposite order face away.
+        // A mesh with the same corners in the opposite order faces away from the receiver.
         let away: Vec<DVec3> = corners.iter().rev().copied().collect();
         let away = mesh(&format!("away-{i}"), &[away]);
         case(format!("back of mesh {i}"), DVec3::Y, object("lamp", &away), expected);
         case(format!("black back of mesh {i}"), DVec3::Y, object("front", &away), 0.0);
-        // A mirrored mesh keeps its front.
+        // The front of a mesh stays the front if a transform mirrors the mesh.
         let image = corners.iter().rev().map(|p| DVec3::new(-p.x, p.y, p.z)).collect();
         let mirrored = object("front", &mesh(&format!("mirrored-{i}"), &[image]));
         let mirrored = mirrored + "transform = [{ scale = [-1.0, 1.0, 1.0] }]\n";
         case(format!("mirrored mesh {i}"), DVec3::Y, mirrored, expected);
-        // A turned and stretched rectangle: a parallelogram.
+        // A rectangle that is rotated and then stretched becomes a parallelogram.
         let stretched = DVec3::new(2.0, 1.0, 1.0);
         let turn = DMat3::from_rotation_y(30f64.to_radians());
         let sheared: Vec<DVec3> = corners.iter().map(|p| stretched * (turn * *p)).collect();
@@ -129,7 +129,7 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
             case(format!("{material} sphere {i}"), up, object(material, &sphere), expected);
         }
     }
-    // A box shows one face, two, or three.
+    // The receiver sees one, two or three faces of the box.
     for center in [DVec3::Y, DVec3::new(1.5, 1.0, 0.0), DVec3::new(1.5, 0.9, 1.4)] {
         let half = DVec3::new(0.25, 0.2, 0.3);
         let mut expected = 0.0;
@@ -187,7 +187,7 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     let seen = forms::polygon(&corners, DVec3::Y) - forms::polygon(&covered, DVec3::Y);
     let partly = receiver(DVec3::Y, MATT, &(object("black", small) + &lamp));
     check(&[("a part of the face".to_string(), partly, seen / PI)], 1 << 14, ROUNDING);
-    // Shadow rays end at glass, also where it stands on the lamp.
+    // Shadow rays end at glass, even if the glass stands on the lamp.
     let glass = "[materials.glass]\ncolor = [0.0, 0.0, 0.0]\ntransmission = 1.0\n".to_string();
     let block = "shape.box = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0] }";
     let inside = [
@@ -200,7 +200,8 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
         (format!("glass on {shape}"), receiver(DVec3::NEG_Y, MATT, &rest), 0.0)
     });
     check(&inside, 4096, ROUNDING);
-    // In the plane of a turned square, within its bounding box, and beside it.
+    // The lamp's lower face is in the plane of a rotated square. It is within the square's bounding
+    // box, but beside the square.
     let beside =
         object("lamp", "shape.box = { center = [1.8, 1.05, 0.6], size = [0.1, 0.1, 0.1] }");
     let square =
@@ -269,9 +270,9 @@ fn reflection_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     }
 }
 
-/// Checks that white objects inside of a closed surface that emits a radiance of 1 have the
-/// radiance 1: by sampled points, by rays, and by both. Surfaces from which no points are sampled
-/// need a diffuse bounce.
+/// Checks that white objects inside of a closed surface of radiance 1 have the radiance 1. The
+/// emission is found by sampled points, by rays, or by both. Objects need a diffuse bounce if no
+/// points of the surface are sampled.
 #[test]
 fn furnace_of_emissive_walls_shows_white() {
     let walls = [
@@ -314,13 +315,13 @@ fn furnace_of_emissive_walls_shows_white() {
 /// receiver.
 #[test]
 fn inside_of_an_emissive_sphere_has_shadows() {
-    // A black disk-like box between the receiver and half of the wall.
+    // A black square above the receiver, larger than the sphere.
     let cover =
         object("black", "shape.platform = { center = [0.0, 0.5, 0.0], size = [100.0, 100.0] }");
     let wall = object("lamp", "shape.sphere = { center = [0.0, 0.0, 0.0], radius = 2.0 }");
     let scene = receiver(DVec3::Y, MATT, &(cover + &wall));
-    // The part of the wall below the cover: all directions with an elevation below that of the circle in
-    // which the cover cuts the sphere.
+    // The receiver sees the wall below the cover. This is a band of directions from the horizon up
+    // to the elevation of the circle in which the cover cuts the sphere.
     let cos2 = 0.25 / 4.0;
     check(&[("band".to_string(), scene, cos2)], 1 << 15, [1e-3, 1e-6]);
 }

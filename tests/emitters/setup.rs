@@ -16,8 +16,8 @@ pub fn scene(text: &str) -> Scene {
     Scene::parse(text, "test").unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Passes the red radiance of each light group in `count` independent samples of the pixel (0, 0) to `visit`. The lights
-/// have unit intensity, except those in a shared group.
+/// Passes the red radiance of each light group in `count` independent samples of the pixel (0, 0)
+/// to `visit`. The lights have unit intensity, except those in a shared group.
 pub fn samples<L: SimdFloat>(scene: &Scene, count: u32, seed: u64, mut visit: impl FnMut(&[f64])) {
     let world = World::<L>::new(scene);
     let settings = SampleSettings { seed, kind: SamplerKind::Random };
@@ -50,8 +50,8 @@ pub fn mean_and_error(sum: f64, squares: f64, count: u32) -> (f64, f64) {
     (mean, ((squares / n - mean * mean).max(0.0) / (n - 1.0)).sqrt())
 }
 
-/// Returns the mean and its standard error of the red radiance of pixel (0, 0), over all light
-/// groups together; see [`samples`].
+/// Returns the mean red radiance of pixel (0, 0) and the standard error of the mean. The radiance
+/// is the sum over all light groups; see [`samples`].
 pub fn radiance<L: SimdFloat>(scene: &Scene, count: u32, seed: u64) -> (f64, f64) {
     let (mut sum, mut squares) = (0.0, 0.0);
     samples::<L>(scene, count, seed, |groups| {
