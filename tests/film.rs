@@ -100,8 +100,8 @@ fn threads_do_not_change_the_bytes() {
     }
 }
 
-/// Adds the first sample of replicate A to each pixel, by lattices of pixels with the steps
-/// `steps`.
+/// Adds the first sample of replicate A to each pixel. The pixels are visited by lattices, from
+/// coarse to fine; `steps` are the distances between pixels of each lattice.
 fn trace_lattices(film: &mut Film, steps: &[usize]) {
     let all = all_tiles(film);
     let mut before = 0;
@@ -224,7 +224,7 @@ fn extreme_28_saturation_is_flagged() {
     tile.add(0, 0, &[(7e8 * scale) as i64, 0, 0]);
     assert_eq!((tile.saturated_pixels(), film.saturated_pixels()), (1, 1));
     assert_eq!(film.pixel(0, 0, &white)[0], i64::MAX as f64 / scale / 50.0);
-    // The flag survives addition to a film, in either order.
+    // The flag of a saturated pixel survives if the film is added to another film, in either order.
     let mut other = film_of(1, 1, &[scale]);
     let tile = other.slots(&[0]).remove(0).prepare();
     tile.add(0, 0, &[1, 0, 0]);

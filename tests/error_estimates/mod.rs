@@ -30,8 +30,8 @@ const EDGE_X: f64 = 0.15;
 const SHEET: [f64; 3] = [0.9, 0.55, 0.2];
 const SKY: [f64; 3] = [0.08, 0.2, 0.45];
 
-/// Returns the scene of a glossy mirror in the plane z = 0 that fills the picture. Blurred, it
-/// reflects the edge of a bright sheet behind the eye, in front of a sky.
+/// Returns the scene of a glossy mirror in the plane z = 0 that fills the picture. It shows a
+/// blurred reflection of the edge of a bright sheet behind the eye, in front of a sky.
 fn closed_form(filter: Filter) -> Scene {
     let [width, height] = SIZE;
     let (s, c) = TILT.to_radians().sin_cos();
@@ -98,8 +98,8 @@ fn cone_share(theta: f64, delta: f64) -> f64 {
     }
 }
 
-/// Returns the share of the mirror's lobe that hits the bright sheet, at the point (x, y) of the
-/// picture in pixels.
+/// Returns the share of the mirror's lobe that hits the bright sheet. The lobe is that of the
+/// camera ray through the point (x, y) of the picture, in pixels.
 fn sheet_share(x: f64, y: f64) -> f64 {
     let eye = [0.1, 0.05, 1.5];
     let w = unit([-0.1, -0.05, -1.5]);
@@ -154,8 +154,8 @@ fn truth(filter: Filter) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// Checks that a render of many samples agrees with the closed form, and that all shares from none
-/// to all occur in the picture.
+/// Checks that a render of many samples agrees with the closed form. Also checks that the picture
+/// contains pixels with every share of the sheet in the lobe, from none to all.
 #[test]
 fn closed_form_describes_the_scene() {
     for filter in [Filter::Point, Filter::Box] {
@@ -174,9 +174,9 @@ fn closed_form_describes_the_scene() {
     }
 }
 
-/// Returns, for each tile, the number of pixels whose lobe contains the edge of the bright sheet.
-/// Lobes of which the edge cuts off less than a thousandth do not count, because they are hardly
-/// distinguishable from uncut ones.
+/// Returns, for each tile, the number of pixels whose lobe contains the edge of the bright sheet. A
+/// lobe does not count if the edge cuts off less than a thousandth of it, because it hardly differs
+/// from an uncut one.
 fn blurred_pixels(truth: &[[f64; 3]]) -> Vec<usize> {
     let columns = SIZE[0] / TILE;
     let mut tiles = vec![0; columns * SIZE[1] / TILE];
@@ -273,9 +273,9 @@ fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
         assert!((0.9..=1.1).contains(&ratio), "{case}: true/estimated {name} {ratio}");
     }
 
-    // Each tile's estimates against its true error, in the mean over the seeds. A tile whose error is
-    // concentrated in a few pixels has few degrees of freedom and an uncertain estimate: the limit of 20 %
-    // applies to tiles with enough blurred pixels.
+    // Spread over the seeds of each tile's estimated error, relative to the tile's true error. Only
+    // tiles with many blurred pixels are tested. If the error is concentrated in a few pixels, the
+    // estimate has few degrees of freedom and spreads by more than 20 %.
     let blurred = blurred_pixels(&truth(filter));
     let mut tested = 0;
     for (tile, blurred) in blurred.into_iter().enumerate() {
@@ -331,9 +331,10 @@ fn extreme_30_noise_target_is_reached() {
     }
 }
 
-/// Checks that `--noise 0.5` gives an RMSE of at most 0.55 8-bit levels, unrounded, against a
-/// reference of another seed. The estimate of a picture of a few dozen tiles is uncertain by some 6
-/// % (96 x 72 pixels, 24 seeds: 0.40 to 0.56 levels); this picture has 300 tiles.
+/// Checks that `--noise 0.5` gives an RMSE of at most 0.55 8-bit levels before rounding to
+/// integers, against a reference of another seed. The picture has 300 tiles, because the estimate
+/// is uncertain by some 6 % with a few dozen tiles. With 96 x 72 pixels, 24 seeds gave 0.40 to 0.56
+/// levels.
 #[test]
 fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
     let scene = sized(shipped("mirror-room.toml"), [320, 240]);
@@ -364,8 +365,8 @@ fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
     }
 }
 
-/// Checks that a render of the physical mirror room to a noise target in linear radiance has this
-/// true RMSE, against a reference of another seed.
+/// Renders the physical mirror room to a noise target in linear radiance. Checks that the true
+/// RMSE, against a reference of another seed, exceeds the target by at most 5 %.
 fn assert_linear_target_is_met(size: [u32; 2], seeds: u64) {
     let scene = sized(shipped("mirror-room-physical.toml"), size);
     let pool = pool(2);
@@ -399,8 +400,8 @@ fn linear_target_is_met() {
     assert_linear_target_is_met([96, 72], 4);
 }
 
-/// Checks a linear noise target on a picture of 640x480 pixels, the size of the measurements of
-/// speed.
+/// Checks a linear noise target on a picture of 640x480 pixels, the size at which speed is
+/// measured.
 #[test]
 #[ignore = "half a minute: cargo test --test engine error_estimates:: -- --ignored --nocapture"]
 fn linear_target_is_met_at_full_size() {

@@ -1,5 +1,5 @@
-//! Cost of adaptive pictures: their number of rays, divided by that of uniform pictures with the
-//! same true error.
+//! Cost of adaptive pictures: the number of their rays, divided by the number of rays of uniform
+//! pictures with the same true error.
 
 use crate::error_estimates::scenes::{KINDS, Sample, scene};
 use crate::error_estimates::survey::{LIMIT_SPP, Reference, run, target_of};
@@ -36,14 +36,15 @@ impl Point {
 /// error.
 pub struct RayRatio {
     pub ratio: f64,
-    /// Standard error of the logarithm of the ratio, computed by leaving out each seed in turn; 0
-    /// for one seed.
+    /// Standard error of the logarithm of the ratio, by the jackknife (each seed is left out in
+    /// turn); 0 for one seed.
     pub error: f64,
 }
 
 /// Returns the number of rays of `adaptive` pictures, divided by that of uniform pictures with the
-/// same true error. `adaptive` has one picture for each of `seeds`. Each seed has a uniform picture
-/// whose sample count doubles until it has at least as many rays as the mean adaptive picture.
+/// same true error. `adaptive` has one picture for each of `seeds`. The sample count of the uniform
+/// pictures, one for each seed, doubles until the first of them has at least as many rays as the
+/// mean adaptive picture.
 pub fn ray_ratio(
     sample: &Sample,
     seeds: &[u64],
@@ -108,7 +109,8 @@ fn rays_at(curve: &[Point], square: f64) -> f64 {
     let next = curve.iter().position(|point| point.square <= square).unwrap_or(curve.len() - 1);
     let [before, after] = [next.max(1) - 1, next.max(1)].map(|i| curve[i]);
     let [from, to, wanted] = [before.square, after.square, square].map(|s| s.max(1e-12).ln());
-    // The power of independent samples is 1, that of well distributed ones up to 3. Others are chance.
+    // The squared error falls with the power 1 of the rays for independent samples, and with up to
+    // the power 3 for well distributed ones. Powers outside of 0.5 to 4 are chance.
     let fall = ((from - to) / (after.rays / before.rays).ln()).clamp(0.5, 4.0);
     after.rays * ((to - wanted) / fall).exp()
 }
@@ -161,7 +163,8 @@ fn survey_of_rays() {
             square.max(0.0).sqrt(),
             reference.own
         );
-        // A ratio that chance explains is measured again with more seeds.
+        // The ratio is lowered by three standard errors. A ratio that chance explains does not
+        // fail; it can be measured again with more seeds.
         highest = highest.max(ratio * (-3.0 * error).exp());
     }
     assert!(highest <= 1.5, "{highest} times the rays of uniform pictures");

@@ -1,5 +1,5 @@
-//! Random scenes for the survey of error estimates. Sparse pictures have noise in few pixels, dense
-//! ones everywhere.
+//! Random scenes for the survey of error estimates. Sparse pictures have noise in a few pixels,
+//! dense pictures in all of them.
 
 use crate::common::Numbers;
 use crate::error_estimates::coverage::Balls;
@@ -93,7 +93,8 @@ fn head(size: [u32; 2], background: &str, ambient: f64) -> String {
     )
 }
 
-/// Returns unshaded balls: about as large as a pixel, or smaller and brighter than white.
+/// Returns balls of constant radiance. They are about as large as a pixel, or they are smaller and
+/// brighter than white.
 fn balls(n: &mut Numbers, size: [u32; 2], count: u32, radiance: f64) -> Balls {
     let pixel = 2.0 * HALF_HEIGHT / f64::from(size[1]);
     let across = HALF_HEIGHT * f64::from(size[0]) / f64::from(size[1]);

@@ -1,5 +1,5 @@
-//! Survey over random sparse and dense scenes: reported against true errors, and rays of adaptive
-//! pictures against those of uniform pictures with the same true error.
+//! Survey over random sparse and dense scenes. Compares the reported with the true error, and the
+//! rays of adaptive pictures with those of uniform pictures of the same true error.
 //!
 //! The short form runs with all tests. The long form prints a table of 200 scenes: `cargo test
 //! --test engine error_estimates::survey -- --ignored --nocapture`.
@@ -15,8 +15,8 @@ use zerkalo::world::Precision;
 /// Number of samples per pixel at which the survey ends a picture that has not reached its noise
 /// target.
 pub const LIMIT_SPP: u32 = 1024;
-/// Number of effective pixels (pixels that carry the noise) of a scene's pictures that suffices.
-/// The ratio of true to estimated error is then known to 1 / sqrt(1600), that is 2.5 %.
+/// Sufficient number of effective pixels (pixels that carry the noise), summed over the pictures of
+/// a scene. The ratio of true to reported error is then known to 1 / sqrt(1600), that is 2.5 %.
 const ENOUGH: f64 = 1600.0;
 
 fn codes(radiance: &[[f64; 3]]) -> Vec<f64> {
@@ -98,9 +98,9 @@ pub fn target_of(number: u64) -> f64 {
 }
 
 /// Compares the reported and the true error of adaptive pictures of a scene. If k pixels carry the
-/// noise, the error of one picture scatters by 1 / sqrt(2 k) of its value, and so does any estimate
-/// of it. Seeds are therefore added until their pictures together have [`ENOUGH`] such pixels, but
-/// at most `seeds`. The first eight seeds are compared with uniform pictures.
+/// noise of a picture, its true error scatters by the share 1 / sqrt(2 k), and so does any estimate
+/// of the error. Seeds are therefore added until their pictures together have [`ENOUGH`] such
+/// pixels, but at most `seeds`. The first eight seeds are compared with uniform pictures.
 fn examine(number: u64, reference_count: u32, seeds: u64) -> Outcome {
     let sample = scene(number);
     let reference = Reference::new(&sample, reference_count);
@@ -138,9 +138,9 @@ fn examine(number: u64, reference_count: u32, seeds: u64) -> Outcome {
     Outcome { name: sample.name, ratio, pixels, rays }
 }
 
-/// Checks that the true error agrees with the reported one within their uncertainty. Both are means
-/// of k squares, uncertain by 1 / sqrt(2 k). Also checks that adaptive sampling takes at most 1.5
-/// times the rays of uniform sampling.
+/// Checks that the true error agrees with the reported one within their uncertainty. Each error is
+/// the root of a mean of k squares, for k effective pixels, and uncertain by the share 1 / sqrt(2
+/// k). Also checks that adaptive sampling takes at most 1.5 times the rays of uniform sampling.
 fn assert_honest(outcomes: &[Outcome]) {
     let mut scores = Vec::new();
     for Outcome { name, ratio, pixels, rays, .. } in outcomes.iter().filter(|o| o.pixels >= 16.0) {
@@ -157,7 +157,7 @@ fn assert_honest(outcomes: &[Outcome]) {
     assert!(mean.abs() < 1.0, "the mean of {count} scores is {mean}");
 }
 
-/// Checks one scene of every kind.
+/// Checks 13 scenes of four kinds that are cheap to render.
 #[test]
 fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     let cheap = (0..40).filter(|number| number % 10 <= 5 || *number == 8 || *number == 9);
@@ -165,18 +165,18 @@ fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     assert_honest(&outcomes);
 }
 
-/// Checks pictures of stars, whose true error once was 1.55 times the reported one. Repeated
-/// allocation rounds must not give the fewest samples to tiles whose validation estimate is low by
-/// chance.
+/// Checks pictures of stars, whose true error once was 1.55 times the reported one. A tile whose
+/// validation estimate (the reported one) is low by chance must not therefore get the fewest
+/// samples in repeated allocation rounds.
 #[test]
 fn reported_error_of_stars_is_not_selected() {
     let Outcome { ratio, .. } = examine(62, 0, 24);
     assert!((0.9..1.3).contains(&ratio), "true/reported {ratio}");
 }
 
-/// Checks uniform pictures of single balls, whose true error once was 0.77 to 0.8 of the reported
-/// one. The reported error must be that of all pixels, not the larger one of two estimates. The
-/// ratio of each ball is uncertain by 6 %.
+/// Checks adaptive pictures of single balls, whose true error once was 0.77 to 0.8 of the reported
+/// one. The reported error must be that of all pixels, not the larger one of two estimates from
+/// half of the pixels each. The ratio of each ball is uncertain by 6 %.
 #[test]
 fn reported_error_of_few_pixels_is_that_of_all() {
     let ratios = [60, 130, 180].map(|number| examine(number, 0, 96).ratio);
@@ -203,8 +203,9 @@ fn survey_of_200_scenes() {
     assert!(100 * inside >= 95 * outcomes.len() && extreme <= 1.3 && highest <= 1.5);
 }
 
-/// Checks that the picture of a white ball as large as a pixel ends with few samples. Its tile is
-/// noisy only in pixels of the validation estimate.
+/// Checks a picture of a white ball as large as a pixel: adaptive sampling takes at most 1.5 times
+/// the rays of uniform sampling. The allocation estimate, which is made from half of the pixels,
+/// sees no noise in the ball's tile; only the other pixels are noisy.
 #[test]
 fn single_ball_ends_with_few_samples() {
     let text = "

@@ -5,8 +5,9 @@ use crate::common::report::report;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Table of the thirty numbered extremes: subject, criterion, name of the test without its prefix,
-/// and file. Further tests may have the same number.
+/// Table of the thirty numbered extremes. Each has a subject, a criterion, the name of a test
+/// without the prefix `extreme_NN_`, and the file of the test. Further tests may have the same
+/// number.
 const EXTREMES: [(&str, &str, &str, &str); 30] = [
     (
         "a unit sphere from 1e2 .. 1e9 away",

@@ -50,7 +50,7 @@ fn to_toml(height: f64, [x, y, z]: [f64; 3], object: &str) -> String {
     )
 }
 
-/// Checks the earth with a lamp 6 units above the ground, and lamps close to walls inside the
+/// Checks a lamp 6 units above a sphere as large as the earth, and lamps close to walls inside the
 /// scene's bounding box.
 #[test]
 fn surface_near_lamp_is_lit_at_every_scene_extent() {
@@ -141,7 +141,7 @@ fn floor(material: &str, intensity: f64) -> Scene {
     ))
 }
 
-/// Checks that a dark colour in light of the reciprocal intensity is white.
+/// Checks that a colour c in light of the intensity 1 / c is white.
 #[test]
 fn dim_colour_in_bright_light_is_white() {
     for colour in [1e-15, 1e-9, 1e-6, 0.002, 1.0, 50.0, 1e6] {
@@ -167,8 +167,8 @@ fn bright_colour_does_not_saturate_film() {
     assert!((mean(&rendering) - 1.0).abs() < 1e-6, "{}", mean(&rendering));
 }
 
-/// Checks two facing mirrors that amplify light in front of a white background. They show white,
-/// and finite radiance.
+/// Checks two facing mirrors that amplify light in front of a bright background. The radiance of
+/// every pixel is finite and above 1, which is displayed as white.
 #[test]
 fn amplifying_mirrors_give_finite_white() {
     let text = |k: f64, depth: u32| {

@@ -106,12 +106,13 @@ fn check_frames<L: SimdFloat>(bound: f64) {
     let mut numbers = Numbers::new(18);
     let mut worst: f64 = 0.0;
     for round in 0..1_000_000 / L::WIDTH {
-        // Normals in single precision are rounded again, as far from unit length as it allows.
+        // Normals in single precision are rounded a second time. Their length then differs from 1
+        // by as much as rounding to single precision can cause.
         let mut normals = [[0.0; 3]; 16];
         for n in &mut normals {
             let around = match round % 4 {
                 0 => numbers.direction(),
-                // Normals near the poles, down to differences that round away.
+                // Normals near the poles, some so near that their tilt rounds to zero.
                 _ => {
                     let tilt = 10f64.powf(numbers.between(-17.0, -3.0));
                     let pole = if numbers.bits() & 1 == 0 { 1.0 } else { -1.0 };

@@ -14,8 +14,8 @@ use zerkalo::primitive::{
 };
 use zerkalo::shape::{Cuboid, Prism, Pyramid, ShapeDesc};
 
-/// Returns the area of one face of a polyhedron, from the corners on it, sorted around their
-/// middle.
+/// Returns the area of one face of a polyhedron. The corners on the face are sorted around their
+/// mean.
 fn face_area(face: &HalfSpace, corners: &[DVec3], size: f64) -> f64 {
     let near = |c: &&DVec3| (face.normal.dot(**c) - face.offset).abs() < 1e-12 * size;
     let mut on: Vec<DVec3> = corners.iter().filter(near).copied().collect();
@@ -141,8 +141,8 @@ impl Tally {
         }
     }
 
-    /// Checks the share of hits and the mean chord. Returns the larger deviation in standard
-    /// deviations.
+    /// Checks the share of lines that hit and the mean chord. Returns the larger of both deviations
+    /// in units of its standard deviation.
     fn check(&self, name: &str, share: f64, mean_chord: f64) -> f64 {
         let found = self.hits / self.lines;
         let sigma = (share * (1.0 - share) / self.lines).sqrt();
@@ -193,7 +193,8 @@ fn through_box(numbers: &mut Numbers, center: DVec3, half: DVec3) -> Line {
 }
 
 const LINES: usize = 62 << 14;
-/// Number of lines traced together: few, because the allocator returns large blocks to the system.
+/// Number of lines traced together. It is small because the allocator returns large blocks to the
+/// system after each use.
 const BLOCK: usize = 1 << 9;
 
 fn tally<L: SimdFloat>(
@@ -237,8 +238,8 @@ fn extreme_07_cauchy() {
         });
         worst[1] = worst[1].max(single.check(name, share, chord));
         inconsistent += single.inconsistent;
-        // A line that passes an edge within rounding may hit from one end only, or have its point
-        // on the next face: about a share of the rounding.
+        // A line that passes an edge within rounding may hit from one end only, or have its hit
+        // point on the adjacent face. The share of such lines is about the rounding error.
         let limit = 100.0 * f64::from(f32::EPSILON) * single.lines;
         assert!(
             single.inconsistent as f64 <= limit,
@@ -303,7 +304,7 @@ fn infinite_plane_is_hit_by_one_half_of_every_line() {
     assert_eq!(bounded + planes, every_kind().len(), "every kind has a law");
 }
 
-/// Returns boxes, prisms and pyramids, some of whose sides are a millionth of the others.
+/// Returns boxes, prisms and pyramids, some of whose edges are a million times as short as others.
 fn slivers() -> Vec<(&'static str, Form)> {
     let thin = 1e-6;
     let corner = [-0.5, -0.5, 0.5];
@@ -335,8 +336,8 @@ fn extreme_13_slivers() {
             through_box(n, 0.5 * (low + high), half)
         });
         worst = worst.max(found.check(name, surface / outer, 4.0 * volume / surface));
-        // Parity. Coordinates about 1 are rounded to 1e-16 times the distance of 4: 1e-9 of the
-        // thin side.
+        // All lines enter and leave consistently. Hit points are rounded by 1e-16 times the
+        // distance of 4 units, which is about 1e-9 of the thin side.
         assert_eq!(
             found.inconsistent, 0,
             "{name}: {} of {} lines",

@@ -14,8 +14,9 @@ fn nudged(x: f64, units: i32, epsilon: f64) -> f64 {
     x * (1.0 + f64::from(units) * epsilon)
 }
 
-/// Checks a box with a hole from its top. The top of the shape that cuts the hole is `units`
-/// roundings from the top of the box. No ray from above hits a surface in the opening.
+/// Checks a box with a hole from its top. The top of the shape that cuts the hole is `units` times
+/// the rounding error above or below the top of the box. No ray from above hits a surface in the
+/// opening.
 fn check_flush<L: SimdFloat>(units: i32, rays: usize) {
     let top = nudged(1.0, units, L::EPSILON);
     let cutter = block([0.0, (top + 0.3) / 2.0, 0.0], [1.0, top - 0.3, 1.0]);
@@ -42,7 +43,7 @@ fn check_flush<L: SimdFloat>(units: i32, rays: usize) {
             && hit.point.z.abs() < 0.5 - unit;
         assert!(!in_opening, "skin: {}", context());
     }
-    // Rays from the hole upwards leave it unblocked.
+    // Rays that start in the hole and point upwards meet no surface in the opening.
     let up: Vec<Line> =
         lines.iter().map(|(o, d)| (*o + *d * 0.45, -*d)).filter(|l| l.0.y > 0.31).collect();
     let leaves_opening = |l: &Line| {
@@ -118,8 +119,8 @@ fn extreme_10_touching_parts_have_no_crack() {
     report(10, "both", "0 cracks");
 }
 
-/// Checks that coincident faces of two materials show the part listed first, not a mixture by
-/// rounding.
+/// Checks that coincident faces of two materials show the part listed first. Rounding must not mix
+/// the materials.
 #[test]
 fn coincident_faces_show_the_first_part() {
     let parts =
@@ -165,8 +166,9 @@ fn lamp_in_hollow_ball_lights_only_its_inside() {
         assert!(closed.radiance(&inward).iter().all(|l| l[0] > 0.0), "{precision:?}");
         assert!(closed.radiance(&down).iter().all(|l| l[0] == 0.0), "{precision:?}");
         let open = Traced::new(&room(window), precision);
-        // The window's lower rim is at y = -0.954, 0.3 from the axis. Light from the lamp at (0.1,
-        // 0, 0.1) falls into a disc around the lamp's image through it.
+        // The window is a hole along the y axis. Its outer rim is at y = -0.954 and 0.3 from the
+        // axis. Light of the lamp at (0.1, 0, 0.1) that passes both rims falls into a disc on the
+        // floor.
         for (line, light) in down.iter().zip(open.radiance(&down)) {
             // The segment from the lamp to the floor point crosses the planes of both rims.
             let floor_point = DVec3::new(line.0.x, -3.0, line.0.z);

@@ -188,13 +188,13 @@ fn extreme_08_parity() {
                 }
                 let t = gap[0] + numbers.between(0.01, 0.99) * (gap[1] - gap[0]);
                 let inside = tree_contains(&tree, &parts, line.0 + line.1 * t);
-                // A random point lies in a sliver that the tie tolerance hides as rarely as the
-                // sliver is thin.
+                // The tie tolerance hides very thin slivers of the solid. It is very improbable
+                // that a random point lies in one.
                 assert_eq!(inside, n % 2 == 1, "{name}: {line:?} at {t} of {ends:?}");
             }
         }
-        // Rays from inside, cavities and outside: the side of the first surface hit decides where
-        // the origin is.
+        // Rays that start inside of the solid, in its cavities or outside of it. If the first hit
+        // is on the inner side of a surface, the origin is inside.
         let starts: Vec<Line> =
             (0..5_000).map(|_| (numbers.in_cube(1.5), numbers.direction())).collect();
         for (line, hit) in starts.iter().zip(closest(&double, &starts)) {
@@ -207,7 +207,8 @@ fn extreme_08_parity() {
         }
     }
     assert!(seen > 150_000, "{seen} surfaces");
-    // Single precision loses parts thinner than 2e-5, which a line here hits as rarely.
+    // Single precision loses parts of the solid that are thinner than 2e-5. About the share 2e-5 of
+    // the lines here hits such a part.
     assert!(
         odd * 10_000 <= line_count,
         "single precision: {odd} of {line_count} lines out of turn"
@@ -222,8 +223,9 @@ fn alternates(line: &Line, hits: &[LineHit]) -> bool {
     hits.len().is_multiple_of(2) && hits.iter().enumerate().all(right_side)
 }
 
-/// Returns the number of lines on which the surfaces of two forms differ in single precision: in
-/// number, or in distance by more than 1e-5 of the distance divided by the cosine.
+/// Returns the number of lines on which the surfaces of two forms differ in single precision. They
+/// differ if their numbers of hits are unequal, or if distances t differ by more than 1e-5 t
+/// divided by the cosine.
 fn differing(a: &Form, b: &Form, lines: &[Line]) -> usize {
     let (a, b) = (geometry::<Single>(a), geometry::<Single>(b));
     let apart = |line: &Line, a: &LineHit, b: &LineHit| {
@@ -237,7 +239,8 @@ fn differing(a: &Form, b: &Form, lines: &[Line]) -> usize {
 }
 
 /// Checks that two forms have the same surfaces along all lines, to 1e-12 of the distance. Lines
-/// with a grazing hit are left out, because the tie tolerance is wide there.
+/// with a grazing hit are left out. The tie tolerance, within which surfaces count as coincident,
+/// is wide there.
 fn same_surfaces(name: &str, a: &Form, b: &Form, lines: &[Line]) {
     let (a, b) = (geometry::<Double>(a), geometry::<Double>(b));
     for ((line, a), b) in lines.iter().zip(surfaces(&a, lines)).zip(surfaces(&b, lines)) {

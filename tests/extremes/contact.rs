@@ -1,4 +1,5 @@
-//! Transparent objects in contact with others: the picture is the limit of a vanishing gap.
+//! Transparent objects in contact with others. The picture must be the limit of pictures with a gap
+//! between the objects as the gap vanishes.
 
 use crate::common::Numbers;
 use crate::common::rays::{Line, Traced};
@@ -146,7 +147,8 @@ impl Setting<'_> {
     /// Checks the contact of both shapes by rays from above and from below.
     fn check(&self, precision: Precision, count: usize) {
         let both_flat = !is_solid(self.upper) && !is_solid(self.lower);
-        // In front is the transparent one of two flat shapes in one plane, or the one listed last.
+        // Of two flat shapes in one plane, a transparent one is in front of an opaque one. If both
+        // are transparent, the one listed last is in front.
         let front_is_lower = !["matte", "mirror"].contains(&self.materials.1);
         for above in [true, false] {
             let gap = if both_flat && above == front_is_lower { -GAP } else { GAP };
@@ -210,7 +212,8 @@ fn transformed_contact_is_the_limit_of_a_gap() {
     let mut numbers = Numbers::new(9);
     for scale in [1e-4, 1.0, 1e4] {
         for far in [0.0, 1.0, 1e5] {
-            // Decimals in the scene file are rounded to 1e-16 of the offset.
+            // Numbers in the scene file are rounded to 1e-16 of the offset, which is too coarse
+            // here.
             if far == 1e5 && scale < 1.0 {
                 continue;
             }
@@ -236,8 +239,9 @@ fn transformed_contact_is_the_limit_of_a_gap() {
     }
 }
 
-/// Checks solids on the same side of a common face. A transparent solid is outside of an opaque
-/// one, and the last one listed is outside of other transparent ones.
+/// Checks nested solids with a common face that bounds both on the same side. A transparent solid
+/// counts as outside of an opaque one. Of transparent solids, the last one listed counts as
+/// outside.
 #[test]
 fn common_faces_of_nested_solids_have_an_order() {
     let folder = meshes();
@@ -283,8 +287,8 @@ fn diffuse_bounces_in_contact_are_the_limit_of_a_gap() {
             let average = differences.iter().sum::<f64>() / 8.0;
             let squares: f64 = differences.iter().map(|d| (d - average).powi(2)).sum();
             let error = (squares / 56.0).sqrt();
-            // Of 7 degrees of freedom, t exceeds 8 with a probability of 1e-4. The gap itself moves
-            // edges by about its width.
+            // With 7 degrees of freedom, Student's t exceeds 8 with a probability of 1e-4. The gap
+            // itself moves edges by about its width.
             assert!(
                 average.abs() < 8.0 * error + 10.0 * GAP,
                 "glass on {floor}, {precision:?}: {average} +- {error} brighter in contact"

@@ -65,7 +65,7 @@ fn check_rays_from_inside<L: SimdFloat>(
     for (line, hit) in lines.iter().zip(&hits) {
         let hit = hit.unwrap_or_else(|| panic!("{name}, {}: lost {line:?}", L::NAME));
         assert!(hit.normal.dot(line.1) > 0.0, "{name}, {}: {line:?} {hit:?}", L::NAME);
-        // Rays past the exit hit nothing; reversed, they hit the exit first.
+        // Rays that start behind the exit hit nothing. Reversed rays from there hit the exit first.
         onward.push((line.0 + line.1 * (hit.t + 1e-3 * radius), line.1));
     }
     for (line, hit) in onward.iter().zip(closest(geometry, &onward)) {
@@ -78,7 +78,7 @@ fn check_rays_from_inside<L: SimdFloat>(
         let (Some(first), Some(exit)) = (first, exit) else {
             panic!("{name}, {}: lost {line:?}", L::NAME)
         };
-        // The hit point moves along the surface by rounding over the cosine.
+        // The hit point moves along the surface by the rounding error divided by the cosine.
         let rounding = 64.0 * L::EPSILON * (radius + line.0.length());
         let apart = (first.point - exit.point).length();
         let grazing = exit.normal.dot(line.1).abs();
@@ -100,8 +100,8 @@ fn extreme_04_camera_inside() {
 }
 
 /// Returns the distances at which a line enters and leaves the closed box from -1 to 1. Returns
-/// `None` if it misses. Distances are fractions `(numerator, denominator)` of the length of `d`
-/// with a positive denominator, in exact integers scaled by `UNIT`.
+/// `None` if it misses. Coordinates are exact integers, scaled by `UNIT`. A distance in lengths of
+/// `d` is a fraction `(numerator, denominator)` with a positive denominator.
 fn slabs(origin: [i64; 3], d: [i64; 3]) -> Option<[(i64, i64); 2]> {
     let less = |a: (i64, i64), b: (i64, i64)| a.0 * b.1 < b.0 * a.1;
     let mut ends: Option<[(i64, i64); 2]> = None;
@@ -166,15 +166,15 @@ fn check_lattice<L: SimdFloat>() -> [usize; 3] {
                 counts[0] += 1;
                 continue;
             };
-            // A line in the plane of a face or through an edge touches the box: hit and miss are
-            // both right.
+            // A line in the plane of a face or through an edge only touches the box. Both a hit and
+            // a miss are right.
             let in_face = (0..3).any(|i| d[i] == 0 && origin[i].abs() == UNIT);
             if in_face || leave - enter < 1e-9 {
                 counts[1] += 1;
                 continue;
             }
             counts[2] += 1;
-            // Rays from a face may start on either side of it.
+            // Rays whose origin is on a face may count as starting on either side of it.
             let expected = if enter.abs() < 1e-9 || leave.abs() < 1e-9 {
                 continue;
             } else if enter > 0.0 {
@@ -229,8 +229,8 @@ fn extreme_06_degenerate_rays_at_every_kind() {
     }
 }
 
-/// Checks rays beside a solid, parallel to a face that has no opposite face. They miss, whatever
-/// the signs of the zeros in their direction.
+/// Checks rays along an axis that pass beside the bounding box of a shape. They miss, whatever the
+/// signs of the zeros in their direction.
 #[test]
 fn extreme_06_zeros_of_either_sign_beside_every_solid() {
     for (name, form) in every_kind() {
@@ -243,7 +243,8 @@ fn extreme_06_zeros_of_either_sign_beside_every_solid() {
                 let zero = |bit: i32| if n >> bit & 1 == 0 { 0.0 } else { -0.0 };
                 let mut d = DVec3::new(zero(0), zero(1), zero(2));
                 d[axis] = if n & 8 == 0 { 1.0 } else { -1.0 };
-                // Origin outside the box across the ray, within the ball around the box.
+                // The ray passes beside the box, at most about 0.3 of the size of the box away from
+                // it.
                 let mut o = low + size * DVec3::new(numbers.unit(), numbers.unit(), numbers.unit());
                 let beside = (axis + 1 + (n >> 4 & 1) as usize) % 3;
                 let out = numbers.between(1e-3, 0.3) * (size[beside] + 0.1);

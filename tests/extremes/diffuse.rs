@@ -14,7 +14,8 @@ fn scene(text: &str, bounces: u32) -> Scene {
     scene
 }
 
-/// Returns the mean of the red channel, the largest deviation from it, and its standard error.
+/// Returns the mean of the red channel, the largest deviation of a pixel from the mean, and the
+/// standard error of the mean.
 fn moments(scene: &Scene, precision: Precision) -> [f64; 3] {
     let rendering = rendered(scene, 11, precision, SAMPLES);
     assert_eq!(rendering.film.bad_samples().count, 0);
@@ -115,9 +116,8 @@ fn sphere_from_inside_is_a_geometric_series() {
     }
 }
 
-/// Checks a floor beside a wall; only the wall is lit. The form factor between a point of the floor
-/// and the wall is known. The wall is 1 high and infinitely wide, with the radiosity of a
-/// directional light.
+/// Checks a floor beside a wall. Directional light falls on the wall only, which is 1 high and
+/// infinitely wide. The form factor between a point of the floor and the wall is known.
 #[test]
 fn light_of_a_wall_falls_on_the_floor_by_its_form_factor() {
     let rho = 0.5;
@@ -139,11 +139,12 @@ fn light_of_a_wall_falls_on_the_floor_by_its_form_factor() {
             material = \"white\"
             shape.platform = {{ center = [5.0, 0.0, 0.0], size = [10.0, 10.0] }}"
         );
-        // Radiance of the wall: rho times that of a white matt surface, 1. A strip from the floor up
-        // to the angle phi above the horizon has the form factor (1 - cos phi) / 2.
+        // A white matt wall would have the radiance 1, this one has rho. As seen from the floor, it
+        // extends from the horizon to the angle phi above it, and has the form factor (1 - cos phi)
+        // / 2.
         let cos = distance / f64::hypot(distance, 1.0);
         let expected = rho * rho * 0.5 * (1.0 - cos);
-        // The light grazes the floor and leaves it dark.
+        // The directional light is parallel to the floor and leaves it dark.
         let scene = scene(&text, 1);
         let [mean, _, error] = moments(&scene, Precision::Double);
         let z = (mean - expected).abs() / error;

@@ -35,8 +35,8 @@ const TEXT: &str = "
     transform = [{ rotate = { axis = [0.5, 1.0, 0.25], degrees = 30.0 } }]
 ";
 
-/// Collects the names of all keys whose value is a direction. Compounds contain shapes again; two
-/// levels are searched.
+/// Collects the names of all keys whose value is a direction. Compounds contain shapes again; the
+/// search therefore ends at depth 8.
 fn directions(fields: &[Field], depth: usize, out: &mut BTreeSet<&'static str>) {
     for field in fields.iter().filter(|_| depth < 8) {
         match field.takes {

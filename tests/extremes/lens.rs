@@ -56,9 +56,9 @@ fn profile(depth: f64, radius: f64, focus: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Compares a picture with `expected`, the radiance of each column. Returns the largest deviation
-/// of a pixel with independent random numbers, in standard errors, and two root mean square errors:
-/// with these numbers and with Sobol points.
+/// Compares two pictures of a scene, by independent random numbers and by Sobol points, with
+/// `expected`, the radiance of each column. Returns the largest deviation of a pixel with random
+/// numbers, in standard errors, and the root mean square errors of both pictures.
 fn compare(scene: &Scene, expected: &[f64], precision: Precision) -> (f64, [f64; 2]) {
     const SAMPLES: u32 = 1024;
     let mut worst = 0.0f64;
@@ -71,7 +71,8 @@ fn compare(scene: &Scene, expected: &[f64], precision: Precision) -> (f64, [f64;
             let p = expected[i % expected.len()];
             let error = (value - p).abs();
             squares += error * error;
-            // Each sample is 0 or 1. Film and edge are rounded to 1e-6.
+            // Each sample is 0 or 1, so that the variance is p (1 - p). Film and edge are rounded
+            // to 1e-6.
             let deviation = (p * (1.0 - p) / f64::from(SAMPLES)).sqrt();
             if kind == SamplerKind::Random {
                 worst = worst.max(error / (deviation + 1e-6));
@@ -136,7 +137,8 @@ fn tiny_aperture_equals_the_pinhole() {
                 .filter(|(a, b)| (0..3).any(|c| (a[c] - b[c]).abs() > 1e-4 * (1.0 + a[c].abs())))
                 .count();
             println!("{name}, {precision:?}: {different} pixels differ");
-            // In glass the branch choices use other numbers: compared by the agreement tests.
+            // With a lens, rays in glass choose between reflection and transmission by other random
+            // numbers than without. The agreement tests compare these pictures.
             let allowed = if name == "mirror-room.toml" { 0 } else { pinhole.len() / 100 };
             assert!(different <= allowed, "{name}, {precision:?}: {different} pixels differ");
         }

@@ -113,9 +113,10 @@ fn missed<L: SimdFloat>(mesh: &Arc<Mesh>, place: DAffine3, axes: DVec3, rays: us
     (0..rays.div_ceil(BLOCK)).into_par_iter().map(block).sum()
 }
 
-/// Checks fine and coarse meshes: one far from the origin for its size, a needle and a sheet of
-/// 1e-6, whose triangles are slivers. Single precision resolves the inside of a sliver to a tenth
-/// of its thickness and loses one ray in a million there; `auto` selects double.
+/// Checks meshes of few and of many triangles. One of them is scaled, rotated and moved. A needle
+/// and a sheet have the relative thickness 1e-6, and their triangles are slivers. Single precision
+/// resolves the inside of a sliver to a tenth of its thickness and loses one ray in a million
+/// there; `auto` selects double.
 fn check(rays: usize) {
     let turned = DAffine3::from_scale_rotation_translation(
         DVec3::splat(3.7),

@@ -8,8 +8,9 @@ use std::path::Path;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Surfaces on which the lamp at (0, 3, 0) lies. The second value is the distance from the axis
-/// beyond which the lamp lights points at y = 4.
+/// Surfaces on which the lamp at (0, 3, 0) lies. The second value is a distance from the y axis.
+/// The lamp lights those points of the plane y = 4, above the ceiling, that are farther from the
+/// axis.
 const CEILINGS: [(&str, f64); 9] = [
     ("platform = { center = [0, 3, 0], size = [4, 4] }", 0.0),
     ("plane = { point = [0, 3, 0], normal = [0, -1, 0] }", 0.0),
@@ -38,7 +39,7 @@ fn receivers(numbers: &mut Numbers, count: usize) -> [Vec<(DVec3, DVec3)>; 2] {
     for _ in 0..count {
         let [x, z] = [numbers.between(-1.9, 1.9), numbers.between(-1.9, 1.9)];
         below.push((DVec3::new(x, 0.0, z), DVec3::Y));
-        // Height down to a thousandth of the ceiling's distance below it.
+        // Height of a point of the wall, from 0.002 below the ceiling downwards.
         let height = 3.0 - 10f64.powf(numbers.between(-2.7, 0.4));
         below.push((DVec3::new(-2.0, height, z), DVec3::X));
         above.push((DVec3::new(x, 4.0, z), DVec3::NEG_Y));

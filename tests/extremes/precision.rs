@@ -10,8 +10,9 @@ use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 const SIZE: [u32; 2] = [32, 24];
-/// Samples per pixel in each replicate (half of the samples). Rounding diverts some paths, equally
-/// often to either side; with this number of samples they add no visible noise.
+/// Samples per pixel in each replicate (half of the samples). Rounding diverts some paths, as often
+/// to one side of an edge as to the other. With this number of samples, diverted paths add no
+/// visible noise.
 const SAMPLES: u32 = 128;
 
 /// Largest error of single precision in scenes for which `auto` selects it, in 8-bit levels: a
@@ -186,8 +187,8 @@ fn far_apart(p: f64) -> String {
 const FAMILIES: [Family; 10] = [
     Family { name: "a small ball on a floor", text: small_ball, least: 1e-6, visible: 1.0 },
     Family { name: "a thin slab", text: thin_slab, least: 1e-6, visible: 1.0 },
-    // Surfaces within rounding of each other are hit in their order: single precision is right
-    // here, too.
+    // Single precision is right even for the smallest gap, because surfaces within a rounding error
+    // of each other are hit in the right order. Therefore `visible` is 0.
     Family { name: "a narrow gap under glass", text: narrow_gap, least: 1e-7, visible: 0.0 },
     Family { name: "a thin shell around a lamp", text: thin_shell, least: 1e-7, visible: 1.0 },
     Family { name: "a low lamp", text: low_lamp, least: 1e-6, visible: 1.0 },
@@ -198,9 +199,9 @@ const FAMILIES: [Family; 10] = [
     Family { name: "two balls far apart", text: far_apart, least: 1e-7, visible: 1.0 },
 ];
 
-/// Checks that `auto` selects single precision first, then double, as the proportion of a family
-/// shrinks. Where it selects single, the error is invisible. At the smallest proportion the error
-/// of single precision would be visible.
+/// Checks families of scenes whose proportion shrinks. `auto` selects single precision at first,
+/// and double precision from some proportion on. Where it selects single, the error is invisible.
+/// At the smallest proportion the error of single precision would be visible.
 #[test]
 fn auto_takes_double_where_single_would_show() {
     let mut wrong = Vec::new();
@@ -238,8 +239,8 @@ fn auto_takes_double_where_single_would_show() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Checks that size and place of the whole scene have no effect on the choice of precision, only
-/// proportions.
+/// Checks that the choice of precision depends on the proportions of a scene only, not on its size
+/// and place.
 #[test]
 fn auto_takes_single_where_proportions_are_harmless() {
     let scene_text = |place: f64, size: f64| {
@@ -265,7 +266,7 @@ fn auto_takes_single_where_proportions_are_harmless() {
     for (place, size) in [(0.0, 1e-6), (0.0, 1e6), (1e6, 1.0), (-1e7, 10.0), (1e3, 1e-3)] {
         assert!(takes_single(&parsed(&scene_text(place, size))), "at {place:e}, of size {size:e}");
     }
-    // Two balls that almost touch do so in a spot smaller than a pixel, except in a close view.
+    // Two balls almost touch. The gap between them is smaller than a pixel, except in a close view.
     let two_balls = |degrees: f64| {
         let ball = |x: f64| {
             format!("[[object]]\nshape.sphere = {{ center = [{x:?}, 0.0, 0.0], radius = 0.25 }}\n")
@@ -276,9 +277,8 @@ fn auto_takes_single_where_proportions_are_harmless() {
     assert!(takes_single(&two_balls(40.0)) && !takes_single(&two_balls(0.4)));
 }
 
-/// Checks the choice of precision for scenes with the numbered extremes. `auto` selects double
-/// precision for those beyond single precision, single for the others. One shipped scene represents
-/// many.
+/// Checks the choice of precision for scenes of all thirty numbered extremes. `auto` selects double
+/// precision for the extremes that single precision cannot represent, and single for the others.
 #[test]
 fn auto_takes_double_for_the_extremes_beyond_single() {
     let scene_from = |eye: [f64; 3], degrees: f64, shape: &str| {
@@ -313,7 +313,7 @@ fn auto_takes_double_for_the_extremes_beyond_single() {
         (15, false, small_ball(0.5)),
         (16, true, narrow_gap(1e-6)),
         (17, true, scene_from([3.0, 2.0, 3.0], 1e-3, ball)),
-        // At the border of so wide a view neighbouring rays are nearly parallel.
+        // Near the border of a view as wide as this, adjacent rays are nearly parallel.
         (17, true, scene_from([3.0, 2.0, 3.0], 179.9, ball)),
     ];
     let shipped_scenes = [
@@ -384,10 +384,10 @@ fn eye_inside_a_box_of_a_round_solid_decides_by_its_distance_from_the_surface() 
 /// Checks that shipped scenes are traced in single precision, without visible error.
 #[test]
 fn shipped_scenes_stay_in_single_precision() {
-    // Rounding makes some paths in glass and between mirrors end elsewhere. That is noise, not
-    // error: in gallery-glass.toml single and double precision differ by 0.24, 0.13, 0.066 and
-    // 0.035 levels at 16, 64, 256 and 1024 samples a pixel (96x54), in emissive-objects.toml by 0.41,
-    // 0.16 and 0.08 at 64, 256 and 1024.
+    // Rounding diverts some paths in glass and between mirrors. The result is noise, not an error,
+    // and falls with the number of samples. With 96x54 pixels, single and double precision differ
+    // in gallery-glass.toml by 0.24, 0.13, 0.066 and 0.035 levels at 16, 64, 256 and 1024 samples
+    // per pixel, and in emissive-objects.toml by 0.41, 0.16 and 0.08 levels at 64, 256 and 1024.
     let mut wrong = Vec::new();
     let mut worst = (0.0, String::new());
     for (name, scene) in all_shipped() {

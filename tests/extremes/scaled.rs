@@ -11,7 +11,7 @@ use zerkalo::world::Precision;
 const SIZE: [u32; 2] = [64, 48];
 const SAMPLES: u32 = 16;
 
-/// Files of scenes, one of each family: cone lobes, Beckmann lobes with light that falls off,
+/// Files of scenes with different features: cone lobes, Beckmann lobes and lights with falloff,
 /// glass, compounds, meshes.
 const SCENES: [&str; 5] = [
     "mirror-room.toml",
@@ -63,15 +63,17 @@ fn rms_difference(a: &Scene, b: &Scene, precision: Precision, left_out: usize) -
     let mut squares: Vec<f64> = a.iter().zip(&b).map(square_difference).collect();
     squares.sort_by(f64::total_cmp);
     let (most, flipped) = squares.split_at(squares.len() - left_out);
-    // Change of a pixel by one of its samples, in the steep part of the tone curve.
+    // Largest change of a pixel by one of its samples, in 8-bit levels. The factor 4 allows for the
+    // steep part of the tone curve.
     let one_path = 4.0 * 255.0 / f64::from(SAMPLES);
     assert!(flipped.iter().all(|s| s.sqrt() < 3f64.sqrt() * one_path), "{flipped:?}");
     (most.iter().sum::<f64>() / (3 * a.len()) as f64).sqrt()
 }
 
-/// Checks all scenes, scaled by `s` and moved by `by`. `limits` are the largest differences in
-/// 8-bit levels, in double precision and with `auto`. `flipped` is the number of pixels in which a
-/// path with `auto` may differ.
+/// Compares all scenes with copies that are scaled by `s` and moved by `by`. `limits` are the
+/// largest differences in 8-bit levels, in double precision and with `auto`. `flipped` is the
+/// number of pixels that may differ by more with `auto`, because a path passes an edge on the other
+/// side.
 fn check(name: &str, s: f64, by: DVec3, limits: [f64; 2], flipped: usize) {
     for file in SCENES {
         let scene = sized(shipped(file), SIZE);
@@ -96,12 +98,12 @@ fn scaled_scenes_give_the_same_picture() {
     check("scaled by 2^20", 1_048_576.0, DVec3::ZERO, [0.0; 2], 0);
 }
 
-/// Number of pixels, of 3,072, in which a path in single precision may pass the other side of an
-/// edge.
+/// Number of pixels, of 3,072, in which a path in single precision may pass an edge on another side
+/// than in the original scene.
 const FLIPPED: usize = 2;
 
-/// Largest RMSE by rounding with equal samples, in 8-bit levels: in double precision and with
-/// `auto`. Measured are 3e-7, and 5e-5 in single precision.
+/// Largest RMSE that rounding may cause with equal samples, in 8-bit levels: in double precision
+/// and with `auto`. The measured RMSE is 3e-7 in double and 5e-5 in single precision.
 const DOUBLE_AUTO: [f64; 2] = [1e-6, 2e-4];
 
 /// Checks moved scenes. Numbers in a scene file that are moved by ten million units are rounded to

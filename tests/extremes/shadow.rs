@@ -142,7 +142,7 @@ fn falsely_dark(
         let (p, n) = shape.point(&mut numbers);
         let side = numbers.direction();
         let out = if side.dot(n) < 0.0 { -side } else { side };
-        // Grazing views are skipped: rounding cannot separate the ray from one beside the shape.
+        // Grazing views are skipped, because the ray may pass beside the shape within rounding.
         if out.dot(n) < 0.05 {
             continue;
         }
@@ -150,7 +150,8 @@ fn falsely_dark(
         lines.push((surface_point + out * (3.0 * scale), -out));
         cosines.push(n.dot(towards));
     }
-    // Rounding of the cosine: by the direction of the light and the normal.
+    // Bound of the error of the cosine. It arises because the direction of the light and the normal
+    // are rounded.
     let unsure = if precision == Precision::Single { 4e-7 } else { 1e-9 };
     let light = traced.centered(&lines);
     for (i, (l, c)) in light.iter().zip(&cosines).enumerate() {
@@ -203,9 +204,9 @@ fn extreme_15_self_shadow() {
     report(15, "both", &format!("0 falsely dark of {point_count} points"));
 }
 
-/// Checks self-shadowing a million units from the origin. Numbers in the scene file are rounded to
-/// 1e-10 there, and shapes are as small as 1e-4. Compilation moves the scene to the origin, so that
-/// single precision is as good as there.
+/// Checks self-shadowing a million units from the origin, where numbers in the scene file are
+/// rounded to 1e-10. Shapes are as small as 1e-4. Compilation moves the scene to the origin, so
+/// that single precision is as good as for a scene at the origin.
 #[test]
 fn extreme_15_self_shadow_far_from_the_origin() {
     let place = DVec3::new(1e6, -1e6, 1e6);
@@ -216,7 +217,7 @@ fn extreme_15_self_shadow_far_from_the_origin() {
 }
 
 /// Checks the shadow of a box that hovers a millionth of its size above the ground. The ground
-/// under it is dark, except for the strip that slanting light reaches, as wide as the gap.
+/// under the box is dark, except for a strip as wide as the gap, which slanting light reaches.
 fn check_gap(scale: f64, precision: Precision) {
     let gap = 1e-6 * scale;
     let scene = scene(&format!(

@@ -60,7 +60,8 @@ fn check(name: &str, at_most: f64) {
 fn check_scene(name: &str, scene: &Scene, at_most: f64) {
     let [sobol, random] = slopes(name, scene);
     assert!(sobol.value + 2.0 * sobol.standard_error <= at_most, "{name}: {sobol:?}");
-    // Six points leave four degrees of freedom: three standard errors are 96 %.
+    // Six points leave four degrees of freedom. The value is within three standard errors with a
+    // probability of 96 %.
     let error = 3.0 * random.standard_error;
     assert!((random.value + 0.5).abs() <= error, "{name}, random: {random:?}");
 }
@@ -83,8 +84,9 @@ fn lens_error_converges_like_four_dimensions() {
 
 /// Checks the convergence of samples with six dimensions: the position in the pixel, the direction
 /// in the lobe, and the point of the light. The error falls in steps, because the points fill these
-/// dimensions at some powers of two and not at others. With 24 seeds in place of 6 the slope is
-/// -0.733 +- 0.045. The standard error is that of the steps; the slope alone is therefore compared.
+/// dimensions at some powers of two and not at others. The standard error of the fit describes
+/// these steps, not chance. Therefore only the slope is tested. With 24 seeds instead of 6, the
+/// slope is -0.733 +- 0.045.
 #[test]
 fn light_error_through_a_rough_mirror_converges_like_smooth_dimensions() {
     let [sobol, random] = slopes("slope-light.toml", &sized(shipped("slope-light.toml"), SIZE));

@@ -61,13 +61,15 @@ fn exact((origin, d): Line, center: DVec3, radius: f64) -> (f64, DVec3) {
     (across2.0.sqrt() - radius, DVec3::from_array(point))
 }
 
-/// Checks rays at a unit sphere from the distance `far`, within 0.7 of the radius and near the
-/// limb. Returns the largest distance of a hit point from the surface.
+/// Checks rays from the distance `far` at a unit sphere. They are aimed at points within 0.7 of the
+/// radius and at points near the limb. Returns the largest distance of a hit point from the
+/// surface.
 fn check_far<L: SimdFloat>(far: f64, seed: u64) -> f64 {
     let mut worst = 0f64;
     let mut numbers = Numbers::new(seed);
     let rounded = |v: DVec3| if L::EPSILON > 1e-10 { v.as_vec3().as_dvec3() } else { v };
-    // The ray is rounded: its direction has this precision, and so has f . d.
+    // The direction of the ray is rounded to the type's precision. The rounding grows with the
+    // distance.
     let tolerance = 4.0 * L::EPSILON * far.max(1.0);
     for _ in 0..20 {
         let center = rounded(numbers.in_cube(1.0));
@@ -116,8 +118,8 @@ fn extreme_01_sphere_far_away() {
         worst = worst.max(check_far::<Double>(far, 10 + i as u64));
     }
     report(1, "double", &format!("hits right, {worst:.0e} r off at most"));
-    // Single precision is limited to where a rounding of the distance is a thousandth of the
-    // radius; `auto` takes double before.
+    // Single precision is tested up to the distance at which its rounding is a thousandth of the
+    // radius. `auto` selects double precision at smaller distances already.
     let mut worst = 0f64;
     for (i, far) in [1e2, 1e3, 8192.0].into_iter().enumerate() {
         worst = worst.max(check_far::<Single>(far, 30 + i as u64));
@@ -140,7 +142,8 @@ fn extreme_02_sphere_as_ground() {
             -radius
         )
     };
-    // The horizon lies below the level by acos(r / (r + h)): tan = sqrt(h (2 r + h)) / r.
+    // The horizon is below the horizontal by the angle acos(r / (r + h)), whose tangent is sqrt(h
+    // (2 r + h)) / r.
     let dip = (height * (2.0 * radius + height)).sqrt() / radius;
     let plane_height = 2.0 * 20f64.to_radians().tan();
     let row = 240.0 + dip / plane_height * 480.0;
@@ -163,7 +166,8 @@ fn extreme_02_sphere_as_ground() {
 
     for light in ["[0.0, -1.0, 0.0]", "[0.3, -0.2, 0.1]", "[1.0, -0.001, 0.0]"] {
         let scene = scene(&text(light));
-        // Single precision resolves such a ground to 100: `auto` takes double.
+        // `auto` selects double precision, because single precision rounds coordinates of such a
+        // ground to about 100 units.
         let auto = AnyWorld::compile(&scene, &Options::default());
         assert!(matches!(auto, AnyWorld::Double(_)));
         let traced = Traced::new(&scene, Precision::Double);
@@ -285,8 +289,9 @@ fn closed_form_10_every_pixel_of_a_sphere() {
     assert!((5_000..30_000).contains(&covered), "{covered} pixels covered");
 }
 
-/// Returns the longest chord that rounding can give a tangent. A line at distance 8 is rounded to 4
-/// x 8 roundings across its direction. A line as much below the surface has this chord.
+/// Returns the longest chord that rounding can give a tangent. Rounding moves a line that starts at
+/// distance 8 across its direction, by up to 4 x 8 times the rounding error. A line this far below
+/// the surface has the returned chord.
 fn longest_touch<L: SimdFloat>() -> f64 {
     2.0 * (2.0 * 32.0 * L::EPSILON).sqrt()
 }
@@ -306,7 +311,8 @@ fn check_tangents<L: SimdFloat>() {
     };
     for n in 0..20_000 {
         let (touching, d, ahead) = if n % 2 == 0 {
-            // Exact: along an axis past the end of another one.
+            // These tangents are exact: they are parallel to one axis and touch the sphere on
+            // another axis.
             let s = signs(numbers.bits());
             let (a, b) = (numbers.below(3), 1 + numbers.below(2));
             let (mut o, mut d) = (DVec3::splat(s.z), DVec3::splat(s.z));
@@ -337,6 +343,6 @@ fn check_tangents<L: SimdFloat>() {
 fn extreme_05_tangent_to_a_sphere() {
     assert!(longest_touch::<Double>() < 1e-6);
     check_tangents::<Double>();
-    // 5.5e-3 in single precision.
+    // The limit is 5.5e-3 in single precision.
     check_tangents::<Single>();
 }

@@ -69,7 +69,8 @@ fn frustum_spans_match_the_quadratic_formula() {
         for line in lines(11, 20_000) {
             let Some((low, high)) = quadratic_span(s, line) else { continue };
             let form = canonical(s);
-            // Rays start far outside on both sides: a wide solid surrounds the line's origin.
+            // Rays start far outside on both sides, because a wide solid contains the origin of the
+            // line.
             let (enter, leave) =
                 ends(&form, line, 60.0).unwrap_or_else(|| panic!("s = {s}: lost {line:?}"));
             let error = (enter - low).abs().max((leave - high).abs());
@@ -98,7 +99,8 @@ fn extreme_11_tapered_cylinders() {
                     assert!((b.normal.length() - 1.0).abs() < 1e-14, "{hair}: {line:?}");
                 }
                 (None, None) => {}
-                // The limb moves by the hair.
+                // The limb moves by about `hair`, so that a grazing line may hit one of the solids
+                // only.
                 (Some(m), None) | (None, Some(m)) => {
                     assert!(m.normal.dot(line.1).abs() < 1e-5, "{hair}: {line:?} {m:?}")
                 }
@@ -143,7 +145,8 @@ fn extreme_11_flat_and_tall_solids() {
         for s in [0.0, 0.5, 1.0, 3.0] {
             let form = Form::conical_frustum(DAffine3::from_scale(DVec3::new(1.0, 1.0, height)), s);
             for n in 0..4000 {
-                // Lines through a point of the axis, across it and aslant.
+                // Lines through a point of the axis: every second one is perpendicular to it, the
+                // others have any direction.
                 let at = DVec3::Z * (height * numbers.between(0.1, 0.7));
                 let d = match n % 2 {
                     0 => DVec3::new(numbers.between(-1.0, 1.0), 1.0, 0.0).normalize(),
@@ -180,8 +183,8 @@ fn extreme_12_along_a_generator() {
                 let high = placed(DVec3::new(s * cos, s * sin, 1.0));
                 let d = (high - low).normalize();
                 let middle = (low + high) / 2.0;
-                // A line on the generator is inside or outside by rounding, but its hits are
-                // finite. A line slightly inside has the length between the ends.
+                // A line on a generator of the solid is inside or outside by rounding, but its hits
+                // are finite. A line slightly inside has the length between the solid's ends.
                 let along = [(low - d * 3.0, d)];
                 let single = closest_hits::<Single>(&form, &along);
                 for hit in closest_hits::<Double>(&form, &along).into_iter().chain(single).flatten()
@@ -211,7 +214,7 @@ fn extreme_12_along_a_generator() {
     report(12, "single", "finite");
 }
 
-/// Checks tangents: hits are finite, and at most the length `limit` of a line is inside.
+/// Checks tangents. Their hits are finite, and no line has a chord longer than `limit`.
 fn check_tangents<L: SimdFloat>(limit: f64) {
     let mut longest = 0.0f64;
     let mut numbers = Numbers::new(15);
@@ -241,7 +244,8 @@ fn check_tangents<L: SimdFloat>(limit: f64) {
                 assert!(hit.t.is_finite() && hit.normal.is_finite(), "{}", context());
             }
             if let (Some(a), Some(b)) = (a, b) {
-                // A line inside by e of the radius has a chord of about sqrt(8 e) / sin(turn).
+                // A line whose depth below the surface is the share e of the radius has a chord of
+                // about sqrt(8 e) / sin(turn).
                 longest = longest.max(6.0 - a.t - b.t);
                 assert!(6.0 - a.t - b.t <= limit, "{}", context());
             }

@@ -108,7 +108,7 @@ fn extreme_09_volumes() {
                 .form(),
                 below(0.1),
             ]),
-            // The top at height 0.6 of 1.5 has side 0.72.
+            // The pyramid of height 1.5 is cut at the height 0.6, where its side is 0.72.
             0.6 * (1.44 + 0.5184 + (1.44f64 * 0.5184).sqrt()) / 3.0,
         ),
     ]
@@ -145,8 +145,8 @@ fn extreme_09_inclusion_and_exclusion() {
             for n in 0..lines.len() {
                 let sum = alone[i][n] + alone[j][n];
                 let context = || format!("{i} {j} {:?}", lines[n]);
-                // Intervals thinner than the tie tolerance are dropped; along a grazing line they
-                // have some length.
+                // Intervals thinner than the tie tolerance (within which surfaces count as
+                // coincident) are dropped. A grazing line has a longer part in such an interval.
                 let close = |a: f64, b: f64| (a - b).abs() < 1e-5;
                 assert!(close(either[n] + both[n], sum), "{}: {}", context(), either[n] + both[n]);
                 assert!(close(first[n] + both[n], alone[i][n]), "{}", context());

@@ -25,7 +25,7 @@ type Motion<'a> = &'a dyn Fn(&Camera, &str) -> Camera;
 /// invariants, and that the picture shows the room from the new viewpoint. `moved` returns the
 /// camera after a named motion.
 fn moves_correctly(room: &Scene, moved: Motion) -> Verdict {
-    // Camera coordinates are rounded new_eye about a millionth of the distance new_eye the target.
+    // Coordinates of the camera are rounded to about a millionth of the distance from the target.
     let near = |quantity: &str, a: f64, b: f64| {
         ensure((a - b).abs() < 2e-5, || format!("{quantity}: {a} instead of {b}"))
     };
@@ -123,8 +123,8 @@ fn b3_camera_frame() {
     );
 }
 
-/// Checks that the picture of `tested` shows the circles of confusion like that of `original`: the
-/// bright bead on the right, and the ball in front of it.
+/// Checks that circles of confusion in the picture of `tested` agree with those of `original`,
+/// around two points: the bright bead on the right, and the ball in front of it.
 fn discs_agree(original: &Scene, tested: &Scene) -> Verdict {
     [[0.9, 1.5, -6.5], [0.7, 0.35, 2.3]].into_iter().try_for_each(|point| {
         agrees(&zoomed(original, point, 6.0), &zoomed(tested, point, 6.0), 1536)
@@ -147,7 +147,7 @@ fn d1_thin_lens() {
             ("focus in front", &|s| s.camera.focus = Some(Focus::Point([0.7, 0.35, 2.3]))),
         ],
     );
-    // The same lens in other words.
+    // The same lens, described by f-number and focus distance.
     let zoomed = zoomed(&original, [0.9, 1.5, -6.5], 6.0);
     let f_number = zoomed.camera.focal_length() / (2.0 * zoomed.camera.lens_radius());
     let mut reworded = zoomed.clone();

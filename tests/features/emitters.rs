@@ -67,8 +67,8 @@ fn d5_rectangle_light() {
         ));
         (format!("height {height}"), scene, 0.7)
     };
-    // A light that fills the cone lobe. Either technique alone finds all of its light, points of the light with the
-    // weight 0.22 and reflected rays with the weight 0.78.
+    // A light that fills the cone lobe. Sampled points of the light and reflected rays both find
+    // all of its light. Their weights are 0.22 and 0.78.
     check(&[filled(0.5), filled(1.0), filled(20.0)], 1 << 14, [1e-4, 1e-9]);
 }
 
@@ -103,7 +103,7 @@ fn d9_environment() {
             ("half the intensity", &|s| lamp(s).intensity *= 0.5),
         ],
     );
-    // Diffuse bounces that escape add nothing.
+    // A diffuse bounce that leaves the scene adds no light of the environment.
     let mut bouncing = shipped("environment.toml");
     bouncing.trace.max_diffuse_depth = 2;
     agrees(&bouncing, &bouncing, 128).unwrap_or_else(|e| panic!("two diffuse bounces: {e}"));

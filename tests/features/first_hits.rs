@@ -63,9 +63,9 @@ pub fn centers([width, height]: [u32; 2]) -> Vec<[f64; 2]> {
     (0..height).flat_map(row).collect()
 }
 
-/// Compares the first hits of the program in `tested` with the analytic shapes of `original`. Each ray must end on
-/// the surface of the object that it reports, with that surface's normal, and must not cross another surface
-/// before.
+/// Compares the first hits of the program in `tested` with the analytic shapes of `original`. Each
+/// ray must end on the surface of the object that it reports, with that surface's normal, and must
+/// not cross another surface before.
 pub fn hits_agree(original: &Scene, tested: &Scene) -> Verdict {
     hits_agree_with(
         original,
@@ -74,7 +74,8 @@ pub fn hits_agree(original: &Scene, tested: &Scene) -> Verdict {
     )
 }
 
-/// Compares the first hits of the program in `tested` with `shapes`, which stand for the objects of `original`.
+/// Compares the first hits of the program in `tested` with `shapes`, which stand for the objects of
+/// `original`.
 pub fn hits_agree_with(original: &Scene, shapes: &[AnalyticShape], tested: &Scene) -> Verdict {
     let (original, tested) = (sized(original.clone(), RASTER), sized(tested.clone(), RASTER));
     let hits = first_hits(&tested);
@@ -104,13 +105,15 @@ fn check_hit(ray: &PixelRay, near: f64, shapes: &[AnalyticShape], hit: &FirstHit
     let depth = f64::from(hit.depth);
     let tolerance = TOLERANCE * (1.0 + depth.min(1e3));
     let far_t = if depth.is_finite() { depth } else { 100.0 };
-    // Without both ends, where rounding decides the side.
+    // The tested part of the ray leaves out both ends, where rounding decides on which side of the
+    // surface a point is.
     let (first, last) = (near_t + tolerance, far_t - 2.0 * tolerance);
     for (i, shape) in shapes.iter().enumerate() {
         match shape {
             AnalyticShape::Solid(inside, slope) => {
                 let side = inside(point_at(first)) < 0.0;
-                // Number of steps over which a value of 1 keeps its sign. The factor covers rounding.
+                // Number of steps over which an implicit function of value 1 keeps its sign,
+                // because its slope is at most `slope`. The factor 0.999 covers rounding.
                 let steps_per_value = 0.999 * STEPS as f64 / ((last - first).abs() * slope);
                 let mut next = 1;
                 for k in 1..=STEPS {

@@ -47,7 +47,7 @@ fn a7_material() {
 }
 
 /// Checks that the radiance of each visible point of the floor is the sum of colour x intensity x
-/// cosine over the lamps that reach it.
+/// cosine over the lamps that no ball hides from the point.
 fn floor_is_lit(original: &Scene, tested: &Scene) -> Verdict {
     let original = sized(original.clone(), RASTER);
     let pixels = without_chance(tested);
@@ -231,8 +231,8 @@ fn a17_composition() {
     );
 }
 
-/// Checks that a camera ray that misses shows the background colour, and a ball that reflects it
-/// k_r times that colour.
+/// Checks that a camera ray that misses shows the background colour. A ball that reflects the
+/// background shows k_r times this colour.
 fn background_is_seen(original: &Scene, tested: &Scene) -> Verdict {
     let original = sized(original.clone(), RASTER);
     let color = DVec3::from(original.background.color.0);

@@ -109,7 +109,8 @@ fn a6_flat_mirror() {
     });
     println!("contrast by roughness: {by_roughness:?}");
     assert!(by_roughness.is_sorted_by(|a, b| a > b), "{by_roughness:?}");
-    // The remaining contrast is that between floor and sky around each point.
+    // Even the roughest mirror keeps some contrast, because each of its points sees more of the
+    // floor or of the sky.
     assert!(by_roughness[4] < 0.5 * by_roughness[0], "{by_roughness:?}");
 }
 
@@ -204,8 +205,8 @@ fn half_side() -> f64 {
     0.5 * PI.sqrt() * RADIUS
 }
 
-/// Returns the distance from the axis at which a direction at `angle` to it reaches the plane at
-/// unit distance. Infinite if it does not reach the plane.
+/// Returns the distance from the axis at which a direction, at `angle` to the axis, reaches the
+/// plane at unit distance. Returns infinity if it does not reach the plane.
 fn reach(angle: f64) -> f64 {
     if angle < 0.5 * PI { angle.tan() } else { f64::INFINITY }
 }

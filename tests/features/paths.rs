@@ -105,8 +105,8 @@ fn traces_the_whole_tree(original: &Scene, tested: &Scene) -> Verdict {
     Ok(())
 }
 
-/// Checks two facing mirrors of 1e4 units that emit radiance 1: every pixel has the sum of `terms`.
-/// Each term is the throughput with which a path reaches its next surface.
+/// Checks two facing mirrors with sides of 1e4 units that emit radiance 1. Every pixel has the sum
+/// of `terms`, the throughputs with which a path reaches its successive surfaces.
 fn sums_reflections(
     tested: &Scene,
     mirrors: [&str; 2],
@@ -165,8 +165,9 @@ fn b2_ray_tree() {
     );
 }
 
-/// Checks a large ball that reflects all light outside and transmits a fifth at each surface. In
-/// front of a white background its radiance is 1 + 0.2 x 0.2: nothing is reflected inside.
+/// Checks a large ball that reflects all light on its outside and transmits a fifth at each
+/// surface. In front of a white background its radiance is 1 + 0.2 x 0.2, because light inside of
+/// the ball is not reflected.
 fn has_no_inner_reflections(tested: &Scene) -> Verdict {
     let mut alone = tested.clone();
     alone.objects.truncate(1);

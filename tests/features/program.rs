@@ -46,9 +46,9 @@ fn tiles(film: &Film, scene: &Scene) -> Vec<(u32, bool)> {
         .collect()
 }
 
-/// Checks a render of `tested` to a noise of `levels` 8-bit levels. If `cap` is not 0, the render
-/// ends by the cap on rays per pixel, and reflecting tiles have `cap` samples. If it is 0, the
-/// render ends by the noise, with more than 16 samples.
+/// Checks a render of `tested` to a noise of `levels` 8-bit levels. If `cap` is not 0, the cap on
+/// rays per pixel ends the render, and the largest number of samples of a tile with a reflecting
+/// surface is `cap`. If `cap` is 0, the noise ends the render, after more than 16 samples.
 fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
     let scene = sized(tested.clone(), [96, 72]);
     let stop = Stop { noise_codes: Some(levels), ..Stop::default() };
@@ -66,7 +66,7 @@ fn caps_rays(tested: &Scene, cap: u32, levels: f64) -> Verdict {
     let noise = render.noise_codes().unwrap_or(f64::INFINITY);
     if cap > 0 {
         ensure(reason == StoppedBy::RaysPerPixel, || format!("ended by {}", reason.name()))?;
-        // Tiles with little noise may have fewer.
+        // Reflecting tiles with little noise may have fewer samples than `cap`.
         ensure(most == cap, || format!("{samples:?} samples"))?;
         ensure(noise > levels, || format!("{noise} 8-bit levels"))
     } else {
@@ -150,7 +150,7 @@ const SMALL: [u32; 2] = [40, 30];
 /// Stop criterion of the pictures after edits.
 const SPP: Stop = Stop { spp: Some(8), noise_codes: None, rmse_linear: None, seconds: None };
 
-/// Session that renders scenes as they are edited.
+/// Session: handle of a thread that renders scenes as they are edited.
 struct Desk {
     session: Session,
 }
@@ -188,8 +188,8 @@ fn saved_and_rendered(scene: &Scene) -> Vec<[f64; 3]> {
 /// Name of an edit, and the function that applies it to a scene.
 type NamedEdit<'a> = (&'a str, Box<dyn Fn(&Scene) -> Result<Edit, EditError> + 'a>);
 
-/// Returns the edit that sets the property `key` of the part of the scene with the label `label` in
-/// the outline.
+/// Returns the edit that sets the property `key` of a part of the scene. `label` is the part's
+/// label in the outline (the list of all parts).
 fn set<'a>(label: &'a str, key: &'a str, text: &'a str) -> NamedEdit<'a> {
     let edit = move |scene: &Scene| {
         let subject = edit::outline(scene).into_iter().map(|(_, s)| s).find(|s| {
@@ -248,7 +248,7 @@ fn a15_user_edits() {
         assert!(history.record(next, &label, false), "{label}");
         before = now;
     }
-    // The cap on rays changes no existing sample, only the number of samples to come.
+    // The cap on rays leaves existing samples unchanged and limits the number of samples to come.
     let (_, cap) = set("film", "rays_per_pixel", "4");
     let capped = cap(history.scene()).unwrap().scene;
     let mut capped = Arc::new(capped);

@@ -14,7 +14,8 @@ use zerkalo::world::{self, Precision};
 const SIZE: [u32; 2] = [100, 70];
 const SEED: u64 = 5;
 
-/// Renders `scene` in regions of `rows` rows and compares each row with `whole`, a uniform render.
+/// Renders `scene` in regions (bands of the picture, one after the other) of `rows` rows. Compares
+/// each row with `whole`, a uniform render of the whole picture.
 fn regions_equal(whole: &Film, scene: &Scene, rows: u32) -> Verdict {
     let scene = Arc::new(sized(scene.clone(), SIZE));
     let options = Options {

@@ -69,8 +69,8 @@ fn parts(scene: &Scene, plan: &Plan) -> Result<Vec<Film>, String> {
     (0..=plan.settings.shards).map(part).collect()
 }
 
-/// Checks that the films of `shards` shards add up to the film `one`, in ascending and descending
-/// order.
+/// Checks that the films of `shards` shards add up to the film `one`, both in ascending and in
+/// descending order of the shards.
 fn shards_add_to(one: &Film, scene: &Scene, shards: u32) -> Verdict {
     let parts = parts(scene, &plan(one, shards))?;
     for descending in [false, true] {
@@ -124,8 +124,8 @@ fn part_file(plan: &Plan, number: u32, complete: bool, film: &Film) -> Vec<u8> {
     pieces.concat()
 }
 
-/// Watches the films of the shards of `scene` while they are written: first damaged, then
-/// unfinished, then complete. Compares the sum with the film `one`.
+/// Watches the films of the shards of `scene` while they are written. Each film file is first
+/// damaged, then unfinished, then complete. Compares the sum with the film `one`.
 fn watched_parts_add_to(one: &Film, scene: &Scene, folder: &Path) -> Verdict {
     let plan = plan(one, 3);
     let parts = parts(scene, &plan)?;
@@ -175,9 +175,10 @@ fn e2_watching() {
             ("no lights", &|s| s.lights.clear()),
         ],
     );
-    // The neighbours have left their parts: those of the scene again.
+    // The files in the folder are those of the last mutation. The files of the original scene
+    // replace them.
     watched_parts_add_to(&one, &shipped("mirror-room.toml"), folder.path()).unwrap();
-    // A part that vanishes leaves the sum.
+    // The samples of a film file that is removed no longer count.
     let mut films = WatchedFilms::open(&[folder.path().join("job.plan")]).unwrap();
     fs::remove_file(folder.path().join("job-2.zk")).unwrap();
     assert!(films.poll() && films.film().unwrap().bytes() != one.bytes(), "a shard left out");
