@@ -1,4 +1,5 @@
-//! Ray/mesh intersection: meshes are watertight, and hits are independent of packets and vector width.
+//! Ray/mesh intersection: meshes are watertight, and hits are independent of packets and vector
+//! width.
 
 use crate::common;
 
@@ -10,8 +11,8 @@ use zerkalo::bvh::Ray;
 use zerkalo::lanes::{Double, Float, Mask, SimdFloat, Single, Vec3};
 use zerkalo::primitive::triangle_mesh;
 
-/// Returns a closed mesh of a ball around the origin, read from OBJ. Slivers at the poles are a
-/// thousand times as long as wide.
+/// Returns a closed mesh of a ball around the origin, read from OBJ. The triangles at the poles can
+/// be a thousand times as long as wide.
 fn ball(rings: usize, sides: usize) -> Arc<Mesh> {
     let mut text = String::new();
     for ring in 0..=rings {
@@ -48,8 +49,8 @@ fn unit(v: [f64; 3]) -> [f64; 3] {
     v.map(|x| x / length)
 }
 
-/// Checks that rays from inside of a closed mesh to its corners, edges and triangles all hit, in
-/// packets and singly.
+/// Checks that rays from inside of a closed mesh towards its corners, edges and triangles all hit
+/// the mesh, both in packets and as single rays.
 fn check_watertight<L: SimdFloat>(mesh: &Mesh, rays: usize) {
     let mut random = Numbers::new(0x5EED);
     let triangles = &mesh.mesh().triangles;

@@ -1,5 +1,5 @@
-//! Meshes in scenes: shipped files, pictures against analytic shapes, watertightness, normals, colours,
-//! and files that are invalid or change.
+//! Meshes in scenes: shipped files, pictures against analytic shapes, watertightness, normals,
+//! colours, and files that are invalid or change.
 
 use crate::support;
 
@@ -201,7 +201,8 @@ fn sphere_mesh_hits_converge_to_sphere() {
         let (a, b) = (sights(&sphere, precision), sights(&mesh, precision));
         let mut both = 0;
         for (a, b) in a.iter().zip(&b) {
-            // The faces are at most 1 - cos(pi / 400) inside, most visible at the rim.
+            // The faces are at most 1 - cos(pi / 400) inside of the sphere. The difference of the
+            // depths is largest at the silhouette.
             let (n, m) =
                 (DVec3::from(a.normal.map(f64::from)), DVec3::from(b.normal.map(f64::from)));
             if a.object.is_some() && b.object.is_some() {
@@ -224,8 +225,8 @@ fn sphere_mesh_hits_converge_to_sphere() {
     assert!(apart < 1e-3, "{apart}");
 }
 
-/// Checks a closed red mesh in front of a blue background. No pixel whose neighbours all show the
-/// mesh shows the background, and the mesh is never lit from inside.
+/// Checks that the blue background is nowhere visible through a closed red mesh, up to 33 pixels
+/// from the centre of its image.
 #[test]
 fn closed_mesh_has_no_holes() {
     let desk = Desk::new();
@@ -256,8 +257,8 @@ fn closed_mesh_has_no_holes() {
     }
 }
 
-/// Checks that a light inside of a closed mesh lights no surface outside of it, and that a light
-/// behind the mesh lights no smooth front.
+/// Checks that a light inside of a closed mesh lights no surface outside of it, neither with smooth
+/// nor with flat normals.
 #[test]
 fn closed_mesh_leaks_no_light() {
     let desk = Desk::new();
@@ -308,7 +309,7 @@ fn flat_normals_show_the_triangles() {
     };
     let pictures = [sphere, mesh("smooth"), mesh("flat")]
         .map(|scene| picture(&rendered(&scene, 7, Precision::Auto, 16), Replicates::Both));
-    // Inside of both silhouettes, where all surfaces are lit.
+    // The compared pixels are inside of both silhouettes, where all surfaces are lit.
     let apart = |which: usize| {
         let inner = (0..96 * 96).filter(|i| {
             let (x, y) = ((i % 96) as f64 - 47.5, (i / 96) as f64 - 47.5);
@@ -343,7 +344,8 @@ fn colours_of_the_file_multiply_the_materials() {
     let pixels = picture(&rendered(&desk.scene(text), 1, Precision::Auto, 2), Replicates::Both);
     for (pixel, expected) in [(24, [0.25, 0.125, 0.0]), (31, [0.0, 0.0, 0.5])] {
         for c in 0..3 {
-            // Ambient light, and the light in which a white matt surface has the brightness 1.
+            // The ambient light contributes the colour once. The directional light contributes it
+            // with the diffuse coefficient 0.5.
             let value = expected[c] * 1.5;
             assert!((pixels[pixel][c] - value).abs() < 1e-4, "{pixel} {:?}", pixels[pixel]);
         }
@@ -376,7 +378,7 @@ fn invalid_file_name_is_rejected_and_valid_file_read_once() {
     };
     let triangles = mesh(&named).mesh().triangles.len();
     assert_eq!(triangles, 2 * 9 * 5);
-    // The mesh stays after edits of the scene and changes of the file.
+    // The loaded mesh remains after the file is removed and the scene is edited.
     fs::remove_file(ball_file).unwrap();
     let flat = set(&named, &subject, "shape.mesh.normals", "flat").unwrap().scene;
     let turned = set(&flat, &subject, "transform", "rotate_y").unwrap().scene;
@@ -401,7 +403,7 @@ fn scene_is_not_saved_where_mesh_would_be_missing() {
     let beside = desk.0.path().join("copy.toml");
     file.save_as(&beside, &scene, false).unwrap();
     assert!(Scene::read(&beside).is_ok());
-    // In a folder with another file of this name it is another mesh.
+    // The other folder contains a different mesh under this name, so that the scene would change.
     fs::write(elsewhere.path().join("ball.obj"), ball(5, 5)).unwrap();
     assert!(file.save_as(&other, &scene, false).is_err());
 }

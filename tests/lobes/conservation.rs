@@ -31,8 +31,9 @@ fn variants_match_words_of_fields() {
     assert_eq!(read("fresnel").iter().map(|m| m.fresnel_mode()).collect::<Vec<_>>(), Fresnel::ALL);
 }
 
-/// Checks energy and reciprocity of reflection and transmission together, from outside and from
-/// inside. A mode that does not claim a property violates it.
+/// Checks energy and reciprocity of the interface, reflection and transmission together, for light
+/// from outside and from inside. Also checks that a Fresnel mode without one of these properties
+/// violates it here.
 #[test]
 fn transparent_surfaces_have_declared_properties() {
     for mode in Fresnel::ALL {
@@ -88,15 +89,16 @@ fn highlight_f(material: &Material, v: Vector, l: Vector) -> f64 {
     finish.highlight(Vec3::of(n), Vec3::of(v), Vec3::of(l), nl, nv).x / nl
 }
 
-/// Returns the value f (BRDF) of a reflection lobe for light from `l` seen from `v`: weight x
-/// density / cosine of the light.
+/// Returns the value f (BRDF) of a reflection lobe for light from `l` seen from `v`: the weight of
+/// a sample, times its density, divided by the cosine of the light.
 fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
     let n = tilted_normal();
     let finish = Bsdf::<f64>::new(material, true);
     let (strength, spread) = finish.reflection.unwrap();
     match spread {
         ReflectionLobe::Mirror => unreachable!(),
-        // Tested pointwise below: weight x density = f cos.
+        // The test of weight x density below shows that this lobe and the highlight have the same
+        // f.
         ReflectionLobe::MicrofacetDistribution(_) => highlight_f(material, v, l),
         _ => {
             let incident = Vec3::<f64>::of(combine(&[(-1.0, v)]));
@@ -136,7 +138,7 @@ fn closed_form_13_reciprocity_is_as_claimed() {
                 continue;
             }
             if !has_facets(lobe) {
-                // Property of the lobe alone, with reflectance 1.
+                // Without a Fresnel reflectance, the test checks a property of the lobe alone.
                 material.f0 = None;
             }
             check_reciprocity(&name, lobe.properties(), asymmetry(|v, l| lobe_f(&material, v, l)));
@@ -153,7 +155,8 @@ fn closed_form_13_reciprocity_is_as_claimed() {
     }
 }
 
-/// Checks a mirror, which has no finite value f: the reverse ray has the same path and weight.
+/// Checks the reciprocity of a mirror, whose BRDF has no finite value: the reverse ray follows the
+/// same path with the same weight.
 fn mirror_is_reciprocal(material: &Material) {
     assert!(material.lobe.properties().reciprocal);
     let n = tilted_normal();
@@ -173,8 +176,8 @@ fn mirror_is_reciprocal(material: &Material) {
     }
 }
 
-/// Checks Lambert's law in traced paths: exchanging light and eye changes only the cosine of the
-/// light.
+/// Checks the reciprocity of Lambert's law in traced paths: if light and eye are exchanged, the
+/// radiance divided by the cosine of the light stays the same.
 #[test]
 fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
     assert_eq!(
@@ -199,15 +202,17 @@ fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
         trace(&world, &Sampler::new(settings, world.camera_dimensions()), (0, 0), 0, 0)[0][0][0]
     };
     for (v, l) in pairs().into_iter().filter(|(v, l)| dot(*v, n).min(dot(*l, n)) > 0.1) {
-        // The irradiance of a surface that faces the light is pi: f = L / (pi cos).
+        // A light of intensity 1 gives the irradiance pi on a surface that faces it. `there` and
+        // `back` are therefore pi f = L / cos.
         let (there, back) = (radiance(v, l) / dot(n, l), radiance(l, v) / dot(n, v));
         assert!((there - back).abs() < 1e-12, "{there} {back}");
-        // f = albedo / pi, whose integral with the cosine is the albedo.
+        // Lambert's law is f = albedo / pi, so that pi f equals the albedo of 0.5.
         assert!((there - 0.5).abs() < 1e-12, "{there}");
     }
 }
 
-/// Returns the mean weight of reflections at an angle, by a set of Sobol points.
+/// Returns the mean weight of sampled reflections at an angle, estimated with a set of Sobol
+/// points.
 fn mean_weight(material: &Material, degrees: f64) -> f64 {
     let n = tilted_normal();
     let incident = combine(&[(-1.0, at_angle(n, degrees.to_radians(), 1.0))]);
@@ -273,8 +278,8 @@ fn closed_form_7_energy_of_highlights_is_as_claimed() {
     }
 }
 
-/// Checks weight x density = f cos at every sampled direction: the sampled reflection and the
-/// highlight are the same model.
+/// Checks weight x density = f cos at every sampled direction, with the f of the highlight. The
+/// sampled reflection and the highlight are then the same model.
 #[test]
 fn closed_form_13_weight_times_density_is_the_highlight() {
     let n = tilted_normal();
@@ -300,8 +305,9 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
                     let density = finish.density(&spread, Vec3::of(incident), vn, vd).unwrap();
                     let shine = finish.highlight(vn, Vec3::of(v), vd, dot(n, d), dot(n, v));
                     for (w, f_cos) in weight.into_iter().zip(vector(shine)) {
-                        // Error of exp(-tan^2 / alpha^2) with a slope from rounded directions, and of
-                        // the light's cosine, which is tiny at grazing angles.
+                        // The first term is the error of exp(-tan^2 / alpha^2), because the slope
+                        // comes from rounded directions. The second is the error of the light's
+                        // cosine, which is tiny at grazing angles.
                         let error = (w * density / f_cos - 1.0).abs();
                         let limit = 1e-12 / (alpha * degrees.to_radians().cos());
                         let limit = limit + 1e-15 / dot(n, d);
@@ -314,7 +320,8 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
         }
     }
     assert!(compared > 50_000, "{compared}");
-    // Densities of the square lobe are stated in its frame.
+    // The third axis of the frame must be exactly the normal, because the density of the square
+    // lobe is computed in this frame.
     assert!(vector(Frame::around(Vec3::<f64>::of(n)).n) == n);
 }
 

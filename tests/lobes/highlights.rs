@@ -9,15 +9,15 @@ fn shiny(exponent: f64) -> Material {
     Material { diffuse: 0.0, specular: 0.7, exponent, ..Material::default() }
 }
 
-/// Returns a unit vector, rounded to the precision of the kernel, and the same numbers in double
+/// Returns a unit vector, rounded to the precision of `L`, and the same rounded numbers in double
 /// precision.
 fn rounded<L: SimdFloat>(v: [f64; 3]) -> (Vec3<L>, [f64; 3]) {
     let v = Vec3::<L>::of(v).normalize();
     (v, v.lane(0).map(Float::to_f64))
 }
 
-/// Returns (R.V)^alpha, computed from the tangent of the angle between R and V, which keeps full
-/// precision.
+/// Returns (R.V)^alpha for the mirror direction R and the view direction V. It is computed from the
+/// tangent of the angle between R and V, which keeps full precision at small angles.
 fn power(n: [f64; 3], view: [f64; 3], light: [f64; 3], alpha: f64) -> f64 {
     let n = unit(n);
     let r = combine(&[(2.0 * dot(light, n), n), (-1.0, light)]);
@@ -31,8 +31,8 @@ fn power(n: [f64; 3], view: [f64; 3], light: [f64; 3], alpha: f64) -> f64 {
     if along > 0.0 { (-0.5 * alpha * tan2.ln_1p()).exp() } else { 0.0 }
 }
 
-/// Checks highlights around their centre for every valid exponent. They have the exact value, which
-/// is at most k_s.
+/// Checks highlights near the mirror direction for every valid exponent. Their values equal those
+/// of a computation in double precision within rounding, and never exceed k_s / pi.
 fn check<L: SimdFloat>(rounding: f64) {
     let most = L::from_f64(0.7) * L::from_f64(std::f64::consts::FRAC_1_PI);
     let most = most.lane(0).to_f64();
@@ -44,7 +44,8 @@ fn check<L: SimdFloat>(rounding: f64) {
             let (theta, turn) = (f64::from(step % 30) * 0.05, f64::from(step) * 0.7);
             let n = tilted_normal();
             let [t, b] = across(n);
-            // Up to four times the highlight's width away from the mirror direction.
+            // Distance of the view from the mirror direction: up to four times the highlight's
+            // width.
             let off = f64::from(step % 20) * 0.2 * alpha.recip().sqrt();
             let plane = combine(&[(turn.cos(), t), (turn.sin(), b)]);
             let light = combine(&[(theta.cos(), n), (theta.sin(), plane)]);
@@ -59,8 +60,8 @@ fn check<L: SimdFloat>(rounding: f64) {
             let expected = most * power(n64, view64, light64, alpha);
             worst = worst.max((value - expected).abs() / most);
         }
-        // Error for ordinary exponents: the cosine's rounding times the exponent; for larger ones the
-        // angle's rounding, in widths.
+        // Up to the exponent 1024, the error is the rounding of the cosine times the exponent. For
+        // larger exponents it is the rounding of the angle, divided by the highlight's width.
         let allowed = rounding * (4.0 * alpha.min(1024.0) + 8.0 * alpha.sqrt());
         assert!(worst <= allowed, "{}: {worst:e} off for {alpha:e}, {allowed:e} allowed", L::NAME);
     }

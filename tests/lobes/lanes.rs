@@ -24,8 +24,9 @@ macro_rules! for_every_instance {
     };
 }
 
-/// Returns the largest error of `f` against `exact` over `inputs`. The unit is an ulp of the
-/// result, or of 1 if `of_one` is `true`. `exact` gets the input rounded to this precision.
+/// Returns the largest error of `f` against `exact` over `inputs`. If `of_one` is `true`, the unit
+/// is the spacing of numbers (ulp) at 1, otherwise that at the exact result. `exact` gets the input
+/// rounded to the precision of `L`.
 fn worst_ulps<L: SimdFloat>(
     inputs: impl Fn(u32) -> f64,
     f: impl Fn(L) -> L,
@@ -45,9 +46,9 @@ fn worst_ulps<L: SimdFloat>(
     worst
 }
 
-/// Checks sine and cosine of 2 pi u with u in [0, 1), as lobes use them. They are exact within 1.5
-/// ulps of 1, which is enough for a direction. Near a multiple of pi / 2 the smaller of the two has
-/// no better precision.
+/// Checks sine and cosine of 2 pi u with u in [0, 1), as lobes use them. Their absolute error is at
+/// most 1.5 ulps of 1, which is enough for a direction. Near a multiple of pi / 2 one of the two is
+/// small, and its relative error is larger.
 fn sine_and_cosine<L: SimdFloat>() {
     let angle = |i: u32| std::f64::consts::TAU * uniform(i);
     let sin = worst_ulps::<L>(angle, |x| x.sin_cos().0, f64::sin, true);
@@ -56,8 +57,8 @@ fn sine_and_cosine<L: SimdFloat>() {
     assert!(sin <= 1.5 && cos <= 1.5, "{}: sin {sin}, cos {cos}", L::NAME);
 }
 
-/// Checks the angles of points in all directions. They are exact within 3 ulps of 1, for angles up
-/// to pi, without NaN on axes.
+/// Checks the angles (atan2) of points in all directions. Their absolute error is at most three ulps
+/// of 1. At the origin and on the positive x axis the angle is 0, not NaN.
 fn arc_tangent<L: SimdFloat>() {
     let angle = |i: u32| std::f64::consts::PI * (2.0 * uniform(i) - 1.0);
     let rounded = |x: f64| L::from_f64(x).lane(0).to_f64();
@@ -74,9 +75,9 @@ fn arc_tangent<L: SimdFloat>() {
     assert_eq!(L::from_f64(0.0).atan2(L::from_f64(2.0)).lane(0).to_f64(), 0.0);
 }
 
-/// Checks logarithms and exponentials of the arguments that occur. Logarithms are those of
-/// Beckmann's lobe (1 - u) and of Phong's highlight (a cosine, at least 1e-30); exponentials are
-/// those of both highlights.
+/// Checks logarithms and exponentials of the arguments that occur. Logarithms are taken of 1 - u
+/// for Beckmann's lobe, and of a cosine of at least 1e-30 for Phong's highlight. Exponentials are
+/// taken of the exponents of both models.
 fn logarithm_and_exponential<L: SimdFloat>() {
     let small = |i: u32| 10f64.powf(-30.0 * uniform(i));
     let share = |i: u32| 1.0 - f64::from(noise(i) >> 8) / 16_777_216.0;
@@ -105,7 +106,8 @@ fn elementary_functions_are_good_to_stated_ulps() {
     for_every_instance!(logarithm_and_exponential);
 }
 
-/// Checks that sums of rounded lanes are exact: they equal scalar sums, rounded to nearest even.
+/// Checks the fixed-point sums of the film: rounded lanes add up exactly, and their sum equals the
+/// sum of scalars that are rounded to nearest even.
 fn fixed_point<L: SimdFloat>() {
     let halves = [0.5, 1.5, 2.5, -0.5, -1.5, -2.5, 0.0, -0.0];
     for i in 0..20_000u32 {
@@ -135,7 +137,7 @@ fn fixed_point_sums_are_exact() {
     for_every_instance!(fixed_point);
 }
 
-/// Checks lookups in tables of one element, of a register of every width, and of more.
+/// Checks lookups in tables of one element, of as many as a register has lanes, and of more.
 fn gathers<L: SimdFloat>() {
     for length in [1, 4, 8, 16, 17, 64] {
         let value = |i: usize| L::Scalar::from_f64(uniform(i as u32));
@@ -166,7 +168,7 @@ fn integers<L: SimdFloat>() {
             assert_eq!((x << shift).lane(lane), one << shift);
             assert_eq!((x >> shift).lane(lane), one >> shift);
             assert_eq!((x * x + x).lane(lane), one.wrapping_mul(one).wrapping_add(one));
-            // Uniform numbers are less than 1 and keep the top bits.
+            // Uniform numbers are less than 1 and keep the top 24 bits of the integer.
             let unit = L::to_unit(x).lane(lane).to_f64();
             assert!((0.0..1.0).contains(&unit));
             assert_eq!((unit * 16_777_216.0) as u32, one >> 8);
@@ -202,7 +204,7 @@ fn masks<L: SimdFloat>() {
             assert_eq!(mask.lane(lane), truth);
             let chosen = L::select(mask, yes, no).lane(lane).to_f64();
             assert_eq!(chosen, if truth { 2.0 } else { -3.0 });
-            // `masked` clears lanes that would poison a sum.
+            // `masked` replaces lanes outside of the mask by 0, even if they are NaN.
             let nan = L::from_f64(f64::NAN).masked(mask).lane(lane).to_f64();
             assert_eq!(nan.is_nan(), truth);
             assert!(truth || nan == 0.0);
@@ -238,7 +240,8 @@ fn masks_select_lanes_and_keep_labels() {
     for_every_instance!(tags);
 }
 
-/// Checks that `min` and `max` drop NaN on the left, and that comparisons with NaN are false.
+/// Checks that `min` and `max` ignore a NaN in the left operand, and that comparisons with NaN are
+/// false.
 fn not_a_number<L: SimdFloat>() {
     let nan = L::from_f64(f64::NAN);
     for x in [-1.0, 0.0, 2.5, f64::INFINITY, f64::NEG_INFINITY] {
@@ -318,8 +321,8 @@ fn ieee_operations_are_the_same_bits_at_every_width() {
     same_bits::<f64, Double>();
 }
 
-/// Checks that the axes of an upright mirror's lobes are horizontal and vertical for every
-/// orientation.
+/// Checks that the frame of a lobe about any horizontal direction has one horizontal and one
+/// vertical axis. The lobes of upright mirrors are then aligned with the horizon.
 #[test]
 fn frames_around_horizontal_vectors_are_upright() {
     for i in 0..360 {

@@ -65,7 +65,8 @@ impl ReflectionModel for Highlight {
 pub fn transmission_properties(fresnel: Fresnel) -> BsdfProperties {
     match fresnel {
         Fresnel::Dielectric => BsdfProperties { reciprocal: true, energy: Energy::Conserving },
-        // k_r and k_t are independent, and the inner sides of surfaces do not reflect.
+        // In all other modes k_r and k_t are independent, and surfaces do not reflect on their
+        // inner sides.
         _ => BsdfProperties { reciprocal: false, energy: Energy::Unbounded },
     }
 }

@@ -38,7 +38,7 @@ fn erf(x: f64) -> f64 {
     (0..=steps).map(term).sum::<f64>() * h / 3.0 * 2.0 / PI.sqrt()
 }
 
-/// Microfacet distribution of this test, implemented a second time from the papers.
+/// Microfacet distribution, implemented for this test a second time from the papers.
 struct Facets {
     ggx: bool,
     masking: Masking,
@@ -95,14 +95,14 @@ impl Facets {
         let (rings, turns) = (300, 120);
         let mut sums = [0.0; 2];
         for i in 0..rings {
-            // tan^2 = alpha^2 s / (1 - s), with s = 1 - (1 - q)^2 against the singularity at grazing
-            // microfacets.
+            // With s = 1 - (1 - q)^2, tan^2 = alpha^2 s / (1 - s). The square removes the
+            // singularity at grazing microfacets.
             let q = (f64::from(i) + 0.5) / f64::from(rings);
             let rest = (1.0 - q) * (1.0 - q);
             let tan2 = self.alpha * self.alpha * (1.0 - rest) / rest;
             let nh = 1.0 / (1.0 + tan2).sqrt();
             let sin_h = (tan2 / (1.0 + tan2)).sqrt();
-            // Solid angle: sin dtheta dphi = cos^3 / 2 d(tan^2) dphi.
+            // The solid angle is sin dtheta dphi = cos^3 / 2 d(tan^2) dphi.
             let d_tan2 = self.alpha * self.alpha * 2.0 * (1.0 - q) / (rest * rest);
             let d_tan2 = d_tan2 / f64::from(rings);
             let solid_angle = 0.5 * nh.powi(3) * d_tan2 * TAU / f64::from(turns);
@@ -155,8 +155,8 @@ fn sampled_albedo<L: SimdFloat>(
     sums
 }
 
-/// Checks that the albedos of rough glass equal those of single scattering by quadrature. A set of
-/// 16,384 Sobol points has an error of a thousandth.
+/// Checks that sampled albedos of rough glass equal those of single scattering, computed by
+/// quadrature. The sampled ones have an error of a thousandth (16,384 Sobol points).
 #[test]
 fn rough_glass_has_the_albedo_of_single_scattering() {
     let mut worst = 0f64;
@@ -218,9 +218,9 @@ fn rough_glass_conserves_energy_at_extremes() {
     }
 }
 
-/// Checks that weight x density is the cosine times Walter's f (2007, eq. 21) without the factor
-/// eta^2 of radiance, at every sampled direction. f / n_t^2 is the same after light and viewer
-/// change places.
+/// Checks transmission at every sampled direction. Weight x density is the cosine times Walter's f
+/// (2007, eq. 21) without the factor eta^2 of radiance. Also checks reciprocity: f / n_t^2 stays
+/// the same if light and viewer are exchanged.
 #[test]
 fn closed_form_13_weight_times_density_is_walters_formula() {
     let n = tilted_normal();
@@ -236,7 +236,8 @@ fn closed_form_13_weight_times_density_is_walters_formula() {
                     let v = at_angle(n, degrees.to_radians(), 2.0);
                     let incident = combine(&[(-1.0, v)]);
                     let sides = Sides { n_i, n_t, thin: false };
-                    // f of light from `l` in a medium of index `n_l`, seen from `v` in `n_v`.
+                    // Returns f for light from `l` in a medium of the index `n_l`, seen from `v` in
+                    // a medium of the index `n_v`.
                     let walter = |(v, n_v): (Vector, f64), (l, n_l): (Vector, f64), n: Vector| {
                         let h = combine(&[(-n_v, v), (-n_l, l)]);
                         let h = unit(combine(&[(1f64.copysign(dot(h, n)), h)]));
@@ -264,7 +265,8 @@ fn closed_form_13_weight_times_density_is_walters_formula() {
                         );
                         let f = walter((v, n_i), (l, n_t), n);
                         let error = (weight * density / (f * -dot(n, l)) - 1.0).abs();
-                        // Error of D and of cosines with directions that are rounded.
+                        // The directions are rounded, which causes an error of the distribution D
+                        // and of the cosines.
                         let limit = 1e-5;
                         let name = format!("{lobe:?} {masking:?} {alpha} {n_i} {n_t} {degrees}");
                         assert!(error < limit, "{name}: {error:.1e}");
@@ -291,7 +293,8 @@ fn smooth_glass_is_clear() {
     }
 }
 
-/// Checks that the value of an interface, divided by the density, is the weight of the sampled rays.
+/// Checks that the value of an interface in the direction of a sampled ray, divided by the density,
+/// is the weight of the ray.
 fn check_evaluation<L: SimdFloat>(tolerance: f64) {
     let sides = [(1.0, 1.5, false), (1.5, 1.0, false), (1.0, 1.5, true), (1.0, 1.0, false)];
     let n = [0.0, 0.0, 1.0];

@@ -1,5 +1,5 @@
-//! Numbers of the samplers: nets (distribution in elementary intervals), independence, moments,
-//! order of convergence.
+//! Random numbers of the samplers. The tests check that Sobol points form nets (one point in each
+//! elementary interval), that pixels are independent, the moments, and the order of convergence.
 
 use crate::lobes::stats::slope;
 use std::f64::consts::PI;
@@ -31,8 +31,8 @@ fn pairs<L: SimdFloat>(
     out
 }
 
-/// Checks that each elementary interval of area 2^-m, of any shape, contains one of the first 2^m
-/// points.
+/// Checks that `points`, the first 2^m of a sequence, form a net. Each elementary interval of area
+/// 2^-m, whatever its aspect ratio, contains exactly one of them.
 fn assert_net(points: &[[f64; 2]], name: &str) {
     let m = points.len().ilog2();
     assert_eq!(points.len(), 1 << m);
@@ -48,9 +48,9 @@ fn assert_net(points: &[[f64; 2]], name: &str) {
     }
 }
 
-/// Checks that scrambling keeps each pair of dimensions a net: every elementary interval holds the
-/// right number of points. This holds in the joint set, and in the padded sets, whose indices are
-/// also shuffled.
+/// Checks that scrambling keeps each pair of dimensions a net: every elementary interval contains
+/// one point. This holds in the joint set (the first eight dimensions) and in the padded sets
+/// (further dimensions), whose indices are also shuffled.
 fn nets<L: SimdFloat>() {
     for seed in [0, 1, u64::MAX] {
         for replicate in 0..2 {
@@ -142,10 +142,10 @@ fn numbers(sampler: &Sampler<f64>, pixel: (u32, u32), replicate: usize, index: u
     [place.0, place.1].into_iter().chain(lobes).collect()
 }
 
-/// Checks the independence of pixels and replicates (halves of the samples). Over pixels, every
-/// dimension of every index is uniform in mean and variance. It is uncorrelated with other
-/// dimensions, the other replicate, the neighbouring pixel and another seed. The limit is 4.8
-/// sigma: one false alarm in a thousand runs of these 1300 tests.
+/// Checks the independence of pixels and replicates (halves of the samples). Over all pixels, each
+/// dimension of a sample is uniform in mean and variance. It is uncorrelated with the next
+/// dimension, the other replicate, the neighbouring pixel and another seed. The limit is 4.8 sigma,
+/// which gives one false alarm in a thousand runs of these 1300 tests.
 #[test]
 fn pixels_and_replicates_are_independent() {
     const SIGMAS: f64 = 4.8;
@@ -237,8 +237,9 @@ fn rmse_slope(kind: SamplerKind, f: &Integrand) -> f64 {
     slope(&(4..=10).map(point).collect::<Vec<_>>())
 }
 
-/// Checks the rates at which errors fall with N samples: nearly 1 / N for a smooth integrand in
-/// four dimensions, N^-3/4 for an edge in two dimensions, N^-1/2 for random numbers.
+/// Checks the rates at which the error falls with the number N of samples. Sobol points give nearly
+/// 1 / N for a smooth integrand in four dimensions, and N^-3/4 for an edge in two dimensions.
+/// Random numbers give N^-1/2.
 #[test]
 fn errors_fall_at_the_known_rates() {
     let smooth = rmse_slope(SamplerKind::Sobol, &SMOOTH);

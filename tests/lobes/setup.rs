@@ -73,7 +73,7 @@ pub fn every_lobe() -> Vec<(Lobe, Masking)> {
     Lobe::ALL.into_iter().flat_map(|l| maskings(l).iter().map(move |m| (l, *m))).collect()
 }
 
-/// Random numbers with which reflections are sampled: kind, seed and pixel.
+/// Source of the random numbers for sampled reflections: kind, seed and pixel.
 #[derive(Clone, Copy)]
 pub struct Numbers {
     pub kind: SamplerKind,
@@ -91,7 +91,7 @@ impl Numbers {
     }
 }
 
-/// Samples `count` reflections like the kernel, in the SIMD type `L`. Passes each direction and
+/// Samples `count` reflections as the program does, in the SIMD type `L`. Passes each direction and
 /// weight to `take`. `incident` points towards the surface.
 pub fn each_reflection<L: SimdFloat>(
     material: &Material,
@@ -128,8 +128,8 @@ fn reflect<L: SimdFloat>(
     }
 }
 
-/// Returns a white dielectric with the lobe `lobe`, whose coefficients of reflection and
-/// transmission are 1.
+/// Returns a white dielectric with the lobe `lobe`. Its coefficients of reflection and transmission
+/// are 1.
 pub fn rough_glass(lobe: Lobe, masking: Masking, alpha: f64, ior: f64) -> Material {
     Material {
         alpha: Some(alpha),
@@ -167,8 +167,8 @@ pub struct Crossing {
     pub transmitted: (Vector, f64),
 }
 
-/// Samples `count` pairs of reflected and transmitted rays like the kernel, in the SIMD type `L`.
-/// Passes each pair to `take`.
+/// Samples `count` pairs of reflected and transmitted rays as the program does, in the SIMD type
+/// `L`. Passes each pair to `take`.
 pub fn each_crossing<L: SimdFloat>(
     material: &Material,
     (incident, n): (Vector, Vector),
@@ -240,8 +240,8 @@ pub fn scene(text: &str) -> Scene {
 
 const SETTINGS: SampleSettings = SampleSettings { seed: 3, kind: SamplerKind::Sobol };
 
-/// Returns the samples `0..count` of every pixel, each summed over the light groups, with white
-/// lights.
+/// Returns the samples `0..count` of every pixel. Each is the sum over the light groups, with the
+/// weight 1 for all lights.
 pub fn samples<L: SimdFloat>(scene: &Scene, count: u32) -> Vec<Vector> {
     let world = World::<L>::new(scene);
     let sampler = Sampler::<L>::new(SETTINGS, world.camera_dimensions());

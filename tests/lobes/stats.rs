@@ -22,8 +22,8 @@ fn ln_gamma(a: f64) -> f64 {
     0.5 * (2.0 * PI).ln() + (x + 0.5) * t.ln() - t + sum.ln()
 }
 
-/// Returns the regularised upper incomplete gamma function Q(a, x): below a + 1 by the power series
-/// of P, above by Lentz's continued fraction.
+/// Returns the regularised upper incomplete gamma function Q(a, x). If x is less than a + 1, it is
+/// computed from the power series of P = 1 - Q, otherwise by Lentz's continued fraction.
 fn gamma_q(a: f64, x: f64) -> f64 {
     if x <= 0.0 {
         return 1.0;
@@ -61,8 +61,8 @@ pub fn chi_square_tail(chi2: f64, dof: usize) -> f64 {
     gamma_q(0.5 * dof as f64, 0.5 * chi2)
 }
 
-/// Returns the p-value of counts against expected ones. Bins with fewer than five expected counts
-/// are pooled.
+/// Returns the p-value of `counts` against the expected counts. Bins with fewer than five expected
+/// samples are merged.
 pub fn chi_square_p(counts: &[u64], expected: &[f64]) -> f64 {
     let mut order: Vec<usize> = (0..counts.len()).collect();
     order.sort_by(|a, b| expected[*a].total_cmp(&expected[*b]));

@@ -16,13 +16,15 @@ fn mean(samples: &[Vector]) -> Vector {
 const GLASS: &str = "ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\n\
                      fresnel = \"dielectric\"\n";
 
-/// Returns the largest error of a ray's displacement by a slab, as a fraction of its thickness t.
+/// Returns the largest error of a ray's displacement by a slab, as a fraction of the slab's
+/// thickness t.
 ///
-/// The slab displaces a ray by t sin i (1 - cos i / sqrt(n^2 - sin^2 i)) and keeps its direction. The error
-/// is bounded by rounding: that of the direction over the path through the slab, which at 89.9 degrees is up
-/// to 430 long, and the two ray offsets of 8 roundings of the slab's half width.
+/// The slab displaces a ray by t sin i (1 - cos i / sqrt(n^2 - sin^2 i)) and keeps its direction.
+/// Two rounding errors bound the difference. The first is that of the direction, times the length
+/// of the path through the slab, which is up to 430 at 89.9 degrees. The second is that of the two
+/// ray offsets, each 8 roundings of the slab's half width.
 fn check_slab<L: SimdFloat>() -> f64 {
-    /// Smallest half width that contains a ray at 89.9 degrees in a slab of index 1.
+    /// Half width of the slab. It is large enough for a ray at 89.9 degrees if the index is 1.
     const HALF_WIDTH: f64 = 450.0;
     let t = 0.75;
     let slab = scene(&format!(
@@ -52,10 +54,10 @@ fn check_slab<L: SimdFloat>() -> f64 {
                 let origin = normal.mul_add(-surface.ray_offset(), surface.point);
                 ray = Ray { origin, direction: interface.refracted };
             }
-            // Displacement from the path without the slab.
+            // Displacement of the ray behind the slab from the straight path.
             let way = ray.origin - from;
             let shift = (number(way.x) * -cos - number(way.z) * sin).abs();
-            // n^2 - sin^2, without cancellation at n = 1.
+            // The expression under the root is n^2 - sin^2. In this form no digits cancel at n = 1.
             let expected = t * sin * (1.0 - cos / (n * n - 1.0 + cos * cos).sqrt());
             let off = (shift - expected).abs() / t;
             let through = t / (1.0 - (sin / n).powi(2)).sqrt();
@@ -63,7 +65,8 @@ fn check_slab<L: SimdFloat>() -> f64 {
             assert!(off <= L::EPSILON * roundings / t, "{}, {n} {i}: {shift} {expected}", L::NAME);
             worst = worst.max(off);
             let turned = number((ray.direction - direction).max_abs());
-            // Near grazing incidence a rounding error of the sine is a larger one of the cosine.
+            // Near grazing incidence, a rounding error of the sine causes a larger error of the
+            // cosine.
             let allowed = L::EPSILON * (4.0 * n / cos).min(4.5e5);
             assert!(turned <= allowed, "{}, {n} {i}: turned by {turned}", L::NAME);
         }
@@ -103,8 +106,9 @@ fn between_walls(slab: &str) -> Scene {
     ))
 }
 
-/// Checks a slab in which all orders of reflection are traced. At normal incidence it reflects 2 F
-/// / (1 + F) and transmits (1 - F) / (1 + F). A thin pane has the same values.
+/// Checks a slab in which all orders of internal reflection are traced. With the reflectance F of
+/// one surface at normal incidence, the slab reflects 2 F / (1 + F) and transmits (1 - F) / (1 +
+/// F). A thin pane has the same values.
 #[test]
 fn closed_form_11_a_slab_with_all_orders() {
     for n in [1.0, 1.5, 4.0, 1e3] {
@@ -151,8 +155,8 @@ fn through_slab<L: SimdFloat>(degrees: f64, ior: f64, keys: &str) -> Vector {
 }
 
 /// Checks Beer's law: a slab of thickness t with the absorption coefficient s has the transmittance
-/// exp(-s t / cos). cos is the cosine of the refracted direction. The path through the slab is
-/// shorter by the ray offset, 8 roundings of the slab's half width of 200.
+/// exp(-s t / cos), where cos is the cosine of the refracted direction. The tolerance allows for
+/// the ray offset, which shortens the path by 8 roundings of the slab's half width of 200.
 fn check_beer<L: SimdFloat>() {
     let (color, distance, thickness) = ([0.25f64, 0.9, 0.0], 0.5, 0.8);
     let keys = format!("attenuation_color = {color:?}\nattenuation_distance = {distance:?}");
@@ -171,7 +175,8 @@ fn check_beer<L: SimdFloat>() {
         }
     }
     println!("{}: Beer's law {worst:.1e} off at most", L::NAME);
-    // Extremes: absorption within a rounding of the surface, and none within the whole range.
+    // Extreme distances: all light is absorbed within a rounding of the surface, or none in the
+    // whole slab.
     for (distance, expected) in [(1e-300, 0.0), (1e-9, 0.0), (1e9, 1.0)] {
         let keys =
             format!("attenuation_color = [0.5, 0.5, 0.5]\nattenuation_distance = {distance:?}");
@@ -187,9 +192,10 @@ fn closed_form_beers_law_through_a_slab() {
     check_beer::<Single>();
 }
 
-/// Checks a glass slab with Fresnel's equations and the transmittance a. It reflects F + F (1 -
-/// F)^2 a^2 / (1 - F^2 a^2) and transmits (1 - F)^2 a / (1 - F^2 a^2). The bound of 4.5 standard
-/// errors allows for twelve comparisons.
+/// Checks an absorbing glass slab at normal incidence. F is the reflectance of one surface, and a
+/// the transmittance of the interior. The slab reflects F + F (1 - F)^2 a^2 / (1 - F^2 a^2) and
+/// transmits (1 - F)^2 a / (1 - F^2 a^2). The bound of 4.5 standard errors allows for twelve
+/// comparisons.
 #[test]
 fn closed_form_an_absorbing_slab_with_all_orders() {
     for n in [1.5f64, 2.4, 4.0] {
@@ -248,7 +254,8 @@ fn glass_is_invisible_in_white_furnace() {
         [materials.air]\nindex = 1.0\n";
     for index in [0.7, 1.0, 1.5, 1e3] {
         let inner = format!("{GLASS}ior = {index:?}\n");
-        // A bubble in glass of index 1000 refracts light so that it is trapped by total reflection.
+        // With glass of index 1000 there is no bubble: total reflection would trap light in the
+        // glass around it.
         let bubble = if index < 100.0 { format!("{nested}{GLASS}") } else { String::new() };
         for more in [String::new(), bubble] {
             let scene = ball_in_front("[1.0, 1.0, 1.0]", 10_000, &inner, &format!("{BALL}{more}"));
@@ -290,8 +297,8 @@ fn rough_glass_in_white_furnace() {
     }
 }
 
-/// Checks that the picture of rough glass converges to that of clear glass as alpha vanishes. Below
-/// 0.001 it is the same.
+/// Checks that the picture of rough glass converges to that of clear glass as alpha vanishes. If
+/// alpha is less than 0.001, the two pictures are equal in every bit.
 #[test]
 fn rough_glass_converges_to_clear_glass() {
     let mut scene = scene(
@@ -317,7 +324,8 @@ fn rough_glass_converges_to_clear_glass() {
     };
     let (near, far) = (apart(1e-3), apart(0.2));
     println!("root mean square {near:.4} at alpha 0.001, {far:.4} at 0.2");
-    // Half of the rays at an interface beyond the second are reflected at random: the noise is 0.01.
+    // From the third interface of a path on, a ray is reflected or transmitted at random. The noise
+    // of this choice is 0.01.
     assert!(near < 0.2 * far, "{near} {far}");
 }
 
@@ -338,8 +346,9 @@ fn index_1_is_invisible() {
     assert!(without.iter().any(|s| s[0] > 0.4), "the box is not seen");
 }
 
-/// Checks a camera inside of glass. It sees the outside up to the critical angle, 41.8 degrees, and
-/// reflections beyond it, also with a near plane and from a bubble in the glass.
+/// Checks a camera inside of glass. It sees the outside up to the critical angle of 41.8 degrees,
+/// and internal reflections beyond it. This also holds with a near plane, and for a camera in a
+/// bubble in the glass.
 #[test]
 fn camera_inside_glass_starts_in_its_medium() {
     let look = |degrees: f64, near: f64, fresnel: &str, more: &str| {
@@ -367,7 +376,7 @@ fn camera_inside_glass_starts_in_its_medium() {
         assert_eq!(look(41.82, near, "", ""), 0.0);
         assert_eq!(look(60.0, near, "fresnel = \"dielectric\"", ""), 0.0);
         let f = 0.04;
-        // The ray leaves at the first surface or at the second.
+        // The ray leaves the glass at the first surface, or after one reflection at the second.
         let seen = look(0.0, near, "fresnel = \"dielectric\"", "");
         assert!((seen - (1.0 - f * f)).abs() < 1e-9, "{near}: {seen}");
     }
@@ -376,15 +385,16 @@ fn camera_inside_glass_starts_in_its_medium() {
     assert_eq!(look(41.82, 0.0, "", bubble), 0.0);
 }
 
-/// Checks that a material with fixed coefficients reflects on its outer side only. Otherwise k_r =
-/// 1 would give endless reflections between inner walls; the light leaves by k_t.
+/// Checks that a material with fixed coefficients k_r and k_t reflects on its outer side only. With
+/// k_r = 1 on the inner side, too, reflections between inner walls would never end. Light inside
+/// leaves by k_t.
 #[test]
 fn fixed_coefficients_reflect_outside_only() {
     let inner =
         "ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmission = 0.5\nindex = 1.4286\n";
     let scene = ball_in_front("[1.0, 1.0, 1.0]", 100, inner, BALL);
     let all = samples::<Double>(&scene, 8);
-    // 1 is reflected, and 0.5 x 0.5 is transmitted.
+    // The outer side reflects 1, and two transmissions pass on 0.5 x 0.5.
     let on_ball = all.iter().filter(|s| (s[0] - 1.25).abs() < 1e-12).count();
     let beside = all.iter().filter(|s| s[0] == 1.0).count();
     assert_eq!(on_ball + beside, all.len());
@@ -403,7 +413,7 @@ fn glass_packets_equal_scalar_samples() {
         let (wide, one) = (samples::<Double>(&scene, 8), samples::<f64>(&scene, 8));
         assert_eq!(wide.len(), one.len());
         for (a, b) in wide.iter().zip(&one) {
-            // Powers of highlights differ by a few roundings.
+            // The powers of highlights differ by a few roundings between the vector widths.
             assert!((0..3).all(|c| (a[c] - b[c]).abs() <= 1e-12 * (1.0 + b[c])), "{a:?} {b:?}");
         }
     }

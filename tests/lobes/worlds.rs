@@ -90,10 +90,10 @@ fn parallel_mirrors(depth: u32) -> Scene {
     ))
 }
 
-/// Checks two parallel emissive mirrors of rho = 0.999. The sum of rho^k over all images is 1000,
-/// and the part beyond the depth limit equals the reported bias. In single precision rho is rounded
-/// by up to 3e-8, which 1000 images multiply, and each of the 10,000 terms of the sum is rounded as
-/// well.
+/// Checks two parallel emissive mirrors with the reflectance rho = 0.999. The sum of rho^k over all
+/// images is 1000. The part of it beyond the depth limit equals the reported bias. In single
+/// precision the error of the sum is at most 1e-4. Its parts are the rounding of rho by up to 3e-8,
+/// multiplied by 1000 images, and the roundings of 10,000 terms.
 #[test]
 fn extreme_26_parallel_mirrors() {
     let rho: f64 = 0.999;
@@ -107,7 +107,7 @@ fn extreme_26_parallel_mirrors() {
         let told = double.biases();
         assert_eq!(told.len(), 1, "{told:?}");
         assert!(told[0].contains(&format!("max_depth {depth} ")), "{told:?}");
-        // The report has three digits, rounded up.
+        // The report shows the bound with three digits, rounded up.
         let (_, bound) = told[0].split_once("at most ").expect("a bound");
         let bound: f64 = bound.split(' ').next().unwrap().parse().expect("a number");
         assert!(bound >= cut && bound < 1.01 * cut, "{told:?}, {cut}");
@@ -128,14 +128,14 @@ fn extreme_26_parallel_mirrors() {
     report(26, "single", &format!("{:.0e} off (relative)", worst[1]));
 }
 
-/// Smallest radiance to which differences are relative: a hundredth of that of a lit wall of the
-/// physical room. At grazing light N.L is tiny, and the rounding of a direction is a large fraction
-/// of it.
+/// Smallest denominator of relative differences: a hundredth of the radiance of a lit wall of the
+/// physical room. Darker samples are compared by absolute differences, because in grazing light N.L
+/// is tiny, and the rounding of a direction is a large fraction of it.
 const DIM: f64 = 1e-4;
 
-/// Compares samples traced alone with samples in packets. Returns the fraction that differs at all,
-/// the fraction that differs by more than 1e-3, the largest relative difference of the others, and
-/// the relative difference of the means.
+/// Compares samples traced alone with samples in packets. Returns the fraction of samples that
+/// differ at all, and the fraction that differ by more than 1e-3. Also returns the largest relative
+/// difference of all other samples, and the relative difference of the means.
 fn compare<One: SimdFloat, Many: SimdFloat>(scene: &Scene) -> [f64; 4] {
     let (one, many) = (samples::<One>(scene, 16), samples::<Many>(scene, 16));
     assert_eq!(one.len(), many.len());
@@ -167,8 +167,9 @@ fn physical() -> Scene {
     scene
 }
 
-/// Checks that only ln, sin and exp of the mirror differ between vector widths. Such a rounding may
-/// change a path so that it hits another object's edge or a shadow.
+/// Checks that samples traced alone and in packets differ only by rounding. The functions ln, sin
+/// and exp, which the mirror's lobe uses, depend on the vector width. Such a difference can let a
+/// path pass an edge of an object or of a shadow on the other side.
 #[test]
 fn packets_equal_single_samples_but_for_roundings_of_sin_and_ln() {
     for [any, far, near, mean] in

@@ -9,7 +9,7 @@ fn film(path: PathBuf) -> Film {
     FilmReader::open(&path).and_then(FilmReader::read).unwrap_or_else(|e| panic!("{e}")).1
 }
 
-/// Waits until the file `name` exists. It is complete from then on.
+/// Waits until the file `name` exists. A checkpoint gets its name only when it is complete.
 fn wait_for_file(fixture: &Fixture, name: &str) {
     let end = Instant::now() + Duration::from_secs(60);
     while !fixture.path(name).exists() {
@@ -25,8 +25,8 @@ fn kill(terminal: Terminal) {
     drop(terminal);
 }
 
-/// Returns the paths of the checkpoints in the folder, each with its number of samples. All of them
-/// are complete.
+/// Returns the paths of the checkpoints in the folder, each with its number of samples. Panics if a
+/// checkpoint is incomplete.
 fn checkpoints(fixture: &Fixture) -> Vec<(PathBuf, u64)> {
     let files = fs::read_dir(fixture.0.path()).unwrap().map(|entry| entry.unwrap().path());
     let files = files.filter(|path| {
@@ -36,15 +36,15 @@ fn checkpoints(fixture: &Fixture) -> Vec<(PathBuf, u64)> {
     files.map(|path| (path.clone(), film(path).samples())).collect()
 }
 
-/// Kills a dashboard at `moments` random moments while it renders and writes checkpoints. Each next
-/// one continues from the checkpoint with most samples. At the end, compares the film with that of
+/// Starts and kills a dashboard `moments` times while it renders and writes checkpoints. Each run
+/// continues from the checkpoint with the most samples. At the end, compares the film with that of
 /// an uninterrupted render.
 fn kill_at_random_moments(moments: u32, text: &str, seed: u64) {
     let fixture = Fixture::new();
     fs::write(fixture.path("room.toml"), text).unwrap();
     let start = Instant::now();
     fixture.rendered(&["room.toml", "--noise", "0.5", "--checkpoint", "whole.zk"], "whole.png");
-    // The lives together are about as long as the uninterrupted render.
+    // All runs together last about as long as the uninterrupted render.
     let life = start.elapsed().as_secs_f64() / f64::from(moments);
     let whole = film(fixture.path("whole.zk"));
     let mut random = seed;
@@ -55,7 +55,7 @@ fn kill_at_random_moments(moments: u32, text: &str, seed: u64) {
     let (mut latest, mut samples, mut kept) = ("room.toml", 0, 0);
     for moment in 0..moments {
         let mut terminal = fixture.open(&[latest], [80, 24]);
-        // Every fourth life may end before its first picture or checkpoint.
+        // Every fourth run may be killed before its first picture or checkpoint.
         if moment % 4 != 3 {
             wait_for_picture(&terminal);
             terminal.send("K");
@@ -88,8 +88,8 @@ fn kill_at_random_moments(moments: u32, text: &str, seed: u64) {
     assert_eq!(terminal.end().0, 0);
 }
 
-/// Requests checkpoints `room-FIRST.zk` and so on until one has as many samples as `whole`. Its
-/// film must equal `whole`.
+/// Requests checkpoints, named `room-FIRST.zk` and so on, until one has as many samples as `whole`.
+/// Checks that its film equals `whole`.
 fn await_film(fixture: &Fixture, terminal: &mut Terminal, whole: &Film, first: usize) {
     for number in first.. {
         terminal.send("K");
@@ -121,12 +121,12 @@ fn dashboard_killed_at_twenty_random_moments_ends_with_the_same_film() {
     kill_at_random_moments(20, &text, 2);
 }
 
-/// Checks that a dashboard that is killed after a checkpoint, and one that continues it, end with
-/// the film of `zerkalo render`.
+/// Checks a dashboard that is killed after a checkpoint and one that continues from it. The film of
+/// the second one equals that of `zerkalo render`.
 #[test]
 fn killed_dashboard_continues_from_its_checkpoint() {
     let fixture = Fixture::with_room();
-    // Noise that takes a few seconds.
+    // The render must take a few seconds to reach its noise target.
     let text = fs::read_to_string(fixture.path("room.toml")).unwrap();
     let text = text.replace("size = [640, 480]", "size = [320, 240]");
     fs::write(fixture.path("room.toml"), &text).unwrap();
@@ -144,14 +144,14 @@ fn killed_dashboard_continues_from_its_checkpoint() {
 
     let mut terminal = fixture.open(&["room-1.zk"], [120, 36]);
     wait_for_picture(&terminal);
-    // The scene file is open, not the copy in the checkpoint.
+    // The title shows the scene file, and not the copy of the scene in the checkpoint.
     terminal.wait_for_text("room.toml");
     terminal.send("K");
     wait_for_file(&fixture, "room-2.zk");
     let after = film(fixture.path("room-2.zk")).samples();
     assert!(after >= before, "the samples of the checkpoint are lost");
     await_film(&fixture, &mut terminal, &whole, 3);
-    // A checkpoint that was requested last is complete when the program has ended.
+    // The program quits only when the checkpoint that was requested last is complete.
     terminal.send("Kq");
     let (status, bytes) = terminal.end();
     assert_eq!(status, 0, "{bytes}");

@@ -58,7 +58,7 @@ fn external_changes_are_shown_and_faulty_file_can_be_fixed() {
         terminal.wait_for(what, |s| expected.contains(&picture_cells(s)).then_some(()));
     };
     wait_for_cells("a picture as wide as its film", 2000..3000);
-    // A film of another shape shows another picture.
+    // With another aspect ratio of the film, the shown picture is narrower.
     let narrow = BUILT_IN.replace("size = [640, 480]", "size = [120, 480]");
     fs::write(fixture.path("room.toml"), narrow).unwrap();
     wait_for_cells("a narrower picture", 300..1000);

@@ -20,7 +20,8 @@ fn names_with_control_sequences_are_escaped() {
     let mut terminal = fixture.open(&[&name], [140, 40]);
     wait_for_picture(&terminal);
     terminal.wait_for_text("u{1b}]52");
-    // Outline, inspector, renaming, viewpoints, and a picture whose path is refused.
+    // The keys visit the outline (list of all parts of the scene), the inspector, renaming and
+    // viewpoints. Then a picture is exported, and copying its path is refused.
     for keys in [
         "\t", "\x1b[B", "\x1b[B", "\x1b[B", "\x1b[B", "\x1b[B", "\t", "\x1b", "e", "\x1b", "1",
         "l", "x", "u",

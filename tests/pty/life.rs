@@ -179,7 +179,8 @@ fn unrequested_replies_are_not_keys() {
     open_help_and_quit(terminal);
 }
 
-/// Checks that the query of the terminal's capabilities waits for replies until a signal arrives.
+/// Checks that the query of the terminal's capabilities, which waits for replies, ends when a
+/// signal arrives.
 #[test]
 fn signal_ends_the_capability_query() {
     let fixture = Fixture::with_room();
@@ -192,7 +193,8 @@ fn signal_ends_the_capability_query() {
         env: &env,
         replies: false,
     };
-    // The query takes two seconds. If the signal comes later, the screen has been drawn.
+    // Without replies the query takes two seconds. If the signal arrives after it, the screen has
+    // been drawn, and the test tries again.
     let is_prompt = (0..3).any(|_| {
         let terminal = Terminal::start(&start);
         terminal.wait_for("the screen is taken", |screen| screen.alternate_screen().then_some(()));

@@ -25,7 +25,7 @@ fn film_that_does_not_fit_is_refused_in_the_dashboard() {
         assert!(text.contains(part), "no {part:?} in\n{text}");
     }
     assert_eq!(terminal.screen(picture_cells), 0);
-    // The scene can still be edited: the outline has the keyboard.
+    // The scene can still be edited. The outline (list of all parts) has the focus.
     terminal.send("]");
     terminal.wait_for_text("large.toml ●");
     terminal.send("u");
@@ -42,7 +42,7 @@ fn thousands_of_threads_are_reduced_and_can_be_quit() {
     wait_for_picture(&terminal);
     let tasks = fs::read_dir(format!("/proc/{}/task", terminal.process_id())).unwrap().count();
     let processors = std::thread::available_parallelism().unwrap().get();
-    // Beside the tracing threads the dashboard has less than twenty.
+    // The dashboard has less than twenty threads besides the tracing threads.
     assert!(tasks < (4 * processors).clamp(16, 4096) + 20, "{tasks} threads");
     terminal.send("q");
     let start = std::time::Instant::now();

@@ -20,7 +20,7 @@ use terminal::{Start, Terminal};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_zerkalo");
 
-/// Temporary folder with a scene and its exports, in which the program runs.
+/// Temporary folder in which the program runs. It contains the scene, and gets the exported files.
 struct Fixture(TempDir);
 
 impl Fixture {
@@ -64,7 +64,7 @@ impl Fixture {
     }
 }
 
-/// Waits until some cells of the screen show a picture: half blocks in 24-bit colours.
+/// Waits until more than 100 cells of the screen show a picture, as half blocks in 24-bit colours.
 fn wait_for_picture(terminal: &Terminal) {
     terminal.wait_for("a picture", |screen| (picture_cells(screen) > 100).then_some(()));
 }

@@ -103,7 +103,7 @@ fn shown_picture_matches_render() {
     let error = terminal.wait_for("the picture of 256 samples", |screen| {
         distance(screen, &room_layout(), &written).filter(|d| *d <= 0.01)
     });
-    // A different picture is distant.
+    // A black picture, by contrast, has a large distance from the screen.
     let mut black = written;
     black.rgb.fill(0);
     let far_error = terminal.screen(|screen| distance(screen, &room_layout(), &black)).unwrap();
@@ -126,7 +126,8 @@ fn export_matches_render() {
     terminal.wait_for_text("room-2.png");
     terminal.send("q");
     assert_eq!(terminal.end().0, 0);
-    // The dashboard allocates samples by the displayed picture, also for linear files.
+    // The dashboard distributes samples by the error of the displayed picture, also for linear
+    // (EXR) files.
     let args = ["room.toml", "--spp", "64", "--noise", "1e-9"];
     for (exported, rendered) in [("room-1.png", "render.png"), ("room-1.exr", "render.exr")] {
         let expected = fixture.rendered(&args, rendered);
@@ -147,7 +148,8 @@ fn pending_export_is_written_before_the_end() {
     Picture::of_png(&fs::read(fixture.path("room-1.png")).unwrap());
 }
 
-/// Restarts the render and waits until it has `spp` samples per pixel. It may have had more before.
+/// Restarts the render with the stop criterion of `spp` samples per pixel and waits until it is
+/// reached. The render may have had more samples before.
 fn restart_rendering(terminal: &mut Terminal, spp: u32) {
     let condition = format!("spp {spp}");
     terminal.send("T");

@@ -40,7 +40,8 @@ fn with_picture(fixture: &Fixture, args: &[&str], replies: &[RequestReply]) -> (
 fn wait_for_bytes(terminal: &Terminal, text: &str) -> String {
     let mut all = String::new();
     terminal.wait_for(text, |_| {
-        // The lock of the screen is held here.
+        // The callback runs under the lock of the screen, and `bytes` needs the same lock. The
+        // output is therefore searched below.
         Some(())
     });
     for _ in 0..6000 {
@@ -53,7 +54,8 @@ fn wait_for_bytes(terminal: &Terminal, text: &str) -> String {
     panic!("no {text:?} in {} bytes", all.len());
 }
 
-/// Returns the chunks of images in kitty's protocol: keys and Base64 data of each.
+/// Returns the chunks of images in kitty's graphics protocol: the keys and the Base64 data of each
+/// chunk.
 fn chunks(bytes: &str) -> Vec<(&str, &str)> {
     let chunk = |text: &'_ str| -> Option<(usize, usize)> {
         let keys = text.find(';')?;
@@ -80,12 +82,12 @@ fn kitty_protocol_shows_the_exported_file() {
     let letters: String = chunks.iter().map(|(_, letters)| *letters).collect();
     let sent = Picture::of_png(&STANDARD.decode(letters).unwrap());
     assert_eq!((sent.size, sent.rgb == file.rgb), (file.size, true));
-    // Any key returns.
+    // Any key closes the viewer.
     terminal.send("x");
     terminal.wait_for_text("outline");
     let after = String::from_utf8_lossy(&terminal.bytes()).into_owned();
     assert_eq!(after.matches(REMOVAL).count(), 1);
-    // After another frame the one with the removal has certainly been written.
+    // When a later frame is visible, the frame with the removal has certainly been written.
     terminal.send("?");
     terminal.wait_for_text("orbit left");
     terminal.send("?");
@@ -157,7 +159,7 @@ fn sixel_shows_the_exported_file_in_strips() {
                 rgb.extend(drawn.flat_map(|p| [p[0], p[1], p[2]]));
                 count += 1;
             }
-            // xterm keeps 16 images.
+            // At most 16 strips are allowed, because xterm keeps only 16 images.
             assert!(count <= 16 && rgb.len() == file.rgb.len(), "{count} strips");
             let difference: u64 =
                 rgb.iter().zip(&file.rgb).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
@@ -169,7 +171,7 @@ fn sixel_shows_the_exported_file_in_strips() {
         fs::remove_file(fixture.path("room-1.png")).unwrap();
         terminal.send("q");
         let (status, bytes) = terminal.end();
-        // The last sequence is complete, and the screen was cleared and drawn after it.
+        // The last image sequence is complete. After it, the screen is cleared and drawn again.
         let (strips, after) = bytes.rsplit_once("\x1bP").unwrap();
         assert!(strips.contains("\x1bP") || is_interrupted);
         let (_, after) = after.split_once("\x1b\\").unwrap();
@@ -194,7 +196,7 @@ fn viewer_uses_half_blocks_until_a_late_reply() {
     terminal.send("o");
     wait_for_bytes(&terminal, "\x1b_Ga=T");
     terminal.wait_for_text("640×480  ·  any key returns");
-    // The file is replaced meanwhile.
+    // The image file is replaced by a damaged one while the viewer is closed.
     terminal.send("o");
     terminal.wait_for_text("outline");
     fs::write(fixture.path("room-1.png"), b"\x89PNG\r\n\x1a\nnothing").unwrap();

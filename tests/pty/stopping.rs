@@ -34,7 +34,7 @@ fn suspend_and_resume(stop: impl Fn(&mut Terminal)) {
         (!screen.alternate_screen() && !screen.hide_cursor()).then_some(())
     });
     assert!(is_left(&terminal));
-    // Unsaved edits are kept before the stop.
+    // The program saves unsaved edits to the recovery file before it stops.
     let kept = fs::read_to_string(fixture.path(".room.toml.unsaved")).unwrap();
     assert!(kept.contains("[camera]"), "{kept}");
     terminal.wait_for_text("topped");
@@ -47,7 +47,8 @@ fn suspend_and_resume(stop: impl Fn(&mut Terminal)) {
     terminal.send("u");
     terminal.wait_until_gone("room.toml ●");
     terminal.send("q");
-    // Input before the prompt is discarded, as late replies of the terminal are.
+    // The program discards input that arrives before the shell's prompt, such as late replies of
+    // the terminal. The test waits for the prompt.
     terminal.wait_for("the prompt again", |screen| {
         screen.contents().trim_end().ends_with("shell>").then_some(())
     });
@@ -205,7 +206,7 @@ fn pipe_in_place_of_the_scene_blocks_neither_edits_nor_the_end() {
     fs::remove_file(fixture.path("room.toml")).unwrap();
     let made = std::process::Command::new("mkfifo").arg(fixture.path("room.toml")).status();
     assert!(made.unwrap().success());
-    // The watch of the file meets the pipe.
+    // Within this time the program checks the scene file for changes and finds the pipe.
     std::thread::sleep(Duration::from_millis(1500));
     terminal.send("]");
     terminal.wait_for_text("room.toml ●");
@@ -218,8 +219,8 @@ fn pipe_in_place_of_the_scene_blocks_neither_edits_nor_the_end() {
     assert!(fs::metadata(fixture.path(".room.toml.unsaved")).unwrap().len() > 100);
 }
 
-/// Checks that the terminal is restored after an abort, as after a failed allocation, and after a
-/// kill. The program then runs no code of its own.
+/// Checks that the terminal is restored after an abort, for example after a failed allocation, and
+/// after a kill. The killed program cannot restore it by itself.
 #[test]
 fn abort_and_kill_leave_a_restored_terminal() {
     for name in ["ABRT", "KILL"] {
@@ -237,7 +238,7 @@ fn abort_and_kill_leave_a_restored_terminal() {
         terminal.send("echo $((6 * 7))\n");
         terminal.wait_for_text("42");
         terminal.send("exit\n");
-        // Compares the modes of the terminal with those before.
+        // `end` compares the modes of the terminal with those before the start.
         terminal.end();
     }
 }

@@ -30,8 +30,8 @@ type Keyboard = Arc<Mutex<Box<dyn Write + Send>>>;
 /// Request to the terminal, and the terminal's reply.
 pub type RequestReply = (&'static [u8], &'static str);
 
-/// Requests, and the replies of a terminal with synchronised updates. The empty reply stands for
-/// the cursor position.
+/// Requests, each with the reply of a terminal that supports synchronised updates. The empty reply
+/// stands for the cursor position, which is computed.
 const REPLIES: [RequestReply; 3] =
     [(b"\x1b[c", "\x1b[?62;22c"), (b"\x1b[?2026$p", "\x1b[?2026;2$y"), (b"\x1b[6n", "")];
 
@@ -208,8 +208,8 @@ impl Terminal {
         self.child.process_id().expect("a process")
     }
 
-    /// Waits for the end of the program and checks that the terminal is restored. Returns the exit status
-    /// and all output.
+    /// Waits for the end of the program and checks that the terminal is restored. Returns the exit
+    /// status and all output.
     pub fn end(mut self) -> (u32, String) {
         let child = &mut self.child;
         let end = Instant::now() + PATIENCE;

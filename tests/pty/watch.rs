@@ -36,7 +36,7 @@ fn picture_follows_the_files_of_other_processes() {
     terminal.wait_for_text("3 missing");
     trace(&fixture, 2);
     terminal.wait_for_text("2 of 4 shards complete");
-    // A copy that is not complete yet.
+    // The file of shard 1 is replaced by its first half, like a copy in progress.
     trace(&fixture, 1);
     terminal.wait_for_text("3 of 4 shards complete");
     let part = fs::read(fixture.path("job-1.zk")).unwrap();
@@ -52,7 +52,7 @@ fn picture_follows_the_files_of_other_processes() {
     terminal.wait_for_text("✓ complete");
     terminal.send("p");
     terminal.wait_for_text("room-1.png");
-    // Quitting waits for the picture that was requested last.
+    // The program quits only when the picture that was requested last is written.
     terminal.send("Pq");
     let (status, bytes) = terminal.end();
     assert_eq!(status, 0, "{bytes}");
