@@ -143,7 +143,7 @@ fn view_angles_are_equal_under_every_acceleration() {
 }
 
 /// Compares the acceleration structures with lenses from tiny to larger than the scene. The lenses
-/// are focused anywhere, on cameras of every view angle, also inside of objects.
+/// are focused at any distance. The cameras have any view angle, and some are inside of objects.
 #[test]
 fn lenses_are_equal_under_every_acceleration() {
     check_lenses(0..96);
@@ -274,7 +274,8 @@ fn check_coplanar(seeds: std::ops::Range<u64>) {
 #[test]
 fn coplanar_faces_are_equal_under_every_acceleration() {
     check_coplanar(0..80);
-    // Regression: faces of a solid missed its corners by the rounding of the offset.
+    // Regression: the offsets of a solid's face planes were rounded, so the faces missed the
+    // corners of the solid.
     check_coplanar(1721..1722);
 }
 

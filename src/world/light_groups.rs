@@ -96,7 +96,8 @@ impl LightGroups {
         let mut emitting: Vec<usize> = (0..scene.lights.len()).collect();
         emitting.retain(|i| contributes(&scene.lights[*i], lit));
         let is_point = |i: &usize| scene.lights[*i].point.is_some();
-        // Separate sums of seven of many point lights would take a quarter of the time.
+        // If a scene has many point lights, separate sums for seven of them would take a quarter of
+        // the rendering time.
         let is_shared = emitting.iter().filter(|i| is_point(i)).count() >= MIN_LIGHTS;
         let (shared, separate): (Vec<_>, Vec<_>) =
             emitting.into_iter().partition(|i| is_shared && is_point(i));
@@ -400,7 +401,8 @@ mod tests {
         assert!(!reusable(|s| lamp(s).diffuse = 0.5));
         assert!(!reusable(|s| s.materials.get_mut("matt").unwrap().emission = 1.0));
         assert!(!reusable(|s| s.objects[1].material = "lamp".to_string()));
-        // The group belongs to the name.
+        // The light group is that of the material's name, so samples cannot be reused under another
+        // name.
         assert!(!reusable(|s| {
             let lamp = s.materials.remove("lamp").unwrap();
             s.materials.insert("bulb".to_string(), lamp);
@@ -457,7 +459,8 @@ mod tests {
         assert!(can_reuse(&groups, &scene, |s| s.lights[1].on = true));
         assert!(can_reuse(&groups, &scene, |s| s.lights.push(s.lights[0].clone())));
         assert!(can_reuse(&groups, &scene, |s| s.ambient.color = Color::WHITE));
-        // The group that a black picture needs does not make a background reusable.
+        // A black picture has a group for the background, because the film needs one. Its samples
+        // cannot be reused for a background that is not black.
         assert_eq!(groups.members, [LightGroupSource::Background]);
         assert!(!can_reuse(&groups, &scene, |s| s.background.color = Color::WHITE));
     }

@@ -57,15 +57,15 @@ impl<S: Float> OnSurface<S> {
         (!solids.is_empty()).then_some(Self { position, solids, lift })
     }
 
-    /// Returns the largest distance between the light and the points, a little above its surface,
-    /// at which shadow rays to it end.
+    /// Returns the largest distance between the light and an end point of its shadow rays. The end
+    /// points are a little above the surface on which the light is located.
     pub fn farthest(&self) -> f64 {
         SHARPEST * self.lift.to_f64() * self.solids.len() as f64
     }
 
     /// Returns two values for each lane: the unit direction from `start` to the end point of the
-    /// light's shadow ray, and the distance to it. The end points are a little above the light's
-    /// surface.
+    /// light's shadow ray, and the distance from `start` to this point. The end points are a little
+    /// above the light's surface.
     #[inline(never)]
     pub fn end<L: SimdFloat<Scalar = S>>(&self, start: Vec3<L>) -> (Vec3<L>, L) {
         let to = Vec3::splat(self.position) - start;
@@ -80,7 +80,8 @@ impl<S: Float> OnSurface<S> {
                 inward = inward - normal;
             }
             let lift = Vec3::select(outside, out, inward);
-            // Smallest height above the surfaces in front of which the ray ends.
+            // Smallest height above the surfaces in front of which the ray ends, for a point
+            // displaced by `lift` from the light.
             let mut least = L::from_f64(L::MAX);
             for normal in normals.iter().map(|n| Vec3::splat(*n)) {
                 let before = to.dot(normal).lt(L::zero()) | !outside;

@@ -74,7 +74,7 @@ impl<S: Float> PixelBlock<S> {
     }
 
     /// Returns two values for pixel `i`: the key of its random numbers, and the vector from the eye
-    /// to its corner, the same in all lanes.
+    /// to the pixel's corner. Both are the same in all lanes.
     #[inline(always)]
     pub fn broadcast<L: SimdFloat<Scalar = S>>(&self, i: usize) -> (u32, Vec3<L>) {
         (self.keys[i], Vec3::splat(self.corner_directions.each_ref().map(|axis| axis[i])))

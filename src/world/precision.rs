@@ -61,7 +61,8 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     }
     let view = PerspectiveCamera::new(&scene.camera, scene.film.size, origin);
     let angle = view.pixel_angle();
-    // An object closer to a point of the lens than to the eye is blurred by more than a pixel.
+    // Distances are measured from the eye, the centre of the lens. An object that is closer to
+    // another point of the lens is blurred by more than a pixel, which hides its errors.
     let distance =
         |form: &Form| Some(form.clearance(view.eye())? * if form.is_flat() { FLAT } else { 1.0 });
     let seen_from =
@@ -79,7 +80,8 @@ pub(super) fn single_suffices(scene: &Scene, forms: &[Form], origin: DVec3, exte
     }
     let mut surfaces = lights().filter_map(|light| light.surface());
     let is_fine = |surface: EmitterSurface| {
-        // Rounding of the coordinates may move a part of the surface.
+        // Rounding of the coordinates may displace a part of the surface, so the largest coordinate
+        // of the surface counts as well.
         let largest = (surface.center() - origin).abs().max_element() + surface.radius();
         extent.max(largest) > MAX_EXTENT_PER_THICKNESS * surface.thickness()
     };

@@ -53,9 +53,11 @@ const SPOT_BITS: f64 = 12.0;
 /// scale of the film is chosen for this range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RadianceRange {
-    /// Radiance of a white surface in the middle of the scene, lit by the light group.
+    /// Radiance of the brightest spot of the dimmest surface: the minimum, over all surfaces, of
+    /// the radiance of their brightest spots.
     pub typical: f64,
-    /// Radiance of the brightest spot of each surface: the smallest value over all surfaces.
+    /// Radiance of the brightest spot of the brightest surface: the maximum, over all surfaces, of
+    /// the radiance of their brightest spots. Spots smaller than a quarter of a pixel are ignored.
     pub dimmest: f64,
     /// Radiance of the brightest spot of each surface: the largest value over all surfaces. Spots
     /// smaller than a quarter of a pixel are ignored.
@@ -270,15 +272,16 @@ impl<'a> SceneDistances<'a> {
         };
         let radiance_at = |distance: f64| (distance * distance * PI).recip();
         let (eye, pixel) = self.eye;
-        // The bright spot below a light has about the size of the distance between light and
-        // surface.
+        // The bright spot on a surface below a light is about as wide as the distance between light
+        // and surface. Spots smaller than a quarter of a pixel are ignored.
         let min_distance = (0.25 * pixel * eye.distance(position)).max(self.ray_offset);
         let spots = radiance_at(clearance(self.forms, position));
         let mut out =
             RadianceRange { typical, dimmest: f64::INFINITY, brightest: 0.0, spots, extreme: 0.0 };
         for (form, response) in self.forms.iter().zip(&self.responses) {
             let Some(response) = response else { continue };
-            // A light on a surface does not illuminate it: rays start above the light.
+            // A light on a surface does not illuminate that surface, because rays that leave it
+            // start above the light.
             if let Some(distance) = form.clearance(position).filter(|d| *d > self.ray_offset) {
                 let radiance = radiance_at(distance.max(min_distance));
                 out.brightest = out.brightest.max(radiance * response.most);
@@ -336,7 +339,8 @@ impl<'a> SceneDistances<'a> {
         emitted: f64,
         visible: bool,
     ) -> RadianceRange {
-        // Radiance of a white surface that faces the emitter at a distance from its centre.
+        // Radiance of a white surface that faces the emitter at `distance` from the emitter's
+        // centre.
         let radiance_at = |distance: f64| {
             emitted * (area / (PI * distance * distance).max(f64::MIN_POSITIVE)).min(1.0)
         };
@@ -353,7 +357,8 @@ impl<'a> SceneDistances<'a> {
         }
         let mut spots = brightest;
         if visible {
-            // The surface itself, unless it is smaller than a quarter of a pixel.
+            // The radiance of the emitting surface itself counts, too. It counts as `brightest`
+            // only if the surface is larger than a quarter of a pixel.
             let (eye, pixel) = self.eye;
             spots = spots.max(emitted);
             extreme = extreme.max(emitted * self.gain);
@@ -381,7 +386,8 @@ impl<'a> SceneDistances<'a> {
         if !visible {
             return range;
         }
-        // Bright pixels of the image may be smaller than a pixel of the picture.
+        // Bright pixels of the environment's image may be smaller than a pixel of the picture. They
+        // count as `spots`; for `brightest`, the mean of the image counts.
         let dimmest = map.min().unwrap_or(typical).max(1e-6 * typical);
         RadianceRange {
             dimmest: range.dimmest.min(dimmest * self.faintest),
@@ -433,14 +439,15 @@ mod tests {
         assert_eq!(exponent(&|_| ()), 28.0);
         assert_eq!(ONE.times(0.5, 0.75).scale_exponent(), 28.0);
         assert_eq!(ONE.times(2f64.powi(40), 2f64.powi(40)).scale_exponent(), -12.0);
-        // The first exponent is that of a dim surface, the others are those of bright surfaces.
+        // Radiance of a dim surface, and two values for the radiance of bright surfaces.
         let [dim, bright, far] = [-40, 20, 60].map(|e| 2f64.powi(e));
         assert_eq!(exponent(&|b| b.dimmest = dim), 44.0);
         assert_eq!(exponent(&|b| b.dimmest = 2f64.powi(-20)), 36.0);
         assert_eq!(exponent(&|b| b.dimmest = 2f64.powi(-12)), 28.0);
         assert_eq!(exponent(&|b| (b.brightest, b.spots) = (bright, bright)), 24.0);
         assert_eq!(exponent(&|b| (b.brightest, b.spots) = (far, far)), -16.0);
-        // Spots smaller than a pixel and amplified light do not lower the scale of the dim end.
+        // Spots smaller than a pixel and amplified light do not lower the scale below the bound of
+        // the dim end, 2^16.
         assert_eq!(exponent(&|b| b.spots = far), 16.0);
         assert_eq!(exponent(&|b| b.spots = f64::INFINITY), 16.0);
         assert_eq!(exponent(&|b| b.extreme = bright), 28.0);

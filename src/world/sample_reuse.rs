@@ -86,8 +86,8 @@ impl LightGroups {
     }
 
     /// Returns `true` if the material `name_a` of the scene `compiled` and the material `name_b` of
-    /// `scene` are equal except for their emission. If the first one is in a light group, their
-    /// names must be equal, too. Otherwise the second one must not emit.
+    /// `scene` are equal except for their emission. If the first material has a light group, both
+    /// names must be equal, too. If it has none, the second material must not emit.
     fn same_material(
         &self,
         (compiled, name_a): (&Scene, &str),

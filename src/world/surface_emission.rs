@@ -4,10 +4,12 @@
 //! Light is sampled from spheres, flat shapes, convex polyhedra, and meshes of up to
 //! [`MAX_TRIANGLES`] triangles. The emission of other shapes is found only by rays that hit them.
 //!
-//! Sampled points are lifted off their surface. Where the object touches another one, a lifted
-//! point is beyond the other's surface: below the floor that a box stands on, or inside of the
-//! glass that stands on a shining floor. Shadow rays from there would reach it. Compilation
-//! therefore lists the objects that touch an emissive one, if rays can start behind their surfaces.
+//! Points sampled on an emissive object are lifted off its surface. Where another object touches
+//! the emissive one, a lifted point is behind the other object's surface: below the floor on which
+//! an emissive box stands, or inside of a glass that stands on an emissive floor. Shadow rays that
+//! start behind this surface would reach the point, although the other object covers the emissive
+//! surface there. Compilation therefore lists the objects that touch an emissive one, if rays can
+//! start behind their surfaces.
 //! Shadow rays are tested against these objects a second time, up to the surface from which the
 //! point was lifted.
 
@@ -70,7 +72,8 @@ impl<S: Float> SurfaceEmission<S> {
         if emitting.is_empty() {
             return Self::default();
         }
-        // The group of each primitive, by object.
+        // Returns three values for a primitive whose material emits: the index of its object, the
+        // index of its light group, and its emission.
         let entry_of = |id: &PrimitiveId| {
             let name = scene.objects[id.form].materials()[id.part];
             let (_, group, emission) = emitting.iter().find(|(known, ..)| *known == name)?;
@@ -139,7 +142,8 @@ impl<S: Float> SurfaceEmission<S> {
             while let Some((part, part_lanes)) = next_distinct(hit.item, found) {
                 found = found.and_not(part_lanes);
                 let normal = geometry.surface(part, hit.triangle, ray.at(hit.t)).normal;
-                // A ray leaves a solid along its outward normal.
+                // The cosine is positive where a ray leaves a solid, because normals point
+                // outwards. A flat object covers points on either side.
                 let cosine = normal.dot(ray.direction);
                 let cosine = if *flat { cosine.abs() } else { cosine };
                 let is_near = ((hit.t - distance) * cosine).le(lift);
@@ -183,10 +187,10 @@ impl<S: Float> SurfaceEmission<S> {
     }
 }
 
-/// Returns one list for each of the emissive `objects`: the objects that touch it and behind whose
-/// surfaces rays can start. An entry has two values: the id of the touching object's first
-/// primitive, and `true` if that object is flat. `is_entered` returns `true` for an object that
-/// rays can be inside of.
+/// Returns one list for each of the emissive `objects`: the objects that touch the emissive one, if
+/// rays can start behind their surfaces. An entry has two values: the id of the touching object's
+/// first primitive, and `true` if that object is flat. `is_entered` returns `true` for an object
+/// that rays can be inside of.
 fn touching_objects(
     objects: &[(usize, usize, [f64; 3])],
     forms: &[Form],
@@ -204,7 +208,8 @@ fn touching_objects(
     let wanted = |a: usize, b: usize| {
         (emits.contains(&a) && is_behind(b)) || (emits.contains(&b) && is_behind(a))
     };
-    // A lamp inside of a room is far from its walls.
+    // Excludes pairs whose bounds overlap although their surfaces are far apart, such as a lamp and
+    // the room around it.
     let is_close = |a: &Form, b: &Form| {
         let ball = a.bounding_sphere();
         b.clearance(ball.center).is_none_or(|distance| distance <= ball.radius + lift)
@@ -214,7 +219,8 @@ fn touching_objects(
             continue;
         }
         for (form, other) in [(a, b), (b, a)] {
-            // A flat object lights both sides of a flat one that it lies on, as a light does.
+            // A flat emissive object lights both sides of a flat object that it lies on, as a flat
+            // light does.
             let both_flat = forms[form].is_flat() && forms[other].is_flat();
             if emits.contains(&form) && is_behind(other) && !both_flat {
                 touching.entry(form).or_default().push((first[other], forms[other].is_flat()));

@@ -178,10 +178,11 @@ impl Reach {
 /// The emission of some objects is found only by rays that hit them. Without diffuse bounces,
 /// diffuse surfaces lack the light of these objects.
 ///
-/// With diffuse bounces the factor of a surface includes its diffuse albedo. The lost paths have
-/// hit at least `max_depth + 1` surfaces, `max_diffuse_depth + 1` surfaces, or two surfaces if
-/// `caustics` is `false`. Without diffuse bounces, ambient light stands for all indirect light;
-/// that is no truncation.
+/// With diffuse bounces the factor of a surface includes its diffuse albedo. The paths that
+/// `max_depth` truncates have hit at least `max_depth + 1` surfaces. Those that `max_diffuse_depth`
+/// truncates have hit at least `max_diffuse_depth + 1` surfaces. Those that are lost because
+/// `caustics` is `false` have hit at least two surfaces. Without diffuse bounces, ambient light
+/// stands for all indirect light; that is no truncation.
 ///
 /// Total internal reflection in a transparent ball is included in the bound, although light that
 /// can enter a ball can also leave it, because the angle of incidence is the same at every hit. At
@@ -208,7 +209,8 @@ pub fn truncation_bounds(scene: &Scene) -> Vec<String> {
         out.push(format!("max_depth {depth} cuts longer paths ({})", bound(cut)));
     }
     let least = scene.trace.min_throughput;
-    // At depth 0 no path continues, so that none can be cut off.
+    // At `max_depth` 0 no path continues by reflection or transmission, so only diffuse bounces can
+    // be cut off.
     if least > 0.0 && (depth > 0 && specular.first > 0.0 || bounces > 0) {
         let ended = match bounces {
             0 => reach.ended(least, depth),
@@ -346,7 +348,7 @@ mod tests {
         room.materials.values_mut().for_each(|m| m.diffuse = 0.8);
         assert_eq!(truncation_bounds(&room), [""; 0], "ambient light stands for all of it");
         room.trace.max_diffuse_depth = 2;
-        // 0.4^3 (1 + 0.4) / (1 - 0.16) without the second surface's share: 0.4^3 / 0.6
+        // (w(3) + w(4)) / (1 - r), where r is 0.4^2, gives 0.4^3 (1 + 0.4) / (1 - 0.16).
         assert_eq!(
             truncation_bounds(&room),
             [
@@ -405,7 +407,7 @@ mod tests {
     fn least_weights_end_paths_that_divide_more_than_once() {
         let mut opaque = scene("[0.0, 0.0, 5.0]", &[(0.5, BALL), (0.5, FLOOR)]);
         opaque.trace.min_throughput = 0.01;
-        // 0.01 (1 + 0.5) / (1 - 0.25)
+        // `min_throughput` times the sum of all w(n): 0.01 (1 + 0.5) / (1 - 0.25)
         assert_eq!(
             truncation_bounds(&opaque)[1],
             "min_throughput 0.01 cuts weaker paths (at most 2.00e-2 of the brightest surface)"
@@ -414,7 +416,8 @@ mod tests {
         let m0 = glass.materials.get_mut("m0").unwrap();
         (m0.transmission, m0.fresnel) = (0.5, Some(Fresnel::Dielectric));
         let told = truncation_bounds(&glass).concat();
-        // 0.08, 0.08, 0.08, 1/16, 1/32, ..., 2^-16: 0.365 in all, times 2.
+        // The sum of min(w(n), 8 x 0.01) over all n is 0.08 + 0.08 + 0.08 + 1/16 + 1/32 + ... +
+        // 2^-16 = 0.365. It is multiplied by 2, the sum of all w(n).
         assert!(told.contains("min_throughput 0.01 cuts weaker paths (at most 7.3"), "{told}");
     }
 

@@ -57,8 +57,8 @@ impl<T, S: Float> LightSource<T, S> {
 /// Light without a size, and the end points of shadow rays to it.
 pub(super) struct ShadowRayTarget<S> {
     pub light: DeltaLight<S>,
-    /// End points of shadow rays to a light on a surface. `None` for other lights, at which the
-    /// rays end.
+    /// End points of shadow rays to a light that is located on a surface. `None` for a light that
+    /// is not; shadow rays end at the light itself then.
     pub on_surface: Option<OnSurface<S>>,
 }
 
@@ -112,7 +112,7 @@ pub struct World<L: SimdFloat> {
     pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,
     /// Largest number of surfaces on a path after the first; 0 if no surface reflects or transmits.
     pub(super) depth: u32,
-    /// Limits of diffuse bounces. `None` if the scene has no indirect diffuse light.
+    /// Smallest throughput, in the brightest channel, with which a path continues.
     pub(super) diffuse_limits: Option<DiffuseLimits>,
     /// Smallest throughput with which a path continues. The throughput is that of its largest
     /// channel.
@@ -157,8 +157,8 @@ impl<L: SimdFloat> World<L> {
         self.jitter
     }
 
-    /// Returns two flags: camera rays use random numbers for a position in the pixel, and for a
-    /// position on the lens.
+    /// Returns two flags: whether camera rays use random numbers for their position in the pixel,
+    /// and whether they use random numbers for their position on the lens.
     pub fn camera_dimensions(&self) -> CameraDimensions {
         CameraDimensions { pixel: self.jitter, lens: self.camera.lens().is_some() }
     }

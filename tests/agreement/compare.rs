@@ -20,7 +20,8 @@ use zerkalo::world::Precision;
 pub const SIZE: [u32; 2] = [32, 24];
 /// Side in pixels of the blocks whose means are compared.
 const BLOCK: usize = 4;
-/// Probability of a false alarm in all comparisons of one scene: 1 / 1000 for a hundred scenes.
+/// Probability of a false alarm in all comparisons of one scene. With a hundred scenes, the
+/// probability of any false alarm is 1 / 1000.
 const LEVEL: f64 = 1e-3 / 100.0;
 
 /// Deviation of two pictures, and the largest deviation that chance explains.
@@ -61,10 +62,11 @@ impl<K: PartialEq, V: Clone> Memo<K, V> {
         Self(Mutex::new(Vec::new()))
     }
 
-    /// Returns the result of `compute` for `key`. The result must depend on the key alone.
+    /// Returns the result of `compute` for `key`; `compute` runs only once for each key. The result
+    /// must depend on the key alone.
     pub fn get(&self, key: K, compute: impl FnOnce() -> V) -> V {
         let slot = {
-            // A failed test leaves the table valid.
+            // A test that fails while it holds the lock leaves the table valid.
             let mut slots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             match slots.iter().find(|(known, _)| *known == key) {
                 Some((_, slot)) => slot.clone(),
@@ -102,10 +104,11 @@ impl Picture {
         })
     }
 
-    /// Compares block means with a `reference` of `samples` samples per pixel, which is far
-    /// noisier. The variance of single samples is estimated from the reference and from this
-    /// program's random samples. The larger one is used, because few samples underestimate the
-    /// variance of rare events.
+    /// Compares block means with those of the picture `reference`. The reference has `samples`
+    /// samples per pixel and is far noisier than this picture. The variance of single samples is
+    /// estimated twice: from the reference, and from this program's picture with independent random
+    /// numbers. The larger estimate is used, because few samples underestimate the variance of rare
+    /// events.
     pub fn beside(&self, reference: &[Estimate], samples: u32) -> Verdict {
         let (mut worst_z, mut chi2, mut count) = (0f64, 0.0, 0.0);
         let per_reference = 2.0 * f64::from(self.samples) / f64::from(samples);
@@ -118,13 +121,15 @@ impl Picture {
             let reference_variance = sum(&|p| reference[p].variance);
             let random_variance = sum(&|p| self.random[p] * self.random[p]) * per_reference;
             let picture_variance = sum(&|p| self.half[p] * self.half[p]);
-            // Rounding of the film and of different formulas.
+            // Allowance for rounding errors: those of the film, and those of formulas that differ
+            // between the two programs.
             let floor = 1e-7 * (sum(&|p| reference[p].mean).abs() / n + 1e-3);
             let variance = (reference_variance.max(random_variance) + picture_variance) / (n * n)
                 + floor * floor;
             let z = difference.abs() / variance.map(f64::sqrt);
             worst_z = worst_z.max(z.max_element());
-            // The channels of a block are correlated; their sum is a separate comparison.
+            // The sum of the channels is compared separately, because the channels of a block are
+            // correlated.
             let z = difference.element_sum() / variance.map(f64::sqrt).element_sum();
             chi2 += z * z;
             count += 1.0;
@@ -153,7 +158,7 @@ pub fn small(scene: Scene) -> Scene {
 }
 
 /// Returns the scene seen by a camera that is turned to `point`, with a vertical view angle of
-/// `degrees`. The plane in focus is a plane through the point in focus.
+/// `degrees`. If the camera focuses on a point, the plane in focus still contains this point.
 pub fn zoomed(scene: &Scene, point: [f64; 3], degrees: f64) -> Scene {
     let mut scene = scene.clone();
     scene.camera.target = Some(point);

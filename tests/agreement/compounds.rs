@@ -121,9 +121,9 @@ impl Body {
         Ok(Self { leaves, tree })
     }
 
-    /// Returns the closest hit of a ray beyond the distance `from`: distance, outward or front unit
-    /// normal, index of the simple shape, and index of the triangle. Distances are in lengths of
-    /// `direction`.
+    /// Returns the closest hit of a ray beyond the distance `from`: distance, unit normal, index of
+    /// the simple shape, and index of the triangle. The normal points outwards on a solid, and to
+    /// the front on a flat shape or a mesh. Distances are in lengths of `direction`.
     pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<Meeting> {
         let mut nearest: Option<Meeting> = None;
         for (i, leaf) in self.leaves.iter().enumerate() {
@@ -193,7 +193,8 @@ fn ball(pieces: &[Piece]) -> Option<(DVec3, f64)> {
     let balls = pieces.iter().map(Piece::ball).collect::<Option<Vec<_>>>()?;
     let center = balls.iter().map(|ball| ball.0).sum::<DVec3>() / balls.len() as f64;
     let reaches = balls.iter().map(|ball| center.distance(ball.0) + ball.1);
-    // Rounding of the line's distance is far below the margin.
+    // The margin of 0.1 % is far larger than the rounding error of the line's distance from the
+    // centre.
     reaches.reduce(f64::max).map(|radius| (center, 1.001 * radius))
 }
 
