@@ -9,9 +9,8 @@
 //! an emissive box stands, or inside of a glass that stands on an emissive floor. Shadow rays that
 //! start behind this surface would reach the point, although the other object covers the emissive
 //! surface there. Compilation therefore lists the objects that touch an emissive one, if rays can
-//! start behind their surfaces.
-//! Shadow rays are tested against these objects a second time, up to the surface from which the
-//! point was lifted.
+//! start behind their surfaces. Shadow rays are tested against these objects a second time, up to
+//! the surface from which the point was lifted.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, next_distinct};

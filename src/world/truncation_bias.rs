@@ -70,10 +70,10 @@ impl ObjectTraits {
     }
 
     /// Returns `true` if a path may hit the object at two consecutive vertices. A ray that leaves a
-    /// convex object outwards cannot hit it again. Rays inside of the object can, but paths are
-    /// inside only if they start there or are transmitted. Bump maps make no difference: a
-    /// reflected direction that would point into the surface is mirrored out of it, and a
-    /// transmitted direction that would point out is mirrored into it.
+    /// convex object outwards cannot hit it again. A ray inside of the object can, but a path is
+    /// inside only if it starts there or was transmitted. Bump maps make no difference: a reflected
+    /// direction that would point into the surface is mirrored out of it, and a transmitted
+    /// direction that would point out of the surface is mirrored into it.
     fn sees_itself(&self, material: &Material) -> bool {
         let let_in = !self.flat && material.transmission > 0.0;
         self.concave || let_in || self.contains_eye && material.two_sided

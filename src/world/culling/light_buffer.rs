@@ -72,8 +72,8 @@ struct Entry<S> {
 
 impl<S: Float> LightBuffer<S> {
     /// Creates the light buffer of a light. Returns `None` if at least half of the occluders
-    /// overlap more full cells than cells with room. Such a buffer would be too incomplete to be
-    /// useful.
+    /// overlap more full cells than cells with room for them. Such a buffer would be too incomplete
+    /// to be useful.
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
         let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match target {
