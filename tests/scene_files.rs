@@ -51,7 +51,7 @@ fn every_bad_scene_gives_its_expected_errors() {
 /// Scene files with an intended warning, each with a part of the warning's text.
 const WARNED: &[(&str, &str)] = &[
     ("brighter-than-its-light.toml", "more than the light"),
-    // Colours up to 7, as its formula gives them.
+    // The formula for the colours of this scene gives values up to 7.
     ("reflecting-tracks.toml", "more than the light"),
     ("reflecting-tracks-lit.toml", "more than the light"),
 ];

@@ -60,9 +60,9 @@ fn every_scene_compiles_to_its_inventory() {
     assert_eq!(actual.lines().count(), expected.lines().count());
 }
 
-/// Returns the mean colour of each block and the squared standard error of that mean, row by row.
-/// Pixels are independent. Half the difference of the two replicates (halves of the samples) has
-/// the variance of their mean.
+/// Returns two values for each block, row by row: its mean colour, and the squared standard error
+/// of that mean. Half the difference of a pixel's two replicates (halves of the samples) has the
+/// variance of their mean. The squares are added, because pixels are independent.
 fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     let [columns, rows] = SIZE.map(|n| n as usize / BLOCK);
     let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(rendering, part));
@@ -79,8 +79,8 @@ fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     blocks
 }
 
-/// Returns the reference of a scene as text. Each block has a line with the means of the three
-/// channels, and their standard errors in a single render.
+/// Returns the reference of a scene as text. Each line contains the means of a block's three
+/// channels over all seeds, and their standard errors in the render of one seed.
 fn reference(scene: &Scene) -> String {
     let pool = pool(2);
     let seeds = REFERENCE_SEEDS.count() as f64;
@@ -122,8 +122,8 @@ fn parse_references(text: &str) -> References {
     references
 }
 
-/// Returns the number of standard errors that the largest of `n` deviations exceeds as rarely as
-/// one deviation exceeds four (Sidak).
+/// Returns a bound in standard errors. The largest of `n` deviations exceeds the bound with the
+/// probability with which a single deviation exceeds four standard errors (Sidak).
 fn threshold(n: usize) -> f64 {
     two_sided_z(1.0 - (1.0 - tail(4.0)).powf(1.0 / n as f64))
 }

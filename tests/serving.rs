@@ -1,6 +1,6 @@
-//! Relighting. If a film can be reused for an edited scene, its samples, mixed for that scene, must
-//! be the picture of a fresh render. The test edits every key of every description, from the field
-//! tables.
+//! Relighting: reuse of a film for an edited scene. If the film can be reused, its samples, mixed
+//! with the weights of the edited scene, must give the picture of a fresh render. The test edits
+//! every key of the scene format, from the tables of keys.
 
 use crate::common;
 use crate::common::tables;
@@ -237,8 +237,8 @@ struct Bench {
     pool: Pool,
     tried: usize,
     served: usize,
-    /// Last components of the keys in two sets: those whose edits the film was reused for, and the
-    /// others.
+    /// Last components of the keys in two sets: those after whose edits the film was not reused,
+    /// and those after whose edits it was.
     by_key: [BTreeSet<String>; 2],
 }
 
@@ -288,7 +288,7 @@ fn relit_film_equals_render_of_the_edited_scene() {
             }
         }
     }
-    // Several edits at once, more often of keys that allow relighting.
+    // Several edits at once. Four of five are of keys that often allow relighting.
     let mild = |key: &&Key| {
         matches!(key.path[0].as_str(), "light" | "ambient" | "background" | "materials")
     };

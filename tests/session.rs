@@ -89,7 +89,8 @@ fn interruptions_and_earlier_scenes_do_not_change_the_film() {
     other.camera.eye[0] += 0.1;
     let other = Arc::new(other);
     for pause_us in [0, 50, 300, 2000] {
-        // Cancelled during compilation, first pass or later; its film's memory is reused.
+        // The first scene is cancelled during its compilation, its first pass or later. The second
+        // scene reuses the memory of its film.
         session.set_scene(Arc::clone(&other));
         std::thread::sleep(Duration::from_micros(pause_us));
         let generation = session.set_scene(scene());
@@ -105,8 +106,8 @@ fn interruptions_and_earlier_scenes_do_not_change_the_film() {
     }
 }
 
-/// Prints the cost of a checkpoint of 1920x1080 pixels: the seconds during which no samples are
-/// traced, and the speed of writing and reading.
+/// Prints the cost of a checkpoint of a film of 1920x1080 pixels: the seconds for which tracing
+/// pauses, and the speed of writing and reading.
 #[test]
 #[ignore = "prints figures: cargo test --test program session:: -- --ignored --nocapture checkpoint_cost"]
 fn checkpoint_cost() {

@@ -39,7 +39,8 @@ fn adaptive(scene: &Scene, seed: u64, noise: f64) -> SyncRender {
     render
 }
 
-/// Plans a render by `shards` shards, from a pilot that ended at twice the noise target `noise`.
+/// Plans a render by `shards` shards (parts, each for one process). The pilot (trial render) ended
+/// at twice the noise target `noise`.
 fn plan(scene: &Scene, pilot: &SyncRender, seed: u64, noise: f64, shards: u32) -> Plan {
     let settings = PlanSettings {
         source: "test".into(),
@@ -69,8 +70,8 @@ fn shard(scene: &Scene, plan: &Plan, number: u32) -> (RenderState, u64) {
     (render.state, rays)
 }
 
-/// Returns the sum of the films of the pilot and of all shards, and the number of rays of each
-/// shard.
+/// Returns the sum of the films of the pilot (trial render) and of all shards (parts, each for one
+/// process). Also returns the number of rays of each shard.
 fn merged(scene: &Scene, plan: &Plan, pilot: SyncRender) -> (RenderState, Vec<u64>) {
     let mut state = RenderState::new(scene, &options(plan.settings.seed), None);
     state.film.add(&pilot.rendering().film).unwrap();
@@ -134,8 +135,8 @@ fn interrupted_shard_equals_uninterrupted() {
     assert!(ShardRender::new(state, &plan.ranges(0), rays, THREADS).is_err());
 }
 
-/// Noise and rays of a render planned for eight shards, divided by its noise target and by the rays
-/// of an adaptive render.
+/// Results of a render that is planned for eight shards (parts, each for one process). The noise is
+/// divided by the noise target, and the number of rays by that of an adaptive render.
 struct Planned {
     noise: f64,
     rays: f64,
@@ -173,10 +174,12 @@ fn planned(name: &str, size: Option<[u32; 2]>, seed: u64, target: f64) -> Planne
 fn planned_noise_is_near_the_target() {
     for (name, size) in [("mirror-room", [320, 240]), ("reflecting-tracks", [320, 240])] {
         let result = planned(name, Some(size), 0, 0.25);
-        // A picture of a quarter of the size has a noise estimate of twice the uncertainty.
+        // The picture has a quarter of the usual number of pixels. Its noise estimate is therefore
+        // twice as uncertain, and the bounds are wide.
         assert!((0.8..=1.1).contains(&result.noise), "{name}: {}", result.noise);
         assert!(result.rays < 1.15, "{name}: {}", result.rays);
-        // Shards have 40 to 110 blocks each, whose numbers of rays differ by a factor of three.
+        // A shard has 40 to 110 blocks of work. Their numbers of rays differ by a factor of three,
+        // so that the largest shard may be 25 % above the mean.
         assert!(result.imbalance < 0.25, "{name}: {}", result.imbalance);
     }
 }

@@ -1,4 +1,5 @@
-//! Acceleration structures on random scenes, whose films are identical byte for byte.
+//! Acceleration structures on random scenes. The films with all of them are identical byte for
+//! byte.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::support::{accelerated, picture};

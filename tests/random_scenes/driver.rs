@@ -50,7 +50,8 @@ fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<&str>().map(|t| t.to_string())).unwrap_or_default()
 }
 
-/// Compares the pictures of the scenes with the seeds `seeds`. `name` is the name of the test.
+/// Compares the pictures of the scenes with the seeds `seeds`. If `ZERKALO_SEED` is set, compares
+/// only the scene of that seed. `name` is the name of the test.
 pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
     let (mut wrong, mut skipped) = (Vec::new(), BTreeMap::<&str, u32>::new());
     let mut count = 0;

@@ -10,16 +10,18 @@ use glam::DVec3;
 use zerkalo::scene::{Filter, Object, RayTypes, Scale, Scene, TransformOp};
 use zerkalo::world::Precision;
 
-/// Width of the gap, as a fraction of the size of an object.
+/// Typical relative change of an object's size. The change of each object is 0.2 to 5 times this
+/// value.
 const GAP: f64 = 1e-5;
-/// Largest width of the gap, as a fraction of the smallest length of any object.
+/// Largest allowed width of the widest gap, as a fraction of the smallest length of any object's
+/// bounding box. Scenes with wider gaps are skipped.
 const MAX_GAP: f64 = 1e-2;
 const SAMPLES: u32 = 4;
 /// Allowed effect of the gap on the mean of a block of pixels, in 8-bit levels.
 const FLOOR: f64 = 1.0;
 
-/// Turns off the lights that are on surfaces. Such a light shines on both sides of its surface;
-/// with a gap it would be outside of the object.
+/// Turns off the lights that are on surfaces of objects. Such a light shines on both sides of its
+/// surface. If the object shrank, the light would be outside of it.
 fn without_lights_on_surfaces(scene: &mut Scene) {
     let forms: Vec<_> = scene.objects.iter().map(|object| object.form()).collect();
     let is_on_surface = |position: DVec3| {
@@ -64,7 +66,7 @@ fn lengths(object: &Object) -> Option<DVec3> {
     (size.min_element() > 1e-9 * size.max_element()).then_some(size)
 }
 
-/// Returns the largest and the smallest length of any object of the scene.
+/// Returns the largest and the smallest edge of the bounding boxes of all objects of the scene.
 fn extreme_lengths(scene: &Scene) -> (f64, f64) {
     let sizes = || scene.objects.iter().filter_map(lengths);
     let longest = sizes().map(|size| size.max_element()).fold(0.0, f64::max);
@@ -83,7 +85,8 @@ fn changed(mut scene: Scene, numbers: &mut Numbers, change: Change) -> Scene {
         };
         let middle: DVec3 = 0.5 * (low + high);
         let gap = GAP * log(numbers, 0.2, 5.0);
-        // A face of an opaque object moves by at most half of the least gap.
+        // A face of an opaque object moves by at most half of the narrowest gap of a transparent
+        // object.
         let least_gap = 0.1 * GAP * least / size.max_element();
         let factor = match change {
             _ if transparent => 1.0 - gap,
@@ -100,8 +103,9 @@ fn changed(mut scene: Scene, numbers: &mut Numbers, change: Change) -> Scene {
     scene
 }
 
-/// Returns the scene with every bounded object slightly smaller, and the eye moved by the widest
-/// gap in the direction `aside`. Returns `None` if the sizes of the objects differ too much.
+/// Returns the scene with every bounded object slightly smaller. The eye is moved in the direction
+/// `aside` by the largest change of any object's size. Returns `None` if this change is too large
+/// for the smallest object, or if the scene gets validation errors.
 fn with_gaps(scene: &Scene, numbers: &mut Numbers, aside: DVec3) -> Option<Scene> {
     let (longest, least) = extreme_lengths(scene);
     let mut scene = changed(scene.clone(), numbers, Change::AllShrink);
@@ -111,8 +115,8 @@ fn with_gaps(scene: &Scene, numbers: &mut Numbers, aside: DVec3) -> Option<Scene
     (widest < MAX_GAP * least && scene.faults().is_empty()).then_some(scene)
 }
 
-/// Returns `true` if two coincident opaque surfaces are visible. The picture then depends on
-/// whether opaque objects are slightly smaller or slightly larger.
+/// Returns `true` if two coincident opaque surfaces are visible. This is the case if the picture
+/// changes with the size of opaque objects: slightly smaller or slightly larger.
 pub fn shows_coincident_opaque(scene: &Scene) -> bool {
     let variants = [Change::OpaqueShrink, Change::OpaqueGrow]
         .map(|change| changed(scene.clone(), &mut Numbers::new(1), change));
@@ -124,8 +128,8 @@ pub fn shows_coincident_opaque(scene: &Scene) -> bool {
     matches!(verdict, Verdict::Different(_))
 }
 
-/// Returns directions in which the eye is moved. They lead to both sides of each surface that the
-/// eye is on.
+/// Returns directions in which the eye is moved. If the eye is on surfaces, they include both sides
+/// of each.
 fn asides(scene: &Scene, numbers: &mut Numbers) -> Vec<DVec3> {
     let eye = DVec3::from_array(scene.camera.eye);
     let normals: Vec<DVec3> = scene
@@ -159,16 +163,16 @@ fn same_with_gaps(scene: &Scene) -> Verdict {
         paired(size, ["touching", "with gaps"], [&render(other), &gap_picture], FLOOR)
     };
     let equals_gap = |other: &Scene| matches!(against_gap(other), Verdict::Same);
-    // Of coincident surfaces that face the same side either is visible: no gap separates them. An eye
-    // exactly on a surface is on either side of it.
+    // Shrinking does not separate two coincident surfaces that face the same side: that of the
+    // larger object is visible. An eye exactly on a surface is moved to one of its sides.
     if !variants[1..].iter().all(equals_gap) {
         return Verdict::Skipped(
             "the picture depends on which of two objects is larger, or on the side of the eye",
         );
     }
     let touching = against_gap(&scene);
-    // Rounding decides which of two coincident opaque surfaces is visible. One can see them from
-    // inside of an opaque solid only.
+    // Rounding decides which of two coincident opaque surfaces is visible. Both are visible only
+    // from inside of an opaque solid.
     if matches!(touching, Verdict::Different(_)) && shows_coincident_opaque(&scene) {
         return Verdict::Skipped("two coincident opaque surfaces are visible");
     }

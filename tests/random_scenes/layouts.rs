@@ -90,7 +90,8 @@ fn floor(numbers: &mut Numbers, stock: &Stock) -> Object {
     object
 }
 
-/// Returns random objects in adjacent cells of edge 1 on two levels, at most one in a cell.
+/// Returns a floor, and random objects in cells of a unit grid on two levels, at most one in a
+/// cell.
 fn contact(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let mut all = vec![floor(numbers, stock)];
     let mut cells: Vec<DVec3> = Vec::new();
@@ -173,7 +174,7 @@ fn sparse(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
     let random_object = |_| {
         let base = somewhere(numbers, 3.5);
         match way {
-            // Stars and hairlines.
+            // Small objects (stars), or thin and high ones (hairlines).
             0 | 1 => {
                 let thin = log(numbers, 0.01, 0.1);
                 let size = DVec3::new(thin, if way == 0 { thin } else { 3.0 }, thin);
@@ -181,7 +182,7 @@ fn sparse(numbers: &mut Numbers, stock: &Stock) -> Vec<Object> {
                 named(numbers, stock, key, base, size)
             }
             2 => object(numbers, stock, base, DVec3::splat(0.05)),
-            // Far away; a chessboard if the material has one.
+            // A distant platform; with a checker texture it is a chessboard.
             _ => {
                 let size = DVec3::new(8.0, 0.05, 100.0);
                 named(numbers, stock, "platform", DVec3::new(base.x, -1.0, -40.0), size)

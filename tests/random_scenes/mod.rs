@@ -1,11 +1,13 @@
-//! Random scenes of all kinds, each rendered in several ways that must agree.
+//! Random scenes of all kinds, each rendered in several ways whose pictures must agree.
 //!
 //! Tests without `#[ignore]` compare a fixed, small set of scenes. Ignored tests, named `many_*`,
-//! compare `ZERKALO_SCENES` scenes (default 200) from the seed `ZERKALO_FIRST` (default 0) on. With
-//! `ZERKALO_SEED` every test compares the scene of that seed only. CONTRIBUTING.md has examples.
+//! compare `ZERKALO_SCENES` scenes (default 200), starting with the seed `ZERKALO_FIRST` (default
+//! 0). If `ZERKALO_SEED` is set, every test compares only the scene of that seed. CONTRIBUTING.md
+//! has examples.
 //!
-//! A scene that differs is written to target/tmp/random_scenes, as drawn and as reduced within
-//! `ZERKALO_SHRINK` seconds (default 10) to the smallest scene that still differs.
+//! A scene whose pictures differ is written to target/tmp/random_scenes in two forms: complete, and
+//! reduced to a smaller scene that still fails. The reduction takes at most `ZERKALO_SHRINK`
+//! seconds (default 10).
 
 mod accelerations;
 mod driver;

@@ -37,7 +37,8 @@ pub fn library() -> AssetResolver {
     AssetResolver::new(Path::new(NAME), ASSETS.get_or_init(Arc::default).clone())
 }
 
-/// Returns a random coefficient of a material: 0, 1, between, and rarely above.
+/// Returns a random coefficient of a material: 0, 1 or a number between them, and rarely a larger
+/// number.
 fn coefficient(numbers: &mut Numbers) -> f64 {
     match numbers.below(12) {
         0 => 0.0,
@@ -155,16 +156,17 @@ fn solids() -> &'static (Vec<&'static Field>, Vec<&'static Field>) {
     })
 }
 
-/// Returns the compound of `of` by the set operation `key`. Returns `None` if it has validation
-/// errors.
+/// Returns the compound of the parts `of` by the set operation `key`. Returns `None` if the
+/// compound has validation errors.
 fn compound(key: &str, of: Vec<CsgOperand>) -> Option<Shape> {
     let parts = Table::from_iter([("of".to_string(), Value::try_from(of).ok()?)]);
     let whole = Table::from_iter([(key.to_string(), Value::Table(parts))]);
     whole.try_into::<Shape>().ok().filter(|shape| shape.faults().is_empty())
 }
 
-/// Returns a shape of a kind with random keys, approximately in a box of the lengths `size` on
-/// `base`.
+/// Returns a shape of a kind with random values of its keys. The shape is approximately in a box of
+/// the size `size` that stands on the point `base`. Returns `None` if the shape has validation
+/// errors.
 fn by_keys(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Option<Shape> {
     let key_value = |numbers: &mut Numbers, field: &Field| {
         let least = size.min_element();
@@ -192,8 +194,8 @@ fn by_keys(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Opt
     whole.try_into::<Shape>().ok().filter(|shape| shape.faults().is_empty())
 }
 
-/// Returns a random compound in a box of the lengths `size` on `base`. Faces of its parts often
-/// coincide.
+/// Returns a random compound in a box of the size `size` that stands on the point `base`. Faces of
+/// its parts often coincide.
 pub fn combined(
     numbers: &mut Numbers,
     base: DVec3,
@@ -240,8 +242,8 @@ fn of_kind(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Sha
     drawn.unwrap_or_else(|| Shape::fitted_to(kind.name, base, size).expect("a registered kind"))
 }
 
-/// Returns random transform steps that rotate, stretch, shear or mirror about the fixed point
-/// `base`; mostly none.
+/// Returns random transform steps that rotate, stretch, shear or mirror an object. They leave the
+/// point `base` fixed. In most cases the list is empty.
 fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<TransformOp> {
     let turn = |numbers: &mut Numbers| {
         let any = 180.0 * numbers.unit();
@@ -271,15 +273,16 @@ fn steps(numbers: &mut Numbers, base: DVec3) -> Vec<TransformOp> {
     std::iter::once(to_origin).chain(inner).chain([back]).collect()
 }
 
-/// Names of materials for random objects, and the depth of nested compounds.
+/// Materials that random objects choose from, by name, and the largest depth of nested compounds.
 pub struct Stock<'a> {
     pub materials: &'a [String],
     pub levels: usize,
 }
 
-/// Returns a random object on `base`, about as large as `size`, without validation errors.
+/// Returns a random object that stands on the point `base`, about as large as `size`, without
+/// validation errors.
 pub fn object(numbers: &mut Numbers, stock: &Stock, base: DVec3, size: DVec3) -> Object {
-    // Unbounded objects hide all others, so that they are rare.
+    // Unbounded objects are rare, because they hide all others.
     let kind = loop {
         let kind = &KINDS[numbers.below(KINDS.len())];
         let drawn =
@@ -321,7 +324,7 @@ fn object_of(
     object
 }
 
-/// Returns the object with the files that it refers to loaded.
+/// Returns the object after the files that it refers to, such as meshes, have been loaded.
 pub fn resolved(object: &Object) -> Object {
     let mut scene =
         Scene { objects: vec![object.clone()], resolver: library(), ..Scene::default() };
@@ -329,7 +332,8 @@ pub fn resolved(object: &Object) -> Object {
     scene.objects.remove(0)
 }
 
-/// Scales and moves an object into a box of the lengths `size` on `base`.
+/// Scales an object uniformly and moves it, so that it fits into a box of the size `size` that
+/// stands on the point `base`.
 fn fit(object: &mut Object, base: DVec3, size: DVec3) {
     let Some((low, high)) = resolved(object).form().bounds() else { return };
     let factor = (size / (high - low).max(DVec3::splat(1e-9))).min_element();

@@ -1,4 +1,4 @@
-//! Single precision in random scenes for which `auto` selects it, against double precision.
+//! Single against double precision, in random scenes for which the precision `auto` selects single.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
 use crate::random_scenes::gaps::shows_coincident_opaque;
@@ -11,9 +11,9 @@ use zerkalo::world::{AnyWorld, Options, Precision};
 const SEEDS: u64 = 8;
 /// Samples per pixel and replicate (half of the samples).
 const SAMPLES: u32 = 4;
-/// Allowed error of single precision in the mean of a block of pixels, in 8-bit levels.
-/// docs/accuracy.md measures 0.12 over a picture at the worst proportions for which `auto` selects
-/// it.
+/// Allowed error of single precision in the mean of a block of pixels, in 8-bit levels. At the most
+/// unfavourable ratio of sizes for which `auto` selects it, docs/accuracy.md measures an error of
+/// 0.12 over a whole picture.
 const FLOOR: f64 = 0.5;
 
 /// Returns the displayed values of every pixel, in 8-bit levels: one picture for each seed.
@@ -30,8 +30,8 @@ pub fn codes(scene: &Scene, precision: Precision, samples: u32) -> Vec<Vec<[f64;
         .collect()
 }
 
-/// Compares block means of two sets of pictures. The two pictures of one seed have the same
-/// samples.
+/// Compares block means of two sets of pictures. Pictures with the same seed have the same samples
+/// in both sets, so that their differences are tested.
 pub fn paired(
     size: [u32; 2],
     names: [&str; 2],
@@ -66,7 +66,7 @@ pub fn paired(
 
 fn single_is_double(scene: &Scene) -> Verdict {
     let mut scene = scene.clone();
-    // The centre of a pixel may be exactly on an edge.
+    // With a point filter, the centre of a pixel could be exactly on an edge.
     scene.film.filter = Filter::Box;
     if let AnyWorld::Double(_) = AnyWorld::compile(&scene, &Options::default()) {
         return Verdict::Skipped("auto selects double precision");

@@ -1,6 +1,6 @@
 //! Adaptive and uniform pictures of random scenes, against a reference of other seeds with more
-//! samples. Means are equal, true errors are as reported, and adaptive pictures take no more rays
-//! for equal errors.
+//! samples. The means must be equal, and the true errors must equal the reported ones. For the same
+//! error, adaptive pictures must take at most 1.5 times the rays of uniform ones.
 
 use crate::common::normal::z_of_t;
 use crate::random_scenes::driver::{Verdict, compare, compare_many, many};
@@ -23,24 +23,24 @@ const SAMPLES: u32 = 32;
 const REFERENCE_PICTURES: u64 = 8;
 /// Samples per pixel of each picture of the reference in the first comparison.
 const REFERENCE: u32 = 128;
-/// Factor of the number of seeds, and of the reference's number of samples, in the second
-/// comparison. A scene that differs is compared a second time with other seeds, and only these
-/// decide. The standard error of eight skewed numbers is often far too small: if one of 20 pictures
-/// contains a rare bright sample, eight without it agree.
+/// Factor by which the second comparison has more seeds, and its reference more samples, than the
+/// first. A scene that differs is compared a second time with other seeds, and only this result
+/// counts. The standard error of eight numbers with a skewed distribution is often far too small:
+/// if one of 20 pictures contains a rare bright sample, eight pictures without it agree.
 const REPETITION: u32 = 8;
 /// Allowed range of the true error, divided by the reported one.
 const HONEST: [f64; 2] = [0.9, 1.15];
-/// Largest squared error of the reference, relative to that of the uniform pictures, which have a
-/// 32nd of its samples. It is also the largest relative change of the uniform pictures' error if
-/// half of the reference is left out.
+/// Largest squared error of the reference, relative to that of the uniform pictures. In the first
+/// comparison a uniform picture has a 32nd of the reference's samples. This is also the largest
+/// relative change of the uniform pictures' squared error if half of the reference is left out.
 const MAX_REFERENCE_ERROR: f64 = 0.125;
 /// Largest number of rays of an adaptive picture, divided by that of a uniform one with the same
 /// true error.
 const MAX_RAY_RATIO: f64 = 1.5;
-/// Number of rays, divided by that of the uniform picture, at which a picture that has not reached
-/// its noise target is stopped.
+/// Factor of the uniform pictures' mean number of rays. A picture that has not reached its noise
+/// target after so many rays is stopped.
 const STOP_FACTOR: u64 = 4;
-/// Largest deviation of a measurement from its limit, in standard deviations of a normal
+/// Largest allowed deviation of a measurement from its limit, in standard deviations of a normal
 /// distribution.
 const MAX_DEVIATION: f64 = 5.0;
 /// Smallest deviation, in standard deviations, at which a scene is compared a second time.
@@ -54,7 +54,8 @@ struct Shot {
     rays: f64,
     /// Reported mean squared error of the picture, in squared 8-bit levels.
     reported: f64,
-    /// Number of effective pixels of the reported error: pixels that carry the noise.
+    /// Number of effective pixels of the reported error: the number of equally noisy pixels that
+    /// would give an error of the same uncertainty.
     effective_pixels: f64,
     ended: bool,
 }
@@ -152,9 +153,10 @@ impl Reference {
         square(picture, &self.codes) - self.error
     }
 
-    /// Returns `true` if the reference suffices for the error of the pictures `shots`. It does not
-    /// if it is noisy, or if the error changes with its number of samples: bright samples that are
-    /// rare even in the reference make its own error look too small.
+    /// Returns `true` if the reference is good enough to measure the error of the pictures `shots`.
+    /// It is not if its own error is too large. It is not either if the measured error changes when
+    /// half of the reference is left out, because bright samples that are rare even in the
+    /// reference make its own error look too small.
     fn is_sufficient(&self, shots: &[Shot]) -> bool {
         let mean =
             |of: &dyn Fn(&Shot) -> f64| mean_and_error(&shots.iter().map(of).collect::<Vec<_>>()).0;
@@ -166,9 +168,10 @@ impl Reference {
             && self.half_codes.iter().all(|half| (from_half(half) - truth).abs() <= allowed)
     }
 
-    /// Returns the largest significant difference of block means between pictures and reference.
-    /// The variance of single samples is estimated from the pictures and from the reference. The
-    /// larger one is used, because pictures without a rare event underestimate it.
+    /// Returns the largest difference of block means between pictures and reference, if it is
+    /// significant. The variance of a single sample is estimated from the pictures and from the
+    /// reference. The larger estimate is used, because pictures without a rare bright sample
+    /// underestimate it.
     fn differs(&self, name: &str, shots: &[Shot], size: [u32; 2]) -> Option<String> {
         let blocks = blocks(size);
         let seeds = shots.len().min(self.pictures.len());
@@ -177,7 +180,7 @@ impl Reference {
             let reference_means: Vec<_> =
                 self.pictures.iter().map(|p| mean_of(p, pixels)).collect();
             let shot_means: Vec<_> = shots.iter().map(|s| mean_of(&s.picture, pixels)).collect();
-            // The smallest sample count of a block represents it.
+            // A block is treated as if all its pixels had the smallest sample count among them.
             let per_pixel = |s: &Shot| pixels.iter().map(|p| s.counts[*p]).fold(f64::MAX, f64::min);
             let count = shots.iter().map(per_pixel).sum::<f64>() / shots.len() as f64;
             for c in 0..3 {
@@ -185,7 +188,8 @@ impl Reference {
                     |v: &[[f64; 3]]| mean_and_error(&v.iter().map(|m| m[c]).collect::<Vec<_>>());
                 let ((wanted, error), (found, shot_error)) =
                     (channel(&reference_means), channel(&shot_means));
-                // The errors are those of means of different numbers of pictures.
+                // The error of the reference is scaled to the number of pictures and to their
+                // sample counts.
                 let spread = error * (self.pictures.len() as f64 / shots.len() as f64).sqrt();
                 let expected = spread * (f64::from(self.samples) / count).sqrt();
                 let chance = (error.powi(2) + shot_error.max(expected).powi(2)).sqrt();
@@ -229,14 +233,17 @@ impl Errors {
         [&self.truths, &self.reports].map(|values| mean_and_error(values).0)
     }
 
-    /// Returns the true squared error minus `factor` times the reported one, and its uncertainty.
+    /// Returns the true squared error minus `factor` times the reported one, and the uncertainty of
+    /// this difference.
     ///
-    /// The uncertainty is the larger one of two. The first is the standard error over the pictures. It
-    /// is too small if most of the reported error comes from few pixels of all pictures: one more or
-    /// less would change the sum much. The second therefore counts pixels. The sum R of the reported
-    /// squared errors consists of independent contributions r of pixels, and its variance is at most
-    /// the expectation of the sum Q of r^2. If R equalled T / factor, with the sum T of the true squared
-    /// errors, and came from more contributions of the same sizes, the variance would be
+    /// The uncertainty is the larger one of two estimates. The first is the standard error over the
+    /// pictures. It is too small if a few pixels contribute most of the reported error: one such
+    /// pixel more or less would change the sum much.
+    ///
+    /// The second estimate therefore counts pixels. The sum R of the reported squared errors
+    /// consists of independent contributions r of pixels. Its variance is at most the expectation
+    /// of Q, the sum of r^2. T is the sum of the true squared errors. If T / factor exceeds R,
+    /// contributions of the same sizes are assumed to be missing from R. With them the variance is
     /// Q T / (factor R).
     fn excess(&self, factor: f64) -> (f64, f64) {
         let differences: Vec<f64> =
@@ -246,7 +253,8 @@ impl Errors {
         let count = self.truths.len() as f64;
         let growth = if reported > 0.0 { (truth / (factor * reported)).max(1.0) } else { 1.0 };
         let of_pixels = factor * (self.squares * growth).sqrt() / count;
-        // The error of the reference is known to about a quarter.
+        // Half of the reference's squared error is added, because that error is itself uncertain,
+        // by about a quarter.
         (mean, spread.max(of_pixels).hypot(0.5 * self.reference) + 1e-6)
     }
 
@@ -259,11 +267,13 @@ impl Errors {
     }
 }
 
-/// Returns the ratio of true and reported error if it is significantly out of range.
+/// Returns a text with the true and the reported error if their ratio is significantly out of
+/// range.
 ///
-/// A picture that stops at a noise target stops when its estimate is low by chance. Uniform
-/// pictures that stop there therefore report too small an error as well. `usual` has their errors.
-/// If their ratio is out of range, it is the limit for the adaptive ones.
+/// A picture that stops at a noise target stops when its noise estimate is low by chance. The
+/// reported error is therefore too small even for uniform pictures. `usual` contains the errors of
+/// uniform pictures with the same target. If their ratio is out of range, it replaces the limit for
+/// the adaptive pictures.
 fn dishonest(
     name: &str,
     errors: &Errors,
@@ -343,10 +353,10 @@ fn differences(
     Ok(wrong)
 }
 
-/// Returns the numbers of seeds for which only the adaptive and only the uniform picture has not
-/// reached a noise target. Returns `None` unless adaptive pictures fail significantly more often,
-/// by a sign test (McNemar 1947). The picture of a seed with a rare bright sample reports a larger
-/// noise than the mean does; neither kind may reach the target.
+/// Compares how many seeds do not reach a noise target: those with which only the adaptive picture
+/// fails, and those with which only the uniform one fails. Returns a text with both numbers if the
+/// first is significantly larger by a sign test (McNemar 1947). Some failures are normal: a picture
+/// with a rare bright sample reports more noise than the mean picture does.
 fn unfinished(
     noise: f64,
     adaptive: &[Shot],

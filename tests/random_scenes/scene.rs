@@ -23,7 +23,8 @@ pub struct Random {
     pub text: String,
 }
 
-/// Points of a scene at which renderers often fail.
+/// Points of a scene at which intersection or shading often fails. Eyes and lights are placed
+/// there.
 struct Spots {
     /// Points on surfaces of objects, exact up to rounding.
     on: Vec<DVec3>,
@@ -116,8 +117,9 @@ fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
     if !scene.faults().is_empty() {
         return None;
     }
-    // Points alone find the highlights of emissive objects: sharp ones are few bright samples, whose
-    // error is reported too low.
+    // Highlights of emissive objects are sampled only by points that are chosen on the objects.
+    // Sharp ones consist of few bright samples, whose error is reported too low. Objects therefore
+    // emit light only if no material has a highlight.
     if scene.materials.values().all(|material| material.specular == 0.0) {
         for material in scene.materials.values_mut() {
             (material.emission, material.emission_color) = emission(numbers);
@@ -127,7 +129,7 @@ fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
 }
 
 fn film_size(numbers: &mut Numbers, layout: Layout) -> [u32; 2] {
-    // Sparse pictures have so many tiles that some are empty.
+    // Pictures of the layout `Sparse` are large enough for some tiles to be empty.
     const LARGE: [[u32; 2]; 4] = [[96, 80], [128, 64], [160, 128], [40, 30]];
     const USUAL: [[u32; 2]; 5] = [[64, 48], [40, 30], [48, 36], [33, 17], [20, 20]];
     const NARROW: [[u32; 2]; 5] = [[1, 1], [1, 1000], [1000, 1], [3, 70], [90, 2]];
@@ -187,7 +189,7 @@ fn camera(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Camera {
             around(numbers, distance)
         }
     };
-    // A camera on a surface or inside of an object may look anywhere.
+    // A camera on a surface or inside of an object looks in any direction in half of the cases.
     let look = if way < 2 && chance(numbers, 1, 2) { direction(numbers) } else { target - eye };
     let look = if look == DVec3::ZERO { DVec3::NEG_Z } else { look };
     let ups = [DVec3::Y, DVec3::Y, DVec3::Z, DVec3::new(0.3, 0.9, 0.2)];
@@ -211,8 +213,9 @@ fn camera(numbers: &mut Numbers, spots: &Spots, layout: Layout) -> Camera {
     }
 }
 
-/// Returns aperture and focus of the camera; one camera in three has a lens. The random numbers
-/// depend on the eye alone, so that the scene is otherwise the same without a lens.
+/// Returns aperture and focus of the camera. One camera in three has a lens. The random numbers
+/// depend on the eye alone, so that all other parts of the scene are the same with and without a
+/// lens.
 fn lens(eye: DVec3, spots: &Spots) -> (Option<Aperture>, Option<Focus>) {
     let mut numbers =
         Numbers::new(eye.to_array().map(f64::to_bits).into_iter().fold(0, u64::wrapping_add));

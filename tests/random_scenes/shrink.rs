@@ -34,8 +34,8 @@ pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> Option<
     let mut changed = true;
     while changed {
         changed = false;
-        // Large values first: objects before their keys. Last list entries first, so that the
-        // indices of the others stay valid.
+        // Values near the root come first: objects before their keys. Of the entries of a list, the
+        // last comes first, so that the indices of the others stay valid.
         let mut places = Vec::new();
         walk(&Value::Table(best.clone()), &mut Vec::new(), &mut places);
         places.reverse();
@@ -50,7 +50,8 @@ pub fn shrunk(text: &str, seconds: u64, fails: &dyn Fn(&str) -> bool) -> Option<
             }
             let Value::Table(candidate) = candidate else { continue };
             let text = written(&candidate);
-            // A scene without a size would have the preset one, which is larger.
+            // If the size is removed, the film gets the default size, which is larger. Such a
+            // change is refused.
             let small = |scene: Scene| scene.film.size.iter().product::<u32>() <= pixels;
             let sound = candidate != best && Scene::parse(&text, NAME).is_ok_and(small);
             if sound && fails(&text) {

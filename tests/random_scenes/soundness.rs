@@ -14,7 +14,8 @@ const SAMPLES: u32 = 4;
 fn sound(scene: &Scene) -> Verdict {
     for precision in [Precision::Auto, Precision::Double] {
         let mut rendering = rendered(scene, 1, precision, SAMPLES);
-        // The samples before are traced in packets of many pixels, these in packets of one.
+        // `rendered` traces few samples of each pixel, in packets of many pixels. These eight
+        // samples of a pixel are traced in packets of one pixel.
         uniform(&mut rendering, 8, 8, &pool(2));
         let bad = rendering.film.bad_samples();
         if bad.count > 0 {
@@ -89,7 +90,7 @@ fn many_replicates() {
     compare_many("replicates", replicates_are_equal);
 }
 
-/// Checks that a light a few millionths of the scene above the floor gives bright, valid samples.
+/// Checks a light 1e-5 above a floor that is 10 wide. Its samples are bright and valid.
 #[test]
 fn light_close_to_floor_has_no_bad_sample() {
     let scene = parsed(

@@ -1,5 +1,6 @@
-//! Comparison of pictures of several seeds by means of blocks of pixels. Seeds are independent. The
-//! spread of their means therefore estimates the error of the overall mean, for every sampler.
+//! Comparison of pictures with several seeds, by the means of blocks of pixels. Pictures with
+//! different seeds are independent. The spread of their means therefore estimates the error of the
+//! overall mean, for every sampler.
 
 use crate::common::normal::{two_sided_z, z_of_t};
 

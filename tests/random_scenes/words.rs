@@ -1,12 +1,13 @@
-//! Random values of scene keys, drawn from the tables of the format, which include new keys.
+//! Random values of scene keys. They are drawn from the tables that define the format, so that new
+//! keys are included.
 
 use crate::common::Numbers;
 use glam::DVec3;
 use toml::{Table, Value};
 use zerkalo::value::{DefaultValue, Field, NumberRange, ValueType};
 
-/// Function that returns the value of a key, or `None` for a random value that the format table
-/// allows.
+/// Function that returns the value of a key. If it returns `None`, the key gets a random value that
+/// the format table allows.
 pub type KeyValue<'a> = &'a dyn Fn(&mut Numbers, &Field) -> Option<Value>;
 
 /// Returns a random element of `from`.

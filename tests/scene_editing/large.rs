@@ -1,4 +1,5 @@
-//! Time to write edits of large scenes, as ratios of processor time within one run.
+//! Time that edits of large scene files take. The tests compare processor times of one run, as
+//! ratios.
 
 use super::*;
 use std::fmt::Write;
@@ -23,7 +24,8 @@ fn cpu_seconds() -> f64 {
     times.split(' ').next().unwrap().parse::<f64>().unwrap() * 1e-9
 }
 
-/// Returns the seconds that it takes to change the text of a scene of `count` objects after `edit`.
+/// Returns the seconds of processor time that it takes to update the text of a scene of `count`
+/// objects after `edit`.
 fn seconds(count: usize, has_names: bool, edit: fn(&mut Scene)) -> f64 {
     let document = document(&spheres(count, has_names));
     let times = (0..3).map(|_| {
@@ -47,7 +49,8 @@ fn move_object(object: &mut Object) {
 /// Name of an edit, and the function that applies it.
 type NamedEdit = (&'static str, fn(&mut Scene));
 
-/// Checks that twice as many objects take at most `limit` times the time, from `fewest` objects on.
+/// Checks that the time grows at most by the factor `limit` if the number of objects doubles. The
+/// time for `fewest` objects is compared with that for four times as many, after two doublings.
 fn check_growth(fewest: usize, limit: f64) {
     let edits: [NamedEdit; 3] = [
         ("one moved", |scene| {
@@ -68,8 +71,9 @@ fn check_growth(fewest: usize, limit: f64) {
     }
 }
 
-/// Checks that the growth of the time is less than halfway between linear and quadratic. It is not
-/// exactly linear, because few objects fit into the caches.
+/// Checks the growth of the time from 2,000 to 8,000 objects. The limit for a doubling is halfway
+/// between linear (2) and quadratic (4), on a logarithmic scale. The growth is not exactly linear,
+/// because few objects fit into the caches.
 #[test]
 #[cfg(target_os = "linux")]
 fn edits_of_many_objects_are_written_in_linear_time() {

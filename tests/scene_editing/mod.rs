@@ -19,8 +19,8 @@ fn document(text: &str) -> Document {
     Document::parse(text.to_string(), "scene.toml").unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Applies `edit` to the scene in `text`. Checks that the new text reads back as the edited scene,
-/// and returns it.
+/// Applies `edit` to the scene in `text`. Returns the new text, and checks that it reads back as
+/// the edited scene.
 fn edited(text: &str, edit: impl FnOnce(&mut Scene)) -> String {
     let mut document = document(text);
     let mut scene = document.scene().clone();
@@ -60,7 +60,7 @@ fn layouts_describe_the_same_scene() {
 fn unedited_scene_keeps_its_text() {
     for text in LAYOUTS {
         assert_eq!(edited(text, |_| {}), *text);
-        // An edit and its reversal, too.
+        // An edit followed by its reversal restores the text, too.
         let mut document = document(text);
         let origin = document.scene().clone();
         document.apply(&Scene { objects: Vec::new(), ..origin.clone() });
@@ -115,7 +115,7 @@ fn removed_objects_take_their_comments_and_leave_file_comments() {
     assert!(after.contains("# --- objects ---\n\n# A cube,\n# turned.\n[[object]]"), "{after}");
     let ball = "# Shows a ball.\n\n# The ball.\n[[object]]\n\
                 shape.sphere = { center = [0, 0, 0], radius = 1 }\n";
-    // The comment that opens the file stays although the first table is removed.
+    // The comment at the start of the file stays even if the table below it is removed.
     let after = edited(&format!("{ball}\n[film]\nsize = [20, 20]\n"), |s| {
         s.objects.clear();
     });

@@ -19,7 +19,8 @@ use zerkalo::shape::Shape;
 const BALL: Target = Target::Object(1);
 const GLASS: Target = Target::Object(2);
 
-/// Condition on the scene before the keys, and on the dashboard afterwards.
+/// Expected result of a story: a function of the scene before the keys and of the dashboard after
+/// them. It returns `true` if the story has gone as expected.
 type Expect = dyn Fn(&Scene, &Desk) -> bool;
 
 /// Story of a command: the selection, the keys that are pressed, and the expected result.
@@ -152,7 +153,7 @@ fn camera_stories() -> Vec<Story> {
             d.scene().camera.focus == Some(LensFocus::Point([0.0, 1.0, 0.0]))
         }),
         story("focus on the probe or the selection", BALL, "i F", |_, d| {
-            // The front of the ball.
+            // The focus is on the front of the ball, which the probe shows.
             (d.scene().camera.focus_depth() - 4.5).abs() < 0.01
         }),
         story("reset the camera to the file", c(), "Left Up Home", |a, d| {
@@ -373,7 +374,7 @@ fn picture_stories() -> Vec<Story> {
                 && d.model.stop.noise_codes.is_none()
         }),
         story("noise targets and their times", c(), "N Down Enter", |_, d| {
-            // From the current target of 0.5 to the next finer one.
+            // The noise target changes from 0.5 to the next finer one in the list.
             d.model.stop.noise_codes == Some(0.25) && d.model.overlay.is_none()
         }),
         story("more threads", c(), ":", |_, d| d.asked(|e| *e == Effect::Threads(3))),
@@ -436,7 +437,7 @@ fn every_command_does_what_its_story_expects() {
     }
 }
 
-/// Checks that a command does the same if it is run from the command palette as by its key.
+/// Checks that the command palette finds each command by its label and runs it.
 #[test]
 fn palette_finds_every_command_by_its_label() {
     for command in COMMANDS {

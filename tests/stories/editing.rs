@@ -57,7 +57,7 @@ fn invalid_value_is_refused_in_its_field() {
         let problem = desk.problem().unwrap_or_default().to_string();
         assert!(problem.contains(words), "{typed}: {problem}");
         assert_eq!(desk.text(), ROOM, "{typed}: the scene stays");
-        // Typing clears the reason; Esc restores the old value.
+        // Typing removes the error message, and Esc restores the old value.
         desk.keys("Backspace");
         assert_eq!(desk.problem(), None);
         desk.keys("Esc");

@@ -122,7 +122,7 @@ fn external_change_reloads_unless_edits_would_be_lost() {
     desk.send(Message::ChangedOnDisk);
     desk.keys("`r`");
     assert_eq!((desk.text().as_str(), desk.model.is_unsaved()), (ROOM, false));
-    // An open form is not interrupted.
+    // A change of the file is reported, but it does not close an open form.
     desk.keys("a Enter");
     desk.send(Message::ChangedOnDisk);
     assert!(matches!(desk.model.overlay, Some(Overlay::Form(_))));
@@ -218,8 +218,8 @@ fn export_path_with_control_characters_is_not_copied() {
     assert!(desk.effects.is_empty() && desk.notice().contains("not copied"));
 }
 
-/// Checks the viewer of exported images. An image covers the whole screen; the next key only closes
-/// it.
+/// Checks the viewer of exported images. An image covers the whole screen, and the next key closes
+/// it without any other effect.
 #[test]
 fn image_viewer_closes_on_any_key() {
     let mut desk = Desk::new(ROOM);

@@ -57,7 +57,7 @@ fn event(desk: &mut Desk, rng: &mut Rng, keys: &[Key]) {
                 desk.key(key);
             }
         }
-        // From the palette, which also covers commands without a key.
+        // The command is run from the command palette, which also covers commands without a key.
         14 if desk.model.overlay.is_none() && desk.editor().is_none() => {
             let label = COMMANDS[rng.below(COMMANDS.len())].label;
             if label != QUIT {
@@ -95,7 +95,8 @@ fn play(name: &str, text: &str, seed: u64, fired: &mut HashSet<&'static str>) {
     desk.reads = false;
     for i in 0..EVENTS {
         event(&mut desk, &mut rng, &keys);
-        // Questions may quit or load another file: other tests cover them.
+        // Questions are cancelled, because an answer may quit or load another file. Other tests
+        // cover the answers.
         if let Some(Overlay::Question(_)) = desk.model.overlay {
             desk.keys("Esc");
         }

@@ -7,8 +7,8 @@ use zerkalo::dashboard::message::{Effect, Message, OrphanedEdits};
 use zerkalo::dashboard::overlay::Overlay;
 use zerkalo::scene::Scene;
 
-/// Returns the requests for autosaves since the last call: the scene of each, or `None` for a
-/// removal of the recovery file.
+/// Returns the autosave requests since the last call. Each is a scene to be saved, or `None` if the
+/// recovery file is to be removed.
 fn kept(desk: &mut Desk) -> Vec<Option<Arc<Scene>>> {
     let effects = std::mem::take(&mut desk.effects);
     let kept = effects.into_iter().filter_map(|effect| match effect {

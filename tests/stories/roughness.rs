@@ -23,8 +23,8 @@ fn changed(a: &RenderState, b: &RenderState) -> Vec<bool> {
     (0..width * height).map(|i| pixel(a, i) != pixel(b, i)).collect()
 }
 
-/// Renders the scene with another ambient colour of the materials that `of` selects. Pixels whose
-/// paths hit these materials change.
+/// Renders the scene with another colour and a higher ambient coefficient of the materials that
+/// `of` selects. The pixels whose paths hit these materials change.
 fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> RenderState {
     let mut scene = scene.clone();
     for (_, material) in scene.materials.iter_mut().filter(|(name, _)| of(name)) {
@@ -38,8 +38,8 @@ fn marked(scene: &Scene, of: impl Fn(&str) -> bool) -> RenderState {
 fn roughness_changes_only_pixels_of_the_mirror() {
     let mut desk = Desk::new(BUILT_IN);
     let smooth = desk.scene().clone();
-    // From 0.04 to about 0.1. Shadowed areas are lit evenly, so a small blur leaves their centre
-    // unchanged.
+    // The roughness grows from 0.04 to about 0.1. Such a small blur leaves the centres of shadows
+    // unchanged, because they are evenly lit.
     desk.keys("] ] ] ] ] ] ] ] ] ]");
     let rough = desk.scene().clone();
     let roughness = |scene: &Scene| scene.materials["mirror"].roughness;
@@ -56,7 +56,7 @@ fn roughness_changes_only_pixels_of_the_mirror() {
     assert!(wrong.is_empty(), "pixels whose paths never met the mirror changed: {wrong:?}");
     assert!(same > 1000, "only {same} pixels have nothing to do with the mirror");
 
-    // Pixels in which the mirror reflects an object rather than the background.
+    // Finds the pixels in which the mirror reflects an object, and not only the background.
     let [width, height] = SIZE.map(|n| n as usize);
     let size = [width, height];
     let look = |points: &[[f64; 2]], seen: &mut [FirstHit]| before.world.first_hit(points, seen);

@@ -73,7 +73,8 @@ pub struct Desk {
     pub fired: HashSet<&'static str>,
     pub document: Document,
     begun_with: Document,
-    /// `true` if requests to load the file are answered. A load restarts the undo history.
+    /// `true` if the desk answers requests to load the file. Each load would restart the undo
+    /// history.
     pub reads: bool,
 }
 

@@ -145,10 +145,11 @@ fn cursor_follows_its_row() {
     desk.keys("End");
     assert_eq!(cursor(&desk), 29);
     assert!(desk.model.watch.as_ref().unwrap().scroll > 0);
-    // The rows become fewer.
+    // The cursor moves to the last row if the table becomes shorter.
     desk.send(Message::Watched(Box::new(report(vec![shard(1, WatchedState::Complete)]))));
     assert_eq!(cursor(&desk), 0);
-    // The first row stays selected whatever it is, as the most urgent one.
+    // A cursor on the first row stays there, whatever file the row shows, because the first row is
+    // the most urgent one.
     let rows = (0..9).rev().map(|n| shard(n, WatchedState::Running)).collect();
     desk.send(Message::Watched(Box::new(report(rows))));
     assert_eq!(cursor(&desk), 0);

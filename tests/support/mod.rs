@@ -71,11 +71,12 @@ pub fn session(threads: usize, seed: u64, stop: Stop, adaptive: bool) -> Session
 /// Thread pools that no test uses at present.
 static FREE_POOLS: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
 
-/// Thread pool that another test can use after it is dropped. Starting and ending a thread costs
-/// more than tracing a small picture: each end unmaps a stack in all threads of the process.
+/// Thread pool that other tests reuse after it is dropped. To start and end threads takes longer
+/// than to trace a small picture, because each end of a thread unmaps its stack in all threads of
+/// the process.
 pub struct Pool(Option<ThreadPool>);
 
-/// Returns a pool of `threads` threads, a free one if there is one.
+/// Returns a pool of `threads` threads. Takes a free pool of this size, or creates one.
 pub fn pool(threads: usize) -> Pool {
     let mut free = FREE_POOLS.lock().unwrap();
     let found = free.iter().position(|pool| pool.current_num_threads() == threads);
@@ -143,8 +144,9 @@ pub fn accelerated(
 }
 
 /// Removes all random choices from a scene: anti-aliasing, the lens, blurred lobes, lights with a
-/// size, emission, diffuse bounces, and the choice among many point lights. The choice between
-/// reflection and refraction is also removed; it begins behind the second transmitting surface.
+/// size, emission, diffuse bounces, and the choice among many point lights. Also limits the depth
+/// to 2 if a material transmits light, because paths choose between reflection and refraction at
+/// random behind the second transmitting surface.
 pub fn without_chance(scene: &mut Scene) {
     scene.film.filter = Filter::Point;
     scene.camera.aperture = None;
@@ -155,7 +157,8 @@ pub fn without_chance(scene: &mut Scene) {
             && light.disk.is_none()
             && light.environment.is_none()
     });
-    // Of 16 point lights or more, each surface chooses some.
+    // With 16 point lights or more, a path traces shadow rays from each surface to a random few of
+    // them.
     scene.lights.truncate(15);
     for material in scene.materials.values_mut() {
         (material.roughness, material.alpha, material.emission) = (0.0, None, 0.0);

@@ -240,8 +240,8 @@ fn color(object: &TexturedObject, uv: DVec2) -> DVec3 {
 }
 
 /// Returns the normal in object space, perturbed by the bump map. It is computed by finite
-/// differences: of the coordinates along two directions on the surface, and of the heights one
-/// pixel to both sides.
+/// differences. The texture coordinates are differentiated along two directions on the surface, and
+/// the heights over one pixel to both sides.
 fn bumped(object: &TexturedObject, p: DVec3, n: DVec3) -> DVec3 {
     let Some((image, height)) = object.bump else { return n };
     let uv = coordinates(object, p, n);
@@ -260,7 +260,7 @@ fn bumped(object: &TexturedObject, p: DVec3, n: DVec3) -> DVec3 {
     for way in [s, t] {
         let h = 1e-6;
         let grown = coordinates(object, p + way * h, n) - coordinates(object, p - way * h, n);
-        // The angle jumps by one turn at a seam.
+        // At a seam the angular coordinate jumps by one turn, which is removed here.
         let turn = object.lay.scale[0];
         let grown = grown - DVec2::new(turn * (grown.x / turn).round(), 0.0);
         out -= way * slope.dot(grown / (2.0 * h));

@@ -116,8 +116,8 @@ fn sheet() -> RgbImage {
     })
 }
 
-/// Returns a vase as binary PLY: an outline rotated about the y axis. The texture coordinate u runs
-/// once around, v along the outline.
+/// Returns a vase as binary PLY: a profile curve rotated about the y axis. The texture coordinate u
+/// runs once around the axis, and v along the profile.
 fn vase() -> Vec<u8> {
     const AROUND: usize = 48;
     const ALONG: usize = 40;

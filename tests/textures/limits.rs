@@ -39,8 +39,8 @@ fn bump_without_height_changes_no_bit() {
     }
 }
 
-/// Checks that on a ramp all normals tilt by the angle of its slope. Light along the tilted normal
-/// has full effect, light across it none.
+/// Checks that on a linear ramp of heights all normals tilt by the angle of its slope. Light along
+/// the tilted normal has the full effect, and light across it none.
 #[test]
 fn ramp_tilts_normals_by_its_slope() {
     let folder = tempfile::tempdir().unwrap();
@@ -69,7 +69,7 @@ fn ramp_tilts_normals_by_its_slope() {
     for light in [leaning, DVec3::Z, DVec3::new(0.3, 0.5, 0.8).normalize()] {
         let expected = light.dot(leaning);
         for pixel in towards(light) {
-            // The heights have 16 bits.
+            // The tolerance allows for the rounding of the heights to 16 bits.
             assert!((pixel[0] - expected).abs() < 1e-3, "{pixel:?} {expected}");
         }
         assert!((expected - light.z).abs() > 0.02, "a flat one would show {}", light.z);
@@ -164,7 +164,7 @@ fn texture_edits_read_each_file_once() {
     scene = step(&scene, &m, "bump.image.height", None, -1.0).unwrap().scene;
     assert_eq!(row(&scene, "bump.image.height").unwrap().value, "0.095");
 
-    // Another kind keeps the placement; the cycle of kinds includes none.
+    // With another kind of texture the placement stays. The cycle of kinds also contains `none`.
     let checker = toggle(&scene, &m, "texture", true).unwrap().scene;
     assert_eq!(row(&checker, "texture.checker.mapping").unwrap().value, "planar");
     let none = toggle(&checker, &m, "texture", true).unwrap().scene;
@@ -195,8 +195,8 @@ fn texture_edits_read_each_file_once() {
     assert!(refused.to_string().contains("a.png"), "{refused}");
 }
 
-/// Checks a flat face at the edge of a checker field or of a pixel of the texture. It has one
-/// colour, the same in both precisions.
+/// Checks a flat face that lies exactly in the boundary between two checker fields or two pixels of
+/// the texture. It has one colour, which is the same in both precisions.
 #[test]
 fn faces_in_edges_of_a_texture_have_one_color() {
     let checker =
@@ -205,14 +205,15 @@ fn faces_in_edges_of_a_texture_have_one_color() {
     let middle: &[DVec3] = &[DVec3::ZERO];
     let aside = &[DVec3::X, DVec3::NEG_X, DVec3::Z, DVec3::NEG_Z].map(|axis| 0.6 * axis);
     let cases = [
-        // The lid of a box, one square above its bottom.
+        // The lid of a box is exactly one checker square above the bottom, in the boundary of two
+        // squares.
         (lid, checker("mapping = \"planar\", scale = [0.01, 1.0]"), middle),
         (
             "cylinder = { base = [0, -0.3, 0], top = [0, 0, 0], radius = 4 }",
             checker("mapping = \"planar\", scale = [0.01, 5.0]"),
             middle,
         ),
-        // The equator of a spherical mapping, and the seam of its turn.
+        // The plane contains the equator of the spherical mapping, or the seam of its angle.
         (
             "plane = { point = [0.2, 0, 0.1], normal = [0, 1, 0] }",
             checker(

@@ -24,7 +24,8 @@ fn every_mapping_of_an_image() {
 fn every_mapping_of_a_checker_on_transformed_objects() {
     let desk = Desk::new();
     for case in mappings() {
-        // On a side along the projection the edges of squares are ambiguous.
+        // On a side of the block that is parallel to the projection, the checker's edges are
+        // ambiguous.
         if case.name == "planar block" {
             continue;
         }
@@ -76,8 +77,8 @@ fn seams_and_poles() {
     }
 }
 
-/// Checks that pictures far from the origin equal those at the origin. Coordinates there have a
-/// precision of about 1e-10 units.
+/// Checks that pictures of objects far from the origin equal those at the origin, although
+/// coordinates there are rounded by about 1e-10.
 #[test]
 fn textures_are_accurate_far_from_the_origin() {
     let desk = Desk::new();
@@ -145,7 +146,7 @@ fn a_mesh_of_a_sphere() {
         case.lay.mapping = "uv";
         case.shape = Some("shape.mesh = { file = \"ball.obj\" }".into());
         case.transform = "{ scale = 0.9 }, { translate = [0.1, -0.05, 0.0] }, ";
-        // The same height as on the sphere after scaling.
+        // The transform scales the mesh by 0.9, and with it the heights. The division cancels this.
         case.height /= 0.9;
         let shown = case.shown(&desk, Precision::Double);
         error.push(differing(&shown, &expected, 0.03));
