@@ -126,7 +126,20 @@ const CRATES: &[(&str, &[&str])] = &[
     // `scene` uses rustix in tests only.
     ("rustix", &["render", "dashboard", "terminal", "process_memory", "scene", "disk"]),
     ("safe_arch", &["lanes"]),
-    ("serde", &["command", "scene", "shape", "primitive", "material", "light", "camera", "value"]),
+    (
+        "serde",
+        &[
+            "command",
+            "measure",
+            "scene",
+            "shape",
+            "primitive",
+            "material",
+            "light",
+            "camera",
+            "value",
+        ],
+    ),
     ("serde_json", &["command"]),
     ("signal_hook", &["command", "dashboard"]),
     ("stl_io", &["asset"]),

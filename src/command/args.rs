@@ -7,9 +7,9 @@ use crate::render::plan::MAX_SHARDS;
 use crate::sampling::SamplerKind;
 use crate::scene::{Acceleration, Scene};
 use crate::terminal::Environment;
-use crate::world::Precision;
+use crate::world::{self, Precision};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
 /// A progressive, accumulating ray tracer that lives in a terminal.
@@ -50,8 +50,8 @@ pub struct EditArgs {
 pub struct TerminalArgs {
     /// Colours of the terminal: 24-bit, 256, 16 or none; auto: from the environment and the
     /// terminal's replies
-    #[arg(long, value_enum, default_value_t = ColorArg::Auto)]
-    color: ColorArg,
+    #[arg(long, value_parser = choice(COLORS), default_value = "auto")]
+    color: ColorChoice,
     /// Kilobytes per second sent to the terminal [default: over SSH the measured rate of the
     /// connection; else unlimited]
     #[arg(long, value_name = "KB", value_parser = bandwidth, allow_negative_numbers = true)]
@@ -73,8 +73,8 @@ pub struct ComputeArgs {
 #[derive(Clone, Copy, Debug, Args)]
 pub struct PrecisionArgs {
     /// Floating-point precision of the geometry; auto: double where the scene's proportions need it
-    #[arg(long, value_enum, default_value_t = PrecisionArg::Auto)]
-    precision: PrecisionArg,
+    #[arg(long, value_parser = choice(PRECISIONS), default_value = "auto")]
+    pub precision: Precision,
 }
 
 /// Arguments of every command that makes a picture: size and display.
@@ -87,7 +87,7 @@ pub struct PictureArgs {
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = exposure, allow_negative_numbers = true)]
     exposure: f64,
     /// Tone curve for light brighter than white: clip it, or compress it and keep the hue
-    #[arg(long, value_parser = tone(), default_value = "clip")]
+    #[arg(long, value_parser = choice(Tone::NAMED.map(|(name, tone)| (name, None, tone))), default_value = "clip")]
     tone: Tone,
 }
 
@@ -148,8 +148,8 @@ pub struct RenderArgs {
     #[arg(long, value_parser = acceleration())]
     pub acceleration: Option<Acceleration>,
     /// Sampler: sobol spreads samples evenly, random is for comparison
-    #[arg(long, value_enum, default_value_t = SamplerArg::Sobol)]
-    pub sampler: SamplerArg,
+    #[arg(long, value_parser = choice(SAMPLERS), default_value = "sobol")]
+    pub sampler: SamplerKind,
     /// Give every pixel the same number of samples
     #[arg(long)]
     pub uniform: bool,
@@ -218,8 +218,8 @@ pub struct PlanArgs {
     #[command(flatten)]
     pub precision: PrecisionArgs,
     /// Sampler: sobol spreads samples evenly, random is for comparison
-    #[arg(long, value_enum, default_value_t = SamplerArg::Sobol)]
-    pub sampler: SamplerArg,
+    #[arg(long, value_parser = choice(SAMPLERS), default_value = "sobol")]
+    pub sampler: SamplerKind,
 }
 
 /// Arguments of `zerkalo merge`.
@@ -326,42 +326,30 @@ pub struct DoctorArgs {
     pub rate: bool,
 }
 
-/// Floating-point precision that `--precision` selects.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum PrecisionArg {
-    /// 32-bit floats
-    Single,
-    /// 64-bit floats
-    Double,
-    /// 32-bit or 64-bit floats, chosen by the scene's proportions
-    Auto,
-}
+/// Values of `--precision`, each with its help.
+const PRECISIONS: [Choice<Precision>; 3] = [
+    ("single", Some("32-bit floats"), Precision::Single),
+    ("double", Some("64-bit floats"), Precision::Double),
+    ("auto", Some("32-bit or 64-bit floats, chosen by the scene's proportions"), Precision::Auto),
+];
 
-/// Number of terminal colours that `--color` selects.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ColorArg {
-    /// Chosen by the environment and the terminal's replies
-    Auto,
-    /// 24-bit colours
-    True,
-    /// The 256 colours of xterm
-    #[value(name = "256")]
-    Indexed,
-    /// The 16 colours of every terminal
-    #[value(name = "16")]
-    Sixteen,
-    /// No colours
-    None,
-}
+/// Value of `--color`; `None` for `auto`. clap would take an `Option` for an option without default.
+type ColorChoice = Option<Colors>;
 
-/// Random number sequence that `--sampler` selects.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum SamplerArg {
-    /// Owen-scrambled Sobol points
-    Sobol,
-    /// Independent random numbers
-    Random,
-}
+/// Values of `--color`, each with its help.
+const COLORS: [Choice<ColorChoice>; 5] = [
+    ("auto", Some("Chosen by the environment and the terminal's replies"), None),
+    ("true", Some("24-bit colours"), Some(Colors::True)),
+    ("256", Some("The 256 colours of xterm"), Some(Colors::Indexed)),
+    ("16", Some("The 16 colours of every terminal"), Some(Colors::Sixteen)),
+    ("none", Some("No colours"), Some(Colors::Mono)),
+];
+
+/// Values of `--sampler`, each with its help.
+const SAMPLERS: [Choice<SamplerKind>; 2] = [
+    ("sobol", Some("Owen-scrambled Sobol points"), SamplerKind::Sobol),
+    ("random", Some("Independent random numbers"), SamplerKind::Random),
+];
 
 /// Largest number of tracing threads per processor. More threads slow a render down, because they
 /// wait for each other: with 4,096 threads on two processors, a render of 64 x 48 pixels takes half
@@ -387,15 +375,8 @@ impl TerminalArgs {
     /// Returns the settings of the terminal for these options and the environment variables
     /// `environment`.
     pub fn setup(&self, environment: Environment) -> TerminalSetup {
-        let colors = match self.color {
-            ColorArg::True => Some(Colors::True),
-            ColorArg::Indexed => Some(Colors::Indexed),
-            ColorArg::Sixteen => Some(Colors::Sixteen),
-            ColorArg::None => Some(Colors::Mono),
-            ColorArg::Auto => None,
-        };
         let bandwidth = self.bandwidth.map(|kilobytes| 1e3 * kilobytes);
-        TerminalSetup { colors, environment, bandwidth }
+        TerminalSetup { colors: self.color, environment, bandwidth }
     }
 }
 
@@ -425,31 +406,21 @@ impl Cli {
     /// Returns the warning about `--threads` of the subcommand, or of the dashboard. Returns `None`
     /// if all requested threads are used.
     pub fn warning(&self) -> Option<String> {
-        match &self.command {
-            Some(Command::Render(args)) => args.compute.warning(),
-            Some(Command::Plan(args)) => args.compute.warning(),
-            Some(Command::Measure(args)) => args.compute.warning(),
-            Some(
-                Command::Merge(_)
-                | Command::Watch(_)
-                | Command::Check(_)
-                | Command::Info(_)
-                | Command::New(_)
-                | Command::Doctor(_),
-            ) => None,
-            None => self.edit.compute.warning(),
-        }
+        let compute = match &self.command {
+            Some(Command::Render(args)) => &args.compute,
+            Some(Command::Plan(args)) => &args.compute,
+            Some(Command::Measure(args)) => &args.compute,
+            Some(_) => return None,
+            None => &self.edit.compute,
+        };
+        compute.warning()
     }
 }
 
 impl PrecisionArgs {
-    /// Returns the value of `--precision` as an option of scene compilation.
-    pub fn get(&self) -> Precision {
-        match self.precision {
-            PrecisionArg::Single => Precision::Single,
-            PrecisionArg::Double => Precision::Double,
-            PrecisionArg::Auto => Precision::Auto,
-        }
+    /// Returns the options of scene compilation with the value of `--precision`.
+    pub fn world_options(&self) -> world::Options {
+        world::Options { precision: self.precision, ..world::Options::default() }
     }
 }
 
@@ -473,22 +444,18 @@ impl PictureArgs {
     }
 }
 
-impl SamplerArg {
-    /// Returns the value of `--sampler` as a render option.
-    pub fn kind(self) -> SamplerKind {
-        match self {
-            Self::Sobol => SamplerKind::Sobol,
-            Self::Random => SamplerKind::Random,
-        }
-    }
-}
+/// Possible value of an option: its name, its help, and the value that it stands for.
+type Choice<T> = (&'static str, Option<&'static str>, T);
 
-/// Creates the parser for the name of a tone curve.
-fn tone() -> impl TypedValueParser<Value = Tone> {
-    let names = PossibleValuesParser::new(Tone::NAMED.map(|(name, _)| name));
-    names.map(|given| {
-        let named = Tone::NAMED.into_iter().find(|(name, _)| *name == given);
-        named.map(|(_, tone)| tone).unwrap_or_default()
+/// Creates the parser for an option with the values `choices`.
+fn choice<T, const N: usize>(choices: [Choice<T>; N]) -> impl TypedValueParser<Value = T>
+where
+    T: Clone + Send + Sync + 'static,
+{
+    let names = choices.clone().map(|(name, help, _)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(names).map(move |given| {
+        let chosen = choices.iter().find(|(name, ..)| *name == given);
+        chosen.expect("only these names are parsed").2.clone()
     })
 }
 
@@ -650,7 +617,7 @@ mod tests {
         assert_eq!(cli.edit.scene, Some(PathBuf::from("a.toml")));
         let cli = Cli::try_parse_from(["zerkalo", "a.toml", "--color", "256", "--threads", "2"]);
         let edit = cli.unwrap().edit;
-        assert_eq!((edit.terminal.color, edit.compute.threads()), (ColorArg::Indexed, 2));
+        assert_eq!((edit.terminal.color, edit.compute.threads()), (Some(Colors::Indexed), 2));
         assert!(Cli::try_parse_from(["zerkalo", "--color", "17"]).is_err());
         let slow = Cli::try_parse_from(["zerkalo", "--bandwidth", "12.5"]).unwrap().edit;
         assert_eq!(slow.terminal.bandwidth, Some(12.5));

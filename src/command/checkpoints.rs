@@ -1,7 +1,7 @@
 //! Checkpoints of `zerkalo render`: written at intervals, on signals and at the end.
 
 use crate::command::{Failure, warn};
-use crate::disk::{Existing, WriteError};
+use crate::disk::{Existing, WriteError, check_writable};
 use crate::film::file::is_film_file;
 use crate::render::EncodedCheckpoint;
 use crate::render::export::Provenance;
@@ -50,7 +50,7 @@ impl CheckpointWriter {
     /// # Errors
     /// Fails if `path` cannot be written, or if it is an existing file other than `resume`.
     pub fn check(path: &Path, resume: Option<&Path>) -> Result<(), Failure> {
-        crate::disk::check_writable(path).map_err(|error| Failure::Failed(error.to_string()))?;
+        check_writable(path)?;
         if resume == Some(path) || !path.exists() {
             return Ok(());
         }

@@ -33,7 +33,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
     let diagnosis = match obstacle {
         Some(reason) => Err(reason),
         None => Ok(diagnose(environment.clone(), args.rate)
-            .map_err(|error| Failure::Failed(format!("the terminal cannot be used: {error}")))?),
+            .map_err(|error| format!("the terminal cannot be used: {error}"))?),
     };
     let state = state_folder(|name| env::var_os(name));
     let report = DoctorReport {
@@ -46,8 +46,7 @@ pub fn run(args: &DoctorArgs) -> Result<(), Failure> {
         unsaved_files: state.as_deref().map(kept_in).unwrap_or_default(),
         state,
     };
-    print_line(&report.report())?;
-    Ok(())
+    print_line(&report.report())
 }
 
 /// Results of all tests of `zerkalo doctor`, from which the report is formatted.

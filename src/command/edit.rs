@@ -30,7 +30,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let reporter = LoadReporter::new();
     let state = state_folder(|name| env::var_os(name));
     let checkpoint = match args.scene.as_deref().filter(|path| is_film_file(path)) {
-        Some(path) => Some(read_checkpoint(path)?),
+        Some(path) => Some(Checkpoint::read(path)?),
         None => None,
     };
     let file = match (&checkpoint, &args.scene) {
@@ -48,7 +48,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
     let precision = match &checkpoint {
         Some(checkpoint) if checkpoint.header().film.precision == "double" => Precision::Double,
         Some(_) => Precision::Single,
-        None => args.precision.get(),
+        None => args.precision.precision,
     };
     let setup = Setup {
         file,
@@ -70,8 +70,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
         terminal: args.terminal.setup(environment),
         trace: args.trace.clone(),
     };
-    let ended = run_dashboard(setup).map_err(|error| Failure::Failed(error.to_string()))?;
-    conclude(&ended, io::stdout().lock())
+    conclude(&run_dashboard(setup)?, io::stdout().lock())
 }
 
 /// Prints the results of a dashboard that has ended: names of written files on `out`, everything
@@ -120,10 +119,6 @@ pub fn terminal_environment() -> Result<Environment, &'static str> {
     }
 }
 
-fn read_checkpoint(path: &Path) -> Result<Checkpoint, Failure> {
-    Checkpoint::read(path).map_err(|error| Failure::Failed(error.to_string()))
-}
-
 /// Opens the scene of a checkpoint. This is the scene file from which the checkpoint was rendered,
 /// if the checkpoint's samples are still valid for the present content of this file. Otherwise it
 /// is the scene that is stored in the checkpoint, as a scene without a file.
@@ -139,8 +134,7 @@ fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, F
     {
         return Ok(file);
     }
-    SceneFile::untitled(checkpoint.inputs().scene.clone(), source)
-        .map_err(|errors| Failure::Failed(errors.to_string()))
+    Ok(SceneFile::untitled(checkpoint.inputs().scene.clone(), source)?)
 }
 
 /// Opens the scene file at `path`. The inner error means that the file can be read but is not a

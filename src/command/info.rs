@@ -1,7 +1,7 @@
 //! `zerkalo info`: prints the origin of a picture, film or plan file, and compares it with a scene.
 
 use crate::command::args::InfoArgs;
-use crate::command::{Failure, part_file, print_line, read_scene};
+use crate::command::{Failure, print_line, read_scene};
 use crate::film::FileMetadata;
 use crate::render::SampleInputs;
 use crate::render::export::{scene_hash, settings_text};
@@ -10,7 +10,7 @@ use std::path::Path;
 
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     let origin = match is_plan_file(&args.file) {
-        true => Origin::of_plan(&part_file::read_plan(&args.file)?),
+        true => Origin::of_plan(&Plan::read(&args.file)?),
         false => Origin::of_picture(&args.file)?,
     };
     let [width, height] = origin.size;
@@ -45,12 +45,12 @@ struct Origin {
 impl Origin {
     /// Reads the origin of a PNG, OpenEXR or film file from its metadata.
     fn of_picture(path: &Path) -> Result<Self, Failure> {
-        let metadata = FileMetadata::read(path).map_err(Failure::Failed)?;
+        let metadata = FileMetadata::read(path)?;
         let scene_hash = metadata.get("Scene hash").map(str::to_string);
         let mut entries = metadata.entries;
         if let Some(film) = &metadata.film {
             entries.push(("Light groups".to_string(), film.group_names.join(", ")));
-            if let Some(part) = Part::of_header(path, film).map_err(Failure::Failed)? {
+            if let Some(part) = Part::of_header(path, film)? {
                 entries.push(("Rays".to_string(), part.rays.to_string()));
                 entries.push(("Plan".to_string(), target(&part.plan)));
             }

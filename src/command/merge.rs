@@ -10,7 +10,7 @@ use crate::render::session::Report;
 
 pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let output = FilmOutput::new(&args.output, args.bits)?;
-    let mut merged = Merged::of_files(&args.parts, args.partial).map_err(Failure::Failed)?;
+    let mut merged = Merged::of_files(&args.parts, args.partial)?;
     let report = Report::of_film(&merged.film, &merged.header.weights, &merged.header.display);
     update_metadata(&mut merged.header.metadata, &report);
     output.write(&merged.film, &merged.header)?;

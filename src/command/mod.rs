@@ -25,7 +25,6 @@ mod watch;
 pub use cpu::require as require_cpu;
 pub use malloc_arenas::limit as limit_arenas;
 
-use crate::disk;
 use crate::scene::Document;
 use crate::value::sanitized;
 use args::{Cli, Command};
@@ -33,6 +32,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use load_progress::LoadReporter;
 use std::ffi::OsString;
+use std::fmt::Display;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -50,6 +50,13 @@ enum Failure {
     /// The command was ended by a signal, after it saved the picture or the edits so far. The value
     /// is the exit status: 129, 130, 131 or 143.
     Signalled(u8),
+}
+
+/// An error whose message says what failed is a failure of the command.
+impl<E: Display> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self::Failed(error.to_string())
+    }
 }
 
 /// Runs the command line of the process. Returns its exit status.
@@ -140,8 +147,7 @@ fn write_line(mut out: impl Write, message: &str) -> Result<(), Failure> {
 
 /// Reads the scene file at `path` and reports the progress of large meshes and images on stderr.
 fn read_scene(path: &Path) -> Result<Document, Failure> {
-    Document::read_with(path, LoadReporter::new().assets)
-        .map_err(|errors| Failure::Failed(errors.to_string()))
+    Ok(Document::read_with(path, LoadReporter::new().assets)?)
 }
 
 /// Reads the scene file at `path` as [`read_scene`] does, and prints its warnings.
@@ -151,17 +157,6 @@ fn read_scene_and_warn(path: &Path) -> Result<Document, Failure> {
         warn(&format!("warning: {warning}"));
     }
     Ok(document)
-}
-
-/// Writes `bytes` to a file of results, such as statistics. Replaces an existing file atomically.
-fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    disk::write(path, bytes).map_err(|error| Failure::Failed(error.to_string()))
-}
-
-/// Checks that a file of results can be written to `path`. Commands call it before they start to
-/// render.
-fn check_file(path: &Path) -> Result<(), Failure> {
-    disk::check_writable(path).map_err(|error| Failure::Failed(error.to_string()))
 }
 
 /// Escapes control characters in each line of `message`; file names in it may contain some.

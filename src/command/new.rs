@@ -8,8 +8,7 @@ use std::io::Write;
 
 pub fn run(args: &NewArgs) -> Result<(), Failure> {
     let starter = starter().as_bytes();
-    let written = replace_file(&args.file, Existing::Refuse, |file| file.write_all(starter));
-    written.map_err(|error| Failure::Failed(error.to_string()))?;
+    replace_file(&args.file, Existing::Refuse, |file| file.write_all(starter))?;
     let shown = args.file.display();
     print_line(&format!("{shown} written; `zerkalo render {shown} -o PICTURE.png` renders it"))
 }

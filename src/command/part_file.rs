@@ -1,13 +1,13 @@
 //! Output of films that belong to a plan (a render divided among shards): film files of shards, and
 //! pictures of complete films.
 
-use crate::command::{Failure, check_file};
-use crate::disk::{Existing, WriteError};
+use crate::command::Failure;
+use crate::disk::{Existing, WriteError, check_writable};
 use crate::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
 use crate::film::{Depth, Film, ImageData, ImageOutput, WholeFilm};
 use crate::render::RenderState;
 use crate::render::export::{Provenance, metadata};
-use crate::render::plan::{Part, Plan};
+use crate::render::plan::Part;
 use crate::render::session::Report;
 use std::path::{Path, PathBuf};
 
@@ -23,22 +23,21 @@ impl FilmOutput {
     /// Chooses the format by the extension of `path`, and checks that the file can be written.
     /// `depth` is the number of bits per channel of a PNG.
     pub fn new(path: &Path, depth: Depth) -> Result<Self, Failure> {
-        let failed = |error: WriteError| Failure::Failed(error.to_string());
         if is_film(path) {
-            check_file(path)?;
+            check_writable(path)?;
             return Ok(Self::Film(path.to_path_buf()));
         }
         let output = ImageOutput::from_path(path)
             .map_err(|error| Failure::Usage(format!("{error}; a film has the extension .zk")))?;
-        output.check_writable().map_err(failed)?;
+        output.check_writable()?;
         Ok(Self::Picture(output, depth))
     }
 
     /// Writes `film` to the output file. `header` is the header of a film file. A picture file uses
     /// only a part of it: the weights by which the light groups (separately stored parts of the
     /// picture) are added, the names of these groups, the display transform and the metadata.
-    pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), Failure> {
-        let written = match self {
+    pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
+        match self {
             Self::Film(path) => write_film(path, film, header),
             Self::Picture(output, depth) => {
                 let picture = ImageData {
@@ -50,8 +49,7 @@ impl FilmOutput {
                 };
                 output.write(&picture, &mut WholeFilm { film, metadata: &header.metadata })
             }
-        };
-        written.map_err(|error| Failure::Failed(error.to_string()))
+        }
     }
 }
 
@@ -91,11 +89,6 @@ pub fn summary(report: &Report) -> String {
         None => "noise unknown".to_string(),
     };
     format!("{:.0} spp ({}-{})  {noise}", spp.mean, spp.min, spp.max)
-}
-
-/// Reads the plan file at `path`.
-pub fn read_plan(path: &Path) -> Result<Plan, Failure> {
-    Plan::read(path).map_err(|error| Failure::Failed(error.to_string()))
 }
 
 /// Writes `film` and `header` to the film file at `path`.

@@ -2,7 +2,8 @@
 
 use crate::command::args::PlanArgs;
 use crate::command::part_file;
-use crate::command::{Failure, check_file, print_line, read_scene_and_warn, write_file};
+use crate::command::{Failure, print_line, read_scene_and_warn};
+use crate::disk::{self, check_writable};
 use crate::film::file::FilmReader;
 use crate::film::{Estimator, Noise};
 use crate::render::export::scene_hash;
@@ -11,8 +12,6 @@ use crate::render::schedule::{Criterion, Settings, Stop, USUAL_SLOPE};
 use crate::render::session::Report;
 use crate::render::{Options, SyncRender};
 use crate::sampling::SampleSettings;
-use crate::scene::Document;
-use crate::world;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 
@@ -22,13 +21,13 @@ use std::path::{Path, PathBuf};
 const PILOT: f64 = 2.0;
 
 pub fn run(args: &PlanArgs) -> Result<(), Failure> {
-    check_file(&args.output)?;
+    check_writable(&args.output)?;
     let plan = match (&args.from, &args.scene) {
         (Some(film), _) => next_round(args, film)?,
         (None, Some(scene)) => by_pilot(args, scene)?,
         (None, None) => return Err(Failure::Usage("name a scene or --from FILE.zk".into())),
     };
-    write_file(&args.output, plan.text().as_bytes())?;
+    disk::write(&args.output, plan.text().as_bytes())?;
     let rays: Vec<f64> = (BASE..=plan.settings.shards).map(|shard| plan.rays(shard)).collect();
     let (base, shards) = rays.split_at(1);
     let most = shards.iter().copied().fold(0.0, f64::max);
@@ -44,13 +43,7 @@ pub fn run(args: &PlanArgs) -> Result<(), Failure> {
         "expected rays: {total:.3e}; base {:.1} %, largest shard {:.2} %",
         100.0 * base[0] / total,
         100.0 * most / total
-    ))?;
-    Ok(())
-}
-
-/// Returns the hash of the scene of `document`, including the files that it names.
-pub fn hash(document: &Document) -> String {
-    scene_hash(document.text(), document.scene())
+    ))
 }
 
 /// Renders a pilot (an adaptive render to a coarser noise), writes its film, and plans the
@@ -64,18 +57,17 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
         )));
     }
     let base_file = args.base.clone().unwrap_or_else(|| default_base(&args.output));
-    check_file(&base_file)?;
+    check_writable(&base_file)?;
     let document = read_scene_and_warn(path)?;
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
     let options = Options {
-        world: world::Options { precision: args.precision.get(), ..world::Options::default() },
-        sampling: SampleSettings { seed: args.compute.seed, kind: args.sampler.kind() },
+        world: args.precision.world_options(),
+        sampling: SampleSettings { seed: args.compute.seed, kind: args.sampler },
         display: args.picture.display(),
     };
     let threads = args.compute.threads();
-    let mut pilot = SyncRender::new(&scene, &options, settings(pilot_noise), threads)
-        .map_err(|error| Failure::Failed(error.to_string()))?;
+    let mut pilot = SyncRender::new(&scene, &options, settings(pilot_noise), threads)?;
     let bar = spinner();
     while pilot.step().is_none() {
         if let Some(noise) = pilot.noise_codes() {
@@ -87,10 +79,10 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let state = pilot.rendering();
     let settings = PlanSettings {
         source: path.display().to_string(),
-        scene_hash: hash(&document),
+        scene_hash: scene_hash(document.text(), document.scene()),
         size: scene.film.size,
         seed: args.compute.seed,
-        sampler: args.sampler.kind(),
+        sampler: args.sampler,
         precision: state.world.precision().to_string(),
         display: args.picture.display(),
         rays_per_pixel: scene.film.rays_per_pixel,
@@ -101,15 +93,14 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let mut schedule = pilot.schedule().clone();
     schedule.set_stop(stop(args.noise));
     let plan = Plan::of_schedule(&schedule, [USUAL_SLOPE; 2], settings)
-        .ok_or_else(|| Failure::Failed("the pilot has no estimate of its noise".into()))?;
+        .ok_or("the pilot has no estimate of its noise")?;
     let part = Part {
         plan,
         shards: vec![PartShard { number: BASE, complete: true }],
         rays: schedule.rays(),
     };
     let report = Report::of_film(&state.film, &state.mix, &options.display);
-    part_file::write_film(&base_file, &state.film, &part_file::header(state, &part, &report))
-        .map_err(|e| Failure::Failed(e.to_string()))?;
+    part_file::write_film(&base_file, &state.film, &part_file::header(state, &part, &report))?;
     print_line(&format!(
         "{}  {}  {} rays  {:.2} s  (pilot, the base of the plan)",
         base_file.display(),
@@ -125,15 +116,15 @@ fn by_pilot(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
 fn next_round(args: &PlanArgs, path: &Path) -> Result<Plan, Failure> {
     let failed =
         |reason: &str| Failure::Failed(format!("cannot plan from {}: {reason}", path.display()));
-    let reader = FilmReader::open(path).map_err(|e| Failure::Failed(e.to_string()))?;
-    let part = Part::of_header(path, reader.header()).map_err(Failure::Failed)?;
+    let reader = FilmReader::open(path)?;
+    let part = Part::of_header(path, reader.header())?;
     let part = part.ok_or_else(|| {
         failed("it belongs to no plan; name a film that `zerkalo merge` has written")
     })?;
     if !part.is_whole() {
         return Err(failed("it lacks shards of its plan; merge all of them first"));
     }
-    let (header, film) = reader.read().map_err(|e| Failure::Failed(e.to_string()))?;
+    let (header, film) = reader.read()?;
     let estimator = Estimator::new(film.scales(), &header.weights, &header.display);
     let cap = part.plan.settings.rays_per_pixel;
     let schedule_settings = Settings { rays_per_pixel: cap, ..settings(args.noise) };

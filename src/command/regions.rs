@@ -13,7 +13,7 @@ use crate::render::schedule::{Settings, StoppedBy};
 use crate::render::session::Report;
 use crate::render::{Options, RegionRender};
 use crate::scene::Scene;
-use crate::world::{self, AnyWorld};
+use crate::world::AnyWorld;
 use std::io;
 use std::sync::Arc;
 
@@ -40,10 +40,8 @@ impl Division {
     /// Fails if the smallest regions do not fit. Also fails if a checkpoint is requested and the
     /// film with a separate contribution of each light does not fit.
     pub fn new(scene: &Scene, args: &RenderArgs, cap: u64) -> Result<Self, Failure> {
-        let options =
-            world::Options { precision: args.precision.get(), ..world::Options::default() };
         // The scene is compiled first, so that the measured memory of the process includes it.
-        let world = AnyWorld::compile(scene, &options);
+        let world = AnyWorld::compile(scene, &args.precision.world_options());
         let groups = world.light_groups().members.len();
         let merged = world.light_groups().merged_count();
         let (size, threads) = (scene.film.size, args.compute.threads());
@@ -163,8 +161,7 @@ pub fn render(
     let threads = args.compute.threads();
     let scene = Arc::new(scene);
     let (rows, observer) = ((rows, threads), &mut observe);
-    let mut render = RegionRender::new(&scene, options, settings, rows, provenance, observer)
-        .map_err(Failure::Failed)?;
+    let mut render = RegionRender::new(&scene, options, settings, rows, provenance, observer)?;
     let written = render.write(depth, output);
     let (precision, biased) = match &written {
         Ok(_) => (render.state().world.precision(), render.state().world.biases()),

@@ -6,8 +6,8 @@ use crate::command::progress::Progress;
 use crate::command::regions::{self, Division};
 use crate::command::signals::Signals;
 use crate::command::stats::Stats;
-use crate::command::{Failure, check_file, print_line, read_scene, shard, warn, write_file};
-use crate::disk::WriteError;
+use crate::command::{Failure, print_line, read_scene, shard, warn};
+use crate::disk::{self, WriteError, check_writable};
 use crate::film::ImageOutput;
 use crate::process_memory::resident_memory;
 use crate::render::export::{Provenance, scene_hash};
@@ -16,7 +16,6 @@ use crate::render::session::{Report, Session, State};
 use crate::render::{Checkpoint, Options};
 use crate::sampling::SampleSettings;
 use crate::scene::Scene;
-use crate::world;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -39,7 +38,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     let hash = scene_hash(document.text(), document.scene());
     let scene = sized(document.into_scene(), args)?;
     // An output file that cannot be written is reported before the render starts.
-    output.check_writable().map_err(failed_write)?;
+    output.check_writable()?;
     if let Some(path) = &args.stats {
         check_stats_path(path, &args.output)?;
     }
@@ -50,14 +49,14 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
     for warning in warnings {
         warn(&format!("warning: {warning}"));
     }
-    let signals = Signals::watch().map_err(|e| Failure::Failed(format!("no signals: {e}")))?;
+    let signals = Signals::watch()?;
     let division = args.memory.map(|cap| Division::new(&scene, args, cap)).transpose()?;
 
     let size = scene.film.size;
     let provenance = Provenance {
         source: args.scene.display().to_string(),
         scene_hash: hash.clone(),
-        sampler: args.sampler.kind(),
+        sampler: args.sampler,
         adaptive: !args.uniform,
     };
     let mut options = options(args);
@@ -78,7 +77,7 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
             version: env!("CARGO_PKG_VERSION"),
             size,
             seed: args.compute.seed,
-            sampler: args.sampler.kind().name(),
+            sampler: args.sampler.name(),
             precision,
             lanes: report.lanes,
             threads: args.compute.threads(),
@@ -109,11 +108,11 @@ pub fn run(args: &RenderArgs, started: Instant) -> Result<(), Failure> {
                 End::Signal(_) => "signal",
             },
         };
-        write_file(path, stats.json().as_bytes())?;
+        disk::write(path, stats.json().as_bytes())?;
     }
     printed?;
     if let Some(Err(error)) = kept {
-        return Err(failed_write(error));
+        return Err(error.into());
     }
     match end {
         End::Done(_) => Ok(()),
@@ -153,8 +152,7 @@ struct Rendered {
 fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Failure> {
     let Job { args, scene, options, output, provenance, signals, started } = job;
     let threads = args.compute.threads();
-    let mut session = Session::new(threads, options, schedule_settings(args))
-        .map_err(|error| Failure::Failed(error.to_string()))?;
+    let mut session = Session::new(threads, options, schedule_settings(args))?;
     match checkpoint {
         Some(checkpoint) => resume(&mut session, Arc::new(scene), checkpoint),
         None => drop(session.set_scene(Arc::new(scene))),
@@ -168,9 +166,9 @@ fn as_a_whole(job: Job, checkpoint: Option<Checkpoint>) -> Result<Rendered, Fail
     // An error of writing the checkpoint is kept until the picture has been written.
     let kept = checkpoints.map(|checkpoints| checkpoints.finish(&session));
     let writing = Instant::now();
-    let (report, precision, biased, written) = write(&session, args, output, provenance)
-        .ok_or_else(|| Failure::Failed("the renderer has no picture".to_string()))?;
-    written.map_err(failed_write)?;
+    let (report, precision, biased, written) =
+        write(&session, args, output, provenance).ok_or("the renderer has no picture")?;
+    written?;
     let write_seconds = writing.elapsed().as_secs_f64();
     Ok(Rendered { report, end, precision, biased, set_after, write_seconds, kept })
 }
@@ -250,7 +248,7 @@ fn read_checkpoint(args: &RenderArgs) -> Result<Option<Checkpoint>, Failure> {
     if args.checkpoint.as_ref() == Some(path) && !path.exists() {
         return Ok(None);
     }
-    Checkpoint::read(path).map(Some).map_err(|error| Failure::Failed(error.to_string()))
+    Ok(Some(Checkpoint::read(path)?))
 }
 
 /// Continues the render of `checkpoint`. Prints a note if the lights of `scene` differ from those
@@ -277,10 +275,6 @@ fn check_checkpoint_path(path: &Path, args: &RenderArgs) -> Result<(), Failure> 
     CheckpointWriter::check(path, args.resume.as_deref())
 }
 
-fn failed_write(error: WriteError) -> Failure {
-    Failure::Failed(error.to_string())
-}
-
 /// Returns `scene` with the acceleration structure and the size from the command line, if they are
 /// given.
 fn sized(mut scene: Scene, args: &RenderArgs) -> Result<Scene, Failure> {
@@ -296,13 +290,13 @@ fn check_stats_path(path: &Path, output: &Path) -> Result<(), Failure> {
         let path = path.display();
         return Err(Failure::Usage(format!("--stats and --output name the same file, {path}")));
     }
-    check_file(path)
+    Ok(check_writable(path)?)
 }
 
 fn options(args: &RenderArgs) -> Options {
     Options {
-        world: world::Options { precision: args.precision.get(), ..world::Options::default() },
-        sampling: SampleSettings { seed: args.compute.seed, kind: args.sampler.kind() },
+        world: args.precision.world_options(),
+        sampling: SampleSettings { seed: args.compute.seed, kind: args.sampler },
         display: args.picture.display(),
     }
 }

@@ -11,6 +11,7 @@ use crate::command::signals::Signals;
 use crate::command::{Failure, print_line, read_scene, warn};
 use crate::film::Film;
 use crate::film::file::FilmReader;
+use crate::render::export::scene_hash;
 use crate::render::plan::{BASE, Part, PartShard, Plan, ShardRender};
 use crate::render::session::Report;
 use crate::render::{Options, RenderState};
@@ -32,7 +33,7 @@ const WRITES_PER_INTERVAL: u32 = 50;
 
 /// Renders all shards of the plan in the file `plan_path`, or only the one that `--shard` names.
 pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
-    let plan = part_file::read_plan(plan_path)?;
+    let plan = Plan::read(plan_path)?;
     let numbers = match args.shard {
         Some(number) => {
             check_shard(args, &plan, plan_path, number)?;
@@ -42,7 +43,7 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
     };
     let output = FilmOutput::new(&args.output, args.bits)?;
     let document = read_scene(&args.scene)?;
-    let found = crate::command::plan::hash(&document);
+    let found = scene_hash(document.text(), document.scene());
     if found != plan.settings.scene_hash {
         return Err(Failure::Failed(format!(
             "{} is not the scene of {}: its hash is {found}, that of the plan {}; name the \
@@ -59,12 +60,11 @@ pub fn run(args: &RenderArgs, plan_path: &Path) -> Result<(), Failure> {
         None => None,
     };
     if let Some((_, rays, true)) = saved {
-        print_line(&format!("{}  complete already  {rays} rays", args.output.display()))?;
-        return Ok(());
+        return print_line(&format!("{}  complete already  {rays} rays", args.output.display()));
     }
     let render =
         start(args, &document, &part.plan, &numbers, saved.map(|(film, rays, _)| (film, rays)))?;
-    let signals = Signals::watch().map_err(|e| Failure::Failed(format!("no signals: {e}")))?;
+    let signals = Signals::watch()?;
     let (render, signal) = trace(render, &mut part, &output, &signals)?;
     let unfinished = signal.is_some() && render.progress() < 1.0;
     part.shards.iter_mut().for_each(|shard| shard.complete = !unfinished);
@@ -137,7 +137,7 @@ fn saved(path: &Path, part: &Part) -> Result<Option<(Film, u64, bool)>, Failure>
             return Ok(None);
         }
     };
-    let found = Part::of_header(path, reader.header()).map_err(Failure::Failed)?;
+    let found = Part::of_header(path, reader.header())?;
     let found = found.ok_or_else(|| failed("is a film without plan"))?;
     if found.plan.checksum() != part.plan.checksum() {
         return Err(failed("belongs to another plan"));
@@ -197,7 +197,7 @@ fn start(
         _ => plan.tiles.iter().map(|tile| 0..tile.end).collect(),
     };
     let threads = args.compute.threads();
-    ShardRender::new(state, &ranges, rays, threads).map_err(Failure::Failed)
+    Ok(ShardRender::new(state, &ranges, rays, threads)?)
 }
 
 /// Traces samples of `render` until its shards are complete or a signal arrives. Returns two

@@ -15,7 +15,11 @@ pub struct Signals(Arc<AtomicUsize>);
 
 impl Signals {
     /// Installs the handlers of SIGINT and SIGTERM.
-    pub fn watch() -> io::Result<Self> {
+    pub fn watch() -> Result<Self, String> {
+        Self::register().map_err(|error| format!("no signals: {error}"))
+    }
+
+    fn register() -> io::Result<Self> {
         let caught = Arc::new(AtomicUsize::new(0));
         let armed = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {

@@ -12,9 +12,8 @@ pub fn run(args: &WatchArgs) -> Result<(), Failure> {
         let remedy = "`zerkalo merge --partial FILE.zk.. -o PICTURE.png` writes a picture of parts";
         Failure::Usage(format!("{reason}; {remedy}"))
     })?;
-    let films = WatchedFilms::open(&args.files).map_err(Failure::Failed)?;
+    let films = WatchedFilms::open(&args.files)?;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let ended = watch_films(films, threads, args.terminal.setup(environment))
-        .map_err(|error| Failure::Failed(error.to_string()))?;
+    let ended = watch_films(films, threads, args.terminal.setup(environment))?;
     conclude(&ended, io::stdout().lock())
 }

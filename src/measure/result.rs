@@ -4,9 +4,11 @@ use crate::measure::convergence_order::Slope;
 use crate::measure::error_curve::Point;
 use crate::measure::experiment::{Experiment, Variant};
 use crate::measure::reference_image::Bias;
+use serde::Serialize;
 
-/// Time at which a render reached a noise target.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Time at which a render reached a noise target. The names of the fields are also the keys of JSON
+/// files.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TimeToTarget {
     /// Noise target: RMSE of the displayed picture in 8-bit levels.
     pub codes: f64,
@@ -22,13 +24,16 @@ pub struct TimeToTarget {
 }
 
 /// Extrapolated time to a noise target that the default settings did not reach in the measurement.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The names of the fields are also the keys of JSON files.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Expected {
     /// Noise target that was not reached, in 8-bit levels.
     pub codes: f64,
-    /// Lower and upper estimate of the time to the target in seconds, extrapolated from the
-    /// convergence so far.
-    pub seconds: (f64, f64),
+    /// Lower estimate of the time to the target in seconds, extrapolated from the convergence so
+    /// far.
+    pub seconds_low: f64,
+    /// Upper estimate of this time.
+    pub seconds_high: f64,
 }
 
 /// Results of one variant of the settings in a measurement.

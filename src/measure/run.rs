@@ -144,7 +144,8 @@ pub fn measure(
 /// Returns the extrapolated times at which the noise of `render` falls to `codes` 8-bit levels: a
 /// lower and an upper estimate. Returns `None` if they cannot be extrapolated.
 fn extrapolate(render: &SyncRender, codes: f64) -> Option<Expected> {
-    render.seconds_to_noise(codes).map(|seconds| Expected { codes, seconds })
+    let (seconds_low, seconds_high) = render.seconds_to_noise(codes)?;
+    Some(Expected { codes, seconds_low, seconds_high })
 }
 
 /// Returns the noise at which settings are compared, in 8-bit levels. Candidates are the targets

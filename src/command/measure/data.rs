@@ -2,7 +2,7 @@
 //! them.
 
 use crate::command::measure::table::MeasureReport;
-use crate::measure::{Measured, Measurement, median, spread};
+use crate::measure::{Expected, Measured, Measurement, TimeToTarget, median, spread};
 use serde::Serialize;
 
 #[derive(Serialize)]
@@ -27,7 +27,7 @@ struct Document<'a> {
     /// Null if unknown.
     taken_by_others: Option<f64>,
     /// Noise targets that were not reached, each with a range of extrapolated times.
-    expected: Vec<Expected>,
+    expected: &'a [Expected],
     variations: Vec<Variation<'a>>,
 }
 
@@ -48,22 +48,6 @@ struct Variation<'a> {
     bias_least_codes: Option<f64>,
     crossings: Vec<TimeToTarget>,
     points: Vec<Point>,
-}
-
-#[derive(Serialize)]
-struct TimeToTarget {
-    codes: f64,
-    seconds: f64,
-    spread: f64,
-    spp: f64,
-    at_most: bool,
-}
-
-#[derive(Serialize)]
-struct Expected {
-    codes: f64,
-    seconds_low: f64,
-    seconds_high: f64,
 }
 
 /// Point of an error curve: error of the picture after a number of samples and seconds.
@@ -106,16 +90,6 @@ fn points(measured: &Measured) -> impl Iterator<Item = Point> {
 fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
     let speed = measured.samples_per_second();
     let slope = measured.slope();
-    let time_to_target = |codes: &f64| {
-        let time = measured.time_to(*codes)?;
-        Some(TimeToTarget {
-            codes: *codes,
-            seconds: time.seconds,
-            spread: time.spread,
-            spp: time.spp,
-            at_most: time.at_most,
-        })
-    };
     Variation {
         setting: measured.experiment.name(),
         name: &measured.name,
@@ -129,7 +103,7 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
         bias_z: measured.bias.map(|b| b.z).filter(|z| z.is_finite()),
         bias_codes: measured.bias.map(|b| b.codes),
         bias_least_codes: measured.bias.map(|b| b.least_codes),
-        crossings: targets.iter().filter_map(time_to_target).collect(),
+        crossings: targets.iter().filter_map(|codes| measured.time_to(*codes)).collect(),
         points: points(measured).collect(),
     }
 }
@@ -138,10 +112,6 @@ fn variation<'a>(measured: &'a Measured, targets: &[f64]) -> Variation<'a> {
 pub fn json(report: &MeasureReport) -> Vec<u8> {
     let m = report.measurement;
     let steadiness = m.steadiness();
-    let expected = |e: &crate::measure::Expected| {
-        let (seconds_low, seconds_high) = e.seconds;
-        Expected { codes: e.codes, seconds_low, seconds_high }
-    };
     let document = Document {
         scene: report.scene.display().to_string(),
         version: env!("CARGO_PKG_VERSION"),
@@ -157,7 +127,7 @@ pub fn json(report: &MeasureReport) -> Vec<u8> {
         errors_spread: m.reference_uncertainty(),
         times_spread: steadiness.spread,
         taken_by_others: steadiness.stolen,
-        expected: m.expected.iter().map(expected).collect(),
+        expected: &m.expected,
         variations: m.measured.iter().map(|v| variation(v, &m.targets)).collect(),
     };
     let mut bytes = serde_json::to_vec_pretty(&document).expect("numbers and strings only");

@@ -6,7 +6,8 @@ mod table;
 
 use crate::command::args::MeasureArgs;
 use crate::command::signals::Signals;
-use crate::command::{Failure, check_file, print_line, read_scene_and_warn, write_file};
+use crate::command::{Failure, print_line, read_scene_and_warn};
+use crate::disk::{self, check_writable};
 use crate::film::{self, Display};
 use crate::measure::{self, Experiment, Plan, Reference};
 use crate::world::{self, AnyWorld};
@@ -18,11 +19,13 @@ use std::sync::Arc;
 const SHORT: [Experiment; 3] = [Experiment::Adaptivity, Experiment::Precision, Experiment::Threads];
 
 pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
-    let failed = |reason: String| Failure::Failed(reason);
     if let Some(path) = &args.plot {
         drawing(path).map_err(Failure::Usage)?;
     }
-    [&args.json, &args.csv, &args.plot].into_iter().flatten().try_for_each(|p| check_file(p))?;
+    [&args.json, &args.csv, &args.plot]
+        .into_iter()
+        .flatten()
+        .try_for_each(|p| check_writable(p))?;
     let document = read_scene_and_warn(&args.scene)?;
     let mut scene = document.scene().clone();
     args.picture.resize(&mut scene).map_err(Failure::Usage)?;
@@ -52,15 +55,14 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     let world = AnyWorld::compile(&scene, &world::Options::default());
     let (lanes, single) = (world.lanes(), matches!(world, AnyWorld::Single(_)));
     drop(world);
-    let signals = Signals::watch().map_err(|e| failed(format!("no signals: {e}")))?;
+    let signals = Signals::watch()?;
     let bar = progress_bar();
     let measurement = measure::measure(&Arc::new(scene), &plan, reference, &mut |progress| {
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
         bar.set_message(progress.step.to_string());
         signals.caught().is_none()
-    })
-    .map_err(|error| failed(error.to_string()))?;
+    })?;
     bar.finish_and_clear();
 
     let report = table::MeasureReport {
@@ -72,10 +74,10 @@ pub fn run(args: &MeasureArgs) -> Result<(), Failure> {
     };
     let printed = print_line(&report.to_string());
     if let Some(path) = &args.json {
-        write_file(path, &data::json(&report))?;
+        disk::write(path, &data::json(&report))?;
     }
     if let Some(path) = &args.csv {
-        write_file(path, &data::csv(&measurement))?;
+        disk::write(path, &data::csv(&measurement))?;
     }
     if let Some(path) = &args.plot {
         plot(path, &report)?;
@@ -110,8 +112,8 @@ fn plot(path: &Path, report: &table::MeasureReport) -> Result<(), Failure> {
             Ok(film::png_of_rgb([width, height], &pixels)?)
         }),
     };
-    let bytes = drawn.map_err(|e| Failure::Failed(format!("cannot draw: {e}")))?;
-    write_file(path, &bytes)
+    let bytes = drawn.map_err(|error| format!("cannot draw: {error}"))?;
+    Ok(disk::write(path, &bytes)?)
 }
 
 /// Reads the reference picture at `path`, an EXR file that must have the given size.

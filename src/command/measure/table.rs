@@ -151,7 +151,7 @@ impl fmt::Display for MeasureReport<'_> {
                 (None, Some(e)) => writeln!(
                     f,
                     "  {target:>7}  {:>18}  {:>18}",
-                    format!("~ {}", between(e.seconds)),
+                    format!("~ {}", between((e.seconds_low, e.seconds_high))),
                     "expected"
                 )?,
                 (None, None) => writeln!(f, "  {target:>7}  {:>18}", "not in this time")?,
