@@ -1,5 +1,6 @@
 //! Check of a big picture against single pixels, which are traced without regions and tiles.
 
+use crate::support::test_film::TestFilm;
 use crate::support::{shipped, sized};
 use std::collections::BTreeMap;
 use std::fs::File;

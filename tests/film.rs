@@ -2,6 +2,7 @@
 
 use crate::common;
 use crate::common::report;
+use crate::support::test_film::TestFilm;
 
 use common::Numbers;
 use proptest::prelude::*;

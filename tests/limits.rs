@@ -2,6 +2,7 @@
 //! with the difference from pictures without these limits.
 
 use crate::common;
+use crate::common::shape_examples::EXAMPLES;
 use crate::support;
 
 use common::Numbers;
@@ -9,7 +10,6 @@ use std::fmt::Write;
 use support::{parsed, picture, rendered};
 use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
-use zerkalo::shape::EXAMPLES;
 use zerkalo::world::{self, AnyWorld, Precision};
 
 const SAMPLES: u32 = 4;

@@ -6,6 +6,7 @@
 //!   glossy tiles.
 
 use crate::support;
+use crate::support::test_film::TestFilm;
 
 use support::{
     all_shipped, begin, follow, parsed, picture, pool, rendered, settings, shipped, sized,

@@ -3,6 +3,7 @@
 //! every key of the scene format, from the tables of keys.
 
 use crate::common;
+use crate::common::shape_examples::EXAMPLES;
 use crate::common::tables;
 use crate::support;
 
@@ -16,7 +17,6 @@ use toml::{Table, Value};
 use zerkalo::film::Replicates;
 use zerkalo::render::RenderState;
 use zerkalo::scene::Scene;
-use zerkalo::shape::EXAMPLES;
 use zerkalo::value::ValueType;
 use zerkalo::world::Precision;
 

@@ -1,6 +1,7 @@
 //! Films of sessions, which do not depend on threads, interruptions or earlier scenes.
 
 use crate::support;
+use crate::support::test_film::TestFilm;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use zerkalo::disk::Existing;

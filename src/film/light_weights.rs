@@ -93,6 +93,7 @@ impl Tile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::test_film::TestFilm;
     use crate::film::testing::{each_tile, fill, film, only, white};
 
     #[test]

@@ -8,7 +8,6 @@
 
 mod bands;
 mod box_filter;
-mod canonical_bytes;
 mod display;
 mod downsample;
 mod exr;
@@ -29,6 +28,9 @@ mod png;
 mod png_read;
 mod srgb_table;
 mod store;
+#[cfg(test)]
+#[path = "../../tests/support/test_film.rs"]
+pub mod test_film;
 #[cfg(test)]
 mod test_random;
 #[cfg(test)]

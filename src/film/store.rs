@@ -253,12 +253,6 @@ impl Film {
         self.header.width.div_ceil(TILE)
     }
 
-    /// Returns column and row, in pixels, of the upper left pixel of tile `index`.
-    pub fn tile_origin(&self, index: usize) -> [usize; 2] {
-        let columns = self.tile_columns();
-        [index % columns * TILE, index / columns * TILE]
-    }
-
     /// Returns the tile with the number `index`. Returns `None` if neither
     /// [`TileHandle::prepare`] nor [`Film::add`] has written to it since the last restart.
     pub fn tile(&self, index: usize) -> Option<&Tile> {
@@ -320,19 +314,6 @@ impl Film {
             (counts[0] + counts[1]) * (width * height) as u64 + lattice as u64
         };
         self.touched().map(|(_, tile)| samples_of_tile(tile)).sum()
-    }
-
-    /// Returns the radiance of the pixel in column `x` and row `y`: the mean over its samples in
-    /// both replicates (halves of the samples), or black without samples.
-    ///
-    /// # Panics
-    /// Panics if there is no such pixel.
-    pub fn pixel(&self, x: usize, y: usize, weights: &LightWeights) -> [f64; 3] {
-        assert!(x < self.width() && y < self.height(), "pixel ({x}, {y}) of the film");
-        let index = y / TILE * self.tile_columns() + x / TILE;
-        let pixel = y % TILE * TILE + x % TILE;
-        let per_unit = weights.radiance_per_step(self.scales());
-        self.tile(index).map_or([0.0; 3], |tile| tile.sums(pixel).mean(Replicates::Both, &per_unit))
     }
 
     /// Writes the radiance of the pixels in row `y` to `row`, which is resized to the film's width.
@@ -458,14 +439,15 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::test_film::TestFilm;
     use crate::film::testing::{fill, film, white};
 
     #[test]
     fn tiles_cover_the_film() {
-        let film = film(33, 17, &[1.0]);
+        let mut film = film(33, 17, &[1.0]);
         assert_eq!((film.tile_count(), film.tile_columns()), (6, 3));
-        assert_eq!((film.tile_origin(5), film.tiles[5].extent()), ([32, 16], [1, 1]));
-        assert_eq!((film.tile_origin(1), film.tiles[1].extent()), ([16, 0], [16, 16]));
+        let places = film.slots(&[5, 1]).into_iter().map(|slot| (slot.origin, slot.tile.extent()));
+        assert_eq!(places.collect::<Vec<_>>(), [([32, 16], [1, 1]), ([16, 0], [16, 16])]);
         assert_eq!(film.touched().count(), 0);
     }
 

@@ -176,6 +176,7 @@ fn read(kind: &Field, values: &toml::Table) -> Result<Shape, toml::de::Error> {
 
 #[test]
 fn shape_examples_and_tables_are_valid() {
+    assert_eq!(KINDS.len(), EXAMPLES.len());
     for (kind, (key, text)) in KINDS.iter().zip(EXAMPLES) {
         assert_eq!(kind.name, *key);
         let ValueType::Table(fields) = kind.takes else { panic!("{key}") };

@@ -63,7 +63,7 @@ pub(super) static OF_FIELDS: [Field; 1] = [Field::required(
 )];
 
 macro_rules! compounds {
-    ($($kind:ident, $doc:literal, $example:literal);+ $(;)?) => {$(
+    ($($kind:ident, $doc:literal);+ $(;)?) => {$(
         #[doc = $doc]
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields)]
@@ -83,8 +83,6 @@ macro_rules! compounds {
         }
 
         impl ShapeDesc for $kind {
-            const EXAMPLE: &'static str = $example;
-
             fn form(&self) -> Form {
                 Form::Csg(combined(&self.of, CsgTree::$kind))
             }
@@ -111,24 +109,12 @@ macro_rules! compounds {
 
 compounds! {
     Union,
-    "Solids joined into one: every point that is in any part.",
-    "shape.union.of = [
-    { shape.sphere = { center = [0.0, 0.4, 0.0], radius = 0.4 } },
-    { shape.cylinder = { base = [0.0, 0.4, 0.0], top = [0.0, 1.2, 0.0], radius = 0.2 } },
-]";
+    "Solids joined into one: every point that is in any part.";
     Intersection,
-    "The common part of solids: every point that is in all parts.",
-    "shape.intersection.of = [
-    { shape.cube = { corner = [-0.5, 0.0, 0.5], edge = 1.0 } },
-    { shape.sphere = { center = [0.0, 0.5, 0.0], radius = 0.65 } },
-]";
+    "The common part of solids: every point that is in all parts.";
     Difference,
     "The first part without the others: every point of it that is in none of them. A cut shows \
-     the material of the part that cut it.",
-    "shape.difference.of = [
-    { shape.box = { center = [0.0, 0.5, 0.0], size = [1.0, 1.0, 1.0] } },
-    { shape.sphere = { center = [0.5, 1.0, 0.5], radius = 0.6 } },
-]";
+     the material of the part that cut it.";
 }
 
 /// Returns the example parts of a new compound that fills a box. `base` is the centre of the lower

@@ -90,9 +90,6 @@ impl MeshDesc {
 }
 
 impl ShapeDesc for MeshDesc {
-    const EXAMPLE: &'static str =
-        "shape.mesh = { file = \"scenes/meshes/knot.ply\", normals = \"smooth\" }";
-
     fn form(&self) -> Form {
         let mesh = self.mesh().clone();
         Form::Mesh(MeshForm {

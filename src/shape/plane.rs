@@ -17,9 +17,6 @@ description! {
 }
 
 impl ShapeDesc for Plane {
-    const EXAMPLE: &'static str =
-        "shape.plane = { point = [0.0, 0.0, 0.0], normal = [0.0, 1.0, 0.0] }";
-
     fn form(&self) -> Form {
         let normal = unit(self.normal).unwrap_or(DVec3::Y);
         Form::Plane(PlaneForm { normal, offset: normal.dot(DVec3::from_array(self.point)) })

@@ -1,4 +1,5 @@
 //! Table of shape kinds. A new kind needs a file of its own and one line in this table.
+//! Tests then demand an example of it, in `tests/common/shape_examples.rs`.
 
 use crate::primitive::Form;
 use crate::shape::csg::OF_FIELDS;
@@ -13,9 +14,6 @@ use serde::{Deserialize, Serialize};
 
 /// Description of one kind of shape, as scene files have it.
 pub trait ShapeDesc: Description {
-    /// Example of the shape as TOML, for help and documentation.
-    const EXAMPLE: &'static str;
-
     /// Converts the description to its canonical form: the geometry as one of the kinds of
     /// primitives, in double precision. The description must be valid.
     fn form(&self) -> Form;
@@ -88,10 +86,6 @@ macro_rules! kinds {
 
         /// Every kind of shape, with its key, its fields and its help text.
         pub const KINDS: &[Field] = &KIND_TABLE;
-
-        /// Pairs `(key, example)`: the key of every kind of shape, and an example in TOML for an
-        /// `[[object]]`.
-        pub const EXAMPLES: &[(&str, &str)] = &[$(($key, $kind::EXAMPLE),)+];
 
         impl Shape {
             /// Returns the key of the shape's kind.

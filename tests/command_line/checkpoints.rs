@@ -1,6 +1,7 @@
 //! Checkpoints of `zerkalo render`: interrupted and resumed renders, refusals, `zerkalo info`.
 
 use super::*;
+use crate::support::test_film::TestFilm;
 use std::time::Duration;
 use zerkalo::film::file::FilmReader;
 
@@ -11,7 +12,7 @@ const KILLS: u64 = 20;
 const LONG: [&str; 6] = ["--size", "160x120", "--noise", "0.35", "--threads", "2"];
 
 /// Returns the bytes of the film in the checkpoint at `path`, in their canonical form.
-fn film_bytes(path: &Path) -> Vec<u8> {
+fn test_film(path: &Path) -> Vec<u8> {
     let read = FilmReader::open(path).and_then(FilmReader::read);
     read.unwrap_or_else(|error| panic!("{error}")).1.bytes()
 }
@@ -49,14 +50,14 @@ fn killed_and_resumed_render_equals_an_uninterrupted_one() {
         child.wait().unwrap();
         if desk.path("part.zk").exists() {
             // A checkpoint is complete at every moment.
-            assert!(!film_bytes(&desk.path("part.zk")).is_empty());
+            assert!(!test_film(&desk.path("part.zk")).is_empty());
             resumed += 1;
         }
     }
     assert!(resumed > 2, "{resumed} runs had a checkpoint to continue");
     let end = desk.run(&args("part.png", &keep));
     assert_eq!(end.status, 0, "{}", end.err);
-    assert!(film_bytes(&desk.path("part.zk")) == film_bytes(&desk.path("whole.zk")));
+    assert!(test_film(&desk.path("part.zk")) == test_film(&desk.path("whole.zk")));
     assert!(fs::read(desk.path("part.png")).unwrap() == fs::read(desk.path("whole.png")).unwrap());
     let leftovers = |name: &String| !name.ends_with(".tmp");
     let files: Vec<_> = desk.files().into_iter().filter(leftovers).collect();

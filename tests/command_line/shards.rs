@@ -2,6 +2,7 @@
 //! shard into a film file (a part), and `zerkalo merge` adds the parts.
 
 use crate::command_line::Desk;
+use crate::support::test_film::TestFilm;
 use std::fs;
 use zerkalo::film::file::FilmReader;
 

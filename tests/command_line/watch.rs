@@ -3,6 +3,7 @@
 
 use crate::command_line::Desk;
 use crate::command_line::shards::{done, merge, plan, trace, traced};
+use crate::support::test_film::TestFilm;
 use std::fs;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};

@@ -4,6 +4,7 @@
 pub mod normal;
 pub mod rays;
 pub mod report;
+pub mod shape_examples;
 pub mod tables;
 
 use glam::DVec3;

@@ -1,6 +1,7 @@
 //! Lengths of directions: a direction of any length that a file can contain gives the same picture.
 
 use crate::common::tables::{keys, scene, table, value_at};
+use crate::support::test_film::TestFilm;
 use crate::support::{parsed, rendered};
 use std::collections::BTreeSet;
 use toml::Value;

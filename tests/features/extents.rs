@@ -2,6 +2,7 @@
 
 use crate::features::first_hits::hits_agree;
 use crate::features::row::{Verdict, ensure, row};
+use crate::support::test_film::TestFilm;
 use crate::support::{rendered, shipped, sized};
 use zerkalo::primitive::Acceleration;
 use zerkalo::scene::Scene;

@@ -4,6 +4,7 @@
 use crate::features::first_hits::{RASTER, first_hits, hits_agree};
 use crate::features::plain_tracer::agrees;
 use crate::features::row::{Verdict, ensure, material, number};
+use crate::support::test_film::TestFilm;
 use crate::support::{begin, follow, picture, pool, settings, shipped, sized};
 use std::path::Path;
 use std::sync::Arc;
@@ -38,7 +39,7 @@ fn tiles(film: &Film, scene: &Scene) -> Vec<(u32, bool)> {
     (0..film.tile_count())
         .map(|i| {
             let tile = film.tile(i).expect("every tile has samples");
-            let [x, y] = film.tile_origin(i);
+            let [x, y] = [i % film.tile_columns(), i / film.tile_columns()].map(|n| n * TILE);
             let rows = y..(y + TILE).min(film.height());
             let pixels = rows.flat_map(|y| (x..(x + TILE).min(width)).map(move |x| y * width + x));
             (tile.counts().iter().sum(), pixels.into_iter().any(|p| hits[p].reflects))

@@ -1,6 +1,7 @@
 //! Tests of renders that are divided among machines.
 
 use crate::features::row::{Verdict, ensure, material, row};
+use crate::support::test_film::TestFilm;
 use crate::support::{begin, begin_with, follow, pool, settings, shipped, sized};
 use zerkalo::disk::Existing;
 use zerkalo::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};

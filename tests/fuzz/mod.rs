@@ -3,6 +3,7 @@
 mod files;
 mod mutate;
 
+use crate::support::test_film::TestFilm;
 use mutate::Random;
 use std::path::Path;
 use std::sync::Arc;

@@ -4,6 +4,7 @@
 mod noise;
 
 use crate::support;
+use crate::support::test_film::TestFilm;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};

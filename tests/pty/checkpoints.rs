@@ -1,6 +1,7 @@
 //! Checkpoints of the dashboard, which are written on request and continued after a kill.
 
 use super::*;
+use crate::support::test_film::TestFilm;
 use std::time::{Duration, Instant};
 use zerkalo::film::Film;
 use zerkalo::film::file::FilmReader;

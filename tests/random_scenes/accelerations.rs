@@ -2,6 +2,7 @@
 //! byte.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
+use crate::support::test_film::TestFilm;
 use crate::support::{accelerated, picture};
 use zerkalo::film::Replicates;
 use zerkalo::scene::{Acceleration, Scene};

@@ -2,6 +2,7 @@
 //! counts are equal.
 
 use crate::random_scenes::driver::{Verdict, compare, compare_many};
+use crate::support::test_film::TestFilm;
 use crate::support::{begin, pool, settings, trace};
 use zerkalo::film::Noise;
 use zerkalo::render::schedule::{Step, Stop, StoppedBy};

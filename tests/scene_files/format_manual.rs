@@ -1,8 +1,9 @@
 //! Manual of the scene format (docs/scene-format.md), generated from the tables of keys.
 
+use crate::common::shape_examples::EXAMPLES;
 use std::fmt::Write as _;
 use zerkalo::scene::FIELDS;
-use zerkalo::shape::{EXAMPLES, KINDS, TRANSFORM_OP_FIELDS};
+use zerkalo::shape::{KINDS, TRANSFORM_OP_FIELDS};
 use zerkalo::value::{DefaultValue, Field, ValueType};
 
 const INTRODUCTION: &str = "\

@@ -2,6 +2,7 @@
 //! every bit.
 
 use crate::stories::simulated_dashboard::Desk;
+use crate::support::test_film::TestFilm;
 use crate::support::{pool, rendered, sized};
 use zerkalo::render::{FirstHitBuffer, RenderState};
 use zerkalo::scene::{BUILT_IN, Scene};
