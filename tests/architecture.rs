@@ -126,27 +126,12 @@ const CRATES: &[(&str, &[&str])] = &[
     // `scene` uses rustix in tests only.
     ("rustix", &["render", "dashboard", "terminal", "process_memory", "scene", "disk"]),
     ("safe_arch", &["lanes"]),
-    (
-        "serde",
-        &[
-            "command",
-            "measure",
-            "scene",
-            "shape",
-            "primitive",
-            "material",
-            "light",
-            "camera",
-            "value",
-        ],
-    ),
+    ("serde", &["command", "measure"]),
     ("serde_json", &["command"]),
     ("signal_hook", &["command", "dashboard"]),
     ("stl_io", &["asset"]),
     // `asset` uses tempfile in tests only.
     ("tempfile", &["film", "disk", "command", "scene", "dashboard", "asset"]),
-    // Folders of descriptions (`shape`, `material`, `light`, `camera`, `value`) use toml in tests
-    // only, which parse the documented examples.
     ("toml", &["scene", "shape", "material", "light", "camera", "value"]),
     ("tobj", &["asset"]),
     ("toml_edit", &["scene"]),

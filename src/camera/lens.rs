@@ -1,14 +1,12 @@
 //! Description of a thin lens: its aperture and the plane in focus.
 
 use crate::camera::{Camera, ViewAngle};
-use crate::value::{Field, FieldValue, NumberRange, ValidationError, Validator, ValueType};
+use crate::value::{Field, FieldValue, NumberRange, ValidationError, Validator, ValueType, one_of};
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 /// Aperture of the camera's lens, given by its radius or its f-number. The blur of objects outside
 /// of the plane in focus is in proportion to the radius.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aperture {
     /// Radius of the lens in scene units; 0 is a pinhole.
     Radius(f64),
@@ -17,15 +15,22 @@ pub enum Aperture {
     FNumber(f64),
 }
 
+one_of! {
+    Aperture { "radius" => Radius, "f_number" => FNumber }
+}
+
 /// Plane in focus of the camera's lens, perpendicular to the view direction. It is given by its
 /// distance or by a point.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Focus {
     /// Distance of the plane in focus from the eye along the view direction, in scene units.
     Distance(f64),
     /// Any point of the plane in focus, in scene coordinates.
     Point([f64; 3]),
+}
+
+one_of! {
+    Focus { "distance" => Distance, "point" => Point }
 }
 
 /// Largest valid lens radius, in scene units.

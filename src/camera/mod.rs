@@ -9,24 +9,23 @@ pub use perspective::{PerspectiveCamera, ThinLens};
 
 use crate::value::{
     Description, Field, FieldValue, NumberRange, ValidationError, Validator, ValueType,
-    description, unit,
+    description, one_of, unit,
 };
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 description! {
     /// Perspective camera: a pinhole, or a thin lens with a plane in focus.
     pub struct Camera {
         /// Position of the camera.
-        eye: [f64; 3] => "eye" "[0.0, 1.0, 5.0]", in COORDINATE "scene units";
+        eye: [f64; 3] => eye "[0.0, 1.0, 5.0]", in COORDINATE "scene units";
         /// Point that the camera looks at. Exactly one of `target` and `direction` is given.
         target: Option<[f64; 3]>, or "`direction` is needed", in COORDINATE "scene units";
         /// View direction of the camera.
         direction: Option<[f64; 3]>, or "`target` is needed", as Direction;
         /// Up direction of the picture; not parallel to the view direction.
-        up: [f64; 3] => "up" "[0.0, 1.0, 0.0]", as Direction;
+        up: [f64; 3] => up "[0.0, 1.0, 0.0]", as Direction;
         /// Opening angle of the camera, across the height or across the width of the picture.
-        view_angle: ViewAngle => "view_angle" "{ vertical = 40.0 }";
+        view_angle: ViewAngle => view_angle "{ vertical = 40.0 }";
         /// Near plane: its distance along the view direction; surfaces in front of it are
         /// invisible.
         near: f64 = 0.0, in closed(0.0, 1e9) "scene units";
@@ -38,13 +37,16 @@ description! {
 }
 
 /// Opening angle of the camera in degrees, between 0 and 180.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ViewAngle {
     /// Opening angle across the picture's height, in degrees.
     Vertical(f64),
     /// Opening angle across the picture's width, in degrees.
     Horizontal(f64),
+}
+
+one_of! {
+    ViewAngle { "vertical" => Vertical, "horizontal" => Horizontal }
 }
 
 fn eye() -> [f64; 3] {

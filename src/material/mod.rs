@@ -245,13 +245,13 @@ impl Material {
 #[cfg(test)]
 mod tests {
     use super::{FIELDS, Fresnel, Material, Metal};
-    use crate::value::Color;
+    use crate::value::{Color, TomlValue};
 
     #[test]
     fn documented_f0_of_metals_are_used() {
         for metal in Metal::CHOICES {
             let text = format!("metal = \"{}\"", metal.name);
-            let metal_read: Metal = toml::from_str::<Material>(&text).unwrap().metal.unwrap();
+            let metal_read: Metal = Material::from_text(&text).unwrap().metal.unwrap();
             let numbers = metal.doc.split(' ').filter_map(|word| word.parse().ok());
             let documented: Vec<f64> = numbers.collect();
             assert_eq!(metal_read.f0().0.to_vec(), documented, "{}", metal.name);

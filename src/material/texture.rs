@@ -9,13 +9,11 @@
 
 use crate::asset::{AssetError, Image, Loaded};
 use crate::value::{Color, Description, Field, FieldValue, ValidationError, ValueType};
-use crate::value::{choices, description};
-use serde::{Deserialize, Serialize};
+use crate::value::{choices, description, one_of};
 use std::sync::Arc;
 
 /// Texture that multiplies a material's colour: one kind of texture with its parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Texture {
     /// Image from a file: `texture.image` in scene files.
     Image(ImageTexture),
@@ -23,12 +21,19 @@ pub enum Texture {
     Checker(Checker),
 }
 
+one_of! {
+    Texture { "image" => Image, "checker" => Checker }
+}
+
 /// Bump map that perturbs shading normals: one kind of bump map with its parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Bump {
     /// Heights from an image: `bump.image` in scene files.
     Image(HeightImage),
+}
+
+one_of! {
+    Bump { "image" => Image }
 }
 
 description! {

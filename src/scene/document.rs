@@ -7,6 +7,7 @@ use crate::scene::format::migrate::{FormerWord, write_present};
 use crate::scene::format::patch::rewrite;
 use crate::scene::format::read::{SourceScene, read_text};
 use crate::scene::{AssetResolver, Scene};
+use crate::value::TomlValue;
 use std::fs::File;
 use std::io;
 use std::path::Path;
@@ -169,11 +170,10 @@ fn new_text(text: String, former_words: &[FormerWord], old: &Scene, new: &Scene)
     };
     let crlf = body.contains('\n') && body.matches('\n').count() == body.matches("\r\n").count();
     let open_end = !body.is_empty() && !body.ends_with('\n');
-    // Neither call can fail: the text was parsed before, and TOML can express every scene.
+    // This cannot fail: the text was parsed before.
     let mut document: DocumentMut = body.replace("\r\n", "\n").parse().expect("text that was read");
-    let tree = |scene| toml::Table::try_from(scene).expect("a scene is a TOML table");
     write_present(&mut document, former_words);
-    rewrite(&mut document, &tree(old), &tree(new));
+    rewrite(&mut document, &old.to_table(), &new.to_table());
     let mut body = document.to_string();
     if body.starts_with("\n[") {
         body.remove(0);

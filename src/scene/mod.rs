@@ -38,12 +38,13 @@ pub use validate::Problem;
 use crate::camera::Camera;
 use crate::light::Light;
 use crate::material::Material;
-use serde::{Deserialize, Serialize};
+use crate::value::{TableReader, TomlError, TomlValue, written};
 use std::collections::BTreeMap;
+use toml::de::DeValue;
+use toml::{Spanned, Value};
 
 /// Description of a whole scene, valid or not: see [`Scene::faults`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Default)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct Scene {
     /// Film settings: size, pixel filter, sample limit.
     pub film: FilmSettings,
@@ -58,16 +59,44 @@ pub struct Scene {
     /// Ambient light: uniform, without shadows.
     pub ambient: Ambient,
     /// Lights of the scene, in the order of the file.
-    #[serde(rename = "light")]
     pub lights: Vec<Light>,
     /// Materials of the scene, by name.
     pub materials: BTreeMap<String, Material>,
     /// Objects of the scene, in the order of the file.
-    #[serde(rename = "object")]
     pub objects: Vec<Object>,
     /// Loader of the files (meshes, images) to which the scene refers.
-    #[serde(skip)]
     pub resolver: AssetResolver,
+}
+
+impl TomlValue for Scene {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        let table = TableReader::new(value, FIELDS)?;
+        let mut scene = Self::default();
+        table.replace("ambient", &mut scene.ambient)?;
+        table.replace("background", &mut scene.background)?;
+        table.replace("camera", &mut scene.camera)?;
+        table.replace("cameras", &mut scene.cameras)?;
+        table.replace("film", &mut scene.film)?;
+        table.replace("light", &mut scene.lights)?;
+        table.replace("materials", &mut scene.materials)?;
+        table.replace("object", &mut scene.objects)?;
+        table.replace("trace", &mut scene.trace)?;
+        Ok(scene)
+    }
+
+    fn to_toml(&self) -> Value {
+        written(&[
+            ("film", Some(&self.film)),
+            ("trace", Some(&self.trace)),
+            ("camera", Some(&self.camera)),
+            ("cameras", Some(&self.cameras)),
+            ("background", Some(&self.background)),
+            ("ambient", Some(&self.ambient)),
+            ("light", Some(&self.lights)),
+            ("materials", Some(&self.materials)),
+            ("object", Some(&self.objects)),
+        ])
+    }
 }
 
 #[cfg(test)]

@@ -1,16 +1,14 @@
-//! Comparison of the tables of documented keys with the keys that serde reads and writes.
+//! Comparison of the tables of documented keys with the keys that are read and written.
 
 use crate::material::{Bump, Checker, HeightImage, ImageTexture, Texture};
 use crate::scene::*;
 use crate::shape::{CsgOperand, EXAMPLES, KINDS, MAX_DEPTH, Shape};
-use crate::value::{DefaultValue, Description, Field, ValueType};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
+use crate::value::{DefaultValue, Description, Field, TomlError, TomlValue, ValueType};
 
-/// Returns the valid keys of `T`. They are taken from the error message in which serde lists the
-/// valid keys after it has found an unknown one.
-fn keys_of<T: DeserializeOwned>() -> Vec<String> {
-    let error = match toml::from_str::<T>("\"no such key\" = 0") {
+/// Returns the valid keys of `T`. They are taken from the error message that lists the valid keys
+/// after an unknown one was found.
+fn keys_of<T: TomlValue>() -> Vec<String> {
+    let error = match T::from_text("\"no such key\" = 0") {
         Ok(_) => panic!("an unknown key was taken"),
         Err(error) => error.message().to_string(),
     };
@@ -18,20 +16,20 @@ fn keys_of<T: DeserializeOwned>() -> Vec<String> {
     list.split('`').skip(1).step_by(2).map(str::to_string).collect()
 }
 
-fn same_keys<T: DeserializeOwned>(what: &str, fields: &[Field]) {
-    let mut serde_keys = keys_of::<T>();
+fn same_keys<T: TomlValue>(what: &str, fields: &[Field]) {
+    let mut read_keys = keys_of::<T>();
     let mut documented: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
-    serde_keys.sort();
+    read_keys.sort();
     documented.sort();
-    assert_eq!(serde_keys, documented, "{what}");
+    assert_eq!(read_keys, documented, "{what}");
 }
 
-/// Checks that the documented defaults of `fields` are those that serde uses for missing keys.
+/// Checks that the documented defaults of `fields` are those of missing keys.
 /// `needed` is a TOML table with only the required keys. `what` is the name of the table in
 /// messages.
-fn same_defaults<T: DeserializeOwned + Serialize>(what: &str, fields: &[Field], needed: &str) {
-    let read: T = toml::from_str(needed).unwrap_or_else(|e| panic!("{what}: {e}"));
-    let written = toml::Table::try_from(&read).unwrap();
+fn same_defaults<T: TomlValue>(what: &str, fields: &[Field], needed: &str) {
+    let read = T::from_text(needed).unwrap_or_else(|e| panic!("{what}: {e:?}"));
+    let written = read.to_table();
     let given: toml::Table = needed.parse().unwrap();
     for field in fields {
         let value = written.get(field.name);
@@ -44,7 +42,7 @@ fn same_defaults<T: DeserializeOwned + Serialize>(what: &str, fields: &[Field], 
                     field.name
                 );
                 let text = without.to_string();
-                assert!(toml::from_str::<T>(&text).is_err(), "{what} without {}", field.name);
+                assert!(T::from_text(&text).is_err(), "{what} without {}", field.name);
             }
             DefaultValue::Is(text) => {
                 let line = format!("value = {text}").parse::<toml::Table>().unwrap();
@@ -137,15 +135,15 @@ fn field_tables_match_defaults() {
 
 #[test]
 fn every_documented_choice_is_read() {
-    fn words<T: DeserializeOwned>(fields: &[Field]) {
+    fn words<T: TomlValue>(fields: &[Field]) {
         for field in fields {
             if let ValueType::Choice(choices) = field.takes {
                 for choice in choices {
                     let line = format!("{} = \"{}\"", field.name, choice.name);
-                    assert!(toml::from_str::<T>(&line).is_ok(), "{line}");
+                    assert!(T::from_text(&line).is_ok(), "{line}");
                 }
                 let line = format!("{} = \"no such word\"", field.name);
-                let error = toml::from_str::<T>(&line).err().map(|e| e.message().to_string());
+                let error = T::from_text(&line).err().map(|e| e.message().to_string());
                 let error = error.unwrap_or_else(|| panic!("{line} was read"));
                 let documented =
                     choices.iter().filter(|c| error.contains(&format!("`{}`", c.name)));
@@ -169,9 +167,9 @@ fn example(kind: &Field, text: &str) -> toml::Table {
     table["shape"][kind.name].as_table().unwrap().clone()
 }
 
-fn read(kind: &Field, values: &toml::Table) -> Result<Shape, toml::de::Error> {
+fn read(kind: &Field, values: &toml::Table) -> Result<Shape, TomlError> {
     let outer = toml::Table::from_iter([(kind.name.to_string(), values.clone().into())]);
-    outer.try_into()
+    Shape::from_text(&outer.to_string())
 }
 
 #[test]
@@ -181,7 +179,7 @@ fn shape_examples_and_tables_are_valid() {
         assert_eq!(kind.name, *key);
         let ValueType::Table(fields) = kind.takes else { panic!("{key}") };
         let given = example(kind, text);
-        let shape = read(kind, &given).unwrap_or_else(|e| panic!("{key}: {e}"));
+        let shape = read(kind, &given).unwrap_or_else(|e| panic!("{key}: {e:?}"));
         assert_eq!(shape.key(), *key);
         assert_eq!(shape.faults(), [], "{key}");
         // Files in examples are relative to the folder of the project.
@@ -189,12 +187,12 @@ fn shape_examples_and_tables_are_valid() {
         let scene = Scene::parse(&format!("[[object]]\n{text}\n"), &name);
         assert!(scene.is_ok(), "{key}: {}", scene.unwrap_err());
 
-        let written = toml::Table::try_from(&shape).unwrap();
-        let mut serde_keys: Vec<_> = written[*key].as_table().unwrap().keys().cloned().collect();
+        let written = shape.to_table();
+        let mut read_keys: Vec<_> = written[*key].as_table().unwrap().keys().cloned().collect();
         let mut documented: Vec<_> = fields.iter().map(|f| f.name.to_string()).collect();
-        serde_keys.sort();
+        read_keys.sort();
         documented.sort();
-        assert_eq!(serde_keys, documented, "{key}");
+        assert_eq!(read_keys, documented, "{key}");
         for field in fields {
             let mut without = given.clone();
             without.remove(field.name);
@@ -203,7 +201,7 @@ fn shape_examples_and_tables_are_valid() {
                 DefaultValue::Required => assert!(read.is_err(), "{key} without {}", field.name),
                 DefaultValue::Is(text) => {
                     let line = format!("value = {text}").parse::<toml::Table>().unwrap();
-                    let written = toml::Table::try_from(read.unwrap()).unwrap();
+                    let written = read.unwrap().to_table();
                     assert_eq!(written[*key][field.name], line["value"], "{key}.{}", field.name);
                 }
                 DefaultValue::Without(_) => assert!(read.is_ok(), "{key} without {}", field.name),
@@ -259,7 +257,7 @@ fn every_shape_number_is_range_checked() {
 /// error is a pair `(key, message)`.
 fn faults_of(part: &str) -> Vec<(String, String)> {
     let ball = "{ shape.sphere = { center = [0, 0, 0], radius = 1 } }";
-    let shape: Shape = toml::from_str(&format!("union.of = [{ball}, {part}]")).unwrap();
+    let shape = Shape::from_text(&format!("union.of = [{ball}, {part}]")).unwrap();
     shape.faults().into_iter().map(|f| (f.key, f.found)).collect()
 }
 
@@ -308,8 +306,7 @@ fn errors_in_parts_name_the_part() {
 
 #[test]
 fn compound_nesting_depth_is_limited() {
-    let sphere =
-        || -> Shape { toml::from_str("sphere = { center = [0, 0, 0], radius = 1 }").unwrap() };
+    let sphere = || Shape::from_text("sphere = { center = [0, 0, 0], radius = 1 }").unwrap();
     let part = |shape| CsgOperand { shape, material: String::new(), transform: Vec::new() };
     let mut shape = sphere();
     for depth in 1..=MAX_DEPTH + 1 {

@@ -8,24 +8,25 @@ use crate::primitive::csg_tree::{CsgSolid, CsgTree};
 use crate::shape::registry::KIND_TABLE;
 use crate::shape::transform::{TRANSFORM_OP_FIELDS, TransformOp, compose, ill_conditioned};
 use crate::shape::{Cuboid, Shape, ShapeDesc, Sphere};
-use crate::value::{Description, Field, ValidationError, Validator, ValueType};
+use crate::value::{
+    Description, Field, TableReader, TomlError, TomlValue, ValidationError, Validator, ValueType,
+    written,
+};
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
+use toml::de::DeValue;
+use toml::{Spanned, Value};
 
 /// Largest depth of compounds nested in compounds.
 pub const MAX_DEPTH: usize = 64;
 
 /// Part of a compound: a solid with its own material and transform.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CsgOperand {
     /// Solid of the part. A plane stands for the half-space behind it.
     pub shape: Shape,
     /// Name of one of the scene's materials; empty for the material of the whole compound.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub material: String,
     /// Steps that move, rotate and scale the part inside the whole compound, in order.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub transform: Vec<TransformOp>,
 }
 
@@ -62,14 +63,40 @@ pub(super) static OF_FIELDS: [Field; 1] = [Field::required(
     "Two parts or more, each written like an object: `shape`, `material`, `transform`.",
 )];
 
+impl TomlValue for CsgOperand {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        let table = TableReader::new(value, &PART_FIELDS)?;
+        Ok(Self {
+            shape: table.required("shape")?,
+            material: table.optional("material")?.unwrap_or_default(),
+            transform: table.optional("transform")?.unwrap_or_default(),
+        })
+    }
+
+    fn to_toml(&self) -> Value {
+        let material = (!self.material.is_empty()).then_some(&self.material as &dyn TomlValue);
+        let transform = (!self.transform.is_empty()).then_some(&self.transform as &dyn TomlValue);
+        written(&[("shape", Some(&self.shape)), ("material", material), ("transform", transform)])
+    }
+}
+
 macro_rules! compounds {
     ($($kind:ident, $doc:literal);+ $(;)?) => {$(
         #[doc = $doc]
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-        #[serde(deny_unknown_fields)]
+        #[derive(Clone, Debug, PartialEq)]
         pub struct $kind {
             /// Parts of the compound, two or more.
             pub of: Vec<CsgOperand>,
+        }
+
+        impl TomlValue for $kind {
+            fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+                TableReader::new(value, &OF_FIELDS)?.required("of").map(|of| Self { of })
+            }
+
+            fn to_toml(&self) -> Value {
+                written(&[("of", Some(&self.of))])
+            }
         }
 
         impl Description for $kind {

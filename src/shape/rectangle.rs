@@ -15,7 +15,7 @@ description! {
         /// Direction in which the front faces.
         normal: [f64; 3], as Direction;
         /// Direction of the height, made perpendicular to `normal`; not parallel to it.
-        up: [f64; 3] => "up" "[0.0, 1.0, 0.0]", as Direction;
+        up: [f64; 3] => up "[0.0, 1.0, 0.0]", as Direction;
     }
 }
 

@@ -8,9 +8,10 @@ use crate::shape::{
     Prism, Pyramid,
 };
 use crate::shape::{Rectangle, Sphere, TaperedCylinder, Torus, Union, UnitFrustum};
-use crate::value::{Description, Field, FieldValue, ValidationError, ValueType, rounded_to};
+use crate::value::{
+    Description, Field, FieldValue, ValidationError, ValueType, one_of, rounded_to,
+};
 use glam::{DMat3, DVec3};
-use serde::{Deserialize, Serialize};
 
 /// Description of one kind of shape, as scene files have it.
 pub trait ShapeDesc: Description {
@@ -69,13 +70,16 @@ macro_rules! kinds {
     ($($key:literal => $kind:ident $(with $fields:path)?),+ $(,)?) => {
         /// Shape of an object: one kind of shape with its parameters. In scene files it is a table
         /// with one key, the name of the kind.
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[derive(Clone, Debug, PartialEq)]
         pub enum Shape {
             $(
                 #[doc = concat!("`shape.", $key, "`")]
-                #[serde(rename = $key)]
                 $kind($kind),
             )+
+        }
+
+        one_of! {
+            Shape { $($key => $kind),+ }
         }
 
         // A static instead of a constant, because the table refers to itself through the keys of

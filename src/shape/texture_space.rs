@@ -91,10 +91,11 @@ pub(super) fn turned_axes(degrees: f64) -> DMat3 {
 mod tests {
     use super::*;
     use crate::shape::{EXAMPLES, KINDS};
+    use crate::value::TomlValue;
 
     fn shape(text: &str) -> Shape {
         let table: toml::Table = text.parse().unwrap();
-        table["shape"].clone().try_into().unwrap()
+        Shape::from_text(&table["shape"].as_table().unwrap().to_string()).unwrap()
     }
 
     #[test]

@@ -3,17 +3,16 @@
 use crate::primitive::{Form, PlaneForm};
 use crate::shape::Shape;
 use crate::value::{
-    Description, Field, FieldValue, NumberRange, ValidationError, Validator, ValueType,
-    description, sin_cos_degrees, unit,
+    Description, Field, FieldValue, NumberRange, TomlError, TomlValue, ValidationError, Validator,
+    ValueType, description, one_of, sin_cos_degrees, unit,
 };
 use glam::{DAffine3, DMat3, DVec3};
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
-use std::fmt;
+use toml::de::DeValue;
+use toml::{Spanned, Value};
 
 /// One step of a transform. Angles are in degrees, counter-clockwise as seen from the tip of the
 /// axis.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TransformOp {
     /// Moves the object by this vector, in scene units.
     Translate([f64; 3]),
@@ -44,38 +43,28 @@ description! {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale(pub [f64; 3]);
 
-impl Serialize for Scale {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+impl TomlValue for Scale {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        if value.get_ref().is_array() {
+            return TomlValue::from_toml(value).map(Self);
+        }
+        f64::from_toml(value).map(|factor| Self([factor; 3]))
+    }
+
+    fn to_toml(&self) -> Value {
         let [x, y, z] = self.0;
-        if x == y && y == z { serializer.serialize_f64(x) } else { self.0.serialize(serializer) }
+        if x == y && y == z { x.to_toml() } else { self.0.to_toml() }
     }
 }
 
-struct ScaleVisitor;
-
-impl<'de> de::Visitor<'de> for ScaleVisitor {
-    type Value = Scale;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("a number or a list of three")
-    }
-
-    fn visit_f64<E: de::Error>(self, factor: f64) -> Result<Scale, E> {
-        Ok(Scale([factor; 3]))
-    }
-
-    fn visit_i64<E: de::Error>(self, factor: i64) -> Result<Scale, E> {
-        Ok(Scale([factor as f64; 3]))
-    }
-
-    fn visit_seq<A: de::SeqAccess<'de>>(self, seq: A) -> Result<Scale, A::Error> {
-        Deserialize::deserialize(de::value::SeqAccessDeserializer::new(seq)).map(Scale)
-    }
-}
-
-impl<'de> Deserialize<'de> for Scale {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(ScaleVisitor)
+one_of! {
+    TransformOp {
+        "translate" => Translate,
+        "rotate_x" => RotateX,
+        "rotate_y" => RotateY,
+        "rotate_z" => RotateZ,
+        "rotate" => Rotate,
+        "scale" => Scale,
     }
 }
 

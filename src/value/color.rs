@@ -1,8 +1,5 @@
 //! Linear RGB colours with the primaries of sRGB.
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
-use std::fmt;
-
 /// Linear RGB colour (red, green, blue) without an upper bound. Scene files have `[r, g, b]`
 /// (linear) or `"#rrggbb"` (sRGB).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,44 +55,6 @@ pub fn srgb_from_linear(linear: f64) -> f64 {
 /// Converts an sRGB level (IEC 61966-2-1) from 0..1 to linear light in 0..1.
 pub fn linear_from_srgb(level: f64) -> f64 {
     if level <= 0.04045 { level / 12.92 } else { ((level + 0.055) / 1.055).powf(2.4) }
-}
-
-impl Serialize for Color {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.0.serialize(serializer)
-    }
-}
-
-struct ColorVisitor;
-
-impl<'de> de::Visitor<'de> for ColorVisitor {
-    type Value = Color;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("a linear colour [r, g, b] or a string \"#rrggbb\"")
-    }
-
-    fn visit_str<E: de::Error>(self, text: &str) -> Result<Color, E> {
-        let wrong = || E::invalid_value(de::Unexpected::Str(text), &self);
-        Color::from_hex(text).ok_or_else(wrong)
-    }
-
-    fn visit_seq<A: de::SeqAccess<'de>>(self, mut seq: A) -> Result<Color, A::Error> {
-        let mut rgb = [0.0; 3];
-        for (i, channel) in rgb.iter_mut().enumerate() {
-            *channel = seq.next_element()?.ok_or_else(|| de::Error::invalid_length(i, &self))?;
-        }
-        match seq.next_element::<de::IgnoredAny>()? {
-            None => Ok(Color(rgb)),
-            Some(_) => Err(de::Error::invalid_length(4, &self)),
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for Color {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(ColorVisitor)
-    }
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Macros that declare the tables of scene files.
 //!
-//! [`description!`] generates a struct from one declaration, with its serde implementation, its
-//! defaults, its table of fields and the checks of its value ranges. [`choices!`] generates an enum
-//! for a key that accepts a fixed set of words.
+//! [`description!`] generates a struct from one declaration, with its conversion from and to TOML,
+//! its defaults, its table of fields and the checks of its value ranges. [`choices!`] generates an
+//! enum for a key that accepts a fixed set of words.
 
 use crate::value::{Color, Field, NumberRange, ValidationError, Validator, ValueType};
 
@@ -43,11 +43,6 @@ pub trait FieldValue {
     fn is_absent(&self) -> bool {
         false
     }
-}
-
-/// Calls [`FieldValue::is_absent`]. This function exists for serde attributes, which need a path.
-pub(crate) fn is_absent(value: &impl FieldValue) -> bool {
-    value.is_absent()
 }
 
 /// Returns the text of a doc comment without its leading space. `doc` is the text as the attribute
@@ -179,9 +174,9 @@ macro_rules! choices {
         }
     ) => {
         $(#[$attribute])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, ::serde::Serialize, ::serde::Deserialize)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum $name {
-            $($(#[doc = $doc])+ #[serde(rename = $word)] $variant,)+
+            $($(#[doc = $doc])+ $variant,)+
         }
 
         impl $name {
@@ -193,6 +188,18 @@ macro_rules! choices {
 
             /// Every variant, in the order of [`Self::CHOICES`].
             pub const ALL: [Self; Self::CHOICES.len()] = [$(Self::$variant),+];
+        }
+
+        impl $crate::value::TomlValue for $name {
+            fn from_toml(
+                value: &::toml::Spanned<::toml::de::DeValue>,
+            ) -> Result<Self, $crate::value::TomlError> {
+                $crate::value::choice(value, Self::CHOICES).map(|index| Self::ALL[index])
+            }
+
+            fn to_toml(&self) -> ::toml::Value {
+                ::toml::Value::String(Self::CHOICES[*self as usize].name.to_string())
+            }
         }
 
         impl $crate::value::FieldValue for $name {
@@ -216,7 +223,7 @@ macro_rules! choices {
 
 pub(crate) use choices;
 
-/// Declares a table of a scene file: struct, serde, defaults, table of fields, range checks.
+/// Declares a table of a scene file: struct, conversion, defaults, table of fields, range checks.
 ///
 /// ```ignore
 /// description! {
@@ -239,26 +246,23 @@ pub(crate) use choices;
 /// Ranges are those of [`NumberRange`]. If every key may be left out, the struct is declared as
 /// `Example: Default` and gets the declared defaults. If some key is required, a default of another
 /// key must equal the default of its Rust type. Any other default is declared in the form
-/// `up: [f64; 3] => "up" "[0.0, 1.0, 0.0]"`, with the function that serde calls and the result of
-/// this function as TOML.
+/// `up: [f64; 3] => up "[0.0, 1.0, 0.0]"`, with a function that returns it and the result of this
+/// function as TOML.
 macro_rules! description {
     ($(#[doc = $doc:literal])+ pub struct $name:ident: Default { $($fields:tt)+ }) => {
-        $crate::value::description!(@struct any all [$($doc)+] [] $name $($fields)+);
+        $crate::value::description!(@struct [all] [$($doc)+] [] $name $($fields)+);
         $crate::value::description!(@default $name $($fields)+);
     };
     ($(#[doc = $doc:literal])+ pub struct $name:ident $(: $derived:ident)? { $($fields:tt)+ }) => {
-        $crate::value::description!(@struct all any [$($doc)+] [$($derived)?] $name $($fields)+);
+        $crate::value::description!(@struct [] [$($doc)+] [$($derived)?] $name $($fields)+);
     };
 
-    // One of `$per_field` and `$whole` is `all`, the other is `any`. As conditions of `cfg_attr`,
-    // `all()` is true and `any()` is false. If `$per_field` is `all`, serde takes the default of
-    // each field from the field's Rust type. If `$whole` is `all`, serde takes all defaults from
-    // the `Default` of the struct.
+    // `$all` is given if the struct has a `Default`: missing keys then have its values.
     (
-        @struct $per_field:ident $whole:ident [$($doc:literal)+] [$($derived:ident)?] $name:ident
+        @struct [$($all:ident)?] [$($doc:literal)+] [$($derived:ident)?] $name:ident
         $(
             $(#[doc = $help:literal])+
-            $key:ident: $type:ty $(= $default:expr)? $(=> $function:literal $toml:literal)?
+            $key:ident: $type:ty $(= $default:expr)? $(=> $function:ident $toml:literal)?
             $(, or $absent:literal)?
             $(, in $range:ident $(($($bound:expr),+))? $($unit:literal)?)?
             $(, as $value_type:ident)?;
@@ -266,28 +270,17 @@ macro_rules! description {
         $(skip $hidden:ident: $hidden_type:ty;)?
     ) => {
         $(#[doc = $doc])+
-        #[derive(Clone, Debug, PartialEq, ::serde::Serialize, ::serde::Deserialize)]
+        #[derive(Clone, Debug, PartialEq)]
         $(#[derive($derived)])?
-        #[serde(deny_unknown_fields)]
-        #[cfg_attr($whole(), serde(default))]
         pub struct $name {
             $(
                 $(#[doc = $help])+
-                $(
-                    #[doc = concat!("\n\nDefault: `", stringify!($default), "`.")]
-                    #[cfg_attr($per_field(), serde(default))]
-                )?
-                $(
-                    #[doc = concat!("\n\nDefault: `", $toml, "`.")]
-                    #[serde(default = $function)]
-                )?
-                $(
-                    #[doc = concat!("\n\nDefault: none (", $absent, ").")]
-                    #[serde(default, skip_serializing_if = "crate::value::is_absent")]
-                )?
+                $(#[doc = concat!("\n\nDefault: `", stringify!($default), "`.")])?
+                $(#[doc = concat!("\n\nDefault: `", $toml, "`.")])?
+                $(#[doc = concat!("\n\nDefault: none (", $absent, ").")])?
                 pub $key: $type,
             )+
-            $(#[serde(skip)] $hidden: $hidden_type,)?
+            $($hidden: $hidden_type,)?
         }
 
         impl $crate::value::Description for $name {
@@ -311,6 +304,60 @@ macro_rules! description {
                     $(.field(stringify!($key), &self.$key))+
             }
         }
+
+        impl $crate::value::TomlValue for $name {
+            fn from_toml(
+                value: &::toml::Spanned<::toml::de::DeValue>,
+            ) -> Result<Self, $crate::value::TomlError> {
+                let fields = <Self as $crate::value::Description>::FIELDS;
+                let table = $crate::value::TableReader::new(value, fields)?;
+                $crate::value::description!(@read [$($all)?] [$($hidden)?] table $(
+                    $key
+                    $([Default::default; $default])?
+                    $([$function; $toml])?
+                    $([Default::default; $absent])?,
+                )+)
+            }
+
+            fn to_toml(&self) -> ::toml::Value {
+                $crate::value::written(&[$(
+                    (
+                        stringify!($key),
+                        $crate::value::description!(@write (&self.$key) $($absent)?),
+                    ),
+                )+])
+            }
+        }
+    };
+
+    (@read [all] [$($hidden:ident)?] $table:ident $($key:ident $([$($default:tt)+])?,)+) => {{
+        let mut new = Self::default();
+        $($table.replace(stringify!($key), &mut new.$key)?;)+
+        Ok(new)
+    }};
+    (
+        @read [] [$($hidden:ident)?] $table:ident
+        $($key:ident $([$($function:ident)::+; $unused:tt])?,)+
+    ) => {
+        Ok(Self {
+            $($key: $crate::value::description!(@value_of $table $key $($($function)::+)?),)+
+            $($hidden: Default::default(),)?
+        })
+    };
+    (@value_of $table:ident $key:ident) => {
+        $table.required(stringify!($key))?
+    };
+    (@value_of $table:ident $key:ident $($function:ident)::+) => {
+        $table.optional(stringify!($key))?.unwrap_or_else($($function)::+)
+    };
+
+    // A value of a key without a default value is written if it is not absent.
+    (@write ($value:expr)) => {
+        Some($value as &dyn $crate::value::TomlValue)
+    };
+    (@write ($value:expr) $absent:literal) => {
+        (!$crate::value::FieldValue::is_absent($value))
+            .then_some($value as &dyn $crate::value::TomlValue)
     };
 
     (

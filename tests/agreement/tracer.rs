@@ -16,6 +16,7 @@ use zerkalo::camera::{Aperture, Focus, ViewAngle};
 use zerkalo::light::{Falloff, Light, Spot};
 use zerkalo::material::Material;
 use zerkalo::scene::{Filter, RayTypes, Scene};
+use zerkalo::value::TomlValue;
 
 /// Deliberate error of the reference tracer that the comparison has to detect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -578,9 +579,8 @@ const KNOWN: [&str; 23] = [
 
 /// Returns an error if the material has a key that the reference tracer does not support.
 fn unknown_keys(material: &Material) -> Result<(), String> {
-    let table = |m: &Material| toml::Table::try_from(m).expect("materials are tables");
-    let plain = table(&Material::default());
-    for (key, value) in table(material) {
+    let plain = Material::default().to_table();
+    for (key, value) in material.to_table() {
         if !KNOWN.contains(&key.as_str()) && plain.get(&key) != Some(&value) {
             return Err(format!("the material key `{key}`"));
         }

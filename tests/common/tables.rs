@@ -4,7 +4,7 @@
 
 use toml::{Table, Value};
 use zerkalo::scene::{AssetResolver, FIELDS, Scene};
-use zerkalo::value::{Field, ValueType};
+use zerkalo::value::{Field, TomlValue, ValueType};
 
 /// Key that a scene file may have.
 #[derive(Clone, Debug)]
@@ -18,12 +18,12 @@ pub struct Key {
 
 /// Returns `scene` as a TOML table.
 pub fn table(scene: &Scene) -> Table {
-    Table::try_from(scene).expect("scenes are tables")
+    scene.to_table()
 }
 
 /// Returns the scene in `table`, with the files of `resolver`. Returns `None` if it has errors.
 pub fn scene(table: &Table, resolver: &AssetResolver) -> Option<Scene> {
-    let mut scene: Scene = table.clone().try_into().ok()?;
+    let mut scene = Scene::from_text(&table.to_string()).ok()?;
     scene.resolver = resolver.clone();
     scene.resolve();
     scene.faults().is_empty().then_some(scene)

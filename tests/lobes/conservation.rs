@@ -9,7 +9,7 @@ use zerkalo::material::{
     Bsdf, FIELDS, Fresnel, Highlight, Interface, Lobe, Masking, Material, ReflectionLobe,
 };
 use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
-use zerkalo::value::{Color, ValueType};
+use zerkalo::value::{Color, TomlValue, ValueType};
 use zerkalo::world::World;
 
 /// Checks that the words of the field table and the lists of variants have the same order, so that
@@ -22,7 +22,7 @@ fn variants_match_words_of_fields() {
         choices.iter().map(|c| c.name).collect()
     };
     let read = |key: &str| -> Vec<Material> {
-        let of = |word: &&str| toml::from_str(&format!("{key} = \"{word}\"")).unwrap();
+        let of = |word: &&str| Material::from_text(&format!("{key} = \"{word}\"")).unwrap();
         words(key).iter().map(of).collect()
     };
     assert_eq!(read("lobe").iter().map(|m| m.lobe).collect::<Vec<_>>(), Lobe::ALL);

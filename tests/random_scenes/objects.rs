@@ -11,7 +11,7 @@ use zerkalo::asset::Assets;
 use zerkalo::material::{self, Material};
 use zerkalo::scene::{AssetResolver, Object, Rotate, Scale, Scene, TransformOp};
 use zerkalo::shape::{CsgOperand, KINDS, Shape};
-use zerkalo::value::{Color, Field, ValueType};
+use zerkalo::value::{Color, Field, TomlValue, ValueType};
 
 /// Names of mesh files; the empty name is the built-in icosahedron.
 const MESHES: &[&str] = &[
@@ -114,7 +114,7 @@ pub fn material(numbers: &mut Numbers, finish: Finish) -> Material {
                 set("ambient", Value::Float(pick(numbers, &[1.0, 30.0])));
             }
         }
-        if let Ok(material) = keys.try_into::<Material>()
+        if let Ok(material) = Material::from_text(&keys.to_string())
             && material.faults().is_empty()
         {
             return material;
@@ -159,9 +159,9 @@ fn solids() -> &'static (Vec<&'static Field>, Vec<&'static Field>) {
 /// Returns the compound of the parts `of` by the set operation `key`. Returns `None` if the
 /// compound has validation errors.
 fn compound(key: &str, of: Vec<CsgOperand>) -> Option<Shape> {
-    let parts = Table::from_iter([("of".to_string(), Value::try_from(of).ok()?)]);
+    let parts = Table::from_iter([("of".to_string(), of.to_toml())]);
     let whole = Table::from_iter([(key.to_string(), Value::Table(parts))]);
-    whole.try_into::<Shape>().ok().filter(|shape| shape.faults().is_empty())
+    Shape::from_text(&whole.to_string()).ok().filter(|shape| shape.faults().is_empty())
 }
 
 /// Returns a shape of a kind with random values of its keys. The shape is approximately in a box of
@@ -191,7 +191,7 @@ fn by_keys(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Opt
     };
     let keys = table(numbers, keys_of(kind), 0.5, &key_value);
     let whole = Table::from_iter([(kind.name.to_string(), Value::Table(keys))]);
-    whole.try_into::<Shape>().ok().filter(|shape| shape.faults().is_empty())
+    Shape::from_text(&whole.to_string()).ok().filter(|shape| shape.faults().is_empty())
 }
 
 /// Returns a random compound in a box of the size `size` that stands on the point `base`. Faces of

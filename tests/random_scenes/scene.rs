@@ -14,7 +14,7 @@ use zerkalo::primitive::{ConvexPolyhedronForm, Form, ParallelogramForm, PlaneFor
 use zerkalo::scene::{
     Acceleration, Document, FilmSettings, IntegratorSettings, Object, Scale, Scene, TransformOp,
 };
-use zerkalo::value::{Color, Description, Field};
+use zerkalo::value::{Color, Description, Field, TomlValue};
 
 /// Random scene, with its text.
 pub struct Random {
@@ -151,7 +151,7 @@ fn trace(numbers: &mut Numbers) -> IntegratorSettings {
         _ => None,
     };
     let keys: Table = table(numbers, IntegratorSettings::FIELDS, 0.5, key_value);
-    let mut trace: IntegratorSettings = keys.try_into().expect("keys of the table");
+    let mut trace = IntegratorSettings::from_text(&keys.to_string()).expect("keys of the table");
     trace.acceleration = Acceleration::Auto;
     trace
 }

@@ -4,10 +4,8 @@
 use crate::scene::Scene;
 use crate::scene::edit::{EditError, Target};
 use crate::scene::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
-use crate::value::{Description, Field, ValueType};
+use crate::value::{Description, Field, TomlError, TomlValue, ValueType};
 use crate::{camera, light, material};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
 /// Returns the keys that scene files permit for `subject`, with their types and defaults.
@@ -38,31 +36,27 @@ pub(super) fn exclusive_keys(subject: &Target) -> &'static [&'static str] {
 /// Returns the keys of `subject` with their values in `scene`. Keys with default values are
 /// included.
 pub(super) fn read(scene: &Scene, subject: &Target) -> Result<Table, EditError> {
-    fn table<T: Serialize>(part: Option<&T>) -> Option<Table> {
-        part.and_then(|part| Table::try_from(part).ok())
-    }
     let read = match subject {
-        Target::Camera => table(Some(&scene.camera)),
-        Target::View(name) => table(scene.cameras.get(name)),
-        Target::Ambient => table(Some(&scene.ambient)),
-        Target::Background => table(Some(&scene.background)),
-        Target::Light(i) => table(scene.lights.get(*i)),
-        Target::Object(i) => table(scene.objects.get(*i)),
-        Target::Material(name) => table(scene.materials.get(name)),
-        Target::Film => table(Some(&scene.film)),
-        Target::IntegratorSettings => table(Some(&scene.trace)),
+        Target::Camera => Some(scene.camera.to_table()),
+        Target::View(name) => scene.cameras.get(name).map(TomlValue::to_table),
+        Target::Ambient => Some(scene.ambient.to_table()),
+        Target::Background => Some(scene.background.to_table()),
+        Target::Light(i) => scene.lights.get(*i).map(TomlValue::to_table),
+        Target::Object(i) => scene.objects.get(*i).map(TomlValue::to_table),
+        Target::Material(name) => scene.materials.get(name).map(TomlValue::to_table),
+        Target::Film => Some(scene.film.to_table()),
+        Target::IntegratorSettings => Some(scene.trace.to_table()),
     };
     read.ok_or_else(|| EditError::gone(subject))
 }
 
 /// Returns a copy of `scene` in which the values of the keys of `subject` are replaced by `values`.
 pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Scene, EditError> {
-    fn fill<T: DeserializeOwned>(part: Option<&mut T>, values: Table) -> Result<(), EditError> {
-        let wrong = |e: toml::de::Error| EditError::new(e.message(), "The scene is unchanged.");
+    fn fill<T: TomlValue>(part: Option<&mut T>, values: Table) -> Result<(), EditError> {
+        let wrong = |e: TomlError| EditError::new(e.message(), "The scene is unchanged.");
         if let Some(part) = part {
-            // The values are passed as text, so that the deserialiser of scene files is used and no
-            // second deserialiser is compiled.
-            *part = toml::from_str(&values.to_string()).map_err(wrong)?;
+            // The values are passed as text: scenes are only read from parsed text.
+            *part = T::from_text(&values.to_string()).map_err(wrong)?;
         }
         Ok(())
     }

@@ -6,14 +6,14 @@ use crate::scene::format::migrate::{self, FormerWord, migrate};
 use crate::scene::format::parts::{PART_BYTES, Part, split};
 use crate::scene::format::schema;
 use crate::scene::format::source_map::{line_column, locate};
-use crate::scene::{AssetResolver, Scene};
-use serde::Deserialize;
+use crate::scene::{AssetResolver, Object, Scene};
+use crate::value::{TomlError, TomlValue};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 use std::sync::Arc;
-
-use toml::de::{DeTable, Deserializer};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 /// Size of the largest scene file that is read [bytes]. A file of this size has about four million
 /// objects.
@@ -160,10 +160,10 @@ impl<'a> SourceScene<'a> {
             if !errors.is_empty() {
                 continue;
             }
-            let scene = Scene::deserialize(Deserializer::from(root)).map_err(|error| {
-                let line_column =
-                    error.span().map(|span| line_column(text, part.in_file(span.start)));
-                SceneErrors::at(name, line_column, error.message().to_string(), "")
+            let scene = scene_of(root).map_err(|error| {
+                let at = part.in_file(error.span().start);
+                let message = error.message().to_string();
+                SceneErrors::at(name, Some(line_column(text, at)), message, "")
             })?;
             match number {
                 0 => self.scene = scene,
@@ -204,6 +204,21 @@ enum Reading {
     Done,
     /// The file has objects outside of `[[object]]` sections, so that it must be read as a whole.
     NotInParts,
+}
+
+/// Returns the scene in the table `root`.
+fn scene_of(mut root: Spanned<DeTable>) -> Result<Scene, TomlError> {
+    let objects = root.get_mut().remove("object");
+    let mut scene =
+        Scene::from_toml(&Spanned::new(root.span(), DeValue::Table(root.into_inner())))?;
+    if let Some(DeValue::Array(list)) = objects.map(Spanned::into_inner) {
+        scene.objects.reserve_exact(list.len());
+        // The memory of each object's values is freed before the next object is read.
+        for object in list {
+            scene.objects.push(Object::from_toml(&object)?);
+        }
+    }
+    Ok(scene)
 }
 
 /// Returns the text of the scene file at `path`. `open` opens the file.
@@ -261,7 +276,6 @@ pub(crate) fn read_text(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Object;
     use std::fs;
 
     /// Parses the scene `text` twice: in parts of one object each, and as a whole. Returns the two

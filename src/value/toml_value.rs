@@ -1,0 +1,348 @@
+//! Conversion of descriptions from and to the values of scene files.
+//!
+//! The conversions of `serde` would be compiled for each description and each kind of input. Here
+//! everything that does not depend on the type is a common function.
+
+use crate::value::{Choice, Color, Field};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use toml::de::{DeTable, DeValue};
+use toml::{Spanned, Table, Value};
+
+/// Type with a conversion from and to the values of scene files.
+pub trait TomlValue {
+    /// Converts a value of a scene file to this type.
+    ///
+    /// # Errors
+    /// Fails if `value` has the wrong type, if a key is unknown or missing, or if a number is too
+    /// large for its type. Ranges are not checked.
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError>
+    where
+        Self: Sized;
+
+    /// Converts `self` to a value of a scene file.
+    fn to_toml(&self) -> Value;
+
+    /// Parses `text`, the keys of a table and their values, as this type.
+    ///
+    /// # Errors
+    /// Fails if `text` is not TOML, or for the reasons of [`TomlValue::from_toml`].
+    fn from_text(text: &str) -> Result<Self, TomlError>
+    where
+        Self: Sized,
+    {
+        Self::from_toml(&table_of(text)?)
+    }
+
+    /// Converts `self` to a table of a scene file. It is empty if `self` is not a table.
+    fn to_table(&self) -> Table {
+        match self.to_toml() {
+            Value::Table(table) => table,
+            _ => Table::new(),
+        }
+    }
+}
+
+/// Error of the conversion of a value of a scene file to a description.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TomlError(Box<(Range<usize>, String)>);
+
+impl TomlError {
+    /// Creates an error about the bytes `span` of the file.
+    pub fn new(span: Range<usize>, message: impl Into<String>) -> Self {
+        Self(Box::new((span, message.into())))
+    }
+
+    /// Returns the bytes of the file that the error is about.
+    pub fn span(&self) -> Range<usize> {
+        self.0.0.clone()
+    }
+
+    /// Returns the error as a clause: ``missing field `radius` ``.
+    pub fn message(&self) -> &str {
+        &self.0.1
+    }
+}
+
+fn table_of(text: &str) -> Result<Spanned<DeValue<'_>>, TomlError> {
+    let error = |e: toml::de::Error| TomlError::new(e.span().unwrap_or(0..0), e.message());
+    let table = DeTable::parse(text).map_err(error)?;
+    Ok(Spanned::new(table.span(), DeValue::Table(table.into_inner())))
+}
+
+/// Returns the error that `value` is not `expected`.
+fn wrong(value: &Spanned<DeValue>, expected: &str) -> TomlError {
+    let found = value.get_ref().type_str();
+    TomlError::new(value.span(), format!("invalid type: {found}, expected {expected}"))
+}
+
+/// Returns the error that the name `found` of a `what` (field or variant) is not among `known`.
+fn unknown(span: Range<usize>, what: &str, found: &str, known: &[&str]) -> TomlError {
+    let names: Vec<_> = known.iter().map(|name| format!("`{name}`")).collect();
+    let expected = match names.as_slice() {
+        [] => format!("there are no {what}s"),
+        [only] => format!("expected {only}"),
+        [first, second] => format!("expected {first} or {second}"),
+        names => format!("expected one of {}", names.join(", ")),
+    };
+    TomlError::new(span, format!("unknown {what} `{found}`, {expected}"))
+}
+
+/// Reader of a table of a scene file whose keys are all known.
+pub(crate) struct TableReader<'a> {
+    table: &'a DeTable<'a>,
+    span: Range<usize>,
+}
+
+impl<'a> TableReader<'a> {
+    /// Creates a reader of the table `value`, whose keys must be among `fields`.
+    pub fn new(value: &'a Spanned<DeValue<'a>>, fields: &[Field]) -> Result<Self, TomlError> {
+        let table = value.get_ref().as_table().ok_or_else(|| wrong(value, "a table"))?;
+        for key in table.keys() {
+            if !fields.iter().any(|field| field.name == key.get_ref().as_ref()) {
+                let names: Vec<_> = fields.iter().map(|field| field.name).collect();
+                return Err(unknown(key.span(), "field", key.get_ref(), &names));
+            }
+        }
+        Ok(Self { table, span: value.span() })
+    }
+
+    /// Returns the value of the key `name`; `None` if the table does not have this key.
+    pub fn optional<T: TomlValue>(&self, name: &str) -> Result<Option<T>, TomlError> {
+        self.table.get(name).map(T::from_toml).transpose()
+    }
+
+    /// Returns the value of the key `name`.
+    pub fn required<T: TomlValue>(&self, name: &str) -> Result<T, TomlError> {
+        match self.table.get(name) {
+            Some(value) => T::from_toml(value),
+            None => Err(self.missing(name)),
+        }
+    }
+
+    fn missing(&self, name: &str) -> TomlError {
+        TomlError::new(self.span.clone(), format!("missing field `{name}`"))
+    }
+
+    /// Replaces `value` by the value of the key `name`, if the table has this key.
+    pub fn replace<T: TomlValue>(&self, name: &str, value: &mut T) -> Result<(), TomlError> {
+        if let Some(given) = self.table.get(name) {
+            *value = T::from_toml(given)?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns the table of `entries`, each a key with its value. Entries without a value are left out.
+pub(crate) fn written(entries: &[(&str, Option<&dyn TomlValue>)]) -> Value {
+    let entry = |(name, value): &(&str, Option<&dyn TomlValue>)| {
+        value.map(|value| (name.to_string(), value.to_toml()))
+    };
+    Value::Table(entries.iter().filter_map(entry).collect())
+}
+
+/// Returns the only entry of the table `value` as the index of its key in `names` and its value.
+pub(crate) fn only_entry<'a>(
+    value: &'a Spanned<DeValue<'a>>,
+    names: &[&str],
+) -> Result<(usize, &'a Spanned<DeValue<'a>>), TomlError> {
+    let table = value.get_ref().as_table().ok_or_else(|| wrong(value, "a table"))?;
+    let mut entries = table.iter();
+    let error = |number| format!("wanted exactly 1 element, {number}");
+    let Some((key, inner)) = entries.next() else {
+        return Err(TomlError::new(value.span(), error("found 0 elements")));
+    };
+    if entries.next().is_some() {
+        return Err(TomlError::new(value.span(), error("more than 1 element")));
+    }
+    match names.iter().position(|name| name == key.get_ref()) {
+        Some(index) => Ok((index, inner)),
+        None => Err(unknown(key.span(), "variant", key.get_ref(), names)),
+    }
+}
+
+/// Returns the index in `choices` of the word `value`.
+pub(crate) fn choice(value: &Spanned<DeValue>, choices: &[Choice]) -> Result<usize, TomlError> {
+    let word = value.get_ref().as_str().ok_or_else(|| wrong(value, "a string"))?;
+    choices.iter().position(|choice| choice.name == word).ok_or_else(|| {
+        let names: Vec<_> = choices.iter().map(|choice| choice.name).collect();
+        unknown(value.span(), "variant", word, &names)
+    })
+}
+
+/// Implements [`TomlValue`] for an enum whose variants have one value each. In scene files it is a
+/// table with one key, the name of the variant.
+macro_rules! one_of {
+    ($name:ident { $($key:literal => $variant:ident),+ $(,)? }) => {
+        impl $crate::value::TomlValue for $name {
+            fn from_toml(
+                value: &::toml::Spanned<::toml::de::DeValue>,
+            ) -> Result<Self, $crate::value::TomlError> {
+                type Read<T> = fn(
+                    &::toml::Spanned<::toml::de::DeValue>,
+                ) -> Result<T, $crate::value::TomlError>;
+                const READ: &[Read<$name>] = &[
+                    $(|value| $crate::value::TomlValue::from_toml(value).map($name::$variant),)+
+                ];
+                let (index, value) = $crate::value::only_entry(value, &[$($key),+])?;
+                READ[index](value)
+            }
+
+            fn to_toml(&self) -> ::toml::Value {
+                let (key, value): (&str, &dyn $crate::value::TomlValue) = match self {
+                    $(Self::$variant(value) => ($key, value),)+
+                };
+                $crate::value::written(&[(key, Some(value))])
+            }
+        }
+    };
+}
+pub(crate) use one_of;
+
+fn float(value: &Spanned<DeValue>) -> Result<f64, TomlError> {
+    match value.get_ref() {
+        DeValue::Float(digits) => {
+            let digits = digits.as_str();
+            let number = digits.parse().ok();
+            // A number too large for the type is parsed as infinite.
+            number
+                .filter(|x: &f64| !x.is_infinite() || digits.contains("inf"))
+                .ok_or_else(|| TomlError::new(value.span(), "floating-point number overflowed"))
+        }
+        DeValue::Integer(_) => integer(value).map(|number| number as f64),
+        _ => Err(wrong(value, "a number")),
+    }
+}
+
+fn integer(value: &Spanned<DeValue>) -> Result<i64, TomlError> {
+    let digits = value.get_ref().as_integer().ok_or_else(|| wrong(value, "an integer"))?;
+    let number = i64::from_str_radix(digits.as_str(), digits.radix());
+    number.map_err(|_| TomlError::new(value.span(), "integer number overflowed"))
+}
+
+/// Returns the entries of the list `value`.
+fn entries<'a>(value: &'a Spanned<DeValue<'a>>) -> Result<&'a [Spanned<DeValue<'a>>], TomlError> {
+    value.get_ref().as_array().map(|list| &list[..]).ok_or_else(|| wrong(value, "a list"))
+}
+
+/// Returns the entries of the list `value`, which must have `length` of them.
+fn exactly<'a>(
+    value: &'a Spanned<DeValue<'a>>,
+    length: usize,
+) -> Result<&'a [Spanned<DeValue<'a>>], TomlError> {
+    let list = entries(value)?;
+    let error = || {
+        let message =
+            format!("invalid length {}, expected an array of length {length}", list.len());
+        TomlError::new(value.span(), message)
+    };
+    if list.len() == length { Ok(list) } else { Err(error()) }
+}
+
+impl TomlValue for f64 {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        float(value)
+    }
+
+    fn to_toml(&self) -> Value {
+        // A NaN has no sign in files.
+        Value::Float(if self.is_nan() { self.copysign(1.0) } else { *self })
+    }
+}
+
+impl TomlValue for u32 {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        let number = integer(value)?;
+        let message = || format!("invalid value: integer `{number}`, expected u32");
+        Self::try_from(number).map_err(|_| TomlError::new(value.span(), message()))
+    }
+
+    fn to_toml(&self) -> Value {
+        Value::Integer(i64::from(*self))
+    }
+}
+
+impl TomlValue for bool {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        value.get_ref().as_bool().ok_or_else(|| wrong(value, "a boolean"))
+    }
+
+    fn to_toml(&self) -> Value {
+        Value::Boolean(*self)
+    }
+}
+
+impl TomlValue for String {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        value.get_ref().as_str().map(str::to_string).ok_or_else(|| wrong(value, "a string"))
+    }
+
+    fn to_toml(&self) -> Value {
+        Value::String(self.clone())
+    }
+}
+
+impl<T: TomlValue + Copy + Default, const N: usize> TomlValue for [T; N] {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        let mut array = [T::default(); N];
+        for (place, entry) in array.iter_mut().zip(exactly(value, N)?) {
+            *place = T::from_toml(entry)?;
+        }
+        Ok(array)
+    }
+
+    fn to_toml(&self) -> Value {
+        Value::Array(self.iter().map(T::to_toml).collect())
+    }
+}
+
+impl<T: TomlValue> TomlValue for Vec<T> {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        entries(value)?.iter().map(T::from_toml).collect()
+    }
+
+    fn to_toml(&self) -> Value {
+        Value::Array(self.iter().map(T::to_toml).collect())
+    }
+}
+
+impl<T: TomlValue> TomlValue for BTreeMap<String, T> {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        let table = value.get_ref().as_table().ok_or_else(|| wrong(value, "a table"))?;
+        let entry = |(name, value): (&Spanned<toml::de::DeString>, &Spanned<DeValue>)| {
+            Ok((name.get_ref().to_string(), T::from_toml(value)?))
+        };
+        table.iter().map(entry).collect()
+    }
+
+    fn to_toml(&self) -> Value {
+        Value::Table(self.iter().map(|(name, value)| (name.clone(), value.to_toml())).collect())
+    }
+}
+
+/// Value of a key that may be left out. `None` is an empty table; callers leave out the key.
+impl<T: TomlValue> TomlValue for Option<T> {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        T::from_toml(value).map(Some)
+    }
+
+    fn to_toml(&self) -> Value {
+        self.as_ref().map_or(Value::Table(Table::new()), T::to_toml)
+    }
+}
+
+/// In scene files `[r, g, b]` or `"#rrggbb"`; written as numbers.
+impl TomlValue for Color {
+    fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
+        match value.get_ref() {
+            DeValue::String(text) => {
+                Self::from_hex(text).ok_or_else(|| wrong(value, "a string \"#rrggbb\""))
+            }
+            _ => TomlValue::from_toml(value).map(Self),
+        }
+    }
+
+    fn to_toml(&self) -> Value {
+        self.0.to_toml()
+    }
+}
