@@ -157,11 +157,11 @@ fn assert_honest(outcomes: &[Outcome]) {
     assert!(mean.abs() < 1.0, "the mean of {count} scores is {mean}");
 }
 
-/// Checks 13 scenes of four kinds that are cheap to render.
+/// Checks 13 scenes of the eight kinds that are cheap to render.
 #[test]
 fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
-    let cheap = (0..40).filter(|number| number % 10 <= 5 || *number == 8 || *number == 9);
-    let outcomes: Vec<Outcome> = cheap.step_by(2).map(|number| examine(number, 1024, 1)).collect();
+    let cheap = [8, 9, 10, 11, 21, 22, 32, 33, 3, 14, 24, 25, 35];
+    let outcomes = cheap.map(|number| examine(number, 1024, 1));
     assert_honest(&outcomes);
 }
 
