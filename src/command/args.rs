@@ -96,9 +96,9 @@ pub struct PictureArgs {
 pub enum Command {
     /// Render a scene to a picture file
     Render(Box<RenderArgs>),
-    /// Divide a render among shards, which other processes or machines trace
+    /// Divide a render into shards: parts that other processes or machines trace
     Plan(Box<PlanArgs>),
-    /// Add the parts that the shards of a plan have traced
+    /// Merge the film files of the shards of a plan into one picture
     Merge(MergeArgs),
     /// Show renders of other processes or machines while they run, from their film files
     Watch(WatchArgs),
@@ -156,7 +156,7 @@ pub struct RenderArgs {
     /// Trace the samples of a plan, which `zerkalo plan` has written
     #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "exposure", "tone", "spp", "noise", "rmse", "time", "seed", "precision", "sampler", "uniform", "stats"])]
     pub plan: Option<PathBuf>,
-    /// Trace only this shard of the plan, into a .zk file; 0 is the base
+    /// Trace only this shard of the plan, into a .zk file; 0 is the base, the pilot's samples
     #[arg(long, value_name = "K", requires = "plan", allow_negative_numbers = true)]
     pub shard: Option<u32>,
     /// Stay below this much memory, such as 4GB: lights share a light group, then the picture is
@@ -185,9 +185,9 @@ pub struct RenderArgs {
 #[derive(Clone, Debug, Args)]
 #[command(
     after_help = "The pilot, an adaptive render to a coarser noise, decides how many samples each \
-                        tile gets. Its samples are part of the picture: the base, shard 0. Trace \
-                        shard K of 1..N by\n  zerkalo render SCENE --plan FILE --shard K -o \
-                        part-K.zk\nand add base and parts by `zerkalo merge`."
+                        tile gets. Its samples are part of the picture: they are the base, shard \
+                        0. Trace each of the shards K = 1..N by\n  zerkalo render SCENE --plan FILE \
+                        --shard K -o part-K.zk\nand merge base and parts by `zerkalo merge`."
 )]
 pub struct PlanArgs {
     /// The scene file
@@ -202,7 +202,7 @@ pub struct PlanArgs {
     /// Number of shards
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SHARDS)), allow_negative_numbers = true)]
     pub shards: u32,
-    /// Noise at which the pilot ends, in 8-bit levels [default: twice the target]
+    /// Noise at which the pilot render ends, in 8-bit levels [default: twice the target]
     #[arg(long, value_name = "LEVELS", value_parser = positive, conflicts_with = "from", allow_negative_numbers = true)]
     pub pilot: Option<f64>,
     /// File for the samples of the pilot [default: the plan's name with -0.zk]

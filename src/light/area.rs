@@ -23,7 +23,7 @@ description! {
         center: [f64; 3], in COORDINATE "scene units";
         /// Width and height of the rectangle; the height is along `up`.
         size: [f64; 2], in SIZE "scene units";
-        /// Direction in which the side that shines faces.
+        /// Direction that the emitting side faces.
         normal: [f64; 3], as Direction;
         /// Direction of the height, made perpendicular to `normal`. If the two are parallel, the
         /// height is along z.
@@ -38,7 +38,7 @@ description! {
         center: [f64; 3], in COORDINATE "scene units";
         /// Radius of the disk.
         radius: f64, in SIZE "scene units";
-        /// Direction in which the side that shines faces.
+        /// Direction that the emitting side faces.
         normal: [f64; 3], as Direction;
     }
 }

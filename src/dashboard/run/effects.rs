@@ -303,8 +303,8 @@ impl Effects for EffectRunner {
 }
 
 /// Executes an effect that concerns the terminal: view an image file, copy a path, suspend, or
-/// quit. Other effects are ignored. `frames` is the output to the terminal. A prepared image is
-/// sent to `results`.
+/// quit. Other effects are ignored. `frames` is the output to the terminal. An image file is
+/// decoded and scaled for the terminal, then sent to `results`.
 pub fn run_on_terminal(
     effect: Effect,
     frames: &mut FramePipeline,

@@ -122,8 +122,8 @@ impl Report {
         out
     }
 
-    /// Returns the mean number of samples (over all pixels) per second of tracing, since the start
-    /// of the render.
+    /// Returns the number of samples of all pixels together per second of tracing: the mean since
+    /// the start of the render.
     pub fn samples_per_second(&self) -> f64 {
         if self.seconds > 0.0 { self.samples as f64 / self.seconds } else { 0.0 }
     }
