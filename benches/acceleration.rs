@@ -119,9 +119,9 @@ fn crowd(count: usize, shapes: &[&str]) -> Scene {
 
 const BALL: &str = "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }";
 
-/// Returns the scene of the reflecting tracks with `4 n n` small balls instead of 400: `4 n` rows
-/// of `n`. The rows follow the same curves as in the original scene. The radius of the balls is
-/// proportional to `1 / n`, so that the balls cover about the same fraction of the picture for
+/// Returns the scene of the reflecting tracks with `4 n^2` small balls instead of 400: `4 n` rows
+/// of `n` balls. The rows follow the same curves as in the original scene. The radius of the balls
+/// is proportional to `1 / n`, so that the balls cover about the same fraction of the picture for
 /// every `n`.
 fn tracks(scene: &Scene, n: usize) -> Scene {
     let mut scene = scene.clone();

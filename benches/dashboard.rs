@@ -19,15 +19,15 @@ const SIZE: [u16; 2] = [160, 45];
 /// Escape sequences of arrow keys whose camera moves cancel each other.
 const ARROWS: [&str; 4] = ["\x1b[C", "\x1b[A", "\x1b[D", "\x1b[B"];
 
-/// Line of the file that `--trace` writes for a key: the kind of response and the latency.
-/// `picture` is `true` if the response is a new picture.
+/// Latency of one key press, read from a line of the file that `--trace` writes. `picture` is
+/// `true` if the response is a new picture.
 struct Event {
     picture: bool,
     milliseconds: f64,
 }
 
 fn main() {
-    // `cargo test --benches` runs it without measurement.
+    // `cargo test --benches` runs this program without `--bench`. It measures nothing then.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }
@@ -104,7 +104,8 @@ fn idle_percent(folder: &Path) -> f64 {
     std::thread::sleep(Duration::from_secs(seconds));
     let ticks = processor_ticks(terminal.process_id()) - before;
     end(terminal);
-    // A clock tick is 1/100 s on Linux; ticks per second are therefore percent of a processor.
+    // A clock tick is 1/100 s on Linux. The number of ticks per second is therefore the load of one
+    // processor in percent.
     ticks as f64 / seconds as f64
 }
 
@@ -116,7 +117,7 @@ fn processor_ticks(id: u32) -> u64 {
     after_name.split_whitespace().skip(11).take(2).map(|n| n.parse::<u64>().unwrap()).sum()
 }
 
-/// Ends the program by SIGTERM. It then does not ask about unsaved edits.
+/// Ends the program by SIGTERM. After this signal, the program does not ask about unsaved edits.
 fn end(terminal: Terminal) {
     let id = terminal.process_id().to_string();
     assert!(Command::new("kill").args(["-TERM", &id]).status().unwrap().success());

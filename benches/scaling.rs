@@ -56,7 +56,7 @@ struct Setup {
     slow: f64,
     /// Mean time between failures of a machine, in hours.
     mtbf_hours: f64,
-    /// Seconds from the failure of a machine until its shard runs again.
+    /// Seconds from the failure of a machine until the engine starts its shard again.
     requeue_seconds: f64,
     /// Longest interval between two checkpoints of a shard, in seconds.
     checkpoint_seconds: f64,
@@ -142,7 +142,8 @@ impl Setup {
                 slow * (self.spread * random.normal()).exp()
             })
             .collect();
-        // Times at which machines are free, the earliest one on top.
+        // Heap of the machines by the time at which they become free. The earliest one is at the
+        // top.
         let mut free: BinaryHeap<Free> =
             (0..machines).map(|machine| Free { at: 0.0, machine }).collect();
         let mut end: f64 = 0.0;
@@ -217,8 +218,8 @@ impl Setup {
     }
 }
 
-/// Machine and the time from which it is free. The order is reversed, so that the top of a max-heap
-/// is the machine that is free first.
+/// Machine, with the time at which it becomes free. The comparison is reversed, so that a max-heap
+/// has the machine that becomes free first at its top.
 #[derive(PartialEq)]
 struct Free {
     at: f64,

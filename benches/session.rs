@@ -1,6 +1,7 @@
 //! Latency of a session, which renders on a background thread. It is measured for requests of
-//! pictures, for edits and for other tasks, with a film of the given size. Prints median, 99th
-//! percentile and maximum in milliseconds. The default sizes are 640x480 and 3840x2160 pixels.
+//! pictures, for edits of the scene, and for other tasks that run on this thread. The argument is
+//! the size of the film in pixels. Prints median, 99th percentile and maximum in milliseconds. The
+//! default sizes are 640x480 and 3840x2160 pixels.
 //!
 //! cargo bench -p zerkalo-benches --bench session -- 3840x2160
 

@@ -201,7 +201,8 @@ fn measure(
     let mut terminal = Terminal::start(&start);
     terminal.wait_for_text("spp");
     terminal.set_replying(row.replies == Replies::Always);
-    // A noise target that cannot be reached in this time keeps the picture converging.
+    // This noise target is too low to be reached during the measurement. The picture therefore
+    // keeps converging while the keys are pressed.
     terminal.send("T");
     terminal.wait_for_text("top at");
     terminal.send("\x15noise 0.01\r");
@@ -210,7 +211,8 @@ fn measure(
     seconds.sort_by(f64::total_cmp);
     let quantile = |share: f64| seconds[((share * keys as f64).ceil() as usize).max(1) - 1];
     let mut rates = vec![status(&terminal)];
-    // The next rate is reported for a converged picture, of which little is sent.
+    // Measures the rate a second time, after the picture has converged. The program then sends few
+    // bytes.
     terminal.send("T");
     terminal.wait_for_text("top at");
     terminal.send("\x15noise 2\r");
@@ -218,8 +220,8 @@ fn measure(
     rates.push(status(&terminal));
     terminal.send("q");
     std::thread::sleep(Duration::from_secs(3));
-    // The arrow keys have moved the camera, which is an unsaved edit. `d` answers the question
-    // about it: discard.
+    // The arrow keys have moved the camera, which is an unsaved edit. The program asks whether to
+    // save it; the key `d` discards it.
     if terminal.screen(|screen| screen.contents().contains("unsaved edits")) {
         terminal.send("d");
         std::thread::sleep(Duration::from_secs(3));

@@ -11,9 +11,9 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Size in bytes of the receive buffer of the relay's socket to the server. It is small, because
-/// the kernel acknowledges all bytes that reach the buffer, even if the relay has not read them
-/// yet.
+/// Size in bytes of the receive buffer of the relay's socket to the server. The kernel acknowledges
+/// all bytes that reach the buffer, even if the relay has not read them yet. A large buffer would
+/// therefore accept bytes faster than the simulated connection.
 const RECEIVE_BUFFER: usize = 4 << 10;
 /// Largest number of bytes that the relay forwards at once.
 const PIECE: usize = 700;

@@ -51,7 +51,7 @@ impl Server {
         );
         let file = folder.join("sshd_config");
         fs::write(&file, settings).map_err(|error| error.to_string())?;
-        // Folder for privilege separation, which the system creates only at boot.
+        // `sshd` needs this folder for privilege separation. The system creates it only at boot.
         let _ = fs::create_dir_all("/run/sshd");
         let log = fs::File::create(folder.join("sshd.log")).map_err(|error| error.to_string())?;
         let mut command = Command::new(daemon);

@@ -36,7 +36,8 @@ pub struct Image {
     texels: Texels,
 }
 
-/// Returns a table that converts sRGB levels, 0 (black) to `last` (white), to linear light, 0..=1.
+/// Returns a table of linear light from 0 to 1, indexed by sRGB level from 0 (black) to `last`
+/// (white).
 fn linear_table(last: u16) -> Vec<f32> {
     let linear = |level| linear_from_srgb(f64::from(level) / f64::from(last)) as f32;
     (0..=last).map(linear).collect()

@@ -4,9 +4,9 @@
 //! length of the file. Indices must be below the number of vertices, and coordinates must be
 //! finite. Every error is reported as an [`AssetError`] with the file and the location in the file.
 //!
-//! A file may name other files: an OBJ its MTL files, a glTF its buffers. These files must be in
-//! the folder of the first file or below, named by relative paths without `..`. Other files and
-//! URLs are never read.
+//! A file may name other files: an OBJ its MTL files, a glTF its buffers. The named files must be
+//! in the folder of the file that names them or below it. Their names must be relative paths
+//! without `..`. Other files and URLs are never read.
 
 mod cache;
 mod error;

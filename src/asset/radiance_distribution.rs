@@ -31,12 +31,13 @@ impl RadianceDistribution {
     pub fn new([columns, rows]: [usize; 2], pixels: &[[f32; 3]]) -> Self {
         let cosine = |row: usize| (PI * row as f64 / rows as f64).cos();
         let cosines: Vec<f64> = (0..=rows).map(cosine).collect();
-        // Luminance by the primaries of sRGB.
+        // Luminance of a linear colour with the primaries of sRGB.
         let luminance = |p: &[f32; 3]| {
             0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])
         };
-        // Mean over a pixel, along one axis, of the linear interpolation between the pixel centres.
-        // The arguments are the values of the previous, this and the next pixel.
+        // Mean, over the width of a pixel, of the function that interpolates linearly between the
+        // pixel centres. The arguments are the values of the previous pixel, this pixel and the
+        // next pixel on one axis.
         let smoothed =
             |before: f64, middle: f64, after: f64| 0.125 * before + 0.75 * middle + 0.125 * after;
         let along_row = |row: usize| -> Vec<f64> {
@@ -149,8 +150,8 @@ fn cumulative(weights: &[f64], total: f64) -> impl Iterator<Item = f64> {
     std::iter::once(0.0).chain(weights.iter().enumerate().map(partial))
 }
 
-/// Returns the index `i` of the interval between `numbers[i]` and `numbers[i + 1]`, where
-/// `numbers[i]` is the last number for which `is_below` returns `true`. `numbers` must ascend.
+/// Returns the index `i` of the last number for which `is_below` returns `true`. This is the index
+/// of the interval from `numbers[i]` to `numbers[i + 1]`. `numbers` must ascend.
 fn interval<T>(numbers: &[T], is_below: impl Fn(&T) -> bool) -> usize {
     numbers.partition_point(is_below).clamp(1, numbers.len() - 1) - 1
 }

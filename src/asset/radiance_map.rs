@@ -1,8 +1,8 @@
 //! Images of radiance for environment lights: Radiance HDR, OpenEXR, PNG and JPEG.
 //!
-//! The images are equirectangular. All pixels of a row have the same polar angle, from +y at the
-//! top to -y at the bottom. The middle of the image is in the direction -z, and +x is a quarter of
-//! the image to its right.
+//! The images are equirectangular. All pixels of a row have the same polar angle. The upper edge is
+//! the direction +y, the lower edge -y. The middle of the image is the direction -z. The direction
+//! +x is to the right of the middle, at a quarter of the image's width.
 
 use crate::asset::error::{AssetError, FileLocation};
 use crate::asset::file::FileContents;
@@ -105,12 +105,12 @@ impl RadianceMap {
         self.mean
     }
 
-    /// Returns the largest number of all pixels and channels (R, G, B) of the image.
+    /// Returns the largest value of a channel (R, G or B) over all pixels of the image.
     pub fn max(&self) -> f64 {
         self.pixels.iter().flatten().copied().fold(0.0, f32::max).into()
     }
 
-    /// Returns the smallest number above 0 of all pixels and channels (R, G, B) of the image.
+    /// Returns the smallest positive value of a channel (R, G or B) over all pixels of the image.
     /// Returns `None` if the image is black.
     pub fn min(&self) -> Option<f64> {
         let channels = self.pixels.iter().flatten().copied().filter(|x| *x > 0.0);
@@ -125,8 +125,9 @@ impl RadianceMap {
         let (x, y) = (x * columns as f64 - 0.5, y * rows as f64 - 0.5);
         let (column, row) = (x.floor(), y.floor());
         let (s, t) = (x - column, y - row);
-        // The left and the right edge of the image are adjacent. Between the centres of an
-        // outermost row and the pole, the values of this row are used.
+        // The left and the right edge of the image are adjacent. At the top and at the bottom, no
+        // row follows on the outermost row. Beyond the centres of its pixels, its values are used
+        // without interpolation between rows.
         let left = if column < 0.0 { columns - 1 } else { (column as usize).min(columns - 1) };
         let right = if left + 1 < columns { left + 1 } else { 0 };
         let (above, below) = (row.max(0.0) as usize, (row + 1.0) as usize);
@@ -251,8 +252,8 @@ mod tests {
         let map = RadianceMap::parse(&source(exr)).unwrap();
         assert_eq!(map.size, [9, 5]);
         assert_eq!(map.pixels[2 * 9 + 4], [128.0, 0.5, 2.0]);
-        // The channels of a pixel in a Radiance file share an exponent, so that only similar values
-        // are stored exactly.
+        // The channels of a pixel in a Radiance file share an exponent. Only channels of similar
+        // magnitude are therefore stored exactly.
         let simple = Rgb32FImage::from_fn(9, 5, |x, _| Rgb([f32::exp2(x as f32); 3]));
         let map = RadianceMap::parse(&source(hdr(&simple))).unwrap();
         assert_eq!(map.pixels[9 + 8], [256.0; 3]);
@@ -293,8 +294,9 @@ mod tests {
         assert!((red([-s * c, c, -s * s]) - 1.0).abs() < 1e-12);
         assert!((red([s * c, c, -s * s]) - 2.0).abs() < 1e-12);
         assert!((red([s * c, c, s * s]) - 3.0).abs() < 1e-12);
-        // Directions on boundaries of pixels: straight ahead, between four pixels; behind, between
-        // the left and the right edge of the image; to the right; and at the poles.
+        // Directions on boundaries of pixels. The first one, straight ahead, is between four
+        // pixels. The second one, backwards, is at the left and the right edge of the image. The
+        // next ones point to the right and to the poles.
         assert!((red([0.0, 0.0, -1.0]) - 3.5).abs() < 1e-12);
         assert!((red([0.0, 0.0, 1.0]) - 3.5).abs() < 1e-12);
         assert!((red([1.0, 0.0, 0.0]) - 4.5).abs() < 1e-12);

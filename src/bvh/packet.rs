@@ -22,8 +22,9 @@ pub struct SlabPacket<L> {
 }
 
 impl<L: SimdFloat> SlabPacket<L> {
-    /// Prepares the packet `ray` for slab tests. The tests enlarge boxes by `pad` on both sides of
-    /// each axis, which covers the rounding errors of the primitives' own intersection tests.
+    /// Prepares the packet `ray` for slab tests. The tests enlarge boxes by `pad` in both
+    /// directions of each axis, to cover the rounding errors of the primitives' own intersection
+    /// tests.
     #[inline(always)]
     pub fn new(ray: &Ray<L>, pad: Vec3<L>) -> Self {
         let safe = |d: L| L::one() / d.abs().max(L::from_f64(1e-30)).copysign(d);
@@ -106,12 +107,11 @@ impl<S: Float> PacketBounds<S> {
 
     /// Tests one child box of a node per lane. Returns two values for each box: the smallest
     /// distance at which a ray may enter it, and `true` if a ray may enter it within the distance
-    /// `limit`. `side(k)` returns numbers of row k of [`Bvh8Node::bounds`]: one side of each tested
-    /// box. `ONE` is `true` if the bounds contain a single ray.
+    /// `limit`. `side(k)` returns, for each tested box, its side in row k of [`Bvh8Node::bounds`].
+    /// `ONE` is `true` if the bounds contain a single ray.
     ///
-    /// If [`SlabPacket::enters`] returns `true` for a box and a ray within the bounds, this
-    /// function accepts the box, too: differences and products remain monotonic when they are
-    /// rounded.
+    /// If [`SlabPacket::enters`] accepts a box for a ray within the bounds, this function accepts
+    /// the box, too, because rounded differences and products are monotonic in their operands.
     #[inline(always)]
     pub fn enters<const ONE: bool, L: SimdFloat<Scalar = S>>(
         &self,

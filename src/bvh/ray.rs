@@ -18,9 +18,10 @@ impl<L: SimdFloat> Ray<L> {
         self.direction.mul_add(t, self.origin)
     }
 
-    /// Returns `true` if the rays in the bit mask `lanes`, at least one, are coherent. Coherent
-    /// rays differ from the first of them by at most `max_turn` (length of the difference of the
-    /// unit directions) and by at most `max_shift` in each coordinate of the origin.
+    /// Returns `true` if the rays in the bit mask `lanes`, at least one, are coherent. Each ray is
+    /// compared with the first one in `lanes`. The difference of their unit directions may have a
+    /// length of at most `max_turn`. Each coordinate of their origins may differ by at most
+    /// `max_shift`.
     #[inline(always)]
     pub fn is_coherent(&self, lanes: u32, max_turn: f64, max_shift: f64) -> bool {
         let lane = lanes.trailing_zeros() as usize;

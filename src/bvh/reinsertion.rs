@@ -28,15 +28,16 @@ struct Reinsertion {
 struct Search {
     /// Number of node visits left, over all searches, before the optimisation ends.
     visits_left: usize,
-    /// Nodes to visit, the last one first. Each node has half of the surface area that is saved so
-    /// far: the decrease by the removal of the subtree, less the growth of the nodes above this
-    /// node by its insertion.
+    /// Nodes to visit, the last one first: candidates for the sibling of the moved subtree. The
+    /// number with each node is half of the surface area saved so far. This is the area that the
+    /// removal of the subtree saves, minus the area by which its insertion enlarges the candidate's
+    /// ancestors.
     stack: Vec<(f32, u32)>,
 }
 
 /// Optimises a binary BVH by moving subtrees in 16 rounds. The first round considers the share
-/// `ratio` (0 to 1) of the nodes, those with the largest areas. Round n considers 1/(2n - 1) of
-/// this share.
+/// `ratio` (0 to 1) of all nodes: large ones near the root. Round n considers 1/(2n - 1) times as
+/// many nodes as the first.
 pub fn optimize(tree: &mut Bvh2, ratio: f32) {
     if ratio <= 0.0 || tree.nodes[0].is_leaf() {
         return;
@@ -71,7 +72,7 @@ pub fn optimize(tree: &mut Bvh2, ratio: f32) {
 }
 
 /// Returns the indices of the `count` nodes with the largest surface areas among nodes 1 to `2 *
-/// count + 1`. Node 0 is the root, and the next nodes are those near the root.
+/// count + 1`. Node 0 is the root; the nodes near it have the next indices.
 fn largest_nodes(tree: &Bvh2, count: usize) -> Vec<usize> {
     let end = tree.nodes.len().min(2 * (count + 1));
     let area = |node: usize| tree.nodes[node].aabb().half_area();

@@ -3,8 +3,8 @@
 //!
 //! A ray is tested against the eight boxes of a node at once and continues with the nearest child.
 //! The other children wait in a stack frame, unsorted. When the ray returns to the frame, the
-//! nearest of them is selected without branches. Mispredicted branches are the main cost of
-//! incoherent rays, besides memory latency.
+//! nearest of these children is selected without branches. Besides memory latency, mispredicted
+//! branches are the main cost of incoherent rays.
 
 use crate::bvh::packet::{PacketBounds, SlabPacket, load_wide, valid_lanes};
 use crate::bvh::{BVH_WIDTH, Bvh8, Bvh8Node, LEAF_FLAG};
@@ -148,8 +148,9 @@ impl<S: Float> RayTraversal<S> {
             let (near, enters) = self.bounds.enters::<true, L>(side, L::splat(self.limit));
             let first = part * L::WIDTH;
             entered |= (enters.bits() & valid_lanes()) << first;
-            // The distance is reduced by more than the rounding error of single precision. The key
-            // therefore never exceeds the true distance, and no child within the limit is skipped.
+            // The distance is reduced by more than the rounding error of the conversion to single
+            // precision. The sort key therefore never exceeds the true distance, and no child
+            // within the limit is skipped.
             let near =
                 L::select(enters, near * L::from_f64(1.0 - 2e-7), L::from_f64(f64::INFINITY));
             for (i, key) in keys[first..].iter_mut().enumerate().take(L::WIDTH) {

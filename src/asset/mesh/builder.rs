@@ -16,7 +16,8 @@ const MAX_COORDINATE: f64 = 1e9;
 const MIN_EXTENT: f64 = 1e-9;
 
 /// Ratio of a mesh's largest absolute coordinate to its extent above which the positions are stored
-/// relative to the centre of the mesh. Below it, they are stored relative to the origin.
+/// relative to the centre of the mesh. Below it, they are stored relative to the origin. At this
+/// ratio, single precision resolves the mesh with four bits less than a mesh at the origin.
 const MAX_OFFSET: f64 = 16.0;
 
 /// Mesh under construction, to which the parser of a file format adds vertices and triangles.
@@ -37,7 +38,7 @@ pub struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    /// Creates an empty mesh that is read from `source`.
+    /// Creates a builder without vertices. `source` is the mesh file, which error messages name.
     pub fn new(source: &'a FileContents) -> Self {
         Self {
             source,
@@ -165,7 +166,8 @@ impl<'a> Builder<'a> {
         self.check_limits(0, 1)?;
         self.triangles.push(corners);
         if self.colors.len() > 1 {
-            // The triangles before the first change of colour have colour 0.
+            // The triangles before the first call of [`Builder::color`] have the colour with index
+            // 0.
             self.color_of.resize(self.triangles.len() - 1, 0);
             self.color_of.push(self.color);
         }
@@ -275,7 +277,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Removes triangles whose area is 0 from the mesh, and adds a note with the number of removed
-    /// ones.
+    /// triangles.
     ///
     /// # Errors
     /// Fails if no triangle is left.

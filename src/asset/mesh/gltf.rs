@@ -53,7 +53,8 @@ pub fn parse(source: &FileContents) -> Result<TriangleMesh, AssetError> {
 /// Parses and validates the JSON document of the file. Returns two values: the document, and the
 /// binary chunk of a GLB file (`None` if there is none).
 fn description(source: &FileContents) -> Result<(Document, Option<Vec<u8>>), AssetError> {
-    // The library subtracts the size of the header from this length without a check for underflow.
+    // Bytes 8 to 11 of a GLB file are its length. The library subtracts the size of the header from
+    // this length without a check for underflow.
     let length = source.bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     if source.bytes.starts_with(b"glTF") && length.is_none_or(|length| length < 12) {
         return Err(source.error(
@@ -195,8 +196,8 @@ impl<'a> Part<'a> {
             let found = "a base colour is not a colour";
             return Err(self.source.error(FileLocation::Whole, found, "numbers of at least 0"));
         }
-        // A white colour is not stored unless another colour was, because triangles without a
-        // colour are white.
+        // Triangles without a stored colour are white. White therefore needs to be stored only if
+        // the mesh has a stored colour already.
         if color != [1.0; 3] || builder.has_colors() {
             builder.color(color)?;
         }
@@ -221,7 +222,8 @@ impl<'a> Part<'a> {
                 builder.normal(n.normalize_or_zero().as_vec3().to_array());
             }
             if let Some([u, v]) = uvs.as_mut().and_then(Iterator::next) {
-                // In glTF v points downwards; in [`TriangleMesh::uvs`] it points upwards.
+                // The texture coordinate v points downwards in glTF, and upwards in
+                // [`TriangleMesh::uvs`].
                 builder.uv([u, 1.0 - v]);
             }
         }

@@ -142,8 +142,8 @@ fn check_faces(source: &FileContents) -> Result<[usize; 3], AssetError> {
             corners += 1;
             for (list, index) in word.split(|b| *b == b'/').take(3).enumerate() {
                 let index = std::str::from_utf8(index).ok().and_then(|i| i.parse::<i128>().ok());
-                // The library reports words that are not numbers, and ignores indices into empty
-                // lists.
+                // Two cases need no check here. The library itself reports a word that is not a
+                // number. It ignores an index into an empty list of texture coordinates or normals.
                 let Some(index) = index.filter(|_| list == 0 || totals[list] > 0) else { continue };
                 let (from, to) = (-(so_far[list] as i128), totals[list] as i128);
                 if index == 0 || index < from || index > to {
@@ -251,10 +251,12 @@ impl<'a> Libraries<'a> {
         Self { source, found: RefCell::default() }
     }
 
-    /// Returns the materials of the MTL file `name`. Returns no materials in four cases: `name`
-    /// leads out of the folder, which is recorded as an error; the file cannot be read, which is
-    /// recorded as a note; the file was loaded before; or [`MAX_MTL_FILES`] other files were loaded
-    /// before.
+    /// Returns the materials of the MTL file `name`. Returns no materials in four cases:
+    ///
+    /// - `name` leads out of the folder; this is recorded as an error
+    /// - the file cannot be read; this is recorded as a note
+    /// - the file was loaded before
+    /// - [`MAX_MTL_FILES`] other files were loaded before
     fn load(&self, name: &Path) -> MTLLoadResult {
         let nothing = || tobj::load_mtl_buf(&mut &b""[..]);
         let mut found = self.found.borrow_mut();
