@@ -68,8 +68,8 @@ fn scattered<L: SimdFloat>(spread: f64, rays: usize) -> Vec<Ray<L>> {
 }
 
 /// Returns the number of rays, in millions, that are traced per second. `as_packet` selects packet
-/// traversal (`true`) or single-ray traversal (`false`). If it is `None`, the traversal chooses
-/// between the two by the packet's coherence.
+/// traversal (`true`) or single-ray traversal (`false`). If `as_packet` is `None`, the coherence of
+/// each packet decides between the two.
 fn speed<L: SimdFloat>(mesh: &Mesh, rays: &[Ray<L>], as_packet: Option<bool>) -> f64 {
     let limit = L::from_f64(L::MAX);
     let seconds = in_turns(

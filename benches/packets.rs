@@ -1,6 +1,6 @@
 //! Comparison of ray packets with single rays: closest hits per second by kind of primitive, and
-//! samples per second of whole scenes. The same kernels run with packets, and with a SIMD width of
-//! one lane.
+//! samples per second of whole scenes. The same kernels run with packets of several lanes, and with
+//! single rays in packets of one lane.
 //!
 //! `cargo bench -p zerkalo-benches --bench packets`. It runs on one core. The two widths take
 //! turns.

@@ -46,7 +46,7 @@ struct Setup {
     merge_mb_s: f64,
     /// Seconds to write the picture or the merged film.
     picture_seconds: f64,
-    /// Work of the largest shard relative to the mean work of a shard, minus 1.
+    /// Ratio of the largest shard's work to the mean work of a shard, minus 1.
     imbalance: f64,
     /// Number of tasks that the engine starts per second.
     starts_per_second: f64,

@@ -5,8 +5,9 @@
 //! does this instead. The server's own TCP connection then has the simulated round-trip time.
 //! `benches/link.sh` installs the required programs.
 //!
-//! Arguments: a text, and the number of keys. Only table rows whose names contain the text are
-//! measured. `ZERKALO_PROGRAM` is the path of another build of the program, for comparison.
+//! The arguments are a text and the number of keys. The bench measures only the table rows whose
+//! names contain the text. `ZERKALO_PROGRAM` is the path of another build of the program, for
+//! comparison.
 
 #[path = "../../tests/pty/terminal.rs"]
 mod terminal;

@@ -188,7 +188,7 @@ impl Bvh8Build {
 /// in that paper, the leaves are those of the binary BVH.
 struct CollapsePlan {
     /// Best use of the eight child slots of wide nodes. `splits[i][n - 1]` is for the case that the
-    /// subtree of the binary node `i` may take `n` slots, 2 to 8, of a wide node. It has the
+    /// subtree of the binary node `i` may take `n` slots, 2 to 8, of a wide node. The entry has the
     /// numbers of slots for the two children of node `i`, or `[0, 0]` if node `i` itself takes one
     /// slot. `splits[i][0]` is for the case that node `i` becomes a wide node; it divides the eight
     /// slots between the two children.

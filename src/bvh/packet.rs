@@ -160,9 +160,9 @@ pub fn broadcast<L: SimdFloat>(x: f32) -> L {
     L::splat(L::Scalar::from_f64(f64::from(x)))
 }
 
-/// Loads `WIDTH` of the eight numbers that a BVH8 node stores for its children. The first one is at
-/// position `part * WIDTH`. If there are more lanes than numbers, the numbers are repeated from the
-/// start.
+/// Loads `WIDTH` of the eight numbers that a BVH8 node stores for its children. The number at
+/// position `part * WIDTH` is loaded into the first lane. If `WIDTH` is greater than 8, the numbers
+/// are repeated from the start.
 #[inline(always)]
 pub fn load_wide<L: SimdFloat>(numbers: &[f32; BVH_WIDTH], part: usize) -> L {
     L::from_fn(|i| L::Scalar::from_f64(f64::from(numbers[(part * L::WIDTH + i) % BVH_WIDTH])))

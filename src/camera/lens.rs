@@ -10,8 +10,8 @@ use glam::DVec3;
 pub enum Aperture {
     /// Radius of the lens in scene units; 0 is a pinhole.
     Radius(f64),
-    /// F-number: focal length divided by the diameter of the lens. The film size is 36 x 24 mm, and
-    /// a scene unit is one metre.
+    /// F-number: focal length divided by the diameter of the lens. The radius follows from it for
+    /// film of 36 x 24 mm and scene units of one metre.
     FNumber(f64),
 }
 
@@ -36,7 +36,8 @@ one_of! {
 /// Largest valid lens radius, in scene units.
 const MAX_RADIUS: f64 = 1e9;
 
-/// Smallest distance of the plane in focus from the eye, as a fraction of the lens radius.
+/// Smallest distance of the plane in focus from the eye, as a fraction of the lens radius. A plane
+/// nearer to the eye is moved to this distance.
 const MIN_FOCUS_PER_RADIUS: f64 = 1e-6;
 
 /// Half the height of the picture on film of 36 x 24 mm \[m\].
@@ -153,8 +154,8 @@ impl Camera {
     /// Returns the distance of the plane in focus from the eye along the view direction, greater
     /// than 0. If `focus` is `None`, the target is the point in focus. If the point in focus is
     /// behind the eye, the plane is at the same distance in front of the eye. The result is at
-    /// least a millionth of the lens radius, and at least a millionth of the distance between the
-    /// eye and the point in focus.
+    /// least a millionth of the lens radius. If there is a point in focus, the result is also at
+    /// least a millionth of its distance from the eye.
     pub fn focus_depth(&self) -> f64 {
         let point = match (self.focus, self.target) {
             (Some(Focus::Distance(distance)), _) => Err(distance),

@@ -3,10 +3,10 @@
 //! Every movement function returns a new camera. The new camera has a `target` if the old camera
 //! has one, otherwise a `direction`. The pivot of a movement is the target. A camera without a
 //! target has its pivot straight ahead, at a distance that the caller gives. Coordinates are
-//! rounded to about a millionth of the distance between eye and pivot. If the moved camera would be
-//! invalid (coordinates out of range, or eye and target equal), the function returns the old
-//! camera. Rotations are relative to `up`; the view direction stays at least 0.1 degrees away from
-//! `up`.
+//! rounded to about a millionth of the distance between eye and pivot. The function returns the old
+//! camera if the moved camera would be invalid, such as with coordinates out of range or with the
+//! eye at the target. Rotations are relative to `up`; the view direction stays at least 0.1 degrees
+//! away from `up`.
 
 use crate::camera::{Camera, ViewAngle};
 use crate::value::{floor_log10, round_significant, rounded_to, unit};
@@ -112,8 +112,8 @@ impl Camera {
         self.valid_or_self(Self { up, ..self.clone() })
     }
 
-    /// Multiplies the width of the picture plane at unit distance by `factor`, by changing the
-    /// opening angle. A factor less than 1 narrows the view.
+    /// Changes the opening angle so that the width of the picture plane at unit distance is
+    /// multiplied by `factor`. A factor less than 1 narrows the view.
     pub fn zoom(&self, factor: f64) -> Self {
         if !(factor > 0.0 && factor.is_finite()) {
             return self.clone();
@@ -134,9 +134,10 @@ impl Camera {
     }
 
     /// Moves the eye so that the sphere of `radius` around `center` fills the picture. The distance
-    /// is 10 % greater than that at which the sphere touches the picture's edges. The view
-    /// direction does not change. `center` and `radius` are in scene units. `aspect` is the
-    /// picture's width divided by its height. A camera with a target gets `center` as its target.
+    /// from the eye to `center` is 10 % greater than the distance at which the sphere would touch
+    /// the picture's edges. The view direction does not change. `center` and `radius` are in scene
+    /// units. `aspect` is the picture's width divided by its height. A camera with a target gets
+    /// `center` as its target.
     pub fn framed(&self, center: [f64; 3], radius: f64, aspect: f64) -> Self {
         let forward = self.frame()[2];
         let half = self.half_size(aspect).into_iter().fold(f64::INFINITY, f64::min).atan();
@@ -168,7 +169,7 @@ impl Camera {
         }
         let axis = unit(self.up).unwrap_or(DVec3::Y);
         let [side, _, forward] = self.frame();
-        // View direction without its component along `up`.
+        // Unit vector of the view direction without its component along `up`.
         let ahead = axis.cross(side);
         let pitch = forward.dot(axis).clamp(-1.0, 1.0).asin().to_degrees();
         let pitch = (pitch + up).clamp(-MAX_PITCH, MAX_PITCH).to_radians();

@@ -79,7 +79,7 @@ impl PerspectiveCamera {
         let u = u.normalize();
         let v = u.cross(w);
         let (width, height) = (f64::from(width), f64::from(height));
-        // Half the size of the picture at unit distance.
+        // Half the width and half the height of the picture plane at unit distance from the eye.
         let (half_width, half_height) = match camera.view_angle {
             ViewAngle::Vertical(degrees) => {
                 let half = (0.5 * degrees).to_radians().tan();
@@ -170,15 +170,16 @@ impl PerspectiveCamera {
 
     /// Returns two values for each lane: the origin and the unit direction of the ray through the
     /// eye and a point of a pixel. The origins are on the near plane. `base` is the result of
-    /// [`PerspectiveCamera::pixel_corner_direction`]; `(dx, dy)` is the offset from the corner to
-    /// the right and downward \[pixels\].
+    /// [`PerspectiveCamera::pixel_corner_direction`]; `(dx, dy)` is the offset of the point from
+    /// the upper left corner of the pixel, to the right and downward \[pixels\].
     #[inline(always)]
     pub fn rays<L: SimdFloat>(&self, base: Vec3<L>, (dx, dy): (L, L)) -> (Vec3<L>, Vec3<L>) {
         let dx_axis = Vec3::of(self.dx_axis.to_array());
         let dy_axis = Vec3::of(self.dy_axis.to_array());
         let direction = dx_axis.mul_add(dx, dy_axis.mul_add(dy, base));
         let eye = Vec3::of(self.eye.to_array());
-        // `direction` has unit length along w: `near` times `direction` reaches the near plane.
+        // The component of `direction` along the view direction `w` is 1. The vector `near *
+        // direction` therefore ends on the near plane.
         let origin =
             if self.near > 0.0 { direction.mul_add(L::from_f64(self.near), eye) } else { eye };
         (origin, direction.normalize())

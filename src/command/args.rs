@@ -225,7 +225,7 @@ pub struct PlanArgs {
 /// Arguments of `zerkalo merge`.
 #[derive(Clone, Debug, Args)]
 pub struct MergeArgs {
-    /// Film files of the parts, in any order
+    /// Film files of the shards, in any order
     #[arg(required = true, value_name = "PART.zk")]
     pub parts: Vec<PathBuf>,
     /// The file to write: a picture (.png, .exr) or a film (.zk)
@@ -293,8 +293,8 @@ pub struct CheckArgs {
                         rendered; `p` and `P` write the picture, `q` quits."
 )]
 pub struct WatchArgs {
-    /// Parts of one plan, or one checkpoint; the name of a plan file stands for its parts beside it
-    /// (job.plan: job-0.zk, job-1.zk, ..)
+    /// Film files of the shards of one plan, or one checkpoint; a plan file stands for the film
+    /// files beside it (job.plan: job-0.zk, job-1.zk, ..)
     #[arg(required = true, value_name = "FILE.zk")]
     pub files: Vec<PathBuf>,
     #[command(flatten)]
@@ -333,7 +333,8 @@ const PRECISIONS: [Choice<Precision>; 3] = [
     ("auto", Some("32-bit or 64-bit floats, chosen by the scene's proportions"), Precision::Auto),
 ];
 
-/// Value of `--color`; `None` for `auto`. clap would take an `Option` for an option without default.
+/// Value of `--color`; `None` for `auto`. The alias hides the `Option` from clap, which gives a
+/// field of the type `Option` another meaning: an argument that may be absent.
 type ColorChoice = Option<Colors>;
 
 /// Values of `--color`, each with its help.
@@ -356,8 +357,8 @@ const SAMPLERS: [Choice<SamplerKind>; 2] = [
 /// a minute.
 const THREADS_PER_PROCESSOR: usize = 4;
 
-/// Number of tracing threads that `--threads` may always request, even on machines with few
-/// processors.
+/// Number of tracing threads up to which `--threads` is accepted on every machine, even one with
+/// few processors.
 const THREADS_ANYWHERE: usize = 16;
 
 /// Returns the number of processors that this process may use, at least 1.
@@ -403,8 +404,8 @@ impl ComputeArgs {
 }
 
 impl Cli {
-    /// Returns the warning about `--threads` of the subcommand, or of the dashboard. Returns `None`
-    /// if all requested threads are used.
+    /// Returns a warning if `--threads` requests more threads than are used, otherwise `None`. The
+    /// option may belong to a subcommand or to the dashboard.
     pub fn warning(&self) -> Option<String> {
         let compute = match &self.command {
             Some(Command::Render(args)) => &args.compute,

@@ -11,8 +11,8 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Writer of checkpoints, on a thread of its own. Rendering pauses only while a checkpoint is
-/// encoded.
+/// Writer of checkpoints. A thread of its own writes the files; rendering pauses only while a
+/// checkpoint is encoded.
 pub struct CheckpointWriter {
     path: PathBuf,
     interval: Duration,
@@ -34,8 +34,8 @@ impl CheckpointWriter {
         let thread = std::thread::spawn(move || {
             for checkpoint in inbox {
                 let written = checkpoint.map_or(Ok(()), |it| it.write(&target, Existing::Replace));
-                // If the channel is closed, the render has ended with an error and does not need
-                // the result.
+                // Sending fails only if the channel is closed. The render has then ended with an
+                // error and does not need the result.
                 let _ = outbox.send(written);
             }
         });
@@ -96,8 +96,9 @@ impl CheckpointWriter {
     /// Writes the last checkpoint, waits until it is complete, and returns the path of its file.
     pub fn finish(self, session: &Session) -> Result<PathBuf, WriteError> {
         self.request(session);
-        // Waits until the session has run the checkpoint task and dropped it with its sender.
-        // Otherwise the thread, which runs until all senders are dropped, would not end.
+        // Waits until the render thread of `session` has run the checkpoint task and has dropped it
+        // with its sender. Otherwise the thread that writes checkpoints would not end, because it
+        // runs until all senders are dropped.
         session.with(|_, _| ());
         let Self { path, encoded, results, thread, .. } = self;
         drop(encoded);

@@ -17,7 +17,7 @@ use std::time::Duration;
 
 /// Width of the printed report, in columns of the terminal.
 const COLUMNS: usize = 80;
-/// Width of the column of names in the report, in columns of the terminal.
+/// Width of the left part of the report, which holds the names, in columns of the terminal.
 const NAME: usize = 17;
 
 pub fn run(args: &DoctorArgs) -> Result<(), Failure> {

@@ -194,7 +194,7 @@ fn summary(exported: &Exported) -> String {
 mod tests {
     use super::*;
 
-    /// Writer whose writes all fail, such as one to a terminal that was closed.
+    /// Writer on which every write fails, as on a terminal that was closed.
     struct Gone;
 
     impl Write for Gone {

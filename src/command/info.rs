@@ -128,7 +128,8 @@ fn compare(origin: &Origin, path: &Path, args: &InfoArgs) -> Result<(), Failure>
             "scene: {shown} and the files that it names are those of {file}"
         ));
     }
-    // The picture size may differ from that of the scene file, because it is an option of `render`.
+    // The picture size may differ from the size in the scene file, because the option `--size` of
+    // `render` overrides the latter.
     let mut sized = scene.clone();
     sized.film.size = origin.size.map(|n| n as u32);
     match origin.inputs.as_ref().map(|inputs| inputs.fit(&sized)) {

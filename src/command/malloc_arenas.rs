@@ -3,8 +3,8 @@
 //!
 //! The allocator of glibc reserves an arena of 64 MB of address space for each thread. If the
 //! address space is limited by `ulimit -v`, the arenas of a few threads take all of it. Small
-//! allocations then fail while most of the memory is free. With one arena for all threads this
-//! cannot happen. The number of arenas is read from the environment at the start of a process.
+//! allocations then fail while most of the memory is free. A single arena for all threads avoids
+//! this failure. The number of arenas is read from the environment at the start of a process.
 
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const VARIABLE: &str = "MALLOC_ARENA_MAX";

@@ -36,8 +36,9 @@ pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Formats two noises in 8-bit levels: that of the merged picture, from which shards (parts of the
-/// render) are missing, and `predicted_codes`, the noise predicted for the complete picture.
+/// Formats two values of noise in 8-bit levels. The first is the noise of the merged picture, which
+/// lacks the samples of some shards (parts of the render). The second is `predicted_codes`, the
+/// noise predicted for the picture with all shards.
 fn cost(report: &Report, predicted_codes: f64) -> String {
     match report.noise {
         Some(noise) => format!(

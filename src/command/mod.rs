@@ -52,7 +52,8 @@ enum Failure {
     Signalled(u8),
 }
 
-/// An error whose message says what failed is a failure of the command.
+/// Converts an error to a failure of the command. The message of the error becomes the message of
+/// the failure.
 impl<E: Display> From<E> for Failure {
     fn from(error: E) -> Self {
         Self::Failed(error.to_string())
@@ -92,8 +93,8 @@ pub fn main() -> ExitCode {
 /// Parses the command line. Ends the program with exit status 2 if the command line is not valid.
 fn parse_command_line() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
-        // In `zerkalo rendr a.toml` clap takes `rendr` for a scene and reports `a.toml` as the
-        // error. The unknown command is reported instead.
+        // In `zerkalo rendr a.toml` clap takes `rendr` for a scene file and reports an error about
+        // `a.toml`. This function reports the unknown command `rendr` instead.
         let first = std::env::args_os().nth(1).unwrap_or_default();
         let first = first.to_string_lossy();
         let unknown = !first.starts_with('-') && Cli::command().find_subcommand(&*first).is_none();
@@ -159,7 +160,8 @@ fn read_scene_and_warn(path: &Path) -> Result<Document, Failure> {
     Ok(document)
 }
 
-/// Escapes control characters in each line of `message`; file names in it may contain some.
+/// Escapes control characters in each line of `message`. File names in the message may contain
+/// control characters.
 fn sanitized_lines(message: &str) -> String {
     message.split('\n').map(sanitized).collect::<Vec<_>>().join("\n")
 }

@@ -34,8 +34,9 @@ impl FilmOutput {
     }
 
     /// Writes `film` to the output file. `header` is the header of a film file. A picture file uses
-    /// only a part of it: the weights by which the light groups (separately stored parts of the
-    /// picture) are added, the names of these groups, the display transform and the metadata.
+    /// four values of it: the weights and the names of the light groups, the display transform and
+    /// the metadata. A light group is the contribution of some lights to the picture, which the
+    /// film stores separately.
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
         match self {
             Self::Film(path) => write_film(path, film, header),
@@ -58,8 +59,9 @@ pub fn is_film(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zk"))
 }
 
-/// Creates the header of a film file. `state` has the film, `part` has the plan and the shards
-/// (parts of a divided render) that the film holds, and `report` describes the film.
+/// Creates the header of a film file. `state` has the film. `part` has the plan and the numbers of
+/// the shards (parts of a divided render) whose samples the film holds. `report` has the sample
+/// counts and the noise of the film.
 pub fn header(state: &RenderState, part: &Part, report: &Report) -> FilmFileHeader {
     let settings = &part.plan.settings;
     let provenance = Provenance {

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 /// Seconds of rendering before the first output of progress. Shorter renders show no progress.
 const QUIET_SECONDS: f64 = 0.25;
-/// Seconds before the first line of progress in a log. The interval after each line is equal to the
-/// rendering time so far, but at most [`LONGEST_INTERVAL_SECONDS`].
+/// Seconds of rendering before the first line of progress in a log. The interval after each line is
+/// equal to the rendering time so far, but at most [`LONGEST_INTERVAL_SECONDS`].
 const FIRST_LINE_SECONDS: f64 = 1.0;
 /// Longest interval between lines of progress in a log, in seconds.
 const LONGEST_INTERVAL_SECONDS: f64 = 60.0;
@@ -100,7 +100,7 @@ fn span(low: f64, high: f64) -> String {
     if low_text == high_text {
         return low_text;
     }
-    // A unit that both ends have in common is written once: `3-5 s`.
+    // If both ends have the same unit, it is written once: `3-5 s`.
     match (low_text.split_once(' '), high_text.split_once(' ')) {
         (Some((a, unit)), Some((b, same))) if unit == same => format!("{a}-{b} {unit}"),
         _ => format!("{low_text} - {high_text}"),

@@ -17,14 +17,15 @@ use crate::world::AnyWorld;
 use std::io;
 use std::sync::Arc;
 
-/// Name of the memory limit in messages if `--memory` allows less than the available memory.
+/// Name of the memory limit in messages if `--memory` is the limit: it allows less than the
+/// available memory.
 const OPTION: &str = "--memory";
 
 /// Division of a picture into regions (bands of rows) that fit into the given memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Division {
-    /// `true` if all lights share one light group (part of the picture that the film stores
-    /// separately), to save memory.
+    /// `true` if all lights share one light group, to save memory. A light group is the
+    /// contribution of some lights to the picture, which the film stores separately.
     pub merge_lights: bool,
     /// Regions of the picture. A picture that fits as a whole is one region.
     pub regions: Regions,
@@ -46,8 +47,9 @@ impl Division {
         let merged = world.light_groups().merged_count();
         let (size, threads) = (scene.film.size, args.compute.threads());
         let (cap, limit) = usable(cap);
-        // Before it starts, the render of a whole picture checks for more memory than `divide`
-        // estimates. If this check fails, the picture is divided although it fits by the estimate.
+        // The check at the start of the render of a whole picture demands more memory than `divide`
+        // estimates. If this check would fail, the picture is divided into regions although it fits
+        // by the estimate.
         let refused = |groups| check(size, groups, 0).is_err();
         let divided = |groups| match divide(size, groups, threads, cap) {
             Ok(whole) if whole.count == 1 && refused(groups) => {
@@ -113,7 +115,8 @@ fn usable(cap: u64) -> (u64, &'static str) {
 /// and `cap` the number of bytes that it allows.
 fn too_little(cap: u64, limit: &'static str) -> impl Fn(u64) -> Failure {
     move |least| {
-        // The resident memory of the program differs by up to a megabyte from run to run.
+        // Adds a megabyte, because the resident memory of the program differs by up to a megabyte
+        // from run to run.
         let least = (least + 1_000_000).div_ceil(1_000_000);
         let expected = match limit {
             OPTION => format!("expected at least {OPTION} {least}MB"),
@@ -137,7 +140,7 @@ pub struct Rendered {
     pub stopped_by: StoppedBy,
     pub precision: &'static str,
     /// One sentence for each limit of the scene that ends paths early, such as `max_depth`. The
-    /// sentence has an upper bound of the light that is lost.
+    /// sentence states an upper bound of the light that the picture loses by this limit.
     pub biased: Vec<String>,
 }
 

@@ -138,7 +138,7 @@ struct Rendered {
     end: End,
     precision: &'static str,
     /// One sentence for each limit of the scene that ends paths early, such as `max_depth`. The
-    /// sentence has an upper bound of the light that is lost.
+    /// sentence states an upper bound of the light that the picture loses by this limit.
     biased: Vec<String>,
     /// Time from the start of the program to the start of compiling the scene. It includes the time
     /// of reading the scene file.
@@ -226,8 +226,8 @@ fn watch(
 /// that ends paths early (such as `max_depth`), and the result of writing the picture.
 type Written = (Report, &'static str, Vec<String>, Result<(), WriteError>);
 
-/// Writes the picture to `output`, on the thread of `session`, and returns the results of the
-/// render. Returns `None` if the session has no film yet.
+/// Writes the picture to `output` on the render thread of `session`, and returns the results of the
+/// render. Returns `None` if there is no film yet.
 fn write(
     session: &Session,
     args: &RenderArgs,

@@ -23,10 +23,10 @@ impl Signals {
         let caught = Arc::new(AtomicUsize::new(0));
         let armed = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
-            // Handlers run in the order of registration. The handler that sets `caught` is
+            // Handlers run in the order of registration. The first handler sets `caught`; it is
             // registered first, so that no signal is lost during the registration. The second
-            // handler ends the program if `armed` is set. The third one sets `armed`; it comes
-            // last, so that the first signal does not end the program.
+            // handler ends the program if `armed` is set. The third handler sets `armed`. Because
+            // it runs after the second one, the first signal does not end the program.
             flag::register_usize(signal, Arc::clone(&caught), signal as usize)?;
             flag::register_conditional_shutdown(signal, SIGNALLED + signal, Arc::clone(&armed))?;
             flag::register(signal, Arc::clone(&armed))?;

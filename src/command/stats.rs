@@ -7,7 +7,8 @@ use serde::Serialize;
 pub struct Stats {
     /// Path of the scene file as given on the command line.
     pub scene: String,
-    /// Hash of the scene file, as in the metadata of the picture.
+    /// Hash of the scene file and of the meshes and images that it names, as in the metadata of the
+    /// picture.
     pub scene_hash: String,
     /// Path of the picture file.
     pub output: String,
@@ -30,12 +31,13 @@ pub struct Stats {
     pub spp_max: u32,
     /// Number of all traced rays: camera rays, shadow rays, and rays that continue a path.
     pub rays: u64,
-    /// Seconds of rendering by a monotonic clock, without compilation of the scene and writing.
+    /// Seconds of rendering by a monotonic clock, without the compilation of the scene and without
+    /// the writing of the picture.
     pub seconds: f64,
     pub compile_seconds: f64,
     /// Seconds of encoding, writing and syncing the picture.
     pub write_seconds: f64,
-    /// Seconds from the start of the program to the end of writing.
+    /// Seconds from the start of the program until the picture was written.
     pub total_seconds: f64,
     pub samples_per_second: f64,
     /// Seconds from the start of the program until every pixel has a sample. Null if some pixel has
@@ -55,7 +57,7 @@ pub struct Stats {
     /// Number of pixels whose sum of samples was clamped to the largest value of the film.
     pub saturated_pixels: u64,
     /// One sentence for each limit that ends paths early, such as `max_depth`, as in the picture's
-    /// metadata. Empty if no path ends early, so that the picture is unbiased.
+    /// metadata. Empty if no path ends early; the picture is unbiased then.
     pub biased: Vec<String>,
     /// Peak resident memory in bytes. Null on systems that do not report it.
     pub peak_rss_bytes: Option<u64>,

@@ -12,7 +12,7 @@ pub struct Point {
 }
 
 /// History of the noise of one picture, from the renderer's reports. If the history exceeds a fixed
-/// number of points, some of them are removed.
+/// number of points, every second one of the later points is removed.
 #[derive(Clone, Debug, Default)]
 pub struct Convergence {
     /// Points of the convergence plot in order of increasing time.
@@ -27,8 +27,8 @@ const MOST: usize = 400;
 
 impl Convergence {
     /// Returns the render time in seconds at which the noise fell to `codes` 8-bit levels. The time
-    /// is interpolated between two reports by a power law. Returns `None` if the noise is still
-    /// higher than `codes`, or if no report has had a higher noise.
+    /// is interpolated between two reports by a power law. Returns `None` if the latest noise is
+    /// above `codes`, or if no stored noise is above `codes`.
     pub fn seconds_at(&self, codes: f64) -> Option<f64> {
         // Only the last fall to `codes` counts, because switching on a light raises the noise
         // again.
@@ -64,9 +64,9 @@ impl Convergence {
         }
     }
 
-    /// Removes every second point of the convergence plot except in the first quarter of the
-    /// points. Late points lie closest together on the logarithmic time axis. The newest point
-    /// stays.
+    /// Removes every second point of the convergence plot, except among the earliest 100 points.
+    /// Late points are removed because they lie closest together on the logarithmic time axis. The
+    /// newest point stays.
     fn thin(&mut self) {
         let (early, newest) = (MOST / 4, self.points.len() - 1);
         let mut index = 0;

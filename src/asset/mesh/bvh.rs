@@ -106,8 +106,8 @@ impl Mesh {
         self.firsts[leaf]
     }
 
-    /// Returns a unit normal per vertex: that of the file, if the file has normals. Otherwise it is
-    /// the mean normal of the adjacent triangles; the first call computes these means.
+    /// Returns a unit normal per vertex. If the file has normals, these are returned. Otherwise a
+    /// vertex has the mean normal of the adjacent triangles; the first call computes these means.
     pub fn smooth_normals(&self) -> &[[f32; 3]] {
         match &self.mesh.normals {
             Some(normals) => normals,

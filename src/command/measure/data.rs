@@ -18,10 +18,10 @@ struct Document<'a> {
     reference_linear: f64,
     reference_seconds: f64,
     compared_at_codes: f64,
-    /// Relative uncertainty of a measured error that is due to the noise of the reference picture:
-    /// the largest value over all measured points.
+    /// Largest relative uncertainty of a measured error, over all measured points, that is due to
+    /// the noise of the reference picture.
     errors_spread: f64,
-    /// Relative spread of a time in the table over repeated renders: the largest of all such times.
+    /// Largest relative spread of a time over repeated renders, among all times in the table.
     times_spread: f64,
     /// Largest fraction of the processors' time that other programs used during a measured render.
     /// Null if unknown.
@@ -64,8 +64,8 @@ struct Point {
     rel_mse: f64,
 }
 
-/// First columns of a line of the CSV file: compared setting, its value, and number of threads. The
-/// other columns are those of [`Point`].
+/// First columns of a line of the CSV file: the compared setting, its value, and the number of
+/// threads. The fields of [`Point`] are the columns after them.
 #[derive(Serialize)]
 struct Variant<'a> {
     setting: &'static str,
