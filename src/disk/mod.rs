@@ -1,5 +1,5 @@
 //! Files on disk: opening of regular files without blocking, replacement of files in one step, and
-//! the rule for symbolic links of other users.
+//! the rule for symbolic links that belong to other users.
 
 mod open;
 mod owner;

@@ -18,7 +18,8 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
 /// Opens the regular file at `path` as [`open_regular`] does, with the access that `options`
 /// permits.
 pub(crate) fn open_regular_with(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
-    // The type is checked before opening, because the opening of a device may have effects.
+    // The type is checked before the file is opened, because opening a device may have side
+    // effects.
     require_regular(fs::metadata(path)?.file_type())?;
     let file = options.custom_flags(OFlags::NONBLOCK.bits() as i32).open(path)?;
     // The file at `path` may have been replaced between the check and the opening.

@@ -11,7 +11,7 @@ use tempfile::NamedTempFile;
 
 /// Prefix and suffix of the names of the program's temporary files.
 pub const TEMPORARY: [&str; 2] = [".zerkalo-", ".tmp"];
-/// Largest number of symbolic links that are followed to a file, as in Linux.
+/// Largest number of symbolic links that are followed to find a file. Linux has the same limit.
 const MAX_LINKS: usize = 40;
 
 /// Reason for which a file cannot be written.
@@ -143,8 +143,8 @@ impl Replacement {
             Existing::Refuse => temporary.persist_noclobber(&target),
         };
         renamed.map_err(|e| explain(&path, &folder, exists, &e.error))?;
-        // Stores the new name on the disk. Some systems do not let a directory be opened or
-        // synchronised; the file is complete in any case.
+        // Stores the new name on the disk. Errors are ignored, because some systems cannot open or
+        // synchronise a directory, and the content of the file is already on the disk.
         if let Ok(directory) = File::open(&folder) {
             let _ = directory.sync_all();
         }
@@ -174,11 +174,12 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
 }
 
 /// Writes the file at `path`. `write` fills a temporary file, which is renamed to `path` when it is
-/// complete and stored on the disk. An existing file is replaced or refused, as `existing` says.
+/// complete and stored on the disk. If a file exists at `path`, `existing` decides whether it is
+/// replaced or the call fails.
 ///
 /// # Errors
-/// Fails if the file cannot be written or is refused, or if `write` fails; an existing file is then
-/// unchanged.
+/// Fails if the file cannot be written, if it exists and `existing` does not permit replacing it,
+/// or if `write` fails. An existing file is then unchanged.
 pub fn replace_file(
     path: &Path,
     existing: Existing,
@@ -190,7 +191,7 @@ pub fn replace_file(
     replacement.commit()
 }
 
-/// Checks that [`write()`] could write the file at `path` now, without changing it.
+/// Checks, without changing the file at `path`, that [`write()`] could write it now.
 ///
 /// # Errors
 /// Returns the error that writing would return now.
@@ -274,7 +275,7 @@ fn exists(path: &Path) -> WriteError {
 }
 
 /// Converts an I/O error of writing the file `path` in `folder` to an error with a remedy for the
-/// user. `exists` is `true` if the file existed before.
+/// user. `exists` is `true` if the file existed before the write began.
 fn explain(path: &Path, folder: &Path, exists: bool, error: &io::Error) -> WriteError {
     let shown = folder.display();
     let kept = if exists { "the old file is unchanged" } else { "no file was written" };
@@ -391,7 +392,7 @@ mod tests {
         assert_eq!(fs::read(&real).unwrap(), b"new");
         let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
         assert_eq!(mode(&real) & 0o777, 0o640);
-        // A new file has the permissions of any other file that the user creates.
+        // A new file has the same permissions as a file that `fs::write` creates.
         let [new, plain] = ["new", "plain"].map(|name| folder.path().join(name));
         write(&new, b"new").unwrap();
         fs::write(&plain, "").unwrap();

@@ -1,4 +1,4 @@
-//! Drawing of the viewer of exported images, which has the whole screen.
+//! Drawing of the full-screen viewer of exported images.
 
 use crate::dashboard::model::{Model, short_name};
 use crate::dashboard::overlay::ViewedImage;

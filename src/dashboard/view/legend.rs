@@ -21,7 +21,8 @@ pub struct Legend {
 }
 
 impl Legend {
-    /// Creates the legend of false-colour values on `scale`, in `unit`.
+    /// Creates the legend of a false-colour picture. `scale` gives the values at the ends of the
+    /// colour bar, and `unit` is their unit.
     pub fn magnitude(scale: Scale, unit: &str) -> Self {
         let bar = bar(magnitude);
         let [low, high] = [scale.value(0.0), scale.value(1.0)].map(number);

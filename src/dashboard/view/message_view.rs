@@ -58,8 +58,9 @@ fn formatted(message: &Diagnostic, theme: &Theme) -> Vec<(String, Style)> {
     texts
 }
 
-/// Draws two messages over the last picture: the reason why the current scene cannot be rendered,
-/// and on the lower border the first error of a scene file that has become unreadable.
+/// Draws up to two messages over the last picture. The first is the reason why the current scene
+/// cannot be rendered. The second, on the lower border of the panel, is the first error of a scene
+/// file that has become unreadable.
 pub fn failure(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) {
     let failed = model.snapshot.as_ref().and_then(|s| match &s.report.state {
         State::Failed(why) => Some(why),

@@ -118,7 +118,8 @@ impl View {
     }
 }
 
-/// Returns `true` if the panel `focus` receives the keys.
+/// Returns `true` if key presses go to the panel `focus`: it has the keyboard focus, and no overlay
+/// is open.
 fn is_active(model: &Model, focus: Focus) -> bool {
     model.focus == focus && model.overlay.is_none()
 }

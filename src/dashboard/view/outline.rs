@@ -19,7 +19,7 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
     panel(area, "outline", active, theme, buffer);
     let inner = area.inner(BORDER);
     let lines = outline(model.scene());
-    // With the channel of object ids, the outline shows the colour of each object.
+    // If the picture shows object ids, the outline shows the colour of each object.
     let with_ids =
         model.channel == DisplayChannel::Objects && model.comparison.shown == CompareView::Live;
     let (scroll, border) = (model.outline_scroll, theme.border(active));
@@ -46,7 +46,8 @@ pub fn draw(model: &Model, layout: &Layout, theme: &Theme, buffer: &mut Buffer) 
                     Some(style) => to.put(" ", name).put("■", style).put(" ", name),
                     None => to.put(if selected { " ▸ " } else { "   " }, name),
                 };
-                // The note is omitted if it would shorten the name.
+                // The note, at the right end of the line, is omitted if there is no room for the
+                // whole name beside it.
                 to.put_right(" ", 0, name).put_right(note, 2 + columns(label), noted);
                 to.put(label, name);
             }

@@ -181,7 +181,8 @@ fn noise_part(model: &Model, report: &Report, codes: f64, theme: &Theme) -> Vec<
     text
 }
 
-/// Draws the hint line: the notice if there is one, otherwise the key hints.
+/// Draws the hint line. It shows the current notice (a message to the user) if there is one,
+/// otherwise the key hints.
 pub fn hints_line(model: &Model, area: Rect, theme: &Theme, buffer: &mut Buffer) {
     let mut row = Row::new(buffer, area, 0);
     row.skip(1);

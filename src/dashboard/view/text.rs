@@ -50,7 +50,7 @@ pub struct Row<'a> {
     buffer: &'a mut Buffer,
     /// Column of the screen at which the next text begins.
     x: u16,
-    /// Column of the screen after the last free one of the row.
+    /// Column of the screen that follows the last free column of the row.
     end: u16,
     y: u16,
 }

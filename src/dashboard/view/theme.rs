@@ -87,8 +87,8 @@ impl Theme {
         self.toned(BAD, Modifier::BOLD)
     }
 
-    /// Returns the style of the row under the cursor. `active` is `true` if the list with the row
-    /// receives the keys.
+    /// Returns the style of the row under the cursor. `active` is `true` if the list that contains
+    /// the row has the keyboard focus.
     pub fn selected(&self, active: bool) -> Style {
         match (active, self.colors) {
             (false, _) => self.accent().add_modifier(Modifier::BOLD),

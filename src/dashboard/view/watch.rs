@@ -1,4 +1,5 @@
-//! Drawing of the table of watched film files, and of their summary in the status line.
+//! Drawing of the table of watched film files, which other processes write, and of their summary in
+//! the status line.
 
 use crate::dashboard::layout::{Focus, Layout};
 use crate::dashboard::model::{Model, WatchTable, short_name};
@@ -14,11 +15,11 @@ use ratatui::layout::Rect;
 use ratatui::style::Style;
 use std::time::Duration;
 
-/// Width of the table's column of ages, in columns of the terminal.
+/// Width, in terminal columns, of the table column with the time since each file was written.
 const AGE: usize = 7;
-/// Width of the table's column of percentages, in columns of the terminal.
+/// Width, in terminal columns, of the table column with the progress of each file in percent.
 const SHARE: usize = 5;
-/// Width of the table's column of sample counts, in columns of the terminal.
+/// Width, in terminal columns, of the table column with the number of samples in each file.
 const SAMPLES: usize = 12;
 
 /// Draws the table of watched files. Draws nothing if the panel is folded.
@@ -112,7 +113,7 @@ fn title(report: &WatchReport) -> String {
 }
 
 /// Returns the name of a row in the table of watched files: the numbers of the shards (parts of a
-/// render) in the file, or the name of the file if they are unknown.
+/// render) in the file, or the name of the file if these numbers are unknown.
 fn label(shard: &WatchedShards) -> String {
     match (&shard.path, shard.shards.as_str()) {
         (Some(path), "") => short_name(path),
@@ -159,8 +160,8 @@ fn samples(shard: &WatchedShards) -> String {
     }
 }
 
-/// Formats the time since a watched film file was written in whole units, such as `40 s`, `12 min`,
-/// `3 h` or `2 d`.
+/// Formats `age`, the time that has passed since a watched film file was written, as a whole number
+/// of one unit, such as `40 s`, `12 min`, `3 h` or `2 d`.
 fn age(age: Duration) -> String {
     let seconds = age.as_secs();
     match seconds {
@@ -172,7 +173,7 @@ fn age(age: Duration) -> String {
 }
 
 /// Returns the summary of the watched files for the status line, as texts with their styles: state,
-/// percentage of the samples, and numbers of files that are late, missing or refused.
+/// progress of the render in percent, and numbers of files that are late, missing or refused.
 pub fn summary(report: &WatchReport, theme: &Theme) -> Vec<(String, Style)> {
     let mut texts = Vec::new();
     match report.complete {

@@ -1,7 +1,7 @@
 //! Tests of screens in each state of the model at several sizes.
 //!
-//! `tests/screens` contains the text of every screen. With `ZERKALO_BLESS=1` the golden test
-//! rewrites it.
+//! The files in `tests/screens` contain the text of every screen. If the environment variable
+//! `ZERKALO_BLESS` is 1, the golden test rewrites these files.
 
 mod golden;
 mod paint;
@@ -14,8 +14,8 @@ use crate::dashboard::view::View;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Position, Rect};
 
-/// Returns two values: the screen of `model`, and the position of its text cursor, `None` if the
-/// cursor is hidden.
+/// Returns two values: the screen of `model`, and the position of its text cursor. The position is
+/// `None` if the cursor is hidden.
 fn drawn(model: &Model) -> (Buffer, Option<Position>) {
     let [width, height] = model.screen;
     let mut buffer = Buffer::empty(Rect { x: 0, y: 0, width, height });

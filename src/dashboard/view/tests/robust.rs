@@ -25,8 +25,8 @@ proptest! {
     }
 }
 
-/// Checks that every state of the model can be drawn at screen sizes around each threshold of the
-/// layout.
+/// Checks that every state of the model can be drawn at small screen sizes, and at widths close to
+/// those at which the layout changes.
 #[test]
 fn every_state_draws_at_threshold_sizes() {
     for (_, make) in STATES {

@@ -1,4 +1,5 @@
-//! Tests of styles, which the golden texts of screens do not contain.
+//! Tests of colours and text attributes, which the golden files do not contain (they hold only the
+//! text of the screens).
 
 use crate::dashboard::layout::Focus;
 use crate::dashboard::model::{Colors, Model};
