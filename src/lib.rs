@@ -1,8 +1,8 @@
 //! zerkalo: a progressive, accumulating ray tracer with a dashboard in the terminal.
 //!
-//! ARCHITECTURE.md has the map of the folders and the allowed imports, which a test guards. The
-//! library consists of four crates, whose modules are all found here: `zerkalo-scene`,
-//! `zerkalo-world`, `zerkalo-render` and this one.
+//! ARCHITECTURE.md lists the folders and the imports that are allowed between them; a test checks
+//! the imports. The library consists of four crates: `zerkalo-scene`, `zerkalo-world`,
+//! `zerkalo-render` and this one. This crate re-exports the modules of the others.
 
 pub use zerkalo_render::{
     asset, bvh, camera, disk, film, lanes, light, material, primitive, process_memory, render,

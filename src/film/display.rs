@@ -5,7 +5,8 @@ use crate::value::srgb_from_linear;
 use std::fmt;
 use std::str::FromStr;
 
-/// Tone curve: maps scene radiance to the linear light that a display emits, relative to its white.
+/// Tone curve: maps scene radiance to the linear light that a display emits, as a fraction of the
+/// display's white.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tone {
     /// Tone curve that clips each colour channel at 1.

@@ -84,7 +84,7 @@ struct Span {
     pixels: Vec<Vec<(usize, f64)>>,
 }
 
-/// Contribution of a film tile to the cells (pixels) of a smaller image that it overlaps.
+/// Contribution of a film tile to those cells (pixels) of a smaller image that the tile overlaps.
 #[derive(Default)]
 struct TilePart {
     /// State of the tile at its latest refresh: epoch (number of the film's restarts),
@@ -233,8 +233,9 @@ impl DirtyTile<'_> {
 
 /// Adds every `step`-th pixel in row `y` of a tile to `line`. `line` has the sums of one row of
 /// cells, in the order of [`TilePart::sums`]. Areas are computed as if the whole row of pixels were
-/// inside this row of cells; the caller multiplies `line` by the fraction of its height that is
-/// inside. `per_unit` are factors that convert integer sums to radiance, `[group][channel]`.
+/// inside this row of cells. The caller multiplies `line` by the fraction of the height of the
+/// pixels that is inside. `per_unit` are factors that convert integer sums to radiance,
+/// `[group][channel]`.
 fn add_row(tile: &Tile, y: usize, step: usize, across: &Span, per_unit: &[f64], line: &mut [f64]) {
     let cell = 1 + per_unit.len();
     for (x, columns) in across.pixels.iter().enumerate().step_by(step) {
@@ -345,8 +346,8 @@ mod tests {
     }
 
     /// Adds the first sample, of value x + 100 y, to the pixels whose x and y are multiples of
-    /// `step_px`. Leaves out pixels whose x and y are multiples of `before_px`, the step of the
-    /// previous call; 0 leaves out none.
+    /// `step_px`. Pixels whose x and y are multiples of `before_px`, the step of the previous call,
+    /// are left out. In the first call `before_px` is 0; no pixel is left out then.
     fn first_samples(film: &mut Film, before_px: usize, step_px: usize) {
         each_tile(film, |tile, [x0, y0]| {
             let [width, height] = tile.extent();

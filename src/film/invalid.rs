@@ -6,7 +6,8 @@ pub const INVALID_REMEMBERED: usize = 16;
 /// Position of an invalid sample (NaN or negative): the values that are needed to trace it again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct InvalidSample {
-    /// Index of the sample in the sample sequence of its pixel and replicate (half of the samples).
+    /// Index of the sample in its sample sequence. Each pixel has one sequence for each of the two
+    /// replicates (halves of the samples).
     pub index: u32,
     /// Replicate (half of the samples) to which the sample belongs; 0: A, 1: B.
     pub replicate: u8,
@@ -22,8 +23,8 @@ pub struct InvalidSample {
 pub struct InvalidSamples {
     /// Number of samples that were NaN or negative.
     pub count: u64,
-    /// Positions of invalid samples in ascending order. If there are more than
-    /// [`INVALID_REMEMBERED`], only the lowest ones are stored.
+    /// Positions of invalid samples, sorted by index, replicate, y and x. If there are more than
+    /// [`INVALID_REMEMBERED`], only the first ones in this order are stored.
     pub first: Vec<InvalidSample>,
 }
 

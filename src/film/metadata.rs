@@ -1,5 +1,5 @@
-//! Metadata of picture files and film files. Reads it, and pads values with spaces, so that a value
-//! known only at the end of a render fits into the place reserved for it.
+//! Metadata of picture files and film files: reading, and padding of values with spaces. A value
+//! that is known only at the end of a render then fits into the place reserved for it.
 
 use crate::disk::open_regular;
 use crate::film::file::{FilmFileHeader, FilmReader, is_film_file};

@@ -22,14 +22,14 @@
 //! Adaptive sampling prefers the tiles with the largest estimates, and neglects tiles whose
 //! estimates are low by chance. If the picture's error were estimated from the same numbers, its
 //! RMSE would be too low: by 2 % after 32 samples per pixel, by 5 % after 8. Each tile therefore
-//! has two estimates, from the black and the white squares of a chessboard of pixels. The samples
-//! of black and white pixels are independent. The black pixels give the *allocation estimate*,
-//! which adaptive sampling uses. The white pixels give the *validation estimate*, which is
-//! reported. In a small picture, half of the pixels may give a worse estimate than all pixels do.
-//! The larger of two estimates is therefore reported: that from the white pixels, and that from all
-//! pixels. If all tiles have the same number of samples, no tile was preferred, and the estimate
-//! from all pixels is reported. The larger of both estimates would be too high in this case, by up
-//! to 30 % in pictures whose error is in a few pixels.
+//! has two estimates, from the black and the white pixels of a checkerboard. The samples of black
+//! and white pixels are independent. The black pixels give the *allocation estimate*, which
+//! adaptive sampling uses. The white pixels give the *validation estimate*, which is not biased by
+//! the choice of tiles. In a small picture, half of the pixels may give a worse estimate than all
+//! pixels do. The reported error is therefore the larger of two estimates: that from the white
+//! pixels, and that from all pixels. If all tiles have the same number of samples, no tile was
+//! preferred, and the estimate from all pixels is reported. The larger of both estimates would be
+//! too high in this case, by up to 30 % in pictures whose error is in a few pixels.
 //!
 //! The error of a sparse picture (stars, hairlines) is concentrated in few pixels. With k effective
 //! pixels (see [`Noise::effective_pixels`]) the relative uncertainty of the estimated RMSE is 1 /
@@ -62,15 +62,15 @@ impl Mse {
     }
 }
 
-/// Estimated error of one tile. Its pixels alternate between white and black, like the squares of a
-/// chessboard. Each colour gives an estimate of its own.
+/// Estimated error of one tile. The pixels of the tile alternate between white and black, like the
+/// squares of a checkerboard. The white pixels give one estimate, the black pixels another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileNoise {
     /// Validation estimate, from the white pixels of the checkerboard. The noise of the picture is
     /// computed from it, unless all tiles have the same number of samples.
     pub reported: Mse,
-    /// Allocation estimate, from the black pixels of the checkerboard. It selects tiles for further
-    /// samples.
+    /// Allocation estimate, from the black pixels of the checkerboard. Adaptive sampling uses it to
+    /// select the tiles that get further samples.
     pub allocation: Mse,
     /// Sum of e^2 over the pixels of the tile, where e is the squared error of a pixel, summed over
     /// its channels. [`Noise::effective_pixels`] is computed from it.
@@ -166,7 +166,7 @@ impl Estimator {
             let values = (3 * pixels) as f64;
             Mse { linear: sums.linear / values, codes: sums.codes / values }
         };
-        // A tile with a single pixel uses it for both estimates.
+        // In a tile with a single pixel, both estimates come from this pixel.
         let black = mean_over(halves[0], pixels.div_ceil(2));
         let white = if pixels > 1 { mean_over(halves[1], pixels / 2) } else { black };
         Some(TileNoise {
@@ -214,11 +214,11 @@ impl TileNoise {
 pub struct Noise {
     /// Root mean square error over pixels and channels, in linear radiance.
     pub rmse_linear: f64,
-    /// Root mean square error over pixels and channels as displayed, in 8-bit levels.
+    /// Root mean square error of the displayed picture over pixels and channels, in 8-bit levels.
     pub rmse_codes: f64,
-    /// 95th percentile of the tiles' RMSE as displayed, in 8-bit levels.
+    /// 95th percentile, over the tiles, of the RMSE of a displayed tile, in 8-bit levels.
     pub p95_codes: f64,
-    /// Largest RMSE of a tile as displayed, in 8-bit levels.
+    /// Largest RMSE of a displayed tile, in 8-bit levels.
     pub worst_codes: f64,
     /// Number of effective pixels (Kish's effective sample size), for the linear and for the
     /// displayed error. It is (sum of e)^2 / (sum of e^2), where e is the squared error of a pixel;

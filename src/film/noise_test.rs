@@ -50,8 +50,8 @@ fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
 struct Outcome {
     linear: Vec<f64>,
     codes: Vec<f64>,
-    /// Relative standard deviation of a tile's estimated RMSE between films with different random
-    /// seeds, averaged over all tiles.
+    /// Relative standard deviation of a tile's estimated RMSE over films with different random
+    /// seeds; the mean over all tiles.
     tile_spread: f64,
 }
 
@@ -186,7 +186,7 @@ fn both_tone_curves_are_estimated_as_displayed() {
         let display = Display { exposure_ev: -0.5, tone };
         let (mut film, mut rng) = (film(16, 16, &[2f64.powi(20)]), Rng(3));
         fill(&mut film, 1, |_, _, _| (0..3).map(|_| 2.0 * rng.unit()).collect());
-        // The validation estimate comes from the white squares of the chessboard.
+        // The validation estimate comes from the white pixels of the checkerboard.
         let mut mse = 0.0;
         for y in 0..16 {
             let [m, a, b] = [Replicates::Both, Replicates::A, Replicates::B].map(|replicates| {

@@ -71,8 +71,8 @@ impl ImageOutput {
         &self.path
     }
 
-    /// Checks that the picture file can be written, without changing it. Long renders call it at
-    /// their start.
+    /// Checks, without changing the picture file, that it can be written. Long renders call this
+    /// method at their start.
     ///
     /// # Errors
     ///

@@ -55,7 +55,7 @@ mod tests {
         let (size, pixels) = read_png(&path).unwrap();
         assert_eq!((size, pixels.as_flattened()), ([5, 3], &codes[..]));
         // A truncated file gives an error, or the complete picture if fewer than 16 bytes are
-        // missing.
+        // missing. The last 16 bytes are the checksum of the image data and the empty last chunk.
         let whole = std::fs::read(&path).unwrap();
         for length in 0..whole.len() {
             std::fs::write(&path, &whole[..length]).unwrap();

@@ -21,8 +21,8 @@ const MAX_ERROR_CODES: f64 = 5.5e-4;
 /// Piecewise linear approximation of the sRGB encoding, exact at 128 points per octave of linear
 /// light.
 pub(super) struct SrgbTable {
-    /// Line segments that approximate the sRGB encoding in 8-bit levels. The two numbers are the
-    /// value of the extended line at 0 and its slope.
+    /// Line segments that approximate the sRGB encoding in 8-bit levels. The first number is the
+    /// value at 0 of the line through the segment, the second is the slope of this line.
     chords: [[f64; 2]; ENTRIES],
 }
 
@@ -98,7 +98,8 @@ mod tests {
             let linear = f64::from(i) * 5e-6;
             assert_eq!(SrgbTable::shared().code_8(linear), exact(linear), "{linear}");
         }
-        // Values close to each border between two 8-bit values, within a relative distance of 2e-5.
+        // Tests values whose relative distance from a border between two 8-bit values is at most
+        // 2e-5.
         for border in (0..255).map(|code| (f64::from(code) + 0.5) / 255.0) {
             let linear = linear_from_srgb(border);
             for step in -2000..=2000 {

@@ -182,7 +182,8 @@ impl Film {
             return Ok(self);
         }
         let mut film = Self::without_memory(header)?;
-        // The epoch is larger than that of every old tile, as after a restart.
+        // The new epoch differs from all earlier epochs of this film, as after a restart. Caches
+        // that compare epochs therefore do not mistake the new film for the old one.
         film.epoch = self.epoch + 1;
         for (tile, old) in film.tiles.iter_mut().zip(self.tiles) {
             tile.take_memory(old);
@@ -396,8 +397,8 @@ impl Film {
         tile
     }
 
-    /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to the tile of this
-    /// film with the number `index`. Fails if both tiles have the first sample of only some pixels.
+    /// Adds the samples of `tile`, which was created by [`Film::new_tile`], to tile `index` of this
+    /// film. Fails if each of the two tiles has the first sample of only some pixels.
     pub(super) fn add_at(&mut self, index: usize, tile: Tile) -> Result<(), Mismatch> {
         let ours = &mut self.tiles[index];
         if !ours.is_of(self.epoch) {
@@ -492,7 +493,8 @@ mod tests {
             fill(&mut fresh, 1, |x, _, _| value(x).repeat(groups));
             (header, fresh.bytes())
         };
-        // New films with fewer, more and equally many tiles, and with more and fewer groups.
+        // The new films have fewer, more and equally many tiles compared with the old film, and
+        // more and fewer light groups.
         for (width, height, groups) in [(20, 20, 1), (70, 30, 3), (70, 30, 2), (40, 40, 1)] {
             let (header, bytes) = expected(width, height, groups);
             old = old.reuse_for(header).unwrap();

@@ -112,8 +112,8 @@ impl Tile {
         self.extent
     }
 
-    /// Returns the number of samples that every pixel of the tile has in replicate A, and the
-    /// number in replicate B (halves of the samples).
+    /// Returns two numbers: how many samples every pixel of the tile has in replicate A, and how
+    /// many in replicate B. The replicates are the two halves of the samples.
     pub fn counts(&self) -> [u32; 2] {
         self.counts
     }
@@ -126,8 +126,8 @@ impl Tile {
         usize::from(self.lattice_px)
     }
 
-    /// Returns the number of samples of one pixel in replicate A, and the number in replicate B
-    /// (halves of the samples).
+    /// Returns two numbers: how many samples one pixel has in replicate A, and how many in
+    /// replicate B. The replicates are the two halves of the samples.
     #[inline]
     pub fn counts_of(&self, pixel: usize) -> [u32; 2] {
         let extra = self.lattice_px != 0 && on_lattice(pixel, usize::from(self.lattice_px));
@@ -150,8 +150,8 @@ impl Tile {
     /// sample count grows by one, and the first pass of the tile is complete.
     ///
     /// # Panics
-    /// Panics if `step_px` is another number, or larger than the step of the previous call in the
-    /// same first pass.
+    /// Panics if `step_px` is none of these five numbers, or larger than the step of the previous
+    /// call in the same first pass.
     pub fn set_lattice(&mut self, step_px: usize) {
         assert!(
             matches!(step_px, 1 | 2 | 4 | 8 | 16)
@@ -261,10 +261,10 @@ impl Tile {
         self.bad.record(sample);
     }
 
-    /// Sets the tile's counters to the values in a film file; the integer sums stay. `counts` are
-    /// the sample counts of the replicates A and B (halves of the samples). `saturated_samples`
-    /// counts samples above the film's limit. `bad` are the invalid samples. `full` is `true` if a
-    /// sum has reached `i64::MAX`.
+    /// Sets the tile's counters to the values in a film file. The integer sums do not change.
+    /// `counts` are the sample counts of the replicates A and B (halves of the samples).
+    /// `saturated_samples` is the number of samples above the largest value that the film can
+    /// store. `bad` are the invalid samples. `full` is `true` if a sum has reached `i64::MAX`.
     pub(super) fn restore(
         &mut self,
         counts: [u32; 2],
@@ -319,8 +319,8 @@ fn on_lattice(pixel: usize, step_px: usize) -> bool {
 }
 
 /// Iterates row by row over the pixels of a tile whose x and y are multiples of `step_px`, which
-/// divides 16. Leaves out pixels whose x and y are multiples of the larger step `before_px`; 0
-/// leaves out none.
+/// divides 16. Leaves out pixels whose x and y are multiples of the larger step `before_px`. If
+/// `before_px` is 0, no pixel is left out.
 pub fn lattice_pixels(before_px: usize, step_px: usize) -> impl Iterator<Item = usize> {
     let lines = move || (0..TILE).step_by(step_px);
     lines()

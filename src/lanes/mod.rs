@@ -11,10 +11,10 @@
 //! | `wide::f64x8` | double | 8 | production when built for AVX-512 |
 //! | `f32`, `f64` | both | 1 | tests, benches, and primitives without packet kernels |
 //!
-//! All operations that [`SimdFloat`] declares up to `sqrt` are IEEE operations. Therefore all
-//! instances of one precision return identical bits. [`SimdFloat::mul_add`] is fused on all
-//! instances or on none. Only `sin_cos`, `atan2`, `ln` and `exp` may differ by a few ulps between
-//! the vector instances and those of width 1.
+//! The arithmetic operations, comparisons and square root of [`SimdFloat`] are IEEE operations. All
+//! instances of one precision therefore return identical bits. [`SimdFloat::mul_add`] is fused on
+//! all instances or on none. Only `sin_cos`, `atan2`, `ln` and `exp` may differ by a few ulps
+//! between the vector instances and those of width 1.
 
 mod scalar;
 mod vec3;

@@ -174,10 +174,10 @@ pub struct Frame<L> {
 }
 
 impl<L: SimdFloat> Frame<L> {
-    /// Builds a frame around the unit vector `n` without branches. It is continuous except where
-    /// `n.z` is 0. Around a horizontal vector (`n.y` is 0) the first tangent is horizontal and the
-    /// second vertical. The sides of a square reflection lobe around such a vector have these
-    /// directions.
+    /// Builds a frame around the unit vector `n` without branches. The frame is continuous in `n`
+    /// except where `n.z` is 0. Around a horizontal vector (`n.y` is 0) the first tangent is
+    /// horizontal and the second vertical. A reflection lobe with a square cross-section has sides
+    /// along the tangents; around such a vector they are horizontal and vertical.
     ///
     /// Duff et al. 2017, *Building an Orthonormal Basis, Revisited*, JCGT 6(1).
     #[inline(always)]

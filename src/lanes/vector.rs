@@ -101,8 +101,8 @@ fn gather_by_lane<L: SimdFloat>(table: &[L::Scalar], indices: &[u32; MAX_WIDTH])
     L::from_fn(|i| table[indices[i] as usize])
 }
 
-/// Returns the same result as [`gather_by_lane`]. A table of 16 elements fits into one register, so
-/// that a single permutation instruction looks up all lanes.
+/// Returns the same result as [`gather_by_lane`]. A table of 16 elements fits into one register; a
+/// single permutation instruction then looks up all lanes.
 #[cfg(target_feature = "avx512f")]
 #[inline(always)]
 fn gather16(table: &[f32], indices: &[u32; MAX_WIDTH]) -> f32x16 {

@@ -1,6 +1,6 @@
-//! Descriptions of lights with a size: sphere, rectangle and disk. A light is a radiating surface
-//! that rays pass through and that casts no shadow. Model a visible lamp housing as an object
-//! behind or around it.
+//! Descriptions of lights with a size: sphere, rectangle and disk. Such a light is a radiating
+//! surface that rays pass through and that casts no shadow. A lamp housing must be a separate
+//! object behind or around the light.
 
 use crate::value::{description, unit};
 use glam::DVec3;

@@ -16,12 +16,14 @@ pub enum DeltaLight<S> {
         /// Position of the light, relative to the scene's centre.
         position: [S; 3],
         /// Falloff: `true` if the irradiance at normal incidence is 1 / d^2 at the distance d;
-        /// `false` if it is pi at every distance.
+        /// `false` if it is pi at every distance, so that a white diffuse surface has the radiance
+        /// 1.
         inverse_square: bool,
         /// Cone that limits the light of a spot; `None` for a point light.
         cone: Option<SpotCone<S>>,
     },
-    /// Directional light with the irradiance pi at normal incidence.
+    /// Directional light. The irradiance at normal incidence is pi, so that a white diffuse surface
+    /// has the radiance 1.
     Directional {
         /// Unit vector towards the distant light.
         wi: [S; 3],

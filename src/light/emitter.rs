@@ -8,9 +8,10 @@ use crate::sampling::warp;
 use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
-/// Smallest solid angle at which a rectangle or triangle is sampled by solid angle, in sr divided
-/// by the rounding error (epsilon) of the number type. Smaller surfaces are sampled by area. At
-/// this solid angle, rounding moves the sampled points by 1e-5 of the surface's size.
+/// Smallest solid angle \[sr\] at which a rectangle or triangle is sampled by solid angle, as a
+/// multiple of the rounding error (epsilon) of the number type. Surfaces of smaller solid angle are
+/// sampled by area. At this solid angle, rounding moves the sampled points by 1e-5 of the surface's
+/// size.
 pub(super) const MIN_SOLID_ANGLE: f64 = 2e5;
 
 /// Surface of a compiled light with a size.
@@ -64,8 +65,8 @@ impl<S: Float> Emitter<S> {
     /// if the light has no size or no direction.
     ///
     /// Rounding could hide an emitter that touches an object. The surface is therefore lifted by
-    /// `lift`, at most 1e-4 of its size: a flat emitter moves to the side that emits light, a
-    /// sphere grows and keeps its power.
+    /// `lift`, but at most by 1e-4 of its radius or shorter side. A flat emitter moves in the
+    /// direction that its emitting side faces. A sphere grows and keeps its power.
     pub fn new(light: &Light, origin: DVec3, lift: f64) -> Option<Self> {
         let surface = light.surface()?;
         let frame = surface.frame()?;

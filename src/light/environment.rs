@@ -207,7 +207,8 @@ mod tests {
             let found = radiance(&light, [0.6 * across, height, -0.8 * across]);
             for c in 0..3 {
                 // The image is least exact at the horizon, where the slope of the gradient changes.
-                // The tolerance is the largest change over two rows of the image.
+                // The tolerance is the largest change over two rows of the image: two rows of pi /
+                // `GRADIENT_ROWS` radians, times the largest slope 2.
                 let difference = (found[c] - expected[c]).abs();
                 assert!(difference < 4.0 * PI / f64::from(GRADIENT_ROWS), "{height}: {found:?}");
             }

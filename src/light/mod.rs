@@ -124,7 +124,7 @@ impl Light {
     }
 
     /// Returns the direction in which a directional light travels, the axis of a spot light, or the
-    /// normal of a flat light; `None` for any other light.
+    /// normal of a rectangle or disk light; `None` for any other light.
     pub fn direction(&self) -> Option<[f64; 3]> {
         let directional = self.directional.map(|sun| sun.direction);
         let rectangle = self.rectangle.map(|rectangle| rectangle.normal);
@@ -226,9 +226,9 @@ impl Light {
 
     /// Gives the light a surface of the kind `name` (`sphere`, `rectangle` or `disk`) with the
     /// given radius; the sides of a rectangle are 2 x `radius` long. `normal` is the normal of a
-    /// rectangle or disk. `radius` is rounded to two significant digits, and the coordinates of
-    /// `center` are rounded to a power of ten, at most 1e-4 x `radius`. If `name` is another word,
-    /// the light is unchanged.
+    /// rectangle or disk. `radius` is rounded to two significant digits. The coordinates of
+    /// `center` are rounded to multiples of a power of ten that is at most 1e-4 x `radius`. If
+    /// `name` is another word, the light is unchanged.
     pub fn set_surface(&mut self, name: &str, center: DVec3, normal: [f64; 3], radius: f64) {
         let center = center.map(|x| round_nice(x, radius)).to_array();
         let radius = round_significant(radius, 2);
@@ -243,8 +243,8 @@ impl Light {
         }
     }
 
-    /// Returns the position of the light: the point, or the centre of the surface. `None` for a
-    /// directional or environment light.
+    /// Returns the position of a point or spot light, or the centre of the surface of a light with
+    /// a size. `None` for a directional or environment light.
     pub fn position(&self) -> Option<[f64; 3]> {
         self.apex().or(self.surface().map(|surface| surface.center().to_array()))
     }

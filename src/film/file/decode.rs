@@ -251,7 +251,7 @@ impl FilmFileHeader {
 
 /// Decodes the `HEAD` chunk of a film file. `length` is the length of the whole file in bytes.
 /// Metadata and further chunks of the result are empty. Returns `None` if a field is not valid, or
-/// if the tiles of so large a film do not fit into the file.
+/// if a file of `length` bytes is too short for the tiles of a film of this size.
 fn decode_head(fields: &mut Fields, length: u64) -> Option<FilmFileHeader> {
     let [width, height, groups] = [fields.u32()?, fields.u32()?, fields.u32()?].map(|n| n as usize);
     let tiles = width.div_ceil(TILE) as u64 * height.div_ceil(TILE) as u64;

@@ -53,8 +53,8 @@ pub fn tile_chunks(film: &Film) -> usize {
     film.tile_count().div_ceil(TILES_PER_CHUNK)
 }
 
-/// Encodes the `TILE` chunk with the number `index`, which is below [`tile_chunks`]. Leaves out the
-/// samples of a tile in which only some pixels have their first sample.
+/// Encodes the `TILE` chunk with the number `index`, which is below [`tile_chunks`]. A tile in
+/// which only some pixels have their first sample is written as a tile without samples.
 pub fn encode_tiles(film: &Film, index: usize) -> Vec<u8> {
     let first = index * TILES_PER_CHUNK;
     let count = (film.tile_count() - first).min(TILES_PER_CHUNK);
@@ -88,7 +88,8 @@ pub fn encode_end(film: &Film, pieces: &[Vec<u8>]) -> Vec<u8> {
 /// new one is complete and stored on the disk.
 ///
 /// # Errors
-/// Fails if the file cannot be written or is refused; an existing file is then unchanged.
+/// Fails if the file cannot be written, or if it exists and `existing` does not permit replacing
+/// it. An existing file is then unchanged.
 pub fn write_film_file(
     path: &Path,
     pieces: &[Vec<u8>],

@@ -15,15 +15,20 @@
 //! | `TILE` | number of the first tile and number of tiles (u32 each), then the records of up to 64 consecutive tiles, row by row |
 //! | `DONE` | number of tiles (u64), and the CRC-32 (u32) of all bytes before the first `TILE` chunk and the checksums of the `TILE` chunks; the end of the file |
 //!
-//! A text has its length in bytes (u32) before it. A tile record begins with the sample counts of A
-//! and B, the two halves of the samples (u32 each), and ends there if both are 0. Then follow the
-//! number of samples above the largest value that the film can store (u64), the number of invalid
-//! samples (u64), the number of their stored positions (u8), index, x, y (u32 each) and replicate
-//! (u8) of each position, and the sums. Sums are stored in planes, in the order replicate, group,
-//! channel. A plane begins with the number of bytes that its largest sum needs (u8, 0 to 8). The
-//! sums of the pixels inside the picture follow row by row, each with this number of bytes. The
-//! file takes about 60 % of the film's size in memory. The encoding takes less time than writing
-//! the other 40 % to disk would.
+//! A text has its length in bytes (u32) before it. A tile record consists of
+//!
+//! - the numbers of samples per pixel in the replicates A and B, the two halves of the samples (u32
+//!   each). If both are 0, the record ends here;
+//! - the number of samples above the largest value that the film can store (u64);
+//! - the number of invalid samples (u64);
+//! - the number of invalid samples whose positions are stored (u8), and for each of them its index
+//!   in the sample sequence, x, y (u32 each) and replicate (u8; 0: A, 1: B);
+//! - the integer sums in planes, in the order replicate, group, channel. A plane begins with the
+//!   number of bytes that its largest sum needs (u8, 0 to 8). The sums of the pixels inside the
+//!   picture follow row by row, each with this number of bytes.
+//!
+//! The file takes about 60 % of the film's size in memory. The encoding takes less time than
+//! writing the other 40 % to disk would.
 
 mod decode;
 mod encode;
