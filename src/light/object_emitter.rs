@@ -15,8 +15,9 @@ use crate::sampling::warp;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Largest number of triangles of an emissive object for which one is chosen in proportion to its
-/// solid angle. For this choice, the solid angles of all triangles are computed for each receiver.
+/// Largest number of triangles of an emissive object up to which the triangle to sample is chosen
+/// in proportion to its solid angle. For this choice, the solid angles of all triangles are
+/// computed for each receiver.
 const MAX_FACES: usize = 32;
 
 /// Surface of an emissive object from which light can be sampled.
@@ -72,14 +73,16 @@ enum CompiledSurface<S> {
         axes: [[S; 3]; 3],
         size: [S; 2],
     },
-    /// Up to [`MAX_FACES`] triangles. One is chosen in proportion to its solid angle.
+    /// Up to [`MAX_FACES`] triangles. The triangle to sample is chosen in proportion to its solid
+    /// angle.
     Faces {
         triangles: Vec<Triangle<S>>,
         /// `true` if the triangles enclose a convex solid; no triangle then occludes another.
         convex: bool,
     },
-    /// More than [`MAX_FACES`] triangles, sorted by `end`, the end of the range of random numbers
-    /// for which a triangle is chosen. One is chosen in proportion to its area.
+    /// More than [`MAX_FACES`] triangles. The triangle to sample is chosen in proportion to its
+    /// area: a random number selects the triangle whose range it is in. The triangles are sorted by
+    /// the ends of these ranges.
     Mesh(Vec<Triangle<S>>),
 }
 
@@ -88,21 +91,21 @@ struct Triangle<S> {
     corner: [S; 3],
     /// Edges from the first corner of the triangle to the two others.
     edges: [[S; 3]; 2],
-    /// Start of the triangle's range in [0, 1): the triangle is chosen for random numbers from
-    /// `start` to `end`. The length of the range is the triangle's share of the total area.
+    /// Unit normal of the triangle's front.
     normal: [S; 3],
     area: S,
-    /// Start of the range of random numbers for which this triangle is chosen; `end` is its end.
-    /// The length of the range is the triangle's share of the total area.
+    /// Start of the range of random numbers in [0, 1) for which this triangle is chosen; `end` is
+    /// the end of the range. The length of the range is the triangle's share of the total area.
     start: S,
     end: S,
 }
 
 impl<S: Float> ObjectEmitter<S> {
     /// Compiles the surface of an emissive object. Its back emits light, too, if `two_sided` is
-    /// `true`. `lift` is the height of sampled points above the surface. It is limited to 1e-4 of
-    /// the surface's size, which is the radius of a sphere, the shorter side of a rectangle, or the
-    /// root of the total area of triangles. Returns `None` if the surface has no area.
+    /// `true`. `lift` is the height of sampled points above the surface; larger heights than 1e-4
+    /// of the surface's size are reduced to this limit. The size is the radius of a sphere, the
+    /// shorter side of a rectangle, or the square root of the total area of triangles. Returns
+    /// `None` if the surface has no area.
     pub fn new(surface: &ObjectSurface, two_sided: bool, lift: f64) -> Option<Self> {
         let vector = |v: DVec3| v.to_array().map(S::from_f64);
         let (compiled, center, radius, area, size);
@@ -185,9 +188,9 @@ impl<S: Float> ObjectEmitter<S> {
                 let cone = Cone::new(to_center, radius);
                 let local = warp::cone(u, v, cone.one_minus_cos);
                 let wi = Frame::around(cone.axis).to_world(local).renormalize();
-                // Distance to the lifted point in the sampled direction. This is the intersection
-                // with a sphere whose radius is larger by the lift, or smaller if the receiver is
-                // inside.
+                // Distance to the lifted point in the sampled direction. The lifted point is on a
+                // concentric sphere. The radius of this sphere is larger by the lift if the
+                // receiver is outside, and smaller by the lift if the receiver is inside.
                 let sin2 = local.x * local.x + local.y * local.y;
                 let outer = radius + lift;
                 let root2 = outer * outer - cone.distance2 * sin2;
@@ -248,8 +251,8 @@ impl<S: Float> ObjectEmitter<S> {
     }
 
     /// Returns the density \[1/sr\] with which [`ObjectEmitter::sample`] draws the direction of a
-    /// ray from `origin` that hits the object at `distance`. `triangle` is the index of the hit
-    /// triangle if the object is a mesh. It is stored by [`SimdFloat::from_id`].
+    /// ray from `origin` that hits the object at `distance`. If the object is a mesh, `triangle` is
+    /// the index of the hit triangle, encoded by [`SimdFloat::from_id`].
     #[inline(never)]
     pub fn density<L: SimdFloat<Scalar = S>>(
         &self,
@@ -335,11 +338,11 @@ impl<S: Float> ObjectEmitter<S> {
         (wi, distance, triangle.density(&seen, height, distance))
     }
 
-    /// Lifts each lane's triangle along its normal to the front. In lanes of `backs` whose receiver
-    /// is behind the triangle, it is lifted to the back instead. Returns three values: the lifted
-    /// triangle as seen from the receiver, its corners relative to the receiver, and the coordinate
-    /// of its plane along the normal, also relative to the receiver. The coordinate is negative in
-    /// lanes whose receiver gets light.
+    /// Lifts each lane's triangle along its normal: to the back in lanes of `backs` whose receiver
+    /// is behind the triangle, otherwise to the front. Returns three values: the lifted triangle as
+    /// seen from the receiver, its corners relative to the receiver, and the coordinate of its
+    /// plane relative to the receiver. The coordinate is measured along the normal of the side to
+    /// which the triangle is lifted. It is negative in lanes whose receiver gets light.
     #[inline(always)]
     fn seen_triangle<L: SimdFloat<Scalar = S>>(
         &self,
@@ -441,8 +444,9 @@ impl<L: SimdFloat> PacketTriangle<L> {
     }
 
     /// Returns the density \[1/sr\] of a direction in which the triangle is hit at `distance`: the
-    /// probability of the triangle times the density of its points. `height` is the coordinate of
-    /// the triangle's plane along its normal, relative to the receiver.
+    /// probability that the triangle is chosen, times the density of the direction within the
+    /// triangle. `height` is the coordinate of the triangle's plane along its normal, relative to
+    /// the receiver.
     #[inline(always)]
     fn density(&self, seen: &SphericalTriangle<L>, height: L, distance: L) -> L {
         let by_area = density_of_area(self.area / self.share, distance, height);
@@ -473,8 +477,8 @@ impl<L: SimdFloat> SphericalTriangle<L> {
     fn new(corners: [Vec3<L>; 3], height: L, area: L) -> Self {
         let inverse = corners.map(|corner| L::one() / corner.length_squared().sqrt());
         let [a, b, c] = [0, 1, 2].map(|k| corners[k] * inverse[k]);
-        // The formula of Van Oosterom and Strackee (1983) has no cancellation at small solid
-        // angles.
+        // Solid angle by the formula of Van Oosterom and Strackee (1983), which has no cancellation
+        // at small angles.
         let inverse = inverse[0] * inverse[1] * inverse[2];
         let volume = height.abs() * (area + area) * inverse;
         let below = L::one() + a.dot(b) + b.dot(c) + c.dot(a);
@@ -499,8 +503,9 @@ impl<L: SimdFloat> SphericalTriangle<L> {
         let cross = a.cross(b).dot(a.cross(c));
         let alpha = self.volume.atan2(cross);
         let (sin_alpha, cos_alpha) = alpha.sin_cos();
-        // Point `end` of the edge from a to c, with the cosine q of its angle to a. The arc from b
-        // to `end` cuts off the share `u` of the triangle's area, on the side of a.
+        // `end` is a point of the edge from a to c. The arc from b to `end` cuts off the share `u`
+        // of the triangle's area, on the side of a. q is the cosine of the angle between a and
+        // `end`.
         let (s, t) = u.mul_add(self.solid_angle, -alpha).sin_cos();
         let p = t - cos_alpha;
         let r = sin_alpha.mul_add(cos_c, s);
@@ -601,8 +606,8 @@ mod tests {
     }
 
     /// Checks the mean of 1 / density over the sampled directions. It must be the sum of the solid
-    /// angles of all triangles, front and back. For a convex solid seen from outside it must be
-    /// half of this sum, because only the fronts emit to the receiver.
+    /// angles of all triangles, because both sides emit light. For a convex solid seen from outside
+    /// it must be half of this sum, because only the fronts emit to the receiver.
     #[test]
     fn samples_of_triangles_cover_their_solid_angle() {
         for surface in surfaces() {

@@ -8,8 +8,8 @@ use crate::material::{Fresnel, Highlight, Lobe, Material};
 use crate::sampling::warp;
 use std::f64::consts::FRAC_1_PI;
 
-/// Largest Phong exponent for which a single-precision cosine is accurate enough. The relative
-/// error of the power is about the exponent times 1.5e-7.
+/// Largest Phong exponent alpha for which a single-precision cosine is accurate enough. The
+/// relative error of the power cos^alpha is about alpha times 1.5e-7.
 pub const SHARP_EXPONENT: f64 = 1024.0;
 
 /// Model of highlights (the reflections of lights in a surface), compiled for the kernels.
@@ -80,7 +80,7 @@ pub struct Bsdf<S> {
     pub ambient: [S; 3],
     /// Diffuse coefficient times the material's colour.
     pub diffuse: [S; 3],
-    /// Model of the highlights of lights.
+    /// Model of highlights, which are the reflections of lights in the surface.
     pub specular: SpecularModel<S>,
     /// Reflection coefficient k_r and the distribution of reflected rays; `None` if nothing is
     /// reflected.
@@ -192,8 +192,8 @@ pub(super) fn along_tan2<L: SimdFloat>(h: Vec3<L>, n: Vec3<L>) -> (L, L) {
 /// Returns `cos`^alpha for a cosine computed from unit vectors; 0 for angles of 90 degrees and
 /// more.
 ///
-/// The cosine is clamped to 1, because that of two rounded vectors may exceed 1 by a few rounding
-/// errors, and 1.000001^1e6 is 2.7.
+/// The cosine is clamped to 1. The dot product of two rounded unit vectors may exceed 1 by a few
+/// rounding errors, and 1.000001^1e6 is 2.7.
 #[inline(always)]
 fn cosine_power<L: SimdFloat>(cos: L, alpha: L) -> L {
     let power = (cos.max(L::from_f64(1e-30)).min(L::one()).ln() * alpha).exp();
@@ -220,8 +220,9 @@ fn sharp_cosine_power<L: SimdFloat>(a: Vec3<L>, b: Vec3<L>, alpha: L) -> L {
     (-(alpha * s * series)).exp().masked(along.gt(L::zero()))
 }
 
-/// Samples a direction of the lobe `Cone` or `Square` about the direction `axis`, a unit vector
-/// within rounding errors. `u` and `v` are uniform in [0, 1). Returns `axis` for other lobes.
+/// Samples a unit vector of the lobe `Cone` or `Square` about the direction `axis`. The length of
+/// `axis` is 1 within rounding errors. `u` and `v` are uniform in [0, 1). Returns `axis` for other
+/// lobes.
 #[inline(always)]
 pub(super) fn spread<L: SimdFloat>(
     lobe: &ReflectionLobe<L::Scalar>,
@@ -284,7 +285,7 @@ impl<S: Float> Bsdf<S> {
                 let (nh, tan2) = along_tan2(h, n);
                 let h2 = h.length_squared();
                 let (visible, total) = facets.masking(nh, nv, nl, h2 * L::from_f64(0.5));
-                // f N.L = D G F / (4 N.V): the light's cosine cancels.
+                // f N.L = D G F / (4 N.V): the factor N.L cancels.
                 let d: L = facets.density(tan2);
                 let k = L::from_f64(0.25 * strength.to_f64());
                 let value = d * visible * k / (nv * total);
@@ -328,8 +329,9 @@ impl<S: Float> Bsdf<S> {
             (direction, L::select(below, L::zero(), weight))
         };
         // The normal of the microfacet that reflects this ray is half-way between the direction to
-        // the viewer and that of the reflected ray. Its cosine with either direction is half the
-        // length of their sum, which has no cancellation at grazing angles.
+        // the viewer and that of the reflected ray. The cosine of its angle to either direction is
+        // half the length of the sum of both directions. This length has no cancellation at grazing
+        // angles.
         let cos =
             || ((direction - incident).length_squared().sqrt() * L::from_f64(0.5)).min(L::one());
         BsdfSample { direction, weight: self.reflection_fresnel.times(cos, weight) }
@@ -397,9 +399,10 @@ impl<S: Float> Bsdf<S> {
     }
 
     /// Returns two values for light from `direction`: the value [1/sr] of the reflection lobe times
-    /// the cosine of the direction, and the density [1/sr] with which [`Bsdf::sample`] draws it.
-    /// The weight of a sample is the first divided by the second. Both are zero for a mirror and
-    /// for directions below the surface. The other parameters are those of [`Bsdf::sample`].
+    /// the cosine between `direction` and the normal, and the density [1/sr] with which
+    /// [`Bsdf::sample`] draws `direction`. The weight of a sample is the first value divided by the
+    /// second. Both are zero for a mirror and for directions below the surface. The other
+    /// parameters are those of [`Bsdf::sample`].
     #[inline(always)]
     pub fn evaluate_lobe<L: SimdFloat<Scalar = S>>(
         &self,

@@ -153,7 +153,7 @@ mod tests {
     fn fresnel_has_textbook_values() {
         assert!((index_from_f0(0.04) - 1.5).abs() < 1e-12);
         assert!((exact(0.04).at(0.0).x - 1.0).abs() < 1e-12);
-        // Mean of s and p at 60 degrees for n = 1.5: 0.0892 (s 0.1770, p 0.0014).
+        // Reflectances at 60 degrees for n = 1.5: s 0.1770, p 0.0014, mean 0.0892.
         let sin_t = 3f64.sqrt() / 2.0 / 1.5;
         let (ci, ct) = (0.5, (1.0 - sin_t * sin_t).sqrt());
         let s = ((ci - 1.5 * ct) / (ci + 1.5 * ct)).powi(2);

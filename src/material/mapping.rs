@@ -29,7 +29,8 @@ pub enum Projection {
 }
 
 /// Distance that v keeps from 0 and 1 in a cylindrical projection. At a flat end of the shape v
-/// would be exactly 0 or 1, and rounding errors would give it the colour of the opposite end.
+/// would be exactly 0 or 1. Rounding errors could then move v past the edge of the image, to the
+/// colour of the opposite end.
 const RIM: f64 = 1.0 / 16_384.0;
 
 /// Factor that favours the later of two axes (in the order x, y, z) when a box projection chooses
@@ -68,8 +69,8 @@ pub struct TextureMapping<S> {
     texture_from_scene: [[S; 3]; 3],
     /// Columns of the linear map from texture space to scene space.
     scene_from_texture: [[S; 3]; 3],
-    /// Centre of the object's part in the scene. Points are mapped relative to this centre, so that
-    /// rounding errors are in proportion to the size of the part.
+    /// Centre, in the scene, of the part of the object that has this texture. Points are mapped
+    /// relative to this centre, so that rounding errors are in proportion to the size of the part.
     center: [S; 3],
     /// Coordinates of the centre of the object's part in texture space, relative to the origin of
     /// the projection's formula.
@@ -126,7 +127,8 @@ impl<S: Float> TextureMapping<S> {
         let mut scale = placement.scale;
         let extent = high - low;
         if projection == Projection::Planar && placement.mapping == Mapping::Uv {
-            // With the mapping `uv`, a flat shape has one repetition between opposite edges.
+            // With the mapping `uv`, one repetition of the image spans a flat shape from edge to
+            // edge.
             scale = [scale[0] / extent.x, scale[1] / extent.y];
         }
         Self {
@@ -149,8 +151,8 @@ impl<S: Float> TextureMapping<S> {
     }
 
     /// Maps a normal of any length from scene space to texture space or back. `columns` are the
-    /// columns of the matrix that maps points in the opposite direction: normals are mapped by the
-    /// transpose of this matrix.
+    /// columns of the matrix that maps points in the opposite direction, because normals are mapped
+    /// by the transpose of the inverse matrix.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(columns: &[[S; 3]; 3], n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = columns.map(Vec3::splat);
@@ -222,8 +224,8 @@ impl<S: Float> TextureMapping<S> {
             let constant = across.length_squared().sqrt().le(steepness * angle);
             let largest = value.abs() + offset.abs() + scale;
             let error = largest.mul_add(L::from_f64(POINT_ROUNDINGS * L::EPSILON), moved);
-            // After a full turn, the end of the range of u is the same place as its start; a
-            // constant u at the end is replaced by the start.
+            // The start and the end of the range of u are the same place on the surface, one full
+            // turn apart. A constant u at the end is replaced by the start.
             let at_end = if periodic {
                 constant & (value - offset - scale).abs().le(error)
             } else {

@@ -58,11 +58,11 @@ pub trait MicrofacetEval<L: SimdFloat> {
     /// angle between microfacet normal and surface normal.
     fn density(&self, tan2: L) -> L;
     /// Returns the numerator and the denominator of G, the fraction of the microfacets with normal
-    /// h that are visible both from the viewer v and from the light l. `nh`, `nv`, `nl` and `vh`
-    /// are the positive cosines N.H, N.V, N.L and V.H. `nh` and `vh` may have a common factor, as
-    /// for an h that is not normalised.
+    /// H that are visible both from the viewer V and from the light L. `nh`, `nv`, `nl` and `vh`
+    /// are the positive cosines N.H, N.V, N.L and V.H. H need not be a unit vector: `nh` and `vh`
+    /// may both be multiplied by its length.
     fn masking(&self, nh: L, nv: L, nl: L, vh: L) -> (L, L);
-    /// Returns G_1, the fraction of the microfacets with normal h that are visible from the viewer.
+    /// Returns G_1, the fraction of the microfacets with normal H that are visible from the viewer.
     /// The parameters are those of [`MicrofacetEval::masking`].
     fn visibility(&self, nh: L, nv: L, vh: L) -> L;
     /// Returns G / G_1 in [0, 1]. It is the weight of a reflected ray if visible normals are
@@ -74,8 +74,8 @@ pub trait MicrofacetEval<L: SimdFloat> {
     /// positive cosines: those between the transmitted ray and the reversed surface normal, and
     /// between the ray and the reversed microfacet normal.
     fn shadowing_behind(&self, view: (L, L, L), transmitted: (L, L)) -> L;
-    /// Returns the function Lambda of Smith's masking model, for a direction. `c` > 0 is the cosine
-    /// of its angle to the surface normal.
+    /// Returns the function Lambda of Smith's masking model for one direction. `c` > 0 is the
+    /// cosine of the angle between this direction and the surface normal.
     fn lambda(&self, c: L) -> L;
 }
 

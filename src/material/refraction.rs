@@ -38,11 +38,12 @@ pub struct FresnelSplit<L> {
 
 impl<L: SimdFloat> Interface<L> {
     /// Refracts rays with the unit direction `incident` at a boundary. `n` is the unit normal of
-    /// the boundary on the side of the rays. `n_i` and `n_t` are the indices of refraction on this
-    /// side and on the other one.
+    /// the boundary on the side of the rays. `n_i` is the index of refraction on this side, and
+    /// `n_t` that on the other side.
     ///
-    /// sin t = (n_i / n_t) sin i is computed from the part of the direction along the boundary, so
-    /// that grazing rays keep full precision. With equal indices the direction is unchanged.
+    /// The sine of the angle of refraction is sin t = (n_i / n_t) sin i. It is computed from the
+    /// part of the direction along the boundary, so that grazing rays keep full precision. With
+    /// equal indices the direction is unchanged.
     #[inline(always)]
     pub fn new(incident: Vec3<L>, n: Vec3<L>, n_i: L, n_t: L) -> Self {
         let cos_i = -incident.dot(n);

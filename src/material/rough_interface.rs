@@ -190,8 +190,8 @@ impl<S: Float> Bsdf<S> {
             let through: L = facets.shadowing_behind((nh, nv, vh), (no, oh));
             let passed = shares.transmitted * L::select(media.thin, shadowing, through);
             let value = Vec3::select(behind, gray(passed), reflected) * density;
-            // At nearly equal indices the half vector of refraction is the difference of two nearly
-            // equal vectors: it has too few valid digits.
+            // At nearly equal indices the half vector of refraction has too few valid digits,
+            // because it is the difference of two nearly equal vectors.
             let same = behind.and_not(media.thin)
                 & (media.n_t - media.n_i).abs().le(media.n_i * L::from_f64(MIN_REFRACTION));
             let possible = density.gt(L::zero()).and_not(same);
@@ -226,11 +226,11 @@ struct Facet<L> {
     nv: L,
     /// Cosine of the angle between the direction to the viewer and the microfacet normal.
     vh: L,
-    /// Cosine of the angle between the outgoing direction and the surface normal, which is reversed
-    /// for transmitted rays.
+    /// Cosine of the angle between the outgoing direction and the surface normal. For transmitted
+    /// rays the normal is reversed.
     no: L,
-    /// Cosine of the angle between the outgoing direction and the microfacet normal, which is
-    /// reversed for transmitted rays.
+    /// Cosine of the angle between the outgoing direction and the microfacet normal. For
+    /// transmitted rays the normal is reversed.
     oh: L,
     /// Density [1/sr] with which the outgoing direction is drawn if visible microfacets are
     /// sampled.

@@ -156,7 +156,7 @@ choices! {
     }
 }
 
-/// Placement keys of a texture: they determine its coordinates on the shape.
+/// Placement of a texture on a shape: the keys that determine its texture coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Source of the texture coordinates, such as a projection.
@@ -228,8 +228,8 @@ impl Texture {
         }
     }
 
-    /// Returns a texture of the kind `key` with the placement of this one; `None` if there is no
-    /// such kind.
+    /// Returns a texture of the kind `key` with the placement of the texture `self`; `None` if
+    /// there is no such kind.
     pub fn changed(&self, key: &str) -> Option<Self> {
         let Placement { mapping, axis, scale, offset } = self.placement();
         Some(match Self::new(key)? {

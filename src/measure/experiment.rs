@@ -106,7 +106,7 @@ impl FromStr for Experiment {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        // The names of earlier versions are accepted.
+        // The names that earlier versions of the program used are accepted, too.
         let text = match text {
             "level" => "ray-types",
             "depth" => "max-depth",
@@ -169,7 +169,7 @@ pub struct Plan {
     pub seconds: f64,
     /// Number of tracing threads, except in [`Experiment::Threads`].
     pub threads: usize,
-    /// Exposure and tone curve of the displayed pictures, whose error in 8-bit levels is measured.
+    /// Random seed of the measured renders.
     pub seed: u64,
     /// Exposure and tone curve of the picture whose displayed error is measured.
     pub display: Display,
@@ -221,7 +221,8 @@ impl Plan {
             Experiment::Default => Vec::new(),
             Experiment::Adaptivity => vec![Variant { adaptive: false, ..named("uniform") }],
             Experiment::Precision => {
-                // The precision that `auto` does not choose for this scene.
+                // The variant has the precision that the setting `auto` does not choose for this
+                // scene.
                 let (name, precision) = match AnyWorld::compile(scene, &base.options.world) {
                     AnyWorld::Single(_) => ("double", Precision::Double),
                     AnyWorld::Double(_) => ("single", Precision::Single),
@@ -231,7 +232,8 @@ impl Plan {
                 vec![variant]
             }
             Experiment::Threads => {
-                // The default, all of `self.threads`, is not measured again.
+                // The counts are the powers of two below `self.threads`. This number itself is the
+                // default, which has its own variant.
                 let counts = (0..).map(|k| 1 << k).take_while(|n| *n < self.threads);
                 let variant = |n: usize| {
                     let name = if n == 1 { "1 thread".to_string() } else { format!("{n} threads") };

@@ -132,9 +132,9 @@ impl Axis {
         self.pixels.0 + (share * f64::from(self.pixels.1 - self.pixels.0)).round() as i32
     }
 
-    /// Returns the tick marks of the axis: round numbers in its range, each with its label. They
-    /// are 1, 2 and 5 times each power of ten, or only the powers of ten if there would be more
-    /// than nine.
+    /// Returns the tick marks of the axis: round numbers in its range, each with its label. The
+    /// numbers are 1, 2 and 5 times each power of ten. If more than nine of these are in the range,
+    /// only the powers of ten are returned.
     fn ticks(&self) -> Vec<(f64, String)> {
         let Range { start, end } = self.numbers;
         let powers = start.log10().floor() as i32..=end.log10().ceil() as i32;

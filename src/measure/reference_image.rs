@@ -55,7 +55,8 @@ pub struct Bias {
     /// the standard error of this difference.
     pub z: f64,
     /// Root mean square of the differences between the pixels of the picture and those of the
-    /// reference, in 8-bit levels. The part that noise explains is subtracted.
+    /// reference, in 8-bit levels. The mean square that the noise of both pictures causes is
+    /// subtracted before the root is taken.
     pub codes: f64,
     /// Smallest value of [`Self::codes`] that is significant, in 8-bit levels: its square is two
     /// standard errors of the mean squared difference.
@@ -195,7 +196,8 @@ impl Reference {
         let remaining = |sum: f64, own: f64| (sum / values - own).max(0.0);
         let codes = remaining(sum.codes, self.own.codes);
         // The standard error of the sum of squares is twice `crossed.sqrt()`. The relative error of
-        // its root, the RMSE, is half the relative error of the sum.
+        // the RMSE, the root of the mean square, is half the relative error of the sum. The two
+        // factors cancel.
         let spread = crossed.sqrt() / values;
         Errors {
             rmse_linear: remaining(sum.linear, self.own.linear).sqrt(),

@@ -32,7 +32,7 @@ pub struct Expected {
     /// Lower estimate of the time to the target in seconds, extrapolated from the convergence so
     /// far.
     pub seconds_low: f64,
-    /// Upper estimate of this time.
+    /// Upper estimate of the time to the target in seconds.
     pub seconds_high: f64,
 }
 
@@ -67,15 +67,15 @@ pub struct Measurement {
     pub reference_linear: f64,
     /// Seconds of tracing that the reference picture took.
     pub reference_seconds: f64,
-    /// Noise at which settings are compared, in 8-bit levels: a noise that the default settings
-    /// reached.
+    /// Noise at which settings are compared, in 8-bit levels. The default settings reached this
+    /// noise.
     pub compared_at: f64,
     /// Noise targets in 8-bit levels, in descending order.
     pub targets: Vec<f64>,
     /// Noise targets that the default settings did not reach in time, with extrapolated times.
     pub expected: Vec<Expected>,
-    /// Requested experiments without a variant that differs from the default settings in this
-    /// scene.
+    /// Requested experiments that were not run, because no variant of them differs from the default
+    /// settings in this scene.
     pub idle: Vec<Experiment>,
     /// Results of the renders with each variant of the settings, the default first.
     pub measured: Vec<Measured>,
@@ -104,10 +104,10 @@ const MIN_COUNTED: usize = 5;
 /// the error curve with a larger uncertainty are ignored.
 const MAX_SPREAD: f64 = 0.05;
 
-/// Half the width of the confidence interval of a median, as a multiple of sqrt(n) / 2 ranks for n
-/// values (sign test). sqrt(n) / 2 is the standard deviation of the number of values above the true
-/// median. This number is within 1.4 standard deviations of its mean in about four of five cases.
-/// The factor sqrt 2 is for the difference of two medians.
+/// Half the width of the confidence interval of a median by the sign test. The unit is sqrt(n) / 2
+/// ranks for n values: the number of values above the true median has this standard deviation. It
+/// is within 1.4 standard deviations of its mean in about four of five cases. The factor sqrt 2 is
+/// for the difference of two medians.
 const CERTAINTY: f64 = 1.4 * std::f64::consts::SQRT_2;
 
 /// Returns the median of `values`; for an even number of values, the mean of the two in the middle.
@@ -118,7 +118,7 @@ pub fn median(values: &[f64]) -> f64 {
 
 /// Returns the relative spread of the median of `values`. In about four of five cases, the median
 /// of another measurement on the same machine differs from the median of `values` by at most this
-/// share of it.
+/// fraction.
 ///
 /// For five and more values it is half the width of the confidence interval of the median by the
 /// sign test (Conover, *Practical Nonparametric Statistics*, confidence interval for a quantile),
@@ -328,7 +328,7 @@ mod tests {
 
     #[test]
     fn times_are_interpolated_on_the_power_law() {
-        // error = 8 / sqrt(spp)
+        // The error of the curve is 8 / sqrt(spp).
         let curve = measured(&[(16.0, 2.0), (64.0, 1.0), (256.0, 0.5)]);
         let target = curve.time_to(2f64.sqrt()).unwrap();
         assert!(

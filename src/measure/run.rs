@@ -24,9 +24,9 @@ pub struct Progress<'a> {
 
 /// Seconds of tracing before the measurement starts, so that clock rates and caches are steady.
 const WARM_UP_SECONDS: f64 = 0.3;
-/// Noise at which the render of the reference picture ends, as a share of the smallest noise target
-/// (at most [`COMPARED_AT`]). The squared error of the reference is then 9 % of the squared noise
-/// of this target.
+/// Noise at which the render of the reference picture ends, as a share of the smallest noise to be
+/// measured: the smallest target, or [`COMPARED_AT`] if this is smaller. The squared error of the
+/// reference is then 9 % of the squared smallest noise.
 const REFERENCE_SHARE: f64 = 0.3;
 /// Largest duration of rendering the reference, as a share of the whole measurement's time.
 const REFERENCE_TIME: f64 = 0.3;
@@ -103,8 +103,9 @@ pub fn measure(
         measured.push(result);
     }
 
-    // Repetitions of all variants are interleaved. There are at least `plan.repetitions` rounds,
-    // and further ones until times are steady or time is up.
+    // The repetitions of all variants are interleaved: each round repeats every variant once. There
+    // are at least `plan.repetitions` rounds, and further ones until times are steady or time is
+    // up.
     let mut round = 1;
     let mut round_seconds = 0.0;
     while keep_going {
@@ -164,8 +165,8 @@ fn comparison_noise(default: &Measured, targets: &[f64], seconds: f64) -> f64 {
 }
 
 /// Returns `true` if the times at which the repetitions reached the noise `codes` have a relative
-/// spread of at most [`STEADY`]. If they did not reach it, the times of the whole error curves are
-/// compared.
+/// spread of at most [`STEADY`]. If the noise was not reached, the times until the last point of
+/// the error curve are compared instead.
 fn is_steady(measured: &Measured, codes: f64) -> bool {
     let end = || measured.points.last().map_or(0.0, |p| spread(&measured.seconds(p)));
     measured.true_time_to(codes).map_or_else(end, |c| c.spread) <= STEADY
