@@ -125,9 +125,9 @@ impl RadianceMap {
         let (x, y) = (x * columns as f64 - 0.5, y * rows as f64 - 0.5);
         let (column, row) = (x.floor(), y.floor());
         let (s, t) = (x - column, y - row);
-        // The left and the right edge of the image are adjacent. At the top and at the bottom, no
-        // row follows on the outermost row. Beyond the centres of its pixels, its values are used
-        // without interpolation between rows.
+        // The left and the right edge of the image are adjacent. There is no row above the top row
+        // or below the bottom row. Beyond the pixel centres of these two rows, their values are
+        // used without interpolation between rows.
         let left = if column < 0.0 { columns - 1 } else { (column as usize).min(columns - 1) };
         let right = if left + 1 < columns { left + 1 } else { 0 };
         let (above, below) = (row.max(0.0) as usize, (row + 1.0) as usize);

@@ -97,7 +97,7 @@ fn sorted_leaves(bounds: &[Aabb]) -> Vec<Bvh2Node> {
 
 /// Finds the nearest node of each node among the `distance` nodes before and after it, and writes
 /// it to `nearest`. The nearest node is the one for which the box around both nodes has the
-/// smallest surface area; If several nodes give the same area, the last of them is the nearest.
+/// smallest surface area. If several nodes give the same area, the last of them is the nearest.
 fn find_nearest(nodes: &[Bvh2Node], distance: usize, nearest: &mut [Nearest]) {
     nearest.fill((f32::INFINITY, NONE));
     for (i, node) in nodes.iter().enumerate() {

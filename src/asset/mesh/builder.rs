@@ -17,7 +17,8 @@ const MIN_EXTENT: f64 = 1e-9;
 
 /// Ratio of a mesh's largest absolute coordinate to its extent above which the positions are stored
 /// relative to the centre of the mesh. Below it, they are stored relative to the origin. At this
-/// ratio, single precision resolves the mesh with four bits less than a mesh at the origin.
+/// ratio, single precision resolves the mesh with four bits less than if it were centred at the
+/// origin.
 const MAX_OFFSET: f64 = 16.0;
 
 /// Mesh under construction, to which the parser of a file format adds vertices and triangles.
@@ -166,8 +167,7 @@ impl<'a> Builder<'a> {
         self.check_limits(0, 1)?;
         self.triangles.push(corners);
         if self.colors.len() > 1 {
-            // The triangles before the first call of [`Builder::color`] have the colour with index
-            // 0.
+            // The triangles before the first call of [`Builder::color`] have colour index 0.
             self.color_of.resize(self.triangles.len() - 1, 0);
             self.color_of.push(self.color);
         }
