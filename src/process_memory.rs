@@ -170,7 +170,8 @@ fn first_number(text: &str) -> Option<u64> {
     text.split_whitespace().next()?.parse().ok()
 }
 
-/// Returns the number after the word `name` at the beginning of a line; `None` if there is none.
+/// Returns the number after the word `name` in the first line that begins with this word; `None` if
+/// there is none.
 fn value_of(text: &str, name: &str) -> Option<u64> {
     let line = text.lines().find(|line| line.split_whitespace().next() == Some(name))?;
     line.split_whitespace().nth(1)?.parse().ok()
@@ -192,8 +193,8 @@ mod tests {
         assert_eq!(limit([None, Some(9), Some(8)]), Some((8, "the free memory of this machine")));
     }
 
-    // Free memory changes from one reading to the next. Only the bounds that do not change are
-    // compared.
+    // Free memory changes from one reading to the next. It is therefore compared only with bounds
+    // that do not change, such as the memory of the machine.
     #[test]
     #[cfg(target_os = "linux")]
     fn available_memory_is_within_memory_of_machine() {
@@ -258,7 +259,7 @@ mod tests {
         assert_eq!(free(version_1), Some(6500));
         assert_eq!(free(version_2), Some(7030));
         assert_eq!(free(&(version_1.to_string() + version_2)), Some(6500));
-        // A container may not see the groups above its own.
+        // In a container, the files of the control groups above its own may be invisible.
         assert_eq!(free("5:memory:/docker/0/deep\n0::/../outside\n"), None);
         assert_eq!(free(""), None);
     }

@@ -33,8 +33,8 @@ impl Acceleration {
         Self::CHOICES[self as usize].name
     }
 
-    /// Returns the name that this structure had in earlier versions, which scene files and the
-    /// command line still accept; `None` if the name has not changed.
+    /// Returns the former name of this structure; `None` if its name has not changed. Scene files
+    /// and the command line still accept the former name.
     pub fn former_name(self) -> Option<&'static str> {
         match self {
             Self::Auto | Self::None => None,
@@ -80,9 +80,9 @@ pub fn padded((low, high): (DVec3, DVec3), epsilon: f64) -> [DVec3; 2] {
     [low - pad, high + pad]
 }
 
-/// Assumed distance, caused by rounding, between the bounding box of a solid and the faces that
-/// touch the box, as a fraction of the box's largest coordinate. Far from the origin of the scene
-/// file, double precision rounds the box and the faces differently.
+/// Assumed largest distance between the bounding box of a solid and the faces that touch the box,
+/// as a fraction of the box's largest coordinate. The distance is not 0, because double precision
+/// rounds the box and the faces differently far from the origin of the scene file.
 const GIVEN: f64 = 1.0 / 4_294_967_296.0;
 
 impl<S: Float> ItemBox<S> {

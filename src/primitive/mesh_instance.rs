@@ -63,8 +63,8 @@ impl CanonicalShape for MeshForm {
         let stretched = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
         let size = ((high - low) * DVec3::from(stretched)).to_array();
         let longest = size.into_iter().fold(0.0, f64::max);
-        // The shortest side is the thickness of a needle or a thin sheet. Sides of length 0 are
-        // left out, because a flat mesh encloses no volume.
+        // The thickness of a needle or a thin sheet is the shortest side of its bounding box. Sides
+        // of length 0 are left out, because a flat mesh encloses no volume.
         let thinnest = size.into_iter().filter(|s| *s > 0.0).fold(f64::INFINITY, f64::min);
         thinnest.min(longest / EXTENT_PER_DETAIL)
     }
@@ -251,8 +251,8 @@ impl<S: Float> MeshInstance<S> {
         x * v.x + y * v.y + z * v.z
     }
 
-    /// Transforms the normal `n` from the mesh to the scene, by the transpose of the inverse map.
-    /// The result is not normalised.
+    /// Transforms the normal `n` from mesh space to the scene by the transpose of
+    /// `mesh_from_scene`. The result is not normalised.
     #[inline(always)]
     fn normal<L: SimdFloat<Scalar = S>>(&self, n: Vec3<L>) -> Vec3<L> {
         let [x, y, z] = self.mesh_from_scene.map(Vec3::splat);
@@ -274,8 +274,8 @@ impl<S: Float> MeshInstance<S> {
         (Ray { origin: self.point(ray.origin), direction }, length)
     }
 
-    /// Returns the values of the vertex attribute `attributes` at the three vertices of a mesh
-    /// triangle, which has the id `triangle_tag`. Each lane has its own triangle.
+    /// Returns the values of the vertex attribute `attributes` at the three vertices of the mesh
+    /// triangle with the id `triangle_tag`. Each lane has its own triangle.
     #[inline(always)]
     fn vertices<L: SimdFloat<Scalar = S>>(
         &self,
@@ -302,8 +302,8 @@ impl<S: Float> MeshInstance<S> {
         })
     }
 
-    /// Returns the values of the vertex attribute `attributes`, which are pairs of numbers, at the
-    /// three vertices of a mesh triangle, which has the id `triangle_tag`. Each lane has its own
+    /// Returns the values of the vertex attribute `attributes` at the three vertices of the mesh
+    /// triangle with the id `triangle_tag`. A value is a pair of numbers. Each lane has its own
     /// triangle.
     #[inline(always)]
     fn pairs<L: SimdFloat<Scalar = S>>(
@@ -380,9 +380,9 @@ impl<S: Float> Meshes<S> {
                 continue;
             }
             let (inner, length) = item.ray(ray);
-            // The limit in mesh space is widened by the rounding error of the transform. The
-            // decision is made below by the distances in the scene, so that it does not depend on
-            // the order of the primitives.
+            // The distance limit in mesh space is enlarged by the rounding error of the transform.
+            // Whether a hit is closer than earlier hits is decided below by distances in the scene.
+            // The result therefore does not depend on the order of the primitives.
             let limit = hit.t * length * L::from_f64(1.0 + 4.0 * L::EPSILON);
             let limit = L::select(near, limit, L::from_f64(-1.0));
             let found = triangle_mesh::closest(&item.mesh, &inner, limit);

@@ -1,6 +1,6 @@
 //! Primitives: compiled geometry that rays intersect. Each kind has one file with its canonical
-//! form, its intersection kernel and its tests. The module `shape` has the descriptions in scene
-//! files from which primitives are compiled; several kinds of shapes become the same kind of
+//! form, its intersection kernel and its tests. Primitives are compiled from the shapes of a scene
+//! file, which the module `shape` describes. Several kinds of shapes become the same kind of
 //! primitive.
 
 mod aggregate;

@@ -12,7 +12,7 @@ use crate::primitive::form::Form;
 use glam::{DAffine3, DVec3};
 
 /// Flat parallelogram of the points `corner + a u + b v`, with a and b in 0..=1. Its front is the
-/// side of u x v.
+/// side to which u x v points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParallelogramForm {
     /// Corner at which both edges start.
@@ -70,8 +70,8 @@ impl CanonicalShape for ParallelogramForm {
     fn normals_at(&self, point: DVec3, slack: f64) -> Vec<Vec<DVec3>> {
         let normal = self.u.cross(self.v).normalize();
         let from_corner = point - self.corner;
-        // `distance` is that of the point from `edge`; `width` is that of the opposite edge from
-        // `edge`.
+        // Both numbers are signed distances from the line through `edge`: `distance` is that of the
+        // point, `width` is that of the opposite edge.
         let is_between = |edge: DVec3, other: DVec3| {
             let across = edge.cross(normal).normalize();
             let (distance, width) = (across.dot(from_corner), across.dot(other));
@@ -148,7 +148,8 @@ impl<L: SimdFloat> Primitive<L> for Parallelogram<L::Scalar> {
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)> {
         let normal = Vec3::splat(self.normal);
         let from_corner = ray.origin - Vec3::splat(self.corner);
-        // Parallel rays divide by zero: infinite or NaN distances fail every comparison.
+        // For a ray parallel to the plane, t, a and b are infinite or NaN. The tests below then
+        // fail.
         let t = -from_corner.dot(normal) / ray.direction.dot(normal);
         let hit_point = ray.direction.mul_add(t, from_corner);
         let a = hit_point.dot(Vec3::splat(self.dual_u));

@@ -1,4 +1,4 @@
-//! Infinite planes, and the half-spaces behind them in compounds.
+//! Infinite planes, and the half-spaces behind them, which can be parts of compounds (CSG).
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, SimdFloat, Vec3};
@@ -105,7 +105,7 @@ impl<L: SimdFloat> Primitive<L> for Plane<L::Scalar> {
     }
 }
 
-/// Half-space behind a plane, as a part of compounds.
+/// Half-space behind a plane, as a part of compounds (CSG).
 impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
     type Spans = Option<Span<L>>;
 

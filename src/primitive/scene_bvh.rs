@@ -12,16 +12,16 @@ use glam::DVec3;
 /// Coherence limit of the scene's BVH: it determines which packets of rays traverse the BVH as a
 /// whole. The rays of other packets traverse it one by one.
 ///
-/// A packet is coherent if each ray differs from the packet's first active ray by at most a bound.
-/// The bound applies to two differences: the length of the difference of the unit directions, and
-/// the largest coordinate of the difference of the origins, divided by the largest extent of the
-/// primitives. It is this constant times the number of lanes, divided by the square root of the
-/// number of primitives.
+/// A packet is coherent if two numbers are at most a bound for each of its rays, compared with its
+/// first active ray. The first is the length of the difference of the unit directions. The second
+/// is the largest coordinate of the difference of the origins, divided by the largest extent of the
+/// primitives. The bound is this constant times the number of lanes, divided by the square root of
+/// the number of primitives.
 ///
-/// Measured with spheres in a ball and packets of eight rays. A packet is as fast as single rays if
-/// its differences are 0.8 with 256 spheres, 0.4 with 1000 and 0.13 with 10,000. With 100 spheres,
-/// even packets of random rays are as fast as single rays. For packets of four rays the differences
-/// are at most half as large.
+/// Measured with spheres inside a large ball and packets of eight rays. A packet is as fast as
+/// single rays if its differences are 0.8 with 256 spheres, 0.4 with 1000 and 0.13 with 10,000.
+/// With 100 spheres, even packets of random rays are as fast as single rays. For packets of four
+/// rays the differences are at most half as large.
 const COHERENCE_LIMIT: f64 = 1.5;
 
 /// BVH over the primitives of a scene, one primitive per leaf.

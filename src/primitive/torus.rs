@@ -1,17 +1,17 @@
 //! Tori under any affine map. Rays are transformed into the space of a torus about the y axis, with
 //! a ring of radius 1 and a tube of radius r: (rho - 1)^2 + y^2 <= r^2, rho^2 = x^2 + z^2
 //!
-//! The positions at which a line meets the torus are the roots of a quartic. They are found by
-//! Newton's method in brackets, one root in each bracket. Let s be the distance along the line from
-//! its point closest to the centre. Half the derivative of the quartic is s - rho'(s). The distance
-//! rho(s) from the axis is a hyperbola. Its second derivative is largest at the point closest to
-//! the axis, and exceeds 1 between two known positions. The derivative of the quartic is therefore
-//! monotone on three pieces of the line, and has one or three zeros. The quartic is monotone
-//! between these zeros, which bracket its roots (after Yuksel 2022, *High-Performance Polynomial
-//! Root Finding for Graphics*).
+//! A line meets the torus where the height h = (rho - 1)^2 + y^2 - r^2 is 0, at most four times.
+//! These zeros of h are found by Newton's method in brackets, one zero in each bracket. Let s be
+//! the distance along the line from its point closest to the centre. Half the derivative of h is s
+//! minus rho'(s). The graph of the distance rho(s) from the axis is a hyperbola. The second
+//! derivative of rho is largest at the point closest to the axis, and exceeds 1 between two known
+//! positions. The derivative of h is therefore monotone on three pieces of the line, and has one or
+//! three zeros. Between these positions h is monotone; the positions bracket the zeros of h (after
+//! Yuksel 2022, *High-Performance Polynomial Root Finding for Graphics*).
 //!
-//! The quartic is evaluated from the distance to the ring, not from its polynomial coefficients,
-//! because these would cancel for thin tubes.
+//! The zeros of h are also the roots of a quartic polynomial. Its coefficients are not used,
+//! because their terms would cancel for thin tubes; h is evaluated from the distance to the ring.
 
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3};
@@ -90,8 +90,9 @@ impl CanonicalShape for TorusForm {
         false
     }
 
-    /// Returns the thickness of the tube in the scene. It is the smallest distance between opposite
-    /// faces of a parallelepiped: the image of a cube around a ball with the radius of the tube.
+    /// Returns the thickness of the tube in the scene. The map to the scene turns a cube around a
+    /// ball with the radius of the tube into a parallelepiped. The thickness is the smallest
+    /// distance between opposite faces of this parallelepiped.
     fn thickness(&self) -> f64 {
         let rows = self.scene_from_torus.matrix3.inverse().transpose();
         let rows = [rows.x_axis, rows.y_axis, rows.z_axis];
@@ -267,8 +268,8 @@ impl<L: SimdFloat> UnitLine<L> {
     }
 
     /// Returns two values at position `s` of the line: its height over the torus's surface, and the
-    /// derivative of this height by `s`. The height is a quartic: the squared distance from the
-    /// ring minus the squared radius of the tube. It is negative inside of the torus.
+    /// derivative of this height by `s`. The height is the squared distance from the ring minus the
+    /// squared radius of the tube. It is negative inside of the torus.
     #[inline(always)]
     fn height(&self, s: L) -> (L, L) {
         let (beyond, y, speed, _) = self.place(s);

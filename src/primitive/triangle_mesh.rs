@@ -16,19 +16,20 @@ use crate::lanes::{Float, Frame, MAX_WIDTH, Mask, SimdFloat, Vec3, prefetch};
 /// Coherence limit of a mesh's BVH: it determines which packets of rays traverse the BVH as a
 /// whole. The rays of other packets traverse it one by one.
 ///
-/// A packet is coherent if each ray differs from the packet's first active ray by at most a bound.
-/// The bound applies to two differences: the length of the difference of the unit directions, and
-/// the largest coordinate of the difference of the origins, divided by the size of the mesh. It is
-/// this constant times the number of lanes, divided by the square root of the number of triangles.
+/// A packet is coherent if two numbers are at most a bound for each of its rays, compared with its
+/// first active ray. The first is the length of the difference of the unit directions. The second
+/// is the largest coordinate of the difference of the origins, divided by the size of the mesh. The
+/// bound is this constant times the number of lanes, divided by the square root of the number of
+/// triangles.
 ///
 /// Measured by `benches/mesh.rs` (lines `together or apart`): packets of eight rays are faster than
 /// single rays up to differences of 0.3 with 1,000 triangles, 0.1 with 70,000, 0.02 with a million.
 /// For packets of four the differences are at most half as large.
 const COHERENCE_LIMIT: f64 = 2.5;
 
-/// Upper limit of the bound on differences between the rays of a coherent packet, divided by the
-/// number of lanes. It applies to meshes of less than about 3900 triangles. [`COHERENCE_LIMIT`]
-/// would allow larger differences in these meshes.
+/// Largest bound on the differences between the rays of a coherent packet, divided by the number of
+/// lanes. It replaces the bound from [`COHERENCE_LIMIT`], which is larger for meshes of less than
+/// about 3900 triangles.
 const MAX_COHERENT_SPREAD: f64 = 0.04;
 
 /// Closest triangle of a mesh that each ray hits.
@@ -122,8 +123,8 @@ impl<L: SimdFloat> ShearedRay<L> {
     }
 }
 
-/// Traversal of a mesh's BVH. If `ANY` is `true`, the traversal of a ray ends at the first triangle
-/// that it finds on the ray, which may not be the closest.
+/// Traversal of a mesh's BVH. If `ANY` is `true`, the traversal of a ray ends when any triangle on
+/// the ray is found; it need not be the closest one.
 struct MeshTraversal<'a, const ANY: bool> {
     mesh: &'a Mesh,
 }

@@ -1,5 +1,5 @@
-//! Checkpoints: film files from which a later process continues a render, with bit for bit the same
-//! result.
+//! Checkpoints: film files from which a later process continues a render. The result is bit for bit
+//! that of a render without interruption.
 //!
 //! A checkpoint has three chunks in addition to those of a film file. `SCEN` has the scene for
 //! which the samples were traced, and the other inputs of samples. `SCHD` has the state of the
@@ -132,8 +132,9 @@ impl EncodedCheckpoint {
         Self(pieces)
     }
 
-    /// Writes the checkpoint to the file at `path`. `existing` decides about a file that exists
-    /// already: it is replaced once the new one is complete, or the function fails.
+    /// Writes the checkpoint to the file at `path`. If there is a file at `path` already,
+    /// `existing` decides: the file is replaced once the new one is complete, or the function
+    /// fails.
     ///
     /// # Errors
     /// Fails if the file cannot be written, or if it exists and must not be replaced. An existing

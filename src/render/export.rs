@@ -98,7 +98,8 @@ const SETTINGS: &str = "Settings";
 const DISPLAY: &str = ", exposure ";
 
 /// Returns the metadata entries of a picture that depend on the film alone: samples per pixel,
-/// noise, and the numbers of bad and saturated samples.
+/// noise, and the numbers of bad samples (NaN or negative) and of saturated samples (above the
+/// film's limit).
 fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     let spp = &report.spp;
     let noise = match report.noise {
@@ -117,8 +118,8 @@ fn film_entries(report: &Report) -> [(&'static str, String); 5] {
     ]
 }
 
-/// Replaces the entries about samples and noise in `metadata` (those of `film_entries`) by the
-/// values of `report`.
+/// Replaces the entries about samples and noise in `metadata` by the values of `report`. They are
+/// the entries that `film_entries` returns.
 pub fn update_metadata(metadata: &mut [(String, String)], report: &Report) {
     for (key, value) in film_entries(report) {
         metadata.iter_mut().filter(|(k, _)| k == key).for_each(|(_, v)| v.clone_from(&value));

@@ -1,4 +1,5 @@
-//! First-hit buffer: the first hit of a camera ray in each cell of the dashboard's picture.
+//! First-hit buffer: the first hits of camera rays, one ray for each cell of the grid in which the
+//! dashboard shows the picture.
 
 use crate::world::FirstHit;
 use rayon::prelude::*;

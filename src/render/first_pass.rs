@@ -28,12 +28,12 @@ pub fn run(
 }
 
 /// Number of adjacent tiles in a strip. In stages of the first pass that add only few pixels to
-/// each tile, the tiles of a strip share packets.
+/// each tile, the tiles of a strip share ray packets.
 const STRIP_TILES: usize = 8;
 
-/// Largest step \[pixels\] of a stage of the first pass in which the pixels of one tile fill
-/// packets. A stage traces every n-th pixel in x and y, with n the step. In stages with larger
-/// steps, adjacent tiles share packets.
+/// Largest step \[pixels\] at which one tile has enough pixels to fill ray packets. A stage of the
+/// first pass traces every n-th pixel in x and y, with n the step. In stages with larger steps,
+/// adjacent tiles share packets.
 const SHARED_ABOVE: usize = 2;
 
 fn trace_first_pass<L: SimdFloat>(
@@ -111,8 +111,8 @@ fn pixels_to_add(
 impl<L: SimdFloat> TileRenderer<'_, L> {
     /// Traces the first sample of the pixels that one stage of the first pass adds. A lattice with
     /// the step n holds every n-th pixel in x and y. `steps` has two steps: that of the previous
-    /// stage's lattice (0: none), and that of this one. `slots` are adjacent tiles, which share
-    /// packets while a stage adds only few pixels to each. `counts` receives the ray counts of the
+    /// stage's lattice (0: none), and that of this one. `slots` are adjacent tiles, which share ray
+    /// packets if the stage adds only few pixels to each. `counts` receives the ray counts of the
     /// tiles.
     fn lattice(&self, slots: Vec<TileHandle>, steps: (usize, usize), counts: &mut [Counts]) {
         let mut tiles: Vec<_> =
@@ -164,9 +164,9 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
                 }
             }
         });
-        // The rays of shared packets are divided among the tiles by their numbers of pixels,
-        // because the reported cost must not depend on the packet width. Only packets of a single
-        // tile report glossy lobes.
+        // The rays of shared packets are divided among the tiles in proportion to the pixels of
+        // each tile, because the reported cost must not depend on the packet width. Only packets of
+        // a single tile report glossy lobes.
         let packet_counts = tracer.counts();
         if let [counts] = counts {
             counts.rays += packet_counts.rays;

@@ -1,6 +1,6 @@
 //! Memory that a render needs, compared with the memory that is available.
 //!
-//! An allocation that fails ends the program without a picture, and with the edits of the dashboard
+//! A failed allocation ends the program; the picture and the edits made in the dashboard are then
 //! lost. The needed memory is therefore compared with every known limit before a film is created.
 
 use crate::film::{Film, TILE, TileNoise};
@@ -10,7 +10,8 @@ use crate::process_memory::{
 
 /// Memory for a linear copy of the picture, in addition to the film \[bytes per pixel\].
 const COPY_BYTES: u64 = 16;
-/// Memory for tile, schedule and noise estimate, in addition to the film's sums \[bytes per tile\].
+/// Memory \[bytes\] of each tile in addition to the film's sums: the tile itself, its entry in the
+/// schedule, and its noise estimate.
 const TILE_BYTES: u64 = 512;
 
 /// Returns the memory that a render of `size` pixels with `groups` light groups needs \[bytes\].
@@ -68,8 +69,8 @@ pub fn refused(size: [u32; 2], groups: usize) -> String {
     )
 }
 
-/// Memory for each tile of a picture region in addition to its sums: tile, schedule with the latest
-/// estimates, jobs and their reports \[bytes\].
+/// Memory \[bytes\] of each tile of a picture region in addition to the film's sums: the tile
+/// itself, its entry in the schedule with the latest estimates, its jobs and their reports.
 const REGION_TILE_BYTES: u64 = 1024;
 /// Memory for each tile of a picture that is rendered in regions: its error, and a number in the
 /// list from which percentiles of the errors are computed \[bytes\].
@@ -164,7 +165,7 @@ mod tests {
              available (the limit of the control group). Expected a smaller picture, such as size = \
              [5888, 1408], or `zerkalo render --memory SIZE`, which renders it in regions"
         );
-        // The size that the error message suggests fits.
+        // The error message suggests this size. A picture of this size fits into the memory.
         assert_eq!(compare([5888, 1408], 2, available(1_000_000_000)), Ok(()));
         assert!(compare([65536, 65536], 16, available(0)).unwrap_err().contains("[1, 1]"));
     }

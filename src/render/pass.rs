@@ -102,8 +102,8 @@ impl<'a, L: SimdFloat> TileRenderer<'a, L> {
     /// Traces the samples of `job` in the replicate (half of the samples) with the number
     /// `replicate`, and adds them to `tile`, whose first pixel is at `origin`. Returns the ray
     /// counts. A packet has `WIDTH` lanes. It holds `WIDTH` samples of one pixel if its first
-    /// sample index is a multiple of `WIDTH` and as many samples remain. Otherwise it holds samples
-    /// of several pixels.
+    /// sample index is a multiple of `WIDTH` and at least `WIDTH` samples remain. Otherwise it
+    /// holds samples of several pixels.
     fn job(&self, tile: &mut Tile, origin: [usize; 2], replicate: usize, job: &Job) -> Counts {
         let partial_tile: Vec<u8>;
         let pixels = if tile.extent() == [TILE; 2] {

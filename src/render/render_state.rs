@@ -40,8 +40,8 @@ pub struct RenderState {
 }
 
 impl RenderState {
-    /// Compiles `scene`, which has no validation errors, and creates an empty film, in the memory
-    /// of the film of `previous`.
+    /// Compiles `scene`, which has no validation errors, and creates an empty film. The film reuses
+    /// the memory of the film of `previous`.
     ///
     /// # Panics
     /// Panics if there is not enough memory for the film.

@@ -6,8 +6,8 @@
 //!
 //! - An aligned block of 2^m indices of the Owen-scrambled Sobol sequence is as well distributed as
 //!   the first 2^m. The samples of every shard are therefore stratified (evenly distributed), and
-//!   so are those of a merged picture that lacks a shard. The full picture holds all indices from 0
-//!   to the end of each tile, wherever the cuts are.
+//!   so are those of a merged picture that lacks a shard. The full picture holds the sample indices
+//!   of each tile without gaps, starting at 0, wherever the cuts are.
 //! - A block is as long as the widest packet. Shards trace the same packets as one process, at the
 //!   same speed.
 //! - A shard traces the same indices in both replicates, the halves A and B of the samples. In any

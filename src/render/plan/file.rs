@@ -72,7 +72,8 @@ impl Plan {
         text
     }
 
-    /// Returns the checksum of the plan, a hash of its text. Plans with equal checksums are equal.
+    /// Returns the checksum of the plan, a hash of its text. Plans with equal checksums count as
+    /// equal.
     pub fn checksum(&self) -> u64 {
         fnv1a64(self.body().as_bytes())
     }

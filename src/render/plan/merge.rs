@@ -1,4 +1,5 @@
-//! Merging: adds the films of the shards of a plan, which different processes have traced.
+//! Merging: adds the partial films of a distributed render. Each film holds one or more shards of
+//! the same plan.
 
 use crate::film::Film;
 use crate::film::file::{FilmFileHeader, FilmReader};
@@ -8,7 +9,7 @@ use crate::render::plan::{BASE, Plan};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Merged film: the sum of the films of a plan's shards.
+/// Merged film: the sum of the partial films of a distributed render.
 pub struct Merged {
     /// Film with the samples of all merged files.
     pub film: Film,

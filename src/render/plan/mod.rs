@@ -1,11 +1,12 @@
-//! Plans: renders that are divided among shards, which other processes or machines trace.
+//! Plans: renders that are divided among shards, which different processes or machines trace.
 //!
 //! A plan fixes the sample count of every tile before the shards start, because shards do not
-//! communicate. A pilot is an adaptive render that ends at a noise above the target. Its noise
-//! estimates predict the counts ([`Schedule::predict`]). Its samples are the *base* of the plan,
-//! the start of the sample sequence of every tile. The shards trace the rest. The sum of base and
-//! all shards therefore holds the samples `0..end` of each tile in both replicates, like an
-//! adaptive render that has stopped there. It equals the film of one process bit for bit.
+//! communicate. A pilot is an adaptive render that ends when its noise is still above the target.
+//! Its noise estimates predict the counts ([`Schedule::predict`]). Its samples are the *base* of
+//! the plan, the start of the sample sequence of every tile. The shards trace the rest. The sum of
+//! base and all shards therefore holds the samples `0..end` of each tile in both replicates (halves
+//! of the samples). It equals, bit for bit, the film of a single process that has traced the same
+//! sample counts.
 //!
 //! [`Schedule::predict`]: crate::render::schedule::Schedule::predict
 
@@ -201,8 +202,8 @@ impl Plan {
         Some(Schedule::of_samples(&samples?, settings))
     }
 
-    /// Returns a phrase for messages about two plans that differ: the first line that is not equal
-    /// in the texts of `self` and `other`, in both versions.
+    /// Returns a phrase for messages about two plans that differ: the first line that is not the
+    /// same in the texts of `self` and `other`. The phrase quotes the line of each text.
     fn difference(&self, other: &Self) -> String {
         let [ours, theirs] = [self, other].map(Self::text);
         let different = ours.lines().zip(theirs.lines()).find(|(a, b)| a != b);

@@ -129,7 +129,7 @@ impl Part {
 }
 
 impl Plan {
-    /// Returns the numbers of the plan's shards, with [`BASE`], that are not among `numbers`.
+    /// Returns the numbers of the plan's shards, including [`BASE`], that are not among `numbers`.
     /// `numbers` are in ascending order.
     pub(super) fn absent(&self, numbers: &[u32]) -> Vec<u32> {
         let all = BASE..=self.settings.shards;

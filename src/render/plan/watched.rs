@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
-/// Longest time since the last replacement of an unfinished film file; after it the file counts as
-/// late. It is three times the interval of a minute at which `zerkalo render` replaces its files.
+/// Time since the last replacement of an unfinished film file after which the file counts as late.
+/// It is three minutes, because `zerkalo render` replaces its files every minute.
 const LATE: Duration = Duration::from_secs(180);
 
 /// Film files that other processes write, and the sum of their films.
@@ -174,8 +174,8 @@ impl WatchedFilms {
         self.all.as_ref().or(self.complete.as_ref().map(|(_, film)| film))
     }
 
-    /// Returns the header of a film file that would hold the sum of all films, with plan and
-    /// shards. Returns `None` if no file can be read.
+    /// Returns the header of a film file that would hold the sum of all films. The header contains
+    /// the plan and the list of shards. Returns `None` if no file can be read.
     pub fn header(&self) -> Option<&FilmFileHeader> {
         self.header.as_ref()
     }
@@ -216,8 +216,8 @@ impl WatchedFilms {
 
     /// Returns the state of all files at the time `now`, and of the shards (parts of the render)
     /// without a file. The most urgent states are first: refused, missing, late, running, complete.
-    /// Files with the same state, late or running, are in ascending order of the share of their
-    /// samples that is traced.
+    /// Late files are in ascending order of the fraction of their samples that is traced; so are
+    /// running files.
     pub fn shards(&self, now: SystemTime) -> Vec<WatchedShards> {
         let mut rows: Vec<_> = self.files.iter().map(|file| file.row(now)).collect();
         rows.extend(self.unnamed().map(|shards| WatchedShards {

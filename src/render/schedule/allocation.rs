@@ -8,10 +8,10 @@
 //!
 //! The expected error of a tile is calibrated by similar tiles. Tiles with similar allocation
 //! estimates and sample counts form a *class*. The expected error is mostly the mean of the
-//! validation estimates of the class. An allocation estimate that is low by chance therefore
-//! starves no tile: a feature that only validation pixels contain raises the expected error of all
-//! tiles of the class. An allocation estimate that is high by chance draws few samples from other
-//! tiles.
+//! validation estimates of the class. A tile whose allocation estimate is too low by chance
+//! therefore still gets samples. A feature that only validation pixels contain raises the expected
+//! error of all tiles of the class. A tile whose allocation estimate is too high by chance gets
+//! only a few samples too many.
 
 use crate::film::TILE_PIXELS;
 use crate::render::schedule::tile::Tile;
@@ -31,19 +31,20 @@ const ROUND_SHARE: f64 = 0.1;
 ///
 /// Measured on 30 sparse pictures (stars and balls of the size of a pixel,
 /// `tests/error_estimates`): the true error exceeds the reported one by 18 % in the mean with a
-/// share of 1/16, by 16 % with 1/8, by 13 % with 1/4. The physical mirror room takes 60.7 million
-/// rays to an RMSE of 0.00068 with 1/32, 61.7 million with 1/16, 64.8 million with 1/8.
+/// share of 1/16, by 16 % with 1/8, by 13 % with 1/4. The scene of the physical mirror room needs
+/// 60.7 million rays to reach an RMSE of 0.00068 with a share of 1/32, 61.7 million with 1/16, 64.8
+/// million with 1/8.
 pub(super) const EXPLORATION: f64 = 0.0625;
 /// Smallest number of sample blocks that an allocation round gives to tiles. A round gives fewer
 /// only if fewer tiles can get samples, or if fewer blocks suffice for the error target. A block is
 /// a run of samples of every pixel of a tile. So many blocks keep every thread busy until the end
 /// of the round.
 const MIN_BLOCKS: usize = 64;
-/// Smallest gain (error reduction per ray) of the next block for which an allocation round goes on,
-/// as a share of the largest gain among the tiles that were set aside. A tile is set aside for the
-/// rest of the round when its next block would more than double its sample count, because a noise
-/// estimate is reliable for one doubling only. The round gives at least [`MIN_BLOCKS`] blocks,
-/// whatever their gain is.
+/// Fraction that decides whether an allocation round ends early. The round ends when the largest
+/// gain (error reduction per ray) of the remaining tiles is below this fraction of the largest gain
+/// of the tiles that were set aside. A tile is set aside for the rest of the round when its next
+/// block would more than double its sample count, because a noise estimate is reliable for one
+/// doubling only. The round gives at least [`MIN_BLOCKS`] blocks, whatever their gain is.
 const WORTHWHILE: f64 = 0.25;
 /// Weight per pixel of a tile's own allocation estimate in its expected error. The validation
 /// estimates of all tiles of its class (tiles with similar estimates) have the weight 1 per pixel.

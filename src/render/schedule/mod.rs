@@ -37,8 +37,9 @@ const MIN_SAMPLES: u32 = 4;
 /// [`Noise::effective_pixels`]). Such a picture has either no noise, or a few noisy pixels; more
 /// samples are needed to find them.
 const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
-/// Number of effective pixels (Kish) below which a noise estimate is unreliable. With k effective
-/// pixels the relative uncertainty of the RMSE is 1 / sqrt(2 k): 18 % for 16.
+/// Number of effective pixels (Kish's effective sample size, see [`Noise::effective_pixels`]) below
+/// which a noise estimate is unreliable. With k effective pixels the relative uncertainty of the
+/// RMSE is 1 / sqrt(2 k): 18 % for 16.
 const FEW_PIXELS: f64 = 16.0;
 /// Alignment of the sample counts of tiles, per pixel and replicate (half of the samples): counts
 /// are multiples of this number. Exceptions are smaller counts, and the count after the last block
@@ -310,8 +311,9 @@ impl Schedule {
         open.map(|t| t.done).min().unwrap_or(MAX_SAMPLES)
     }
 
-    /// Returns jobs that bring all tiles below their cap to the same number of samples. `common` is
-    /// the smallest number of samples per pixel and replicate (half of the samples) among them.
+    /// Returns jobs that raise the sample counts of all tiles to the same number, or to the cap of
+    /// a tile (see [`Schedule::cap`]) if that is lower. `common` is the smallest number of samples
+    /// per pixel and replicate (half of the samples) among the tiles below their cap.
     fn uniform(&mut self, common: u32) -> Vec<Job> {
         let grown = match common {
             // The count grows to the next power of two. It is between two powers if an earlier stop

@@ -18,8 +18,8 @@ impl Schedule {
         self.settings.rays_per_pixel = cap;
     }
 
-    /// Discards all noise estimates. The samples stay valid, but their light weights or the display
-    /// transform have changed. The noise is unknown until the next call of
+    /// Discards all noise estimates, because the light weights or the display transform have
+    /// changed. The samples stay valid. The noise is unknown until the next call of
     /// [`Schedule::set_estimates`].
     pub fn forget_estimates(&mut self) {
         self.tiles.iter_mut().for_each(Tile::forget_estimates);

@@ -110,8 +110,8 @@ impl Schedule {
         }
     }
 
-    /// Returns `true` if every tile has the minimum number of samples, so that the error over all
-    /// tiles is reliable.
+    /// Returns `true` if every tile has the minimum number of samples, or its cap if that is lower.
+    /// The error over all tiles is then reliable.
     fn min_samples_reached(&self) -> bool {
         let min_samples = self.min_samples();
         self.tiles.iter().all(|t| t.done >= min_samples.min(self.cap(t)))

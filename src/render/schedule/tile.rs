@@ -95,9 +95,10 @@ impl Tile {
         })
     }
 
-    /// Returns `[estimate before, estimate after]` the latest doubling of the tile's sample count.
-    /// Each estimate is `(sample count, mean squared error of allocation pixels)`. Allocation
-    /// pixels select tiles for more samples. Returns `None` before the first doubling.
+    /// Returns two noise estimates: the one before and the one after the latest doubling of the
+    /// tile's sample count. Each estimate is `(sample count, mean squared error of allocation
+    /// pixels)`. Allocation pixels select tiles for more samples. Returns `None` before the first
+    /// doubling.
     pub fn last_doubling(&self, criterion: Criterion) -> Option<[(f64, f64); 2]> {
         let [.., before, after] = self.history.as_slice() else { return None };
         Some([before, after].map(|e| (f64::from(e.samples), criterion.of(e.allocation))))

@@ -1,5 +1,6 @@
-//! Active render of a session: traces one scene in pieces of a fraction of a second, estimates its
-//! noise, and publishes snapshots.
+//! Active render of a session (a handle of a background rendering thread). It traces one scene in
+//! pieces of a fraction of a second, estimates the noise of the picture, and publishes snapshots of
+//! the render.
 
 use crate::film::{Film, IncrementalDownsample, TileNoise};
 use crate::render::checkpoint::{Checkpoint, EncodedCheckpoint};
@@ -36,9 +37,9 @@ const FIRST_HITS_SECONDS: f64 = 0.002;
 /// measured. It is the value of a small scene.
 const FIRST_HIT_RAY_SECONDS: f64 = 5e-8;
 
-/// Resources that a render uses: the thread pool, the slot for its newest snapshot, the channel
-/// that announces this snapshot, and the optional contents of snapshots that the client has
-/// requested.
+/// Resources that a render uses: the thread pool, the slot for its newest snapshot (state of the
+/// render at one moment), the channel that announces this snapshot, and the optional contents of
+/// snapshots that the client has requested.
 pub(super) struct WorkContext {
     pub pool: rayon::ThreadPool,
     pub shared: Arc<Shared>,
@@ -252,8 +253,8 @@ impl ActiveRender {
                 self.throughput.record(self.seconds(), self.schedule.samples());
                 self.first_picture_after.get_or_insert_with(|| self.started.elapsed());
             }
-            // The first pass was cancelled by a flag: that of a newer command, or that of this
-            // scene, if the client raised it only after the worker had lowered the flags.
+            // The first pass was cancelled. Either a newer command is waiting, or the client raised
+            // the cancel flag for this scene only after the worker had lowered it.
             None => self.state.film.restart(),
         }
     }

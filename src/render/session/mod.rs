@@ -247,7 +247,8 @@ impl Session {
     }
 
     fn send(&self, command: Command) {
-        // The worker ends only by `Quit`, or by a panic, which `drop` propagates.
+        // Sending fails only after the worker has ended: by `Quit`, or by a panic, which `drop`
+        // propagates.
         let _ = self.commands.send(command);
         self.shared.cancel_wave.store(true, Ordering::Release);
     }

@@ -10,8 +10,8 @@ fn adaptive_spp_is_the_mean_and_noisy_tiles_get_most() {
     assert_eq!(reason, StoppedBy::Spp);
     let spp = schedule.spp();
     assert!(spp.mean <= 200.0 && spp.mean > 199.9, "{spp:?}");
-    // The tiles without noise share the rays of exploration: 200 * EXPLORATION / 0.7 samples each,
-    // in whole blocks.
+    // The picture has 200 samples per pixel in the mean. The tiles without noise, 0.7 of all tiles,
+    // share the rays of exploration: 200 * EXPLORATION / 0.7 samples per pixel, in whole blocks.
     assert!((2 * MIN_SAMPLES..=40).contains(&spp.min), "{spp:?}");
     assert!(spp.max > 500, "{spp:?}");
 }
@@ -76,7 +76,7 @@ fn noise_target_is_reached_without_overshoot() {
             let reached = schedule.noise().unwrap().rmse_codes;
             assert!(reached <= target, "{reached} > {target}");
             // A uniform render stops only at multiples of `SAMPLE_ALIGNMENT` samples per replicate.
-            // Its error may therefore end further below the target.
+            // Its error may therefore end further below the target than that of an adaptive render.
             let packet =
                 if adaptive { 0.0 } else { f64::from(2 * SAMPLE_ALIGNMENT) / schedule.spp().mean };
             let least = (0.98 - 0.5 * packet) * target;

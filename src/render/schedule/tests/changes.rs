@@ -4,9 +4,9 @@
 use crate::render::schedule::tests::*;
 
 /// Renders the simulated picture to the end in pieces. Before each wave (set of concurrent jobs) is
-/// traced, [`Wave::cut`] shortens its jobs to at most `longest` samples per pixel, and keeps about
-/// as many jobs as have the samples of `tiles` jobs of this length. The schedule returns the rest
-/// in later waves.
+/// traced, [`Wave::cut`] shortens its jobs to at most `longest` samples per pixel. It then keeps
+/// only so many jobs that they have about `tiles` times `longest` samples per pixel in total. The
+/// schedule returns the rest in later waves.
 fn finish_in_pieces(
     model: &mut Model,
     schedule: &mut Schedule,
@@ -61,8 +61,8 @@ fn higher_target_resumes_after_the_lower_one() {
             );
             assert_eq!(schedule.spp().mean, f64::from(low));
             schedule.set_stop(spp(2000));
-            // With `aligned` unset, the model still panics on repeated samples and on samples out
-            // of order.
+            // Jobs may now start at any sample index. The simulated picture still panics if samples
+            // are repeated or out of order.
             model.aligned = false;
             let mut ends = Vec::new();
             while let Step::Trace(wave) = schedule.next(0.0) {

@@ -10,9 +10,9 @@ use crate::film::{Mse, TileNoise};
 use crate::render::schedule::*;
 use crate::render::wave::JobReport;
 
-/// Sum of e^2 over the pixels of a tile, where e is the squared error of a pixel, in all simulated
-/// estimates ([`TileNoise::squares`]). It is nearly 0, as for an error that is spread over very
-/// many pixels.
+/// Value of [`TileNoise::squares`] in all simulated estimates: the sum of e^2 over the pixels of a
+/// tile, where e is the squared error of a pixel. It is nearly 0, as for an error that is spread
+/// over very many pixels.
 const SPREAD_OUT: Mse = Mse { linear: f64::MIN_POSITIVE, codes: f64::MIN_POSITIVE };
 /// Light period of the simulated pictures, in samples per replicate (half of the samples). From
 /// this count on, the tiles in [`Model::periodic`] have no error.
