@@ -231,7 +231,7 @@ impl<S: Float> ObjectEmitter<S> {
                 triangle.share = angle / total;
                 let u = ((target - start) / angle).max(L::zero()).min(L::one());
                 let (wi, distance, pdf) = self.sample_triangle(&triangle, backs, (u, v));
-                // A receiver that sees no face gets no light.
+                // A receiver gets no light if no triangle emits towards it.
                 let seen = total.gt(L::zero());
                 (wi, distance, (L::one() / total).masked(seen), pdf.masked(seen))
             }

@@ -238,7 +238,7 @@ pub(super) fn spread<L: SimdFloat>(
 }
 
 impl<S: Float> Bsdf<S> {
-    /// Returns `true` if the surface has highlights of lights.
+    /// Returns `true` if the surface has highlights, which are reflections of lights.
     #[inline(always)]
     pub fn has_highlight(&self) -> bool {
         !matches!(self.specular, SpecularModel::None)

@@ -159,9 +159,9 @@ impl<L: SimdFloat> Aggregate<L> {
         PrimitiveSet { ranges, tree: self.all.tree }
     }
 
-    /// Returns the subset of two groups of primitives: `items`, which are in the BVH, and all
-    /// primitives outside of the BVH. Rays are tested against the primitives of the subset one by
-    /// one, without traversal of the BVH.
+    /// Returns a set of two groups of primitives: `items`, which are in the BVH, and all primitives
+    /// outside of the BVH. Rays are tested against each primitive of the set, without traversal of
+    /// the BVH.
     pub fn select_indices(&self, items: &[u32]) -> PrimitiveSet {
         let mut ranges = self.all.ranges.clone();
         for item in items {
@@ -184,7 +184,7 @@ impl<L: SimdFloat> Aggregate<L> {
         self.tree.is_some()
     }
 
-    /// Returns `true` if there is neither a BVH nor bounding boxes.
+    /// Returns `true` if there is neither a BVH nor a list of bounding boxes of primitives.
     pub fn has_no_tree(&self) -> bool {
         self.tree.is_none() && self.extents.is_empty()
     }
@@ -199,7 +199,8 @@ impl<L: SimdFloat> Aggregate<L> {
         self.source.is_empty()
     }
 
-    /// Returns the origin of each primitive: its canonical form, and its part of a compound.
+    /// Returns the origin of each primitive: the index of its canonical form, and the number of its
+    /// part if the form is a compound.
     pub fn sources(&self) -> &[PrimitiveId] {
         &self.source
     }
@@ -227,7 +228,7 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     /// Returns the result of [`Aggregate::closest_masked`] for the primitives of `set` outside of
-    /// the BVH. Tests every one of them, without bounding boxes.
+    /// the BVH. Each of these primitives is tested, without bounding boxes.
     #[inline(always)]
     pub fn closest_linear(&self, ray: &Ray<L>, set: &PrimitiveSet, wanted: L::Mask) -> Hit<L> {
         let mut hit = nearest_wanted(wanted);
@@ -320,7 +321,7 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 
     /// Returns the lanes of `wanted` whose ray hits a primitive of `set` outside of the BVH at a
-    /// distance between 0 and `limit`. Tests every one of them, without bounding boxes.
+    /// distance between 0 and `limit`. Each of these primitives is tested, without bounding boxes.
     #[inline(always)]
     pub fn occluded_linear(
         &self,
@@ -377,8 +378,9 @@ impl<L: SimdFloat> Aggregate<L> {
         hit
     }
 
-    /// Returns the exact surface point and normal of primitive `item` at `point`, a hit point with
-    /// rounding errors. `triangle_tag` is the id of the hit triangle if the primitive is a mesh.
+    /// Returns the projection of `point` onto the surface of primitive `item`, with the normal
+    /// there. `point` is the computed hit point of a ray, with rounding errors. `triangle_tag` is
+    /// the id of the hit triangle if the primitive is a mesh.
     #[inline(always)]
     pub fn surface(&self, item: u32, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         for part in &self.parts {
@@ -412,8 +414,9 @@ impl<L: SimdFloat> Aggregate<L> {
 
     /// Returns the shading normal of primitive `item` at a hit point. `triangle_tag` is the id of
     /// the hit triangle if the primitive is a mesh. `at` has two vectors: the hit point, and the
-    /// geometric normal on the viewer's side. `direction` is the direction of the rays. The shading
-    /// normal is on the viewer's side and faces the viewer.
+    /// geometric normal on the viewer's side. `direction` is the direction of the rays. The angles
+    /// of the shading normal to the geometric normal and to the direction of the viewer are below
+    /// 90 degrees.
     pub fn shading_normal(
         &self,
         (item, triangle_tag): (u32, L),
@@ -444,8 +447,9 @@ impl<L: SimdFloat> Aggregate<L> {
     }
 }
 
-/// Returns a miss in every lane. It accepts hits at any distance in the lanes of `wanted`, and none
-/// in the other lanes: their distance limit is negative.
+/// Returns a miss in every lane, with which the search for the closest hit begins. The lanes of
+/// `wanted` accept hits at any distance. Other lanes accept none, because their distance limit is
+/// negative.
 #[inline(always)]
 fn nearest_wanted<L: SimdFloat>(wanted: L::Mask) -> Hit<L> {
     Hit::with_t_max(L::select(wanted, L::from_f64(L::MAX), L::from_f64(-1.0)))

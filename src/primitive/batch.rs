@@ -52,7 +52,8 @@ pub trait Primitive<L: SimdFloat> {
     /// lanes that hit it. Only distances greater than 0 are hits. Returns `None` if no lane hits.
     fn intersect(&self, ray: &Ray<L>) -> Option<(L, L::Mask)>;
 
-    /// Returns the exact surface point and normal at `point`, a hit point with rounding errors.
+    /// Returns the projection of `point` onto the surface, with the normal there. `point` is the
+    /// computed hit point of a ray, with rounding errors.
     fn surface(&self, point: Vec3<L>) -> SurfacePoint<L>;
 
     /// Returns the texture coordinates, with gradients, that the primitive's own parametrisation
@@ -162,8 +163,9 @@ impl<L: SimdFloat> PrimitiveBatch<L> {
             meshes => meshes.occluded(range, ray, limit, wanted))
     }
 
-    /// Returns the exact surface point and normal of primitive `item` at `point`, a hit point with
-    /// rounding errors. `triangle_tag` is the id of the hit triangle if the primitive is a mesh.
+    /// Returns the projection of `point` onto the surface of primitive `item`, with the normal
+    /// there. `point` is the computed hit point of a ray, with rounding errors. `triangle_tag` is
+    /// the id of the hit triangle if the primitive is a mesh.
     #[inline(always)]
     pub fn surface(&self, item: usize, triangle_tag: L, point: Vec3<L>) -> SurfacePoint<L> {
         each!(self,
@@ -211,7 +213,8 @@ fn occluded<L: SimdFloat>(
     occluded
 }
 
-/// Origin of a compiled primitive: index of its canonical form, and part of a compound.
+/// Origin of a compiled primitive: the index of its canonical form, and the number of its part if
+/// the form is a compound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PrimitiveId {
     /// Index of the canonical form in the list given to `compile`.

@@ -50,9 +50,9 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    /// Returns the blur of the lens between the depths `near` and `far`. It is the largest distance
-    /// there between a ray from the edge of the lens and the ray from the apex with which it meets
-    /// at the depth `focus`.
+    /// Returns the blur of the lens between the depths `near` and `far`. Each ray from the edge of
+    /// the lens meets a ray from the apex at the depth `focus`. The blur is the largest distance
+    /// between two such rays in the given range of depths.
     fn blur(&self, near: f64, far: f64) -> f64 {
         if self.lens_radius == 0.0 {
             return 0.0;
@@ -67,8 +67,8 @@ impl Frustum {
         ray_error(self.apex) + F32_RAY_ERROR * self.lens_radius
     }
 
-    /// Returns `ball`, enlarged by two distances: the displacement of rays by the lens, and their
-    /// rounding errors.
+    /// Returns `ball`, enlarged by two distances: the displacement of rays by the lens, and the
+    /// rounding errors of rays.
     fn blurred(&self, ball: &BoundingSphere) -> BoundingSphere {
         let depth = (ball.center - self.apex).dot(self.forward);
         let radius = ball.radius * (1.0 + F32_RAY_ERROR) + ray_error(ball.center);
@@ -172,10 +172,10 @@ impl BoundingVolume {
         let (mut near, mut far) = (middle - ball.radius - room, middle + ball.radius + room);
         if let Some((normal, offset)) = self.plane {
             // A ray from the apex with the direction c, whose component along `forward` is 1, meets
-            // the plane at the depth `height` / (`toward` . c). The divisor, the slope, is linear
-            // in c. The extreme depths are therefore at the corners if the rays of all four meet
-            // the plane in front of the apex. `slack` and `slope_error` allow for rounding errors
-            // and for the tilt of the lens towards the plane.
+            // the plane at the depth `height` / (`toward` . c). The divisor, called the slope, is
+            // linear in c. If the rays through all four corners meet the plane in front of the
+            // apex, the extreme depths are therefore at corners. `slack` and `slope_error` allow
+            // for rounding errors and for the tilt of the lens towards the plane.
             let tilt = frustum.lens_radius * normal.reject_from_normalized(*forward).length();
             let height = offset - normal.dot(*apex);
             let (height, toward) = (height.abs(), normal * height.signum());
@@ -183,8 +183,8 @@ impl BoundingVolume {
             let slope_error = (tilt + F32_RAY_ERROR * frustum.lens_radius) / frustum.focus;
             let slopes = corners.map(|c| (toward.dot(c), F32_RAY_ERROR * c.length() + slope_error));
             if height <= slack {
-                // Within rounding errors, the apex may be on either side of the plane: no depth is
-                // excluded.
+                // No depth is excluded, because the apex may be on either side of the plane within
+                // rounding errors.
             } else if slopes.iter().all(|(slope, ray_error)| slope > ray_error) {
                 let nearest =
                     slopes.map(|(slope, ray_error)| (height - slack) / (slope + ray_error));
@@ -334,8 +334,8 @@ struct Cone {
 
 impl Cone {
     /// Returns `true` if `ball` may overlap the cone: a part of the ball is in front of the apex,
-    /// and its centre is no farther from the cone's side than its radius. The radius includes a
-    /// margin for rounding errors.
+    /// and the distance of the ball's centre from the cone's side is at most the ball's radius. The
+    /// radius includes a margin for rounding errors.
     fn meets(&self, ball: &BoundingSphere) -> bool {
         let to = ball.center - self.apex;
         let along = to.dot(self.axis);
@@ -465,7 +465,7 @@ mod tests {
         let (mut outside, mut inside) = (0, 0);
         for i in 0..=40 {
             for j in 0..=40 {
-                // Points on the picture plane, in the tile and around it.
+                // Point of the picture plane, in the quadrilateral of the frustum or around it.
                 let [x, y] = [i, j].map(|k| edge * (f64::from(k) / 16.0 - 1.25));
                 let seen = x > -edge && x < 0.6 * edge && y > -0.6 * edge && y < edge;
                 for distance in [0.01, 1.0, 300.0] {

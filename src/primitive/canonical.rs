@@ -1,7 +1,7 @@
-//! Trait of all canonical forms: the geometry of one kind of primitive, in double precision. It is
-//! the stage between the description in the scene file and the compiled primitive. Each kind
-//! implements all properties in its own file. A method has a default implementation only if this
-//! default is right for most kinds.
+//! Trait of all canonical forms. A canonical form is the geometry of one kind of primitive, in
+//! double precision. It is the stage between the description in the scene file and the compiled
+//! primitive. Each kind implements all properties in its own file. A method has a default
+//! implementation only if this default is right for most kinds.
 
 use crate::primitive::bounding::BoundingSphere;
 use crate::primitive::form::Form;
@@ -26,9 +26,9 @@ pub enum DefaultMapping {
     Planar,
     /// Spherical mapping, for geometry that is round on all sides.
     Spherical,
-    /// Box mapping, for geometry with flat sides and for all other geometry.
+    /// Cylindrical mapping, for geometry that is round about an axis.
     Cylindrical,
-    /// Box mapping, for geometry with flat sides and of any other kind.
+    /// Box mapping, for geometry with flat sides and for all other geometry.
     Box,
     /// Texture coordinates that the geometry itself has.
     Uv,
@@ -192,10 +192,10 @@ fn extent_of_box(bounds: Option<Bounds>, axis: DVec3) -> Option<(f64, f64)> {
     Some((center - reach, center + reach))
 }
 
-/// Returns the normals of the sides of a convex solid that are within the distance `slack` of a
-/// point, as a single list. Returns no list if there is no such side. `sides` has two values for
-/// each side: the height of the point above it, and its outward normal. The largest height counts
-/// as the distance between the point and the solid.
+/// Returns the normals of those sides of a convex solid whose distance from a point is at most
+/// `slack`, as a single list. Returns no list if there is no such side. `sides` has two values for
+/// each side: the height of the point above the side, and the outward normal of the side. The
+/// largest height counts as the distance between the point and the solid.
 pub fn normals_of_solid(sides: Vec<(f64, DVec3)>, slack: f64) -> Vec<Vec<DVec3>> {
     let near = sides.iter().all(|(height, _)| *height <= slack);
     let on = sides.into_iter().filter(|(height, _)| near && *height >= -slack);
@@ -222,8 +222,8 @@ pub fn half_space(point: DVec3, normal: DVec3) -> HalfSpace {
     HalfSpace { normal, offset: normal.dot(point) }
 }
 
-/// Returns the factor by which a linear map scales lengths. Returns `None` if, beyond rounding
-/// errors, it depends on the direction.
+/// Returns the factor by which a linear map scales lengths. Returns `None` if the factor depends on
+/// the direction by more than rounding errors.
 pub fn similarity(linear: &DMat3) -> Option<f64> {
     let gram = linear.transpose() * *linear;
     let square = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;

@@ -51,8 +51,8 @@ impl CanonicalShape for ConicalFrustumForm {
     }
 
     fn bounds(&self) -> Option<Bounds> {
-        // Half-widths of the base's bounding box. Each is the length of a row of the matrix of the
-        // first two columns, which map the unit disc to the base.
+        // The first two columns of the matrix map the unit disc to the base. The lengths of the
+        // rows of these two columns are the half-widths of the base's bounding box.
         let m = &self.scene_from_unit;
         let rows = m.matrix3.transpose();
         let half = DVec3::new(
@@ -74,7 +74,8 @@ impl CanonicalShape for ConicalFrustumForm {
     }
 
     fn thickness(&self) -> f64 {
-        // Thickness between the faces of the box around the canonical solid, which is 2 by 2 by 1.
+        // Smallest distance in the scene between opposite faces of the box around the canonical
+        // solid. In canonical space this box is 2 by 2 by 1.
         let rows = self.scene_from_unit.matrix3.inverse().transpose();
         let across = rows.x_axis.length().max(rows.y_axis.length());
         (2.0 / across).min(rows.z_axis.length().recip())
@@ -313,15 +314,16 @@ fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Ch
 }
 
 /// Returns two values for the point of the lateral surface with the canonical coordinates `x` and
-/// `y`. The first is its outward normal in scene space, which is not normalised. The second is its
-/// distance from the axis in canonical space.
+/// `y`. The first is the outward normal in scene space, which is not normalised. The second is the
+/// distance of the point from the axis in canonical space.
 #[inline(always)]
 fn side_normal<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, x: L, y: L) -> (Vec3<L>, L) {
     let rho = x.mul_add(x, y * y).sqrt();
     // The apex has no normal; the direction of the axis is used there.
     let inverse = L::select(rho.gt(L::zero()), L::one() / rho, L::zero());
     let (nx, ny, nz) = (x * inverse, y * inverse, -L::splat(s.slope));
-    // Normals transform by the inverse transpose: columns of the inverse.
+    // Normals transform by the transpose of the inverse map. The columns of this transpose are the
+    // rows of `unit_from_scene`.
     let m = &s.unit_from_scene;
     (Vec3::splat(m[0]) * nx + Vec3::splat(m[1]) * ny + Vec3::splat(m[2]) * nz, rho)
 }

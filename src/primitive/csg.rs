@@ -2,8 +2,9 @@
 //! intervals along lines (Roth 1982, *Ray Casting for Modeling Solids*).
 //!
 //! Each part returns the spans in which a line is inside of it. The sorted ends of all spans divide
-//! the line into pieces. Within a piece each part is either inside or outside, and so is the
-//! compound. A change from one piece to the next is a surface.
+//! the line into pieces. Each piece is either inside or outside of any given part, and therefore of
+//! the compound. The line crosses the surface of the compound where an inner and an outer piece
+//! meet.
 //!
 //! Two ends coincide if their distance, measured perpendicular to the surface, is at most [`TIE`]
 //! rounding errors. There is no piece between them. A cut flush with a face therefore leaves no
@@ -86,7 +87,7 @@ leaves! {
     ConvexPolyhedron(1),
     ConicalFrustum(1),
     Torus(2),
-    // Half-space behind the plane.
+    // A plane stands for the half-space behind it.
     Plane(1),
 }
 
@@ -328,10 +329,10 @@ impl<S: Float> Compounds<S> {
     /// surface is nearer. The function steps along each line through `ends`, the sorted ends of the
     /// parts' spans.
     ///
-    /// Two ends coincide only if each is within the tolerance (`tie`) of the other. The tolerance
-    /// along the line is wide at a face that the line grazes. Such a face would otherwise absorb
-    /// other faces. Coincident faces have equal tolerances, because their angles to the line are
-    /// equal.
+    /// Two ends coincide only if their distance is at most the tolerance (`tie`) of each. The
+    /// tolerance along the line is large at a face that the line grazes. If this tolerance alone
+    /// were enough, the grazed face would absorb other faces. Coincident faces have equal
+    /// tolerances, because their angles to the line are equal.
     #[inline(always)]
     fn sweep_events<L: SimdFloat<Scalar = S>>(
         &self,

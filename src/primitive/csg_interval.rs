@@ -4,8 +4,9 @@
 use crate::lanes::SimdFloat;
 use crate::primitive::solid::Span;
 
-/// Lower bound of the cosine between line and surface normal by which the tolerance of coincident
-/// faces is divided. The bound keeps the tolerance finite for lines parallel to the surface.
+/// Lower bound of the cosine of the angle between a line and a surface normal. The tolerance of
+/// coincident faces is divided by this cosine. The bound keeps the tolerance finite for lines
+/// parallel to the surface.
 const FLATTEST: f64 = 1e-9;
 
 /// End of an interval in which a line is inside of a solid. `t` is the distance of this end along
@@ -38,7 +39,7 @@ impl<L: SimdFloat> Interval<L> {
 pub struct Transition<L: SimdFloat> {
     pub before: L::Mask,
     pub after: L::Mask,
-    /// Distance along the line to the visible surface; undefined in lanes without a transition.
+    /// Distance along the line to the surface; undefined in lanes without a transition.
     pub t: L,
     pub tag: L,
 }
@@ -50,8 +51,8 @@ impl<L: SimdFloat> Transition<L> {
 
     /// Combines `self` and `other`, the transitions of two operands, into the transition of the
     /// result of a set operation. `before` and `after` are the lanes in which the line is inside of
-    /// the result before and after the surface. The surface is that of `self` in lanes in which
-    /// `self` changes sides and ends on the same side as the result. In other lanes it is that of
+    /// the result before and after the surface. In a lane in which `self` changes sides and ends on
+    /// the same side as the result, the surface is that of `self`. In other lanes it is that of
     /// `other`.
     fn joined(self, other: Self, before: L::Mask, after: L::Mask) -> Self {
         let same = (self.after & after) | (!self.after & !after);

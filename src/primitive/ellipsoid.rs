@@ -100,7 +100,7 @@ fn surface_distance(scene_from_unit: &DAffine3, point: DVec3) -> f64 {
     let aside = DVec3::new(0.6, 0.5, 0.7) * (1e-8 / size.sqrt());
     let p = point - scene_from_unit.translation + aside;
     // `size` is the Frobenius norm of Q. The smallest half-axis is therefore at least 1 /
-    // sqrt(size) and at most 3^(1/4) times as long. The first bounds of l follow from it.
+    // sqrt(size) and at most 3^(1/4) times this length. The initial bounds of l follow from it.
     let (mut low, mut high) = (-1.8 / size, 0.25 * p.length_squared() + 1.0 / size);
     let mut nearest = p;
     for _ in 0..160 {

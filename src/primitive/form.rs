@@ -67,8 +67,8 @@ macro_rules! forms {
     };
 }
 
-// The list of canonical forms: a new primitive is a line here, with the noun for such primitives in
-// the inventory of a scene, singular and plural.
+// List of the canonical forms. A new kind of primitive needs a line here: its variant, its type,
+// and the noun for such primitives in the inventory of a scene, singular and plural.
 forms! {
     /// Sphere, given by centre and radius.
     Sphere(SphereForm, "sphere", "spheres"),
