@@ -31,8 +31,8 @@ impl Editor {
         self.input.visual_cursor()
     }
 
-    /// Returns the number of columns of the text that are scrolled out of view at the left, so that
-    /// the cursor is visible in `width` columns.
+    /// Returns the number of columns by which the text must be scrolled to the left to keep the
+    /// cursor visible in a field of `width` columns.
     pub fn scroll_columns(&self, width: usize) -> usize {
         self.input.visual_scroll(width)
     }

@@ -15,7 +15,7 @@ pub enum HelpLine {
 }
 
 /// Returns the state of the dashboard that determines the key hints in the hint line. Returns
-/// `None` while an exported image covers the screen, which has no hint line then.
+/// `None` while an exported image covers the whole screen, because no hint line is visible then.
 fn hint_line(model: &Model) -> Option<HintLine> {
     Some(match &model.overlay {
         Some(Overlay::Help { .. } | Overlay::Inventory { .. }) => HintLine::Reading,

@@ -25,7 +25,7 @@ pub struct Request {
     pub focus: Focus,
     /// `true` if only the picture is visible.
     pub fullscreen: bool,
-    /// `true` if the table of watched files is shown in place of the lists for editing.
+    /// `true` if the table of watched files takes the place of the outline and the inspector.
     pub watching: bool,
 }
 
@@ -112,7 +112,9 @@ fn edit_column(side: Rect, focus: Focus) -> [Option<Rect>; 3] {
     }
     let plot = plot_rows(rows);
     let left = rows - plot;
-    // If there are fewer than 40 rows, the focused panel gets the larger part.
+    // The outline and the inspector share `left` rows. The outline gets the larger part if it has
+    // the focus and the column has fewer than 40 rows. Otherwise the inspector gets the larger
+    // part.
     let outline = match focus {
         _ if rows >= 40 => left * 2 / 5,
         Focus::Outline => left * 3 / 5,

@@ -48,8 +48,8 @@ pub enum Message {
     CheckpointWritten(Result<PathBuf, String>),
     /// Progress of a render for an exported image ([`Effect::ExportSized`]), 0..=1.
     ExportProgress(f64),
-    /// Image that [`Effect::ViewImage`] has read from the file at this path and prepared for the
-    /// image viewer, or the reason of the failure.
+    /// Image that [`Effect::ViewImage`] has read from the file at this path and encoded for the
+    /// terminal, or the reason of the failure.
     ViewerImage(PathBuf, Result<Arc<ViewerImage>, String>),
     /// Fraction of the viewed image's bytes that have been sent to the terminal, 0..=1.
     ImageSent(f64),
@@ -63,9 +63,9 @@ pub enum Message {
 /// Unsaved edits that a crashed run of the program has left, and that the user can recover.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrphanedEdits {
-    /// Time since the crashed program last wrote these edits to the recovery file.
+    /// Scene with the unsaved edits.
     pub scene: Arc<Scene>,
-    /// Time since the unsaved edits were last written to the recovery file.
+    /// Time from the last write of the edits to the recovery file until this offer to recover them.
     pub age: Duration,
     /// `true` if the scene file has changed since the edits were written.
     pub changed: bool,
@@ -157,8 +157,9 @@ pub enum Effect {
     Display(Display),
     /// Render until these stop criteria are reached.
     Stop(Stop),
-    /// Return snapshots of the render at this resolution and with the values of this film pixel.
-    /// The resolution is in half cells (a half cell is the upper or lower half of a terminal cell).
+    /// Return snapshots with the data that this view requests: pictures of a given resolution, and
+    /// the values of one film pixel. The resolution is in half cells (upper or lower halves of
+    /// terminal cells).
     View(View),
     /// Pause (`true`) or resume (`false`) the render.
     Pause(bool),
@@ -201,7 +202,8 @@ pub enum Effect {
         /// Stop criteria of the exported image's render.
         stop: Stop,
     },
-    /// Cancel the render of [`Effect::ExportSized`], so that it writes nothing.
+    /// Cancel the render of [`Effect::ExportSized`]. No image is written then, unless the write has
+    /// already begun.
     CancelExport,
     /// Write the scene with its unsaved edits to the recovery file. The next start of the program
     /// offers to recover them. `None` removes the file.

@@ -209,8 +209,9 @@ pub struct Model {
     pub first_time: bool,
     /// Drag in progress; `None` if no mouse button is held down.
     pub drag: Option<Drag>,
-    /// Time of the last edit, if an edit with the same label soon afterwards joins the undo step of
-    /// this edit. `None` if the next edit starts a new undo step.
+    /// Time of the last edit, if the next edit may still be merged with it. The two edits form one
+    /// undo step if they have the same label and little time passes between them. `None` if the
+    /// next edit starts a new undo step.
     pub last_edit: Option<Duration>,
     /// `true` if the program quits after the pending save.
     pub quit_when_saved: bool,
@@ -221,8 +222,9 @@ pub struct Model {
     /// [`Effect::Autosave`](crate::dashboard::message::Effect::Autosave); it need not be passed
     /// again. `None` if there were no unsaved edits.
     pub autosaved: Option<Arc<Scene>>,
-    /// Columns and rows of half cells that the renderer was last asked to use for its pictures. A
-    /// half cell is the upper or lower half of a terminal cell. `None` before the first request.
+    /// Size of the pictures that were last requested from the renderer, in columns and rows of half
+    /// cells. A half cell is the upper or lower half of a terminal cell. `None` before the first
+    /// request.
     pub raster: Option<[usize; 2]>,
     /// Counter that increases whenever the terminal cells that show the picture may have become
     /// outdated.
@@ -242,7 +244,7 @@ impl Model {
     /// Creates the model of a dashboard that renders `scene` with `threads` threads until the
     /// criteria `stop` are reached. `scene` is an error if the scene file cannot be read. `path` is
     /// the path of the scene file; without a path, `name` is shown as the file name. The event loop
-    /// later sets the screen size and the colours. It renders [`Model::scene`], unless
+    /// later sets the screen size and the colours, and renders [`Model::scene`] unless
     /// [`File::unreadable`] is `true`.
     pub fn new(
         path: Option<PathBuf>,
@@ -334,7 +336,8 @@ impl Model {
         (Some(probe.pixel) == self.probe).then_some(probe)
     }
 
-    /// Returns the lines of the list of the compiled scene's features, wrapped to `width` columns.
+    /// Returns the inventory, which lists the features of the compiled scene, as lines wrapped to
+    /// `width` columns.
     pub fn inventory(&self, width: u16) -> Vec<String> {
         match &self.snapshot {
             Some(snapshot) if !snapshot.report.inventory.is_empty() => {

@@ -22,7 +22,8 @@ pub const ABOUT: &str = "Halving the noise takes two to four times as long. Ente
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cost {
     /// Case in which the noise target has been reached. The value is the render time in seconds at
-    /// which it was reached. It is `None` if the first report was below the target already.
+    /// which it was reached. It is `None` if the noise in the first report was not above the
+    /// target.
     Reached(Option<f64>),
     /// Case in which the noise target has not been reached. The values are a lower and an upper
     /// estimate of the remaining render time in seconds.
@@ -93,8 +94,8 @@ mod tests {
         }
         assert_eq!(cost(&now, &convergence, 4), Cost::Left(0.2, 0.3));
         assert_eq!(cost(&now, &convergence, 5), Cost::Unknown);
-        // The noise is the geometric mean of 2 and 1 levels. The power law then gives the geometric
-        // mean of the times 10 and 20 ms.
+        // The requested noise is the geometric mean of 2 and 1 levels. `seconds_at` interpolates by
+        // a power law, so it returns the geometric mean of the times 10 and 20 ms.
         let between = convergence.seconds_at(2f64.sqrt()).unwrap();
         assert!((between - 0.01 * 2f64.sqrt()).abs() < 1e-9, "{between}");
     }

@@ -69,7 +69,7 @@ impl Overlay {
 pub struct ViewedImage {
     /// Path of the image file.
     pub path: PathBuf,
-    /// Image prepared for the screen; `None` while the file is being read.
+    /// Image scaled and encoded for the terminal; `None` while the file is being read and encoded.
     pub image: Option<Arc<ViewerImage>>,
     /// Fraction of the image's bytes that have been sent to the terminal, 0..=1.
     pub sent: f64,
@@ -157,9 +157,9 @@ pub enum PromptFor {
     Rename(Target),
     /// The typed text is the name under which the current camera is stored.
     StoreView,
-    /// The typed text is the stop criteria of the render.
+    /// The typed text contains the stop criteria of the render.
     StopAt,
-    /// The typed text is the size and the format of an image, which is rendered and exported.
+    /// The typed text contains the size and the file format of an image to render and export.
     ExportSized,
 }
 

@@ -49,8 +49,8 @@ pub struct FieldLine {
     /// Value in the syntax of the text editor, with control characters escaped. Empty if the
     /// property is not set in the scene.
     pub value: String,
-    /// Linear colour of the sample that is drawn beside the value. `None` if the property is not a
-    /// colour, and in the second and third line of a colour.
+    /// Linear colour of the swatch that is drawn beside the value. A colour has one line for each
+    /// of its three components, and the swatch is on the first. `None` for all other lines.
     pub swatch: Option<[f64; 3]>,
 }
 
@@ -200,9 +200,9 @@ pub fn walk_fields(lines: &[PanelLine], cursor: usize, steps: isize) -> usize {
 }
 
 /// Returns the new scroll position of a list: the index of its first visible line. The list has
-/// `len` lines, of which `rows` are visible. The result is the one nearest to the present position
-/// `scroll` at which line `cursor` is visible. If `rows` is greater than 2, the line above the
-/// cursor is visible, too.
+/// `len` lines, of which `rows` are visible. The new position is the nearest one to the present
+/// position `scroll` at which the line with index `cursor` is visible. If `rows` is greater than 2,
+/// the line above the cursor is visible, too.
 pub fn scrolled(scroll: usize, cursor: usize, len: usize, rows: usize) -> usize {
     let lowest = (cursor + 1).saturating_sub(rows);
     let highest = if rows > 2 { cursor.saturating_sub(1) } else { cursor };

@@ -99,9 +99,9 @@ impl Autosave {
         self.pending.as_ref().map(|p| (p.last + DEBOUNCE).min(p.first + MAX_DELAY))
     }
 
-    /// Writes pending edits to the recovery file, as the text that saving the edited scene to
-    /// `file` would write. Returns a warning if the write fails and the previous write did not
-    /// fail.
+    /// Writes pending edits to the recovery file. The written text is the one that a save of the
+    /// edited scene to `file` would write. Returns a warning if this write fails, unless the
+    /// previous write failed, too.
     pub fn write(&mut self, file: &SceneFile) -> Option<Message> {
         let scene = self.pending.take()?.scene;
         let text = file.text_of(&scene);
@@ -125,8 +125,8 @@ impl Autosave {
         }
     }
 
-    /// Returns the path of the recovery file when the program ends; `None` if there is no such
-    /// file.
+    /// Returns the path of the recovery file that remains when the program ends; `None` if there is
+    /// no such file.
     ///
     /// # Errors
     /// Fails with a message for the user if the last edits could not be written.
@@ -143,7 +143,7 @@ impl Autosave {
         }
     }
 
-    /// Returns a writer of recovery files for the same scene that writes to the state folder.
+    /// Returns a second writer of recovery files for the same scene. It uses only the state folder.
     pub fn elsewhere(&self) -> Recovery {
         self.recovery.elsewhere()
     }
@@ -292,15 +292,15 @@ mod tests {
         let messages = second.search(Ok(&file));
         let [Message::OrphanedEdits(left)] = &messages[..] else { panic!("{messages:?}") };
         assert_eq!((&left.scene, left.changed), (&scene(3), false));
-        // A change by another program is reported.
+        // The next offer reports that another program has changed the scene file.
         std::fs::write(&path, format!("# new\n{}", starter())).unwrap();
         let file = SceneFile::open(&path).unwrap();
         let Some(Message::OrphanedEdits(left)) = second.offer(Ok(&file)) else { panic!() };
         assert!(left.changed);
         assert!(second.recover(None).is_none());
         assert!(second.offer(Ok(&file)).is_none());
-        // Saving (`note` with `None`) removes the recovery file, so that the folder has one file
-        // less.
+        // `note` with `None` means that all edits are saved. It removes the recovery file; the
+        // folder then has one file less.
         second.note(Some(scene(3)), Instant::now());
         second.write(&file);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);

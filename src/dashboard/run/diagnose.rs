@@ -14,8 +14,8 @@ use std::time::{Duration, Instant};
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Timeout for a reply from a terminal that has replied before.
 const LONG_PATIENCE: Duration = Duration::from_secs(10);
-/// Duration that a test transfer must have to give a precise rate of the connection, without the
-/// round trip. The test sends larger and larger transfers until one takes this long.
+/// Shortest duration of a test transfer, round trip excluded, that gives a precise transfer rate.
+/// The test sends larger and larger transfers until one takes this long.
 const MEASURED: Duration = Duration::from_millis(300);
 /// Number of bytes of the largest test transfer. The test ends after this transfer, even if it
 /// takes less than [`MEASURED`].
@@ -109,8 +109,8 @@ fn answer(
 
 /// Measures the transfer rate to the terminal in bytes per second. Each transfer has four times as
 /// many bytes as the one before. `through` is the multiplexer (such as tmux) for which requests are
-/// wrapped, if there is one. `round_trip` is the time of a reply without a transfer. Returns `None`
-/// if a reply does not arrive.
+/// wrapped, if there is one. `round_trip` is the time from a request to its reply without a
+/// transfer. It is subtracted from each measured time. Returns `None` if a reply does not arrive.
 fn rate(
     tty: &Tty,
     input: &mut InputReader,
@@ -132,9 +132,9 @@ fn rate(
     }
 }
 
-/// Returns an escape sequence for the upper left corner and hidden text, followed by `bytes`
-/// pseudo-random characters. SSH could compress regular text, which would distort the measured
-/// rate.
+/// Returns escape sequences that move the cursor to the upper left corner and hide text, followed
+/// by `bytes` pseudo-random characters. SSH could compress regular text, which would distort the
+/// measured rate.
 fn hidden_text(bytes: usize) -> Vec<u8> {
     let mut text = b"\x1b[8m\x1b[H".to_vec();
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;

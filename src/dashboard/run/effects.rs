@@ -19,8 +19,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Niceness of tracing threads with low priority: the lowest priority of Linux, at which threads
-/// use only idle processors.
+/// Niceness of tracing threads with low priority: the largest value of Linux. Threads of normal
+/// priority get nearly all the time of a processor that they share with such a thread.
 const LOW_PRIORITY: i32 = 19;
 
 /// Action that the event loop must take after it has executed an effect.
@@ -286,15 +286,15 @@ impl Effects for EffectRunner {
             if let Some(resized) = resized {
                 resized.end();
             }
-            // The render session runs its tasks in order. When this empty task runs, all exports
-            // that were requested before it have been written.
+            // The renderer's thread runs tasks in the order of their submission. When this empty
+            // task runs, all exports that were requested before it have been written.
             session.with(|_, _| ());
             drop((session, results));
         };
         let patience = deadline
             .map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()));
-        // If the thread cannot be started, the render session ends here, and pictures that were not
-        // written yet are lost.
+        // If the thread cannot be started, the closure `end` is dropped without being run. The
+        // renderer ends then, and pictures that were not written yet are lost.
         if let Ok(ending) = Worker::spawn("end", end) {
             ending.join_within(patience);
         }
@@ -303,8 +303,9 @@ impl Effects for EffectRunner {
 }
 
 /// Executes an effect that concerns the terminal: view an image file, copy a path, suspend, or
-/// quit. Other effects are ignored. `frames` is the output to the terminal. An image file is
-/// decoded and scaled for the terminal, then sent to `results`.
+/// quit. Other effects are ignored. `frames` is the output to the terminal, and `terminal` its
+/// capabilities. A separate thread reads and encodes an image file and sends the result to
+/// `results`.
 pub fn run_on_terminal(
     effect: Effect,
     frames: &mut FramePipeline,

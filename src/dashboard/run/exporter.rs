@@ -57,7 +57,8 @@ impl Exporter {
         Ok(exported(path, &rendering.film, report))
     }
 
-    /// Returns the origin of pictures of `scene`, for their metadata.
+    /// Returns the provenance of a picture of `scene` for the metadata of the image: scene file,
+    /// random numbers and sample allocation.
     pub fn provenance(&self, scene: &Scene) -> Provenance {
         let (source, text) = self.source(scene);
         Provenance {
@@ -183,8 +184,8 @@ fn render(
 }
 
 /// Returns the description of an exported image, for the user. `path` is the path of the image
-/// file, `film` the film whose picture it shows, and `report` the renderer's report on this
-/// picture.
+/// file, `film` the film with the exported picture, and `report` the renderer's report on this
+/// film.
 pub fn exported(path: PathBuf, film: &Film, report: &Report) -> Exported {
     Exported {
         scp: export_paths::scp(&path),

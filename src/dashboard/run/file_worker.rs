@@ -18,14 +18,14 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Interval between checks of the scene file for changes by other programs.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
-/// Longest time for which a save waits until the recovery file has been updated.
+/// Longest time that a save waits for the update of the recovery file.
 const PREPARED_WITHIN: Duration = Duration::from_secs(2);
 /// Longest wait for pending saves when the program ends.
 const SAVED_WITHIN: Duration = Duration::from_secs(2);
 /// Longest wait for the recovery file when the program ends. If the file cannot be written beside
-/// the scene file in this time, a write to the user's state folder gets the same time. Together
-/// these two waits and [`SAVED_WITHIN`] are shorter than the grace period after a terminating
-/// signal.
+/// the scene file in this time, it is written to the user's state folder, with the same time limit.
+/// Together, these two waits and [`SAVED_WITHIN`] are shorter than the grace period after a
+/// terminating signal.
 const KEPT_WITHIN: Duration = Duration::from_secs(1);
 
 pub(super) enum Job {
@@ -305,7 +305,8 @@ impl FileWorker {
     }
 
     fn load(&mut self) -> Result<Arc<Scene>, SceneErrors> {
-        // The stamp is taken before reading, so that a write during the read counts as a change.
+        // The stamp (modification time and length) is taken before the file is read, so that a
+        // write during the read counts as a change.
         self.seen = self.path.as_deref().and_then(stamp);
         let file = match (self.file.take(), &self.path) {
             (Some(file), _) => {
@@ -364,7 +365,7 @@ mod tests {
         assert_eq!(files.shared.get().unwrap().document().scene(), &scene);
         let quiet = inbox.recv_timeout(2 * CHECK_INTERVAL + CHECK_INTERVAL / 2);
         assert!(quiet.is_err(), "{quiet:?}");
-        // A renamed file is complete at every moment.
+        // A rename replaces the file at once, so the worker never reads an incomplete file.
         let other = folder.path().join("b.toml");
         fs::write(&other, format!("{}\n# more\n", starter())).unwrap();
         fs::rename(&other, &path).unwrap();
@@ -478,7 +479,8 @@ mod tests {
     fn edits_are_kept_elsewhere_if_the_recovery_file_blocks() {
         let folder = tempfile::tempdir().unwrap();
         let (path, scene) = edited(folder.path());
-        // The thread offers these edits in a message, and blocks because nothing receives it.
+        // The autosave thread offers these edits of a crashed run in a message. It blocks because
+        // nothing receives the message.
         fs::write(folder.path().join(".a.toml.unsaved"), "[trace]\nmax_depth = 3\n").unwrap();
         let state = folder.path().join("state");
         let (mut files, _inbox) = opened_blocking(&path, Some(state.clone()));
