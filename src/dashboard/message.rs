@@ -208,7 +208,8 @@ pub enum Effect {
     /// Write the scene with its unsaved edits to the recovery file. The next start of the program
     /// offers to recover them. `None` removes the file.
     Autosave(Option<Arc<Scene>>),
-    /// Adopt the offered edits of a crashed run of the program as unsaved edits of the scene.
+    /// Recover the offered edits of a crashed run of the program. They become unsaved edits of the
+    /// scene.
     Recover,
     /// Discard the offered edits of a crashed run of the program.
     Discard,

@@ -16,8 +16,8 @@ pub struct OverlayLayout {
     pub input: Rect,
     /// Area of the main content: a list, a form's fields or a text.
     pub list: Rect,
-    /// Area of the text for the user: help on the overlay, the problem of a refused input, or the
-    /// text of a question.
+    /// Area of a text for the user: help on the overlay, the reason why an input was refused, or
+    /// the text of a question.
     pub help: Rect,
 }
 

@@ -215,9 +215,9 @@ impl Autosave {
         }
     }
 
-    /// Adopts the offered edits as unsaved edits of this run of the program. If the scene file is
-    /// unreadable, `path` is its path; a scene file with the recovered text is returned then.
-    /// Otherwise `path` is `None`, and so is the result.
+    /// Adopts the offered edits as unsaved edits of this run of the program. `path` is the path of
+    /// an unreadable scene file; a scene file with the recovered text is returned then. If the
+    /// scene file is readable, `path` is `None`, and so is the result.
     pub fn recover(&mut self, path: Option<&Path>) -> Option<SceneFile> {
         let orphan = self.found.pop()?;
         let file = path.and_then(|path| SceneFile::recovered(path, orphan.text.clone()).ok());

@@ -21,7 +21,8 @@ pub fn numbered<E: Display>(
     extension: &str,
     write: impl Fn(&Path) -> Result<(), E>,
 ) -> Result<PathBuf, String> {
-    // A dangling symbolic link counts as taken.
+    // A path counts as taken if it is a symbolic link, even if the target of the link does not
+    // exist.
     let is_taken = |path: &Path| path.symlink_metadata().is_ok();
     for number in 1..=MOST {
         let path = folder.join(format!("{stem}-{number}.{extension}"));
@@ -54,9 +55,9 @@ pub fn scp(path: &Path) -> String {
     scp_from(&variable("SSH_CONNECTION"), &user, &host_name(), &full(path))
 }
 
-/// Returns the result of [`scp`] for values of the environment. `connection` is the variable
-/// `SSH_CONNECTION` of sshd: addresses and ports in the order `CLIENT PORT SERVER PORT`. It is
-/// empty without SSH.
+/// Returns the result of [`scp`] for the given environment. `connection` is the value of the
+/// variable `SSH_CONNECTION` of sshd: addresses and ports in the order `CLIENT PORT SERVER PORT`.
+/// It is empty without SSH.
 fn scp_from(connection: &str, user: &str, host_name: &str, path: &str) -> String {
     let fields: Vec<_> = connection.split_whitespace().collect();
     let (host, port) = match fields[..] {

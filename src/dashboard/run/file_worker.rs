@@ -131,8 +131,8 @@ impl Files {
         let _ = completion.recv_timeout(patience);
     }
 
-    /// Adopts the edits of the last [`Message::OrphanedEdits`], which a crashed run of the program
-    /// has left, as unsaved edits of the scene.
+    /// Recovers the edits of the last [`Message::OrphanedEdits`], which a crashed run of the
+    /// program has left. They become unsaved edits of the scene.
     pub fn recover(&self) {
         self.give_autosave(AutosaveJob::Recover);
     }

@@ -72,8 +72,8 @@ struct FrameMeta {
 pub enum DrawOutcome {
     /// The connection has no room for a frame. Nothing was drawn.
     Nothing,
-    /// Only the picture differs visibly from the terminal's contents. Its differences will be sent
-    /// later.
+    /// The terminal's contents differ visibly from the model only in cells of the picture. These
+    /// cells will be sent later.
     Deferred,
     /// The terminal's contents have no visible differences from the model.
     Same,
@@ -160,8 +160,8 @@ impl FramePipeline {
             return DrawOutcome::Nothing;
         };
         if !upload.has_begun() {
-            // The exit sequence, which a signal or panic sends to the terminal, must remove the
-            // image from now on. Otherwise the image would stay on the terminal.
+            // A signal or panic sends the exit sequence to the terminal. From now on, this sequence
+            // must remove the image. Otherwise the image would stay on the terminal.
             self.tty.set_exit_sequence(&upload.any_removal());
             self.removing = false;
         }
@@ -192,8 +192,9 @@ impl FramePipeline {
         (self.diff.pending().visible, self.sent)
     }
 
-    /// Updates flow control at time `now`. Stops waiting for acknowledgements of the terminal that
-    /// are overdue. Reads the length of the kernel's send queue if the time for this has come.
+    /// Updates flow control at time `now`: stops waiting for overdue acknowledgements of the
+    /// terminal, and reads the length of the kernel's send queue if it is time for the next
+    /// reading.
     pub fn look(&mut self, now: Duration) {
         self.flow.expire(now);
         if self.flow.wants_queue_length(now) {

@@ -18,7 +18,8 @@ pub struct ImageUpload {
     /// `true` if the bytes sent so far end inside of an escape sequence. The remainder of the
     /// sequence must be sent next.
     open: bool,
-    /// `true` if the image is already visible in half blocks, a coarse preview in terminal cells.
+    /// `true` if the coarse preview of the image (half blocks in terminal cells) is already
+    /// visible.
     pub seen: bool,
 }
 
@@ -39,8 +40,8 @@ impl ImageUpload {
         self.open
     }
 
-    /// Returns `true` if the upload of the image has begun. From then on the half blocks under the
-    /// image, its coarse preview, must not be sent.
+    /// Returns `true` if the upload of the image has begun. From then on, the coarse preview under
+    /// the image (half blocks in terminal cells) must not be sent.
     pub fn has_begun(&self) -> bool {
         self.sent > 0
     }

@@ -1,4 +1,4 @@
-//! Preparation of exported images for the image viewer.
+//! Reading and encoding of exported images for the image viewer, and reports on their upload.
 
 use crate::dashboard::message::Message;
 use crate::dashboard::overlay::Overlay;
@@ -16,9 +16,10 @@ use std::time::Duration;
 /// downscaled to keep within this time.
 const MAX_TRANSFER_TIME: Duration = Duration::from_secs(8);
 
-/// Returns the limits for an image in the viewer: its protocol, size and number of bytes. `screen`
-/// is the number of columns and rows of the terminal. `line_rate` is the rate of the connection in
-/// bytes per second; it is `None` for a local terminal.
+/// Returns the viewport of the image viewer: the image protocol, the size of the screen, and the
+/// largest number of bytes of an image. `screen` is the number of columns and rows of the terminal.
+/// `line_rate` is the rate of the connection in bytes per second; it is `None` for a local
+/// terminal.
 pub fn viewport(
     terminal: &Capabilities,
     screen: [u16; 2],

@@ -110,7 +110,8 @@ impl Dashboard {
     pub(super) fn resize(&mut self) {
         self.resizing = ResizeDebounce::default();
         self.frames.forget();
-        // If the terminal is gone, writing the next frame fails.
+        // An error of `size` is ignored. If its cause is the loss of the terminal, the write of the
+        // next frame fails.
         let screen = size().unwrap_or(self.model.screen);
         self.dispatch(Message::Resize(screen));
     }

@@ -26,9 +26,9 @@ struct Answered {
     after: Duration,
 }
 
-/// Recorder of input latencies. It always tracks input events without a response, because a frame
-/// that responds to input is sent without waiting for the frame interval. It stores latencies only
-/// on request.
+/// Recorder of input latencies. It always tracks the input events that await a response, because
+/// the frame with the response is sent without waiting for the frame interval. It stores latencies
+/// only on request.
 #[derive(Debug)]
 pub struct LatencyRecorder {
     began: Instant,
@@ -83,7 +83,7 @@ impl LatencyRecorder {
     }
 
     /// Records that a frame is being written. `scene` is the generation (number of a version of the
-    /// scene) of its picture; 0 means a frame without picture.
+    /// scene) of the picture in the frame; 0 means a frame without picture.
     pub fn sent(&mut self, scene: u64) {
         self.in_flight.extend(self.awaiting.extract_if(.., |waiting| waiting.scene <= scene));
     }

@@ -131,7 +131,7 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
 }
 
 /// Shows `films`, which other processes write, until the user quits or a signal arrives. `threads`
-/// threads compute noise estimates and pictures; none of them traces.
+/// is the number of threads that compute noise estimates and pictures. No thread traces rays.
 pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
     let model = Model::new(None, "", Ok(Arc::default()), Stop::default(), threads);
     let effects = WatchRunner::new(films, threads)?;
@@ -189,8 +189,8 @@ fn run_on_terminal(
     // If the user quits, the program waits without limit for pictures that are being written. If a
     // signal or the loss of the terminal ends it, the wait is limited.
     let deadline = (!matches!(result, Ok(None))).then(|| Instant::now() + signals::ENDED_WITHIN);
-    // The autosave thread starts to write unsaved edits before this thread may block. A timeout of
-    // 0 does not wait for that write.
+    // This call makes the autosave thread write unsaved edits before this thread may block. With a
+    // timeout of 0, the call does not wait for the write.
     dashboard.effects.flush(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
         dashboard.await_answers(&terminal_io.input);

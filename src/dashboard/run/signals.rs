@@ -30,7 +30,7 @@ pub(super) const HUNG_UP: u8 = (SIGNALLED + SIGHUP) as u8;
 /// Meaning of a signal for the event loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SignalEvent {
-    /// End of the program with this exit status: 129, 130, 131 or 143.
+    /// End of the program with this exit status: 128 plus the number of the terminating signal.
     End(u8),
     /// Possible change of the terminal's size (SIGWINCH).
     Resized,
@@ -60,13 +60,13 @@ impl Signals {
 pub(super) enum StopTarget {
     /// This process alone.
     Itself,
-    /// All processes of this process's group, which Ctrl-Z in a shell suspends.
+    /// All processes in the group of this process. Ctrl-Z in a shell suspends such a group.
     Group,
 }
 
 /// Registers signal handlers, which queue signals until [`watch`] handles them. Must be called
-/// before the terminal enters raw mode. The default handlers would end the program and leave the
-/// terminal in raw mode.
+/// before the terminal enters raw mode, because the default handlers would end the program and
+/// leave the terminal in raw mode.
 pub(super) fn block() -> io::Result<iterator::Signals> {
     iterator::Signals::new([SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGCONT, SIGWINCH])
 }

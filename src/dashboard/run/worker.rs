@@ -1,4 +1,4 @@
-//! Threads whose end is awaited for a limited time.
+//! Threads that can be joined with a timeout.
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, bounded};
 use std::io;

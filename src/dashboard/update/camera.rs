@@ -20,7 +20,7 @@ const DOLLY: f64 = 0.9;
 /// Factor by which a fine step towards the pivot (the point that the camera orbits) multiplies the
 /// distance between eye and pivot.
 const DOLLY_FINE: f64 = 0.99;
-/// Factor by which a zoom step inwards multiplies the width of the camera's view.
+/// Factor by which one step of zooming in multiplies the width of the camera's view.
 const ZOOM: f64 = 0.95;
 
 /// Returns two components of `direction` on the screen: to the right, and upwards. Each component

@@ -21,8 +21,8 @@ pub enum Chapter {
     Camera,
     /// Chapter of commands on lights.
     Light,
-    /// Chapter of commands on the mirror: a reflecting material of the selection, or else of the
-    /// scene.
+    /// Chapter of commands on the mirror. This is a reflecting material of the selection if there
+    /// is one, otherwise a reflecting material elsewhere in the scene.
     Mirror,
     /// Chapter of commands on objects.
     Objects,

@@ -95,8 +95,8 @@ impl UpdateContext<'_> {
     }
 
     /// Shows the pinned picture (stored by the user for comparison) or its difference to the live
-    /// picture; `what` selects one of the two. If it is shown already, shows the live picture
-    /// again.
+    /// picture; `what` selects one of the two. If the selected one is shown already, shows the live
+    /// picture again.
     pub(super) fn compare(&mut self, what: CompareView) {
         if self.model.comparison.pinned.is_none() {
             self.say("No picture is pinned yet · k pins one");

@@ -1,4 +1,5 @@
-//! Commands on undo, saving, reloading and quitting, and results of saves, loads and exports.
+//! Commands on undo, saving, reloading and quitting. Handling of the results of saves, loads and
+//! exports.
 
 use crate::dashboard::message::{Effect, Exported};
 use crate::dashboard::model::{Tone, short_name};
@@ -175,7 +176,7 @@ impl UpdateContext<'_> {
     pub(super) fn exported(&mut self, result: Result<Exported, String>) {
         match result {
             Ok(Exported { path, size: [width, height], spp, noise_codes, scp }) => {
-                // If the sizes agree, the export that has ended is the running one.
+                // If the image has the size of the export in the background, this export has ended.
                 if self.model.export.is_some_and(|e| e.size.map(|n| n as usize) == [width, height])
                 {
                     self.model.export = None;

@@ -26,7 +26,7 @@ impl UpdateContext<'_> {
         self.repaint();
     }
 
-    /// Requests that the viewed image be prepared again for a new screen size.
+    /// Requests that the viewed image be read again and encoded for the new screen size.
     pub(super) fn refit_image(&mut self) {
         if let Some(Overlay::ViewerImage(viewed)) = &self.model.overlay {
             self.view_image(viewed.path.clone());
@@ -39,8 +39,8 @@ impl UpdateContext<'_> {
         self.repaint();
     }
 
-    /// Shows the image that was prepared for the viewer, or reports why it cannot be shown. Ignores
-    /// results for another path or screen size.
+    /// Shows an image that was read and encoded for the viewer, or reports why it cannot be shown.
+    /// Ignores an image of another path or for another screen size.
     pub(super) fn image_ready(&mut self, path: &Path, result: Result<Arc<ViewerImage>, String>) {
         let screen = self.model.screen;
         let Some(Overlay::ViewerImage(viewed)) = &mut self.model.overlay else { return };
@@ -52,7 +52,7 @@ impl UpdateContext<'_> {
                 viewed.image = Some(image);
                 self.repaint();
             }
-            // The image was prepared for the previous screen size.
+            // The image was encoded for the previous screen size. It is ignored.
             Ok(_) => {}
             Err(why) => {
                 let name = short_name(path);

@@ -9,7 +9,7 @@ use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{Command, lookup};
 use crate::terminal::event::{Code, Key};
 
-/// Returns the character that a key types. Returns `None` for other keys.
+/// Returns the character that `key` types. Returns `None` if it types none.
 fn typed(key: Key) -> Option<char> {
     match key {
         Key { code: Code::Char(c), ctrl: false, alt: false, .. } => Some(c),

@@ -7,7 +7,7 @@ use crate::scene::edit::{self, EditError, bounds};
 use crate::value::{number, round_significant};
 
 impl UpdateContext<'_> {
-    /// Opens the camera's lens by `stops`; negative stops close it.
+    /// Opens the camera's aperture by `stops` stops; a negative number closes it.
     pub(super) fn aperture(&mut self, stops: f64) {
         let edit = edit::change_aperture(self.scene(), stops);
         self.commit(edit, Coalesce::Repeat);

@@ -20,9 +20,9 @@ impl UpdateContext<'_> {
         self.say(format!("{label} · ; ' dim, brighten · L on, off · m move"));
     }
 
-    /// Returns the part of the scene that commands on lights change. This is the selected light,
-    /// ambient light or background. If none of these is selected, it is the first light. Fails if
-    /// there is no light.
+    /// Returns the part of the scene that a command on lights changes: the selected light, ambient
+    /// light or background. If none of these is selected, it is the first light. Fails if there is
+    /// no light.
     fn target_light(&self) -> Result<Target, EditError> {
         match &self.model.selection {
             s @ (Target::Light(_) | Target::Ambient | Target::Background) => Ok(s.clone()),
@@ -53,8 +53,8 @@ impl UpdateContext<'_> {
         self.commit_light(edit, Coalesce::Single);
     }
 
-    /// Makes the result of an edit of a light the current scene, and reports the light's new state
-    /// in a notice. `coalesce` decides if the edit joins the previous undo step.
+    /// Records the result of an edit of a light as the current scene. A notice then reports the
+    /// light's new state. `coalesce` decides if the edit joins the previous undo step.
     fn commit_light(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         self.commit(edit, coalesce);

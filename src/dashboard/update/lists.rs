@@ -185,8 +185,8 @@ impl UpdateContext<'_> {
         palette.scroll = 0;
     }
 
-    /// Moves the cursor of the open list to the next entry that starts with the letter `c`. The
-    /// search continues at the first entry after the last one.
+    /// Moves the cursor of the open list to the next entry that starts with the letter `c`. After
+    /// the last entry, the search continues at the first one.
     pub(super) fn jump_to(&mut self, c: char) {
         let Some(Overlay::Pick(pick)) = &self.model.overlay else { return };
         let begins = |i: &usize| {

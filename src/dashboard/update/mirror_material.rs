@@ -1,5 +1,6 @@
-//! Dashboard commands that change the roughness, reflection or lobe of a material. They change the
-//! mirror: a reflecting material of the selection if there is one, otherwise one of the scene.
+//! Dashboard commands that change the roughness, reflection or lobe of the mirror. This is a
+//! reflecting material of the selection if there is one, otherwise a reflecting material elsewhere
+//! in the scene.
 
 use crate::dashboard::update::{Coalesce, UpdateContext};
 use crate::scene::edit::{self, Edit, EditError, Target};
@@ -21,8 +22,8 @@ impl UpdateContext<'_> {
         self.commit_mirror(edit, Coalesce::Single);
     }
 
-    /// Makes the result of an edit of the mirror (a reflecting material) the current scene, and
-    /// reports the material's new values in a notice. `coalesce` decides if the edit joins the
+    /// Records the result of an edit of the mirror (a reflecting material) as the current scene. A
+    /// notice then reports the material's new values. `coalesce` decides if the edit joins the
     /// previous undo step.
     fn commit_mirror(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());

@@ -53,8 +53,8 @@ struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
-    /// `true` if lists in panels scroll so far that their cursor is visible. `false` if the message
-    /// must not change their scroll positions, for example because the user has scrolled.
+    /// `true` if lists in panels are scrolled until their cursors are visible. `false` if the
+    /// message must not change the scroll positions, for example because the user has scrolled.
     follow: bool,
     /// Character of the key that ran the current command; `None` if the key types no character.
     typed: Option<char>,
@@ -85,8 +85,8 @@ enum StepSize {
 enum Coalesce {
     /// Rule: the edit is an undo step of its own.
     Single,
-    /// Rule: the edit is merged with the previous edit if this has the same label and is at most
-    /// [`REPEAT_WINDOW`] old.
+    /// Rule: the edit is merged with the previous edit if both have the same label and the previous
+    /// edit is at most [`REPEAT_WINDOW`] old.
     Repeat,
     /// Rule: the edit is merged with edits of the same label until the gesture (a drag or mode)
     /// ends.
@@ -182,9 +182,9 @@ impl UpdateContext<'_> {
         self.model.scene()
     }
 
-    /// Makes the result of an edit the current scene, or shows the edit's error as a notice.
-    /// `coalesce` decides if the edit joins the previous undo step. Returns `true` if the scene has
-    /// changed.
+    /// Records the result of an edit as the current scene. If `edit` is an error, shows the error
+    /// as a notice instead. `coalesce` decides if the edit joins the previous undo step. Returns
+    /// `true` if the scene has changed.
     fn commit(&mut self, edit: Result<Edit, EditError>, coalesce: Coalesce) -> bool {
         match edit {
             Ok(edit) => self.record(edit, coalesce),
@@ -235,8 +235,8 @@ impl UpdateContext<'_> {
         self.model.last_edit = None;
     }
 
-    /// Makes the result of an edit the current scene and selects the edited part. Returns `true` if
-    /// the scene has changed.
+    /// Records the result of an edit as the current scene, and selects the edited part. Returns
+    /// `true` if the scene has changed.
     fn commit_and_select(&mut self, edit: Result<Edit, EditError>) -> bool {
         let subject = edit.as_ref().ok().map(|edit| edit.subject.clone());
         let changed = self.commit(edit, Coalesce::Single);

@@ -75,7 +75,8 @@ impl UpdateContext<'_> {
     }
 
     fn press_in_outline(&mut self, rows: Rect, mouse: Mouse) {
-        // `rows` is the area before the panel gets the focus, which may change the layout.
+        // `rows` is the area of the list at the time of the press. The change of focus below may
+        // change the layout.
         let lines = outline(self.scene());
         let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
         let subject = line.and_then(OutlineLine::subject).cloned();

@@ -11,7 +11,7 @@ const TURN_DEGREES_FINE: f64 = 1.0;
 /// Largest factor by which a drag multiplies the movement of the selection in depth. The view
 /// direction meets the ground plane at an angle, so depth appears shortened by the sine of this
 /// angle. The selection stays under the mouse if its movement is divided by this sine. The quotient
-/// is unbounded at grazing angles and therefore limited.
+/// is unbounded at grazing angles. It is therefore limited to 4, its value at 14.5 degrees.
 const MOST_STRETCH: f64 = 4.0;
 
 /// Returns the coordinate axis in the ground plane, positive or negative, whose direction is

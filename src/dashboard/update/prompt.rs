@@ -166,8 +166,8 @@ pub(super) fn stop_text(stop: &Stop) -> String {
     if text.is_empty() { "none".to_string() } else { text }
 }
 
-/// Parses stop criteria in the format of [`stop_text`]. Commas and equals signs may also separate
-/// words.
+/// Parses stop criteria in the format of [`stop_text`]. Words may be separated by spaces, commas or
+/// equals signs.
 fn parse_stop(text: &str) -> Result<Stop, String> {
     let mut stop = Stop::default();
     let mut words = text.split([' ', ',', '=']).filter(|word| !word.is_empty());

@@ -73,8 +73,7 @@ impl UpdateContext<'_> {
     }
 
     /// Requests a write of the recovery file if there are new unsaved edits. Requests its removal
-    /// if all edits are saved. Also requests its removal if the user quits, which discards unsaved
-    /// edits.
+    /// if all edits are saved, or if the user quits, which discards unsaved edits.
     pub(super) fn autosave(&mut self) {
         let quit = self.effects.iter().position(|effect| *effect == Effect::Quit);
         let unsaved = quit.is_none() && !self.model.file.unreadable && self.model.is_unsaved();

@@ -15,8 +15,8 @@ use std::sync::Arc;
 
 impl UpdateContext<'_> {
     /// Stores a report on the watched files. A cursor in the first row of the table stays in the
-    /// first row. Any other cursor stays on its file (or missing shard, a part of the render), even
-    /// if this file is now in another row.
+    /// first row. Any other cursor follows its entry to the entry's new row. An entry is a film
+    /// file, or one or more shards (parts of a distributed render) without a file.
     pub(super) fn watched(&mut self, report: WatchReport) {
         let before = self.model.watch.take();
         if let Some(size) = report.size.filter(|size| *size != self.scene().film.size) {
@@ -39,7 +39,8 @@ impl UpdateContext<'_> {
         let at = before.as_ref().and_then(|table| table.report.shards.get(table.cursor)).map(key);
         let same = report.shards.iter().position(|row| Some(key(row)) == at);
         let (cursor, scroll) = before.map_or((0, 0), |table| (table.cursor, table.scroll));
-        // The first row is the most urgent one. It stays selected until the user moves the cursor.
+        // The rows are sorted by urgency. A cursor in the first row stays on the most urgent entry
+        // until the user moves the cursor.
         let cursor = if cursor == 0 { 0 } else { same.unwrap_or(cursor) };
         self.model.watch = Some(WatchTable { report, cursor, scroll });
         self.move_watch_cursor(0);
