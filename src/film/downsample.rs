@@ -87,10 +87,10 @@ struct Span {
 /// Contribution of a film tile to those cells (pixels) of a smaller image that the tile overlaps.
 #[derive(Default)]
 struct TilePart {
-    /// State of the tile at its latest refresh: epoch (number of the film's restarts),
+    /// State of the tile at its latest refresh: the film's epoch (a counter of its restarts),
     /// [`Tile::counts`] and [`Tile::lattice_px`]. If the tile still has these values, its samples
-    /// are unchanged. `None` if [`Film::tile`] returned `None` then, because the tile had no
-    /// samples.
+    /// are unchanged. `None` if the tile had no samples at the latest refresh ([`Film::tile`]
+    /// returned `None`).
     version: Option<(u64, [u32; 2], usize)>,
     /// Sums for each cell that the tile overlaps, `[row][column][area, group 0 red, ...]`. The
     /// first is the total area, inside the cell, of the pixels with samples. Each of the others is

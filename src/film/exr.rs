@@ -139,8 +139,9 @@ fn headers(
         rounding_mode: RoundingMode::Down,
     };
     let header = Header::new(text("picture"), size, descriptions)
-        // RLE is used because it is fast; noise hardly compresses in any case. A file of 108 MB at
-        // 1920x1080 becomes 100 MB in 0.55 s with RLE, and 71 MB in 3.4 s with ZIP.
+        // RLE is used because it is fast and noisy pictures compress poorly anyway. A picture of
+        // 1920x1080 pixels takes 108 MB uncompressed. RLE reduces it to 100 MB in 0.55 s, ZIP to 71
+        // MB in 3.4 s.
         .with_encoding(Compression::RLE, BlockDescription::Tiles(tiles), LineOrder::Increasing)
         .with_shared_attributes(image)
         .with_attributes(layer);

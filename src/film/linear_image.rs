@@ -40,8 +40,9 @@ impl LinearImage {
         [self.width, self.height]
     }
 
-    /// Returns the means of the picture over `cols` x `rows` cells, `[row][column]`, weighted by
-    /// area. The cells (pixels of a smaller image) have equal sizes and together cover the picture.
+    /// Returns the mean of the picture over each of `cols` x `rows` cells (pixels of a smaller
+    /// image), `[row][column]`, weighted by the covered area of each pixel. The cells have equal
+    /// sizes and together cover the picture.
     pub fn resampled(&self, cols: usize, rows: usize) -> Vec<[f32; 3]> {
         let means = box_means(self.size(), [cols, rows], |pixel| self.pixels[pixel].map(f64::from));
         means.into_iter().map(|mean| mean.map(|c| c as f32)).collect()

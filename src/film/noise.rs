@@ -7,13 +7,13 @@
 //! any sampler.
 //!
 //! The displayed error is code(M) - code(truth), where code is the display transform to 8-bit
-//! levels. It is estimated by code(M) - code(M + d) and code(M) - code(M - d), squared and
-//! averaged; M + d is A and M - d is B. These differences displace M by d, which is as large as the
-//! error of M. A curved or clipped tone curve therefore changes the estimate as much as the error.
-//! The hardest case is a dark pixel with 16 samples in each of A and B, only a few of which receive
-//! light. There the ratio of true to estimated RMSE is 1.13. A test compares two simpler estimates.
-//! Half the displayed difference of A and B has the ratio 1.20; d times the slope of the curve at M
-//! has the ratio 1.52.
+//! levels. Its square is estimated by the mean of (code(M) - code(M + d))^2 and (code(M) - code(M -
+//! d))^2, where M + d is A and M - d is B. These differences displace M by d, which is as large as
+//! the error of M. A curved or clipped tone curve therefore changes the estimate as much as the
+//! error. The hardest case of the tests is a dark pixel with 16 samples in each of A and B, only a
+//! few of which receive light. There the ratio of true to estimated RMSE is 1.13. Two simpler
+//! estimates are worse in this test. Half the displayed difference of A and B has the ratio 1.20; d
+//! times the slope of the curve at M has the ratio 1.52.
 //!
 //! The estimate of a single pixel has one degree of freedom and is meaningless. The estimate of a
 //! tile has an uncertainty of about 7 % if its pixels are alike; that of a whole picture is far
@@ -253,8 +253,8 @@ impl Noise {
         let (_, p95, _) = tile_errors.select_nth_unstable_by(rank, f64::total_cmp);
         let p95_codes = p95.sqrt();
         let worst = tile_errors.iter().copied().fold(0.0, f64::max);
-        // `sum` adds up means over the three channels, but `squares` is computed from sums over
-        // them. The factor 3 converts the means to sums.
+        // `sum` adds up means over the three channels, but `squares` is computed from sums over the
+        // channels. The factor 3 converts the means to sums.
         let effective = |sum: f64, squares: f64| {
             let sum = 3.0 * sum;
             if squares > 0.0 { sum * sum / squares } else { 0.0 }

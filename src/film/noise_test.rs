@@ -41,8 +41,8 @@ impl Pixel {
     }
 }
 
-/// Returns the pixels of a simulated picture of 64 x 48 pixels. Their probabilities `chance` of a
-/// lit sample are random in [0, 1); all have the given `normal` and `dark`.
+/// Returns the pixels of a simulated picture of 64 x 48 pixels. The probability `chance` of a lit
+/// sample is random in [0, 1) for each pixel. `normal` and `dark` are the same for all pixels.
 fn scene(normal: bool, dark: [f64; 3], rng: &mut Rng) -> Vec<Pixel> {
     (0..64 * 48).map(|_| Pixel { chance: rng.unit(), normal, dark }).collect()
 }
@@ -125,10 +125,10 @@ fn estimates_equal_true_errors_in_the_mean() {
     }
 }
 
-/// Checks the noise estimate for dark pixels whose samples are rarely lit; the tone curve is steep
-/// and curved there. The estimate must be better than two simpler ones: half the displayed
-/// difference of the replicates A and B (halves of the samples), and the half difference in
-/// radiance times the slope of the curve.
+/// Checks the noise estimate for dark pixels, few of whose samples receive light. The sRGB encoding
+/// is steep and curved at dark values. The estimate must be better than two simpler ones: half the
+/// displayed difference of the replicates A and B (halves of the samples), and the half difference
+/// in radiance times the slope of the encoding.
 #[test]
 fn rare_light_is_estimated_better_than_by_half_differences_or_slopes() {
     let (n, mut rng) = (16u32, Rng(5));

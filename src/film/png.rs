@@ -11,7 +11,7 @@ use png::{
 };
 use std::io::{self, Write};
 
-/// Number of bytes of image data in a chunk of the PNG file.
+/// Largest number of bytes of image data in a chunk of the PNG file.
 const CHUNK_BYTES: usize = 1 << 18;
 /// Number of bytes of the PNG file's last chunk, which has no data.
 const END_CHUNK_BYTES: usize = 12;

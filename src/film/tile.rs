@@ -64,8 +64,8 @@ impl Tile {
         }
     }
 
-    /// Takes the memory of the integer sums of `old`, a tile of another film. Nothing may have been
-    /// written to this tile before.
+    /// Takes the memory of the integer sums of `old`, a tile of another film. The caller must
+    /// ensure that nothing has been written to this tile yet.
     pub(super) fn take_memory(&mut self, old: Self) {
         self.sums = old.sums;
     }
@@ -75,7 +75,8 @@ impl Tile {
         2 * TILE_PIXELS * groups * 3
     }
 
-    /// Allocates the memory of the integer sums if the tile has none. The memory is not written.
+    /// Allocates memory for the integer sums if the tile has less than it needs. Does not write to
+    /// the memory.
     pub(super) fn reserve(&mut self) -> Result<(), TryReserveError> {
         let len = Self::sums_len(self.stride / 3);
         if self.sums.capacity() < len {
@@ -85,8 +86,8 @@ impl Tile {
         Ok(())
     }
 
-    /// Allocates the tile if it has no memory, or clears it if it was written before the film's
-    /// latest restart. `epoch` is the number of the film's restarts.
+    /// Clears the tile if it was last written before the film's latest restart. Allocates its
+    /// memory first if it has too little. `epoch` is the film's epoch, a counter of its restarts.
     pub(super) fn clear_if_stale(&mut self, epoch: u64) {
         if self.epoch == epoch {
             return;

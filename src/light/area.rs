@@ -49,8 +49,9 @@ pub(super) fn up() -> [f64; 3] {
 }
 
 /// Returns the unit vectors of a rectangle's frame: across, up and along `normal`. `up` is made
-/// perpendicular to the normal. If both are parallel (the sine of their angle is at most 1e-6), the
-/// z axis replaces `up`; for a normal along z, the x axis does. Returns `None` if `normal` is zero.
+/// perpendicular to the normal. If `up` and `normal` are parallel (the sine of their angle is at
+/// most 1e-6), the z axis replaces `up`. If `normal` is also parallel to z, the x axis replaces
+/// `up`. Returns `None` if `normal` is zero.
 fn frame(normal: [f64; 3], up: [f64; 3]) -> Option<[DVec3; 3]> {
     let front = unit(normal)?;
     let across = |up: DVec3| Some(up.cross(front)).filter(|across| across.length() > 1e-6);

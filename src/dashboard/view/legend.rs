@@ -46,7 +46,7 @@ impl Legend {
     }
 
     /// Draws the legend at the right end of the row `row` of `area`. Omits the unit if there is no
-    /// room for it. Draws nothing if there is no room for the rest.
+    /// room for it. Draws nothing if even the legend without the unit does not fit.
     pub fn draw(&self, area: Rect, row: u16, theme: &Theme, buffer: &mut Buffer) {
         let mut line = Row::new(buffer, area, row);
         let words = columns(&self.unit) + 1;

@@ -97,7 +97,7 @@ impl View {
         }
         status::draw(model, layout.status, &theme, buffer);
         status::hints_line(model, layout.hints, &theme, buffer);
-        // A form replaces the panels.
+        // An open form replaces the panels: outline, inspector and plot are not drawn then.
         let mut cursor = None;
         if let Some(table) = &model.watch {
             watch::draw(model, table, &layout, &theme, buffer);

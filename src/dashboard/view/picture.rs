@@ -114,7 +114,8 @@ impl PictureView {
         let all = tiles.columns * tiles.rows;
         let values: Vec<f64> = values.get(..all)?.iter().map(|value| (*value).into()).collect();
         let mut scale = Scale::logarithmic(values.iter().copied());
-        // The scale spans at most a factor of 1000.
+        // The scale spans at most a factor of 1000. Smaller values have the colour of its lower
+        // end.
         scale.low = scale.low.max(1e-3 * scale.high);
         self.legend = Some(Legend::magnitude(scale, unit));
         let film = model.scene().film.size.map(|n| n as usize);
