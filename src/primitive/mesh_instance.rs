@@ -265,7 +265,7 @@ impl<S: Float> MeshInstance<S> {
     }
 
     /// Returns two values for each ray: the ray in mesh space, and the length in mesh space of a
-    /// step that has length 1 along the ray in the scene.
+    /// step along the ray whose length in the scene is 1.
     #[inline(always)]
     fn ray<L: SimdFloat<Scalar = S>>(&self, ray: &Ray<L>) -> (Ray<L>, L) {
         let direction = self.vector(ray.direction);

@@ -117,8 +117,8 @@ impl<L: SimdFloat> SolidPrimitive<L> for Plane<L::Scalar> {
         let t = -height / speed;
         let (enters, leaves) = (speed.lt(L::zero()), speed.gt(L::zero()));
         // A line parallel to the plane does not cross it: all of the line is behind the plane or in
-        // front of it. A crossing whose distance overflows is clamped to the largest number, which
-        // stands for no crossing.
+        // front of it. If the distance of a crossing overflows, it is clamped to the largest
+        // number, which means that there is no crossing.
         let enter = L::select(enters, t.max(none).min(all), none);
         let leave = L::select(leaves, t.max(none).min(all), all);
         let meets = enters | leaves | height.le(L::zero());

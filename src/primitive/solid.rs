@@ -1,4 +1,5 @@
-//! Intervals of lines inside of solids, from which compounds (CSG) are computed.
+//! Intervals in which lines are inside of solids. Compounds (CSG) are computed from these
+//! intervals.
 
 use crate::bvh::Ray;
 use crate::lanes::SimdFloat;

@@ -2,7 +2,7 @@
 //!
 //! The rays of a coherent packet traverse the BVH together. Those of other packets traverse it one
 //! by one, and each tests eight boxes or triangles at a time. A triangle is tested by the same
-//! operations in both cases, so that a ray hits the same triangle at the same distance.
+//! operations in both cases. Both therefore find the same triangle at the same distance.
 
 use crate::asset::{Mesh, TriangleBlock};
 use crate::bvh::BVH_WIDTH;
@@ -51,8 +51,8 @@ struct ShearedRay<L> {
 }
 
 /// Returns the ray packet for box tests of the mesh's BVH. The boxes are enlarged by the rounding
-/// errors of the triangle tests. A ray that passes an edge within rounding errors therefore tests
-/// the triangles at the edge.
+/// errors of the triangle tests. A ray whose distance from an edge is within rounding errors is
+/// therefore tested against the triangles at this edge.
 #[inline(always)]
 fn slab_packet<L: SimdFloat>(ray: &Ray<L>, mesh: &Mesh) -> SlabPacket<L> {
     let [low, high] = mesh.mesh().bounds;

@@ -70,9 +70,9 @@ impl SampleInputs {
         (SCENE, out)
     }
 
-    /// Returns `true` if samples with the inputs `self` are valid for `scene`. The lights of
-    /// `scene` may differ from those of [`Self::scene`] in colour and intensity if the film stores
-    /// their light separately.
+    /// Returns `true` if samples that were traced with these inputs are valid for `scene`. The
+    /// lights of `scene` may differ from those of [`Self::scene`] in colour and intensity if the
+    /// film stores their light separately.
     pub fn fit(&self, scene: &Scene) -> bool {
         let resolver = scene.resolver.clone();
         let Ok(compiled) = Scene::parse_in(&self.scene, "checkpoint", resolver) else {

@@ -44,8 +44,8 @@ impl RenderState {
     }
 }
 
-/// Returns the hash that identifies the scene of a picture, with the name of its algorithm. It
-/// covers the text of the scene file and the contents of its meshes and images.
+/// Returns the hash that identifies the scene of a picture, after the name of the hash algorithm.
+/// The hash covers the text of the scene file and the contents of its meshes and images.
 pub fn scene_hash(text: &str, scene: &Scene) -> String {
     let mut hash = Fnv1a64::default();
     hash.update(text.as_bytes());

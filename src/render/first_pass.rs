@@ -135,8 +135,9 @@ impl<L: SimdFloat> TileRenderer<'_, L> {
         tiles.into_iter().for_each(|(_, tile)| tile.set_lattice(step));
     }
 
-    /// Traces the first sample of each of `pixels` with `tracer`, which was created for them, and
-    /// adds it to the pixel's tile. `counts` receives the ray counts of `tiles`.
+    /// Traces the first sample of each of `pixels` with `tracer`, which was created for these
+    /// pixels, and adds the sample to the pixel's tile. `counts` receives the ray counts of
+    /// `tiles`.
     fn add_pixels(
         &self,
         tiles: &mut [([usize; 2], &mut Tile)],

@@ -192,8 +192,7 @@ impl WatchedFilms {
     }
 
     /// Returns the seconds of rendering. For a checkpoint they are those of its render. For the
-    /// files of a plan they are the time between the modifications of the oldest and the newest
-    /// file.
+    /// files of a plan they are the time from the earliest to the latest modification of a file.
     pub fn seconds(&self) -> f64 {
         if let [WatchedFile { contents: Contents::Checkpoint(seconds), .. }] = self.files[..] {
             return seconds;

@@ -59,8 +59,9 @@ const OWN_WEIGHT: f64 = 0.25;
 /// widening, 0.96 to 1.24 with 9 tiles, 0.94 to 1.23 with 17.
 const MIN_CLASS_TILES: f64 = 17.0;
 /// Largest distance between a class (tiles with similar error estimates) and a class that widens
-/// it. The distance is the sum of two numbers: the factors of sqrt(2) between the allocation
-/// estimates and those between the sample counts. A factor of 4 in one of them is a distance of 4.
+/// it. The distance is the sum of two numbers: the number of factors of sqrt(2) between the
+/// allocation estimates, and the number of such factors between the sample counts. For example, a
+/// factor of 4 between the sample counts is a distance of 4.
 const MAX_CLASS_DISTANCE: u32 = 4;
 
 /// Block of samples that an allocation round may give to a tile. A block is a run of samples of
@@ -106,8 +107,8 @@ pub(super) struct ErrorModel {
 }
 
 impl ErrorModel {
-    /// Returns the mean squared error of the tile after `count` samples per pixel and replicate
-    /// (half of the samples).
+    /// Returns the mean squared error of the tile after `count` samples per pixel in each of the
+    /// two replicates (halves of the samples).
     pub fn mse(&self, count: u32) -> f64 {
         self.scale * f64::from(count).powf(-2.0 * self.slope)
     }
@@ -131,12 +132,12 @@ struct TileModels {
 /// if v is 0.
 type Class = (u32, Option<i32>);
 
-/// Returns the length of the next block of a tile with `count` samples per pixel and replicate
-/// (half of the samples). A block is a run of samples that is allocated as a whole. If `count` is
-/// below [`SAMPLE_ALIGNMENT`], the block ends at the next power of two. If `count` is larger but no
-/// multiple of [`SAMPLE_ALIGNMENT`], the block ends at the next multiple. Otherwise the length is
-/// the largest power of two up to a quarter of `count`, at least [`SAMPLE_ALIGNMENT`], because such
-/// blocks of the sample sequence are well distributed.
+/// Returns the length of the next block of a tile with `count` samples per pixel in each of the two
+/// replicates (halves of the samples). A block is a run of samples that is allocated as a whole. If
+/// `count` is below [`SAMPLE_ALIGNMENT`], the block ends at the next power of two. If `count` is
+/// larger but no multiple of [`SAMPLE_ALIGNMENT`], the block ends at the next multiple. Otherwise
+/// the length is the largest power of two up to a quarter of `count`, at least
+/// [`SAMPLE_ALIGNMENT`], because such blocks of the sample sequence are well distributed.
 fn block(count: u32) -> u32 {
     if count < SAMPLE_ALIGNMENT {
         return (count + 1).next_power_of_two() - count;
@@ -151,8 +152,8 @@ fn block(count: u32) -> u32 {
 /// on the next samples of all tiles.
 pub(super) struct Allocation<'a> {
     schedule: &'a Schedule,
-    /// Samples per pixel and replicate (half of the samples) of each tile: those traced so far and
-    /// those allocated in this round.
+    /// Samples per pixel of each tile in each of the two replicates (halves of the samples): those
+    /// traced so far and those allocated in this round.
     pub counts: Vec<u32>,
     /// Expected number of rays of the samples that this round has allocated so far.
     pub spent: f64,
@@ -173,10 +174,10 @@ impl<'a> Allocation<'a> {
         }
     }
 
-    /// Returns the length of the next block of `tile` in samples per pixel and replicate (half of
-    /// the samples). A block is a run of samples that is allocated as a whole. Returns 0 if the
-    /// tile has reached its largest sample count ([`Schedule::cap`]), or if the picture has reached
-    /// its requested mean sample count.
+    /// Returns the length of the next block of `tile`: its number of samples per pixel in each of
+    /// the two replicates (halves of the samples). A block is a run of samples that is allocated as
+    /// a whole. Returns 0 if the tile has reached its largest sample count ([`Schedule::cap`]), or
+    /// if the picture has reached its requested mean sample count.
     pub fn next_block(&self, tile: usize) -> u32 {
         let (t, count) = (&self.schedule.tiles[tile], self.counts[tile]);
         let affordable =
@@ -189,7 +190,8 @@ impl<'a> Allocation<'a> {
         2.0 * f64::from(samples) * f64::from(t.pixels) * t.rays_per_sample()
     }
 
-    /// Allocates `samples` further samples per pixel and replicate (half of the samples) to `tile`.
+    /// Allocates `samples` further samples per pixel in each of the two replicates (halves of the
+    /// samples) to `tile`.
     pub fn allocate(&mut self, tile: usize, samples: u32) {
         self.spent += self.rays(tile, samples);
         self.samples_left -= u64::from(samples) * u64::from(self.schedule.tiles[tile].pixels);

@@ -11,8 +11,8 @@ const POINTS: usize = 7;
 /// Relative uncertainty of the extrapolated number of rays left until an error target, even if the
 /// convergence slope is well fitted. The slope decreases a little during the render, because the
 /// rays of exploration (samples for the tiles with the fewest samples) reduce the error less and
-/// less. At a slope of 0.75, extrapolation over two doublings of the rays therefore needs 4 to 10 %
-/// more rays than predicted.
+/// less. At a slope of 0.75, a render over two doublings of the rays therefore needs 4 to 10 % more
+/// rays than the extrapolation predicts.
 const SPREAD: f64 = 0.15;
 
 /// Convergence fit: RMSE of the picture as a function of rays, over the latest three doublings of
@@ -65,8 +65,8 @@ impl ConvergenceFit {
     }
 
     /// Returns the slope p of the fit RMSE ~ rays^-p through the first and the last recorded point,
-    /// which are at most three doublings of the rays apart. It is 0.5, that of independent samples,
-    /// if there are fewer than two points.
+    /// which are at most three doublings of the rays apart. If there are fewer than two points, p
+    /// is 0.5, the slope of independent samples.
     pub fn slope(&self) -> f64 {
         self.fitted_slope().unwrap_or(0.5)
     }

@@ -32,19 +32,19 @@ use tile::{Tile, clamp_slope};
 /// without noise would get a third of all samples of the mirror room scene, and two thirds of those
 /// of the reflecting tracks scene.
 const MIN_SAMPLES: u32 = 4;
-/// Samples per pixel and replicate (half of the samples) that replace [`MIN_SAMPLES`] if the
-/// estimated error is concentrated in fewer than [`FEW_PIXELS`] effective pixels (see
-/// [`Noise::effective_pixels`]). Such a picture has either no noise, or a few noisy pixels; more
-/// samples are needed to find them.
+/// Value that replaces [`MIN_SAMPLES`] if the estimated error is concentrated in fewer than
+/// [`FEW_PIXELS`] effective pixels (see [`Noise::effective_pixels`]). Such a picture has either no
+/// noise, or a few noisy pixels; more samples are needed to find them.
 const SPARSE_MIN_SAMPLES: u32 = SAMPLE_ALIGNMENT;
 /// Number of effective pixels (Kish's effective sample size, see [`Noise::effective_pixels`]) below
 /// which a noise estimate is unreliable. With k effective pixels the relative uncertainty of the
 /// RMSE is 1 / sqrt(2 k): 18 % for 16.
 const FEW_PIXELS: f64 = 16.0;
-/// Alignment of the sample counts of tiles, per pixel and replicate (half of the samples): counts
-/// are multiples of this number. Exceptions are smaller counts, and the count after the last block
-/// of a tile. The alignment is the number of lanes of the widest SIMD packets of rays. It is the
-/// same for narrower packets, because the samples of a picture must not depend on the processor.
+/// Alignment of the sample counts of tiles. The number of samples per pixel in each of the two
+/// replicates (halves of the samples) is a multiple of this number. Exceptions are smaller counts,
+/// and the count after the last block of a tile. The alignment is the number of lanes of the widest
+/// SIMD packets of rays. It is the same for narrower packets, because the samples of a picture must
+/// not depend on the processor.
 pub const SAMPLE_ALIGNMENT: u32 = 16;
 /// Samples per pixel in each replicate (half of the samples) at which a tile of the film is full.
 /// It is the largest multiple of [`SAMPLE_ALIGNMENT`] for which the sum over both replicates fits
@@ -98,9 +98,9 @@ pub struct Schedule {
     samples: u64,
     rays: u64,
     noise: Option<Noise>,
-    /// Samples per pixel and replicate (half of the samples) after the latest uniform allocation
-    /// round that ended with a noise estimate. A uniform round gives all tiles equally many
-    /// samples.
+    /// Samples per pixel in each of the two replicates (halves of the samples) after the latest
+    /// uniform allocation round that ended with a noise estimate. A uniform round gives all tiles
+    /// equally many samples.
     estimated_at: u32,
     /// Light period: the number of samples of a pixel that together trace a shadow ray to each
     /// light once; see [`Schedule::with_light_period`].
@@ -303,9 +303,9 @@ impl Schedule {
         if self.noise.is_some_and(sparse) { SPARSE_MIN_SAMPLES } else { MIN_SAMPLES }
     }
 
-    /// Returns the smallest number of samples per pixel and replicate (half of the samples) among
-    /// the tiles below their cap (see [`Schedule::cap`]); [`MAX_SAMPLES`] if all tiles have reached
-    /// their cap.
+    /// Returns the smallest number of samples per pixel in each of the two replicates (halves of
+    /// the samples) among the tiles below their cap (see [`Schedule::cap`]); [`MAX_SAMPLES`] if all
+    /// tiles have reached their cap.
     fn common_count(&self) -> u32 {
         let open = self.tiles.iter().filter(|t| t.done < self.cap(t));
         open.map(|t| t.done).min().unwrap_or(MAX_SAMPLES)
@@ -313,7 +313,8 @@ impl Schedule {
 
     /// Returns jobs that raise the sample counts of all tiles to the same number, or to the cap of
     /// a tile (see [`Schedule::cap`]) if that is lower. `common` is the smallest number of samples
-    /// per pixel and replicate (half of the samples) among the tiles below their cap.
+    /// per pixel in each of the two replicates (halves of the samples) among the tiles below their
+    /// cap.
     fn uniform(&mut self, common: u32) -> Vec<Job> {
         let grown = match common {
             // The count grows to the next power of two. It is between two powers if an earlier stop

@@ -9,7 +9,7 @@ use crate::render::schedule::{Schedule, Settings};
 use std::collections::BinaryHeap;
 
 /// Assumed slope of a tile's error, if no tile has doubled its sample count yet: RMSE ~ n^-slope
-/// for n samples. The scenes of the gallery have 0.57 to 0.8.
+/// for n samples. The scenes of the gallery have slopes of 0.57 to 0.8.
 pub const USUAL_SLOPE: f64 = 0.7;
 /// Error at which the prediction aims, as a share of the error target. It is below 1, because the
 /// true error exceeds the predicted one by 3 to 6 % (11 % in the worst of nine renders).

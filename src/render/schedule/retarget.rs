@@ -34,8 +34,8 @@ impl Schedule {
         for (tile, estimate) in self.tiles.iter_mut().zip(estimates) {
             tile.set_estimate(*estimate);
         }
-        // A round that began before there were estimates would end without new ones. It now ends
-        // with estimates if all tiles have one.
+        // An allocation round that began before the first noise estimates would end without new
+        // estimates. It now ends with new estimates if all tiles have one already.
         self.estimate |= self.tiles.iter().all(|t| t.error.is_some());
         self.update_noise();
     }

@@ -56,8 +56,8 @@ pub enum StoppedBy {
     /// The time limit of the render was reached.
     Time,
     /// At least one tile with a glossy lobe has reached its largest number of samples
-    /// ([`Settings::rays_per_pixel`]). The tiles below their largest number together meet the error
-    /// target, or there are none.
+    /// ([`Settings::rays_per_pixel`]). The tiles that may still get samples together meet the error
+    /// target, or there are no such tiles.
     RaysPerPixel,
     /// All tiles of the film hold the largest number of samples.
     Full,

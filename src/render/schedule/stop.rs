@@ -47,9 +47,9 @@ impl Schedule {
         Some((seconds_until(low), seconds_until(high)))
     }
 
-    /// Returns the estimated share of the render that is done, 0..=1. It is the elapsed time over
-    /// the expected total time (see [`Schedule::eta_seconds`]). `seconds` is the time since the
-    /// start of the render. Returns `None` if the total time cannot be estimated.
+    /// Returns the estimated share of the render that is done, 0..=1. It is the elapsed time
+    /// divided by the expected total time (see [`Schedule::eta_seconds`]). `seconds` is the time
+    /// since the start of the render. Returns `None` if the total time cannot be estimated.
     pub fn progress(&self, seconds: f64) -> Option<f64> {
         let (low, high) = self.eta_seconds(seconds)?;
         let seconds_left = 0.5 * (low + high);

@@ -208,8 +208,8 @@ impl Session {
         &self.wakeup
     }
 
-    /// Waits for a snapshot that has not been taken, for at most `limit`. Returns `None` after
-    /// `limit`.
+    /// Waits at most `limit` for a snapshot that has not been taken yet. Returns `None` if there is
+    /// none after this time.
     ///
     /// # Panics
     /// Panics if the rendering thread has panicked.
