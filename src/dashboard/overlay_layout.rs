@@ -6,6 +6,7 @@ use crate::dashboard::noise_targets::ABOUT;
 use crate::dashboard::overlay::Overlay;
 use crate::render::session::QUALITIES;
 use ratatui::layout::Rect;
+use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Areas of an overlay. Areas that an overlay does not use are empty.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,21 +52,13 @@ impl Model {
             Overlay::NoiseTargets { .. } => {
                 let about = wrapped_rows(ABOUT, 76.min(width - 2) - 5);
                 let frame = low(76, QUALITIES.len() as u16 + 2 + about);
-                let inner = frame.inner(BORDER);
-                let list = Rect { height: inner.height.min(QUALITIES.len() as u16), ..inner };
-                let help = Rect {
-                    x: inner.x + 3,
-                    y: inner.y + list.height,
-                    width: inner.width - 3,
-                    height: inner.height - list.height,
-                };
+                let (list, below) = divided(frame.inner(BORDER), QUALITIES.len() as u16);
+                let help = Rect { x: below.x + 3, width: below.width - 3, ..below };
                 OverlayLayout { frame, input: Rect::default(), list, help }
             }
             Overlay::CommandPalette(_) => {
                 let frame = centred(72, height.min(26) - 2);
-                let inner = frame.inner(BORDER);
-                let input = Rect { height: 1, ..inner };
-                let list = Rect { y: inner.y + 1, height: inner.height - 1, ..inner };
+                let (input, list) = divided(frame.inner(BORDER), 1);
                 OverlayLayout { frame, input, list, help: Rect::default() }
             }
             Overlay::Pick(pick) => {
@@ -88,9 +81,7 @@ impl Model {
                 let text = prompt.editor.problem.as_ref().unwrap_or(&prompt.help);
                 let rows = wrapped_rows(text, columns - 2);
                 let frame = low(columns, rows + 3);
-                let inner = frame.inner(BORDER);
-                let input = Rect { height: 1, ..inner };
-                let help = Rect { y: inner.y + 1, height: inner.height - 1, ..inner };
+                let (input, help) = divided(frame.inner(BORDER), 1);
                 OverlayLayout { frame, input, list: Rect::default(), help }
             }
             Overlay::Question(question) => {
@@ -100,10 +91,8 @@ impl Model {
                 let rows = wrapped_rows(&question.text, columns - 4);
                 let frame = low(columns, rows + answers + 2);
                 let inner = frame.inner(BORDER);
-                let answers = answers.min(inner.height);
-                let height = inner.height - answers;
-                let help = Rect { x: inner.x + 1, width: inner.width - 2, height, ..inner };
-                let list = Rect { y: inner.y + height, height: answers, ..inner };
+                let (text, list) = divided(inner, inner.height.saturating_sub(answers));
+                let help = Rect { x: text.x + 1, width: text.width - 2, ..text };
                 OverlayLayout { frame, input: Rect::default(), list, help }
             }
         })
@@ -121,9 +110,8 @@ impl Model {
         let inner = self.layout()?.outline?.inner(BORDER);
         let details = if inner.height >= 10 { 5 } else { 0 };
         // The first row has the titles of the columns.
-        let rows = inner.height.saturating_sub(1 + details);
-        let table = Rect { y: inner.y + 1, height: rows, ..inner };
-        Some((table, Rect { y: table.y + rows, height: details, ..inner }))
+        let (_, below) = divided(inner, 1);
+        Some(divided(below, below.height.saturating_sub(details)))
     }
 
     /// Returns two areas of the inspector: one for its lines, one for help on the field under the
@@ -150,8 +138,14 @@ fn split(inner: Rect, problem: bool) -> (Rect, Rect) {
         (8..14, _) => 2,
         _ => 3,
     };
-    let lines = Rect { height: inner.height - rows, ..inner };
-    (lines, Rect { y: inner.y + lines.height, height: rows, ..inner })
+    divided(inner, inner.height - rows)
+}
+
+/// Divides `area` into its first `rows` rows and the rest.
+fn divided(area: Rect, rows: u16) -> (Rect, Rect) {
+    let upper = Rect { height: rows.min(area.height), ..area };
+    let height = area.height - upper.height;
+    (upper, Rect { y: area.y + upper.height, height, ..area })
 }
 
 /// Returns the number of lines that `text` wraps to in `width` columns.
@@ -160,27 +154,29 @@ pub fn wrapped_rows(text: &str, width: u16) -> u16 {
 }
 
 /// Wraps `text` between words to lines of `width` columns. Words longer than a line are broken.
-/// Each character counts as one column.
 pub fn wrapped(text: &str, width: u16) -> Vec<String> {
     let width = usize::from(width.max(1));
     let mut lines = Vec::new();
     let mut line = String::new();
     let mut columns = 0;
     for word in text.split_whitespace() {
-        let mut rest: Vec<char> = word.chars().collect();
-        if columns > 0 && columns + 1 + rest.len() > width {
+        if columns > 0 && columns + 1 + word.width() > width {
             lines.push(std::mem::take(&mut line));
             columns = 0;
-        }
-        while rest.len() > width {
-            lines.push(rest.drain(..width).collect());
         }
         if columns > 0 {
             line.push(' ');
             columns += 1;
         }
-        columns += rest.len();
-        line.extend(rest);
+        for c in word.chars() {
+            let added = c.width().unwrap_or(0);
+            if columns > 0 && columns + added > width {
+                lines.push(std::mem::take(&mut line));
+                columns = 0;
+            }
+            line.push(c);
+            columns += added;
+        }
     }
     if !line.is_empty() || lines.is_empty() {
         lines.push(line);
@@ -198,6 +194,7 @@ mod tests {
         assert_eq!(wrapped("abcdefgh ij", 3), ["abc", "def", "gh", "ij"]);
         assert_eq!(wrapped("abcdef", 3), ["abc", "def", ""].map(String::from)[..2]);
         assert_eq!(wrapped("", 5), [""]);
+        assert_eq!(wrapped("日本 日本語 ü", 5), ["日本", "日本", "語 ü"], "two columns each");
         assert!(wrapped("a\nb\tc", 1).iter().all(|line| line.chars().count() == 1));
     }
 

@@ -21,7 +21,10 @@ pub enum AutosaveJob {
     Saving(Arc<Scene>, Sender<()>),
     /// Record that the scene was written to the scene file at this path.
     Saved(Arc<Scene>, PathBuf),
+    /// Recover the edits of the last [`Message::OrphanedEdits`], which a crashed run of the program
+    /// has left. They become unsaved edits of the scene.
     Recover,
+    /// Discard the edits of the last [`Message::OrphanedEdits`].
     Discard,
     /// Write scheduled edits, send the path of the recovery file (`None` if there is no such file)
     /// to this sender, and end the thread.

@@ -2,8 +2,9 @@
 //! returns.
 
 use crate::dashboard::message::{Effect, Format, Message};
+use crate::dashboard::run::autosave_worker::AutosaveJob;
 use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport, stem};
-use crate::dashboard::run::file_worker::Files;
+use crate::dashboard::run::file_worker::{Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
 use crate::dashboard::run::{export_paths, image_viewer};
@@ -234,7 +235,7 @@ impl Effects for EffectRunner {
                 });
             }
             Effect::Save { scene, path, overwrite } => self.files.save(scene, path, overwrite),
-            Effect::Load => self.files.load(),
+            Effect::Load => self.files.give(Job::Load),
             Effect::Export(format) => self.export(format),
             Effect::Checkpoint(scene) => {
                 let (exporter, results) = (self.exporter.clone(), self.results.clone());
@@ -264,8 +265,8 @@ impl Effects for EffectRunner {
                 }
             }
             Effect::Autosave(scene) => self.files.autosave(scene),
-            Effect::Recover => self.files.recover(),
-            Effect::Discard => self.files.discard(),
+            Effect::Recover => self.files.give_autosave(AutosaveJob::Recover),
+            Effect::Discard => self.files.give_autosave(AutosaveJob::Discard),
             effect => return run_on_terminal(effect, frames, terminal, &self.results),
         }
         Outcome::Done

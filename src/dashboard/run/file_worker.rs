@@ -37,6 +37,7 @@ pub(super) enum Job {
         /// be saved then.
         prepared: Receiver<()>,
     },
+    /// Read the scene file. The result is a [`Message::Loaded`].
     Load,
     /// Continue with this scene file. Its text was recovered because the scene file on disk is
     /// unreadable.
@@ -111,11 +112,6 @@ impl Files {
         self.give(Job::Save { scene, path, overwrite, prepared });
     }
 
-    /// Reads the scene file. The result is a [`Message::Loaded`].
-    pub fn load(&self) {
-        self.give(Job::Load);
-    }
-
     /// Schedules an autosave of a scene with unsaved edits. The recovery file is written after a
     /// pause in editing, or when the program ends. `None` removes the recovery file.
     pub fn autosave(&mut self, scene: Option<Arc<Scene>>) {
@@ -129,17 +125,6 @@ impl Files {
         let (done, completion) = bounded(1);
         self.give_autosave(AutosaveJob::Flush(done));
         let _ = completion.recv_timeout(patience);
-    }
-
-    /// Recovers the edits of the last [`Message::OrphanedEdits`], which a crashed run of the
-    /// program has left. They become unsaved edits of the scene.
-    pub fn recover(&self) {
-        self.give_autosave(AutosaveJob::Recover);
-    }
-
-    /// Discards the edits of the last [`Message::OrphanedEdits`].
-    pub fn discard(&self) {
-        self.give_autosave(AutosaveJob::Discard);
     }
 
     /// Waits for pending writes, at most four seconds in total. Returns the path of the recovery
@@ -165,11 +150,13 @@ impl Files {
 
     // Sending fails only after a panic of the thread, which `finish` propagates.
 
-    fn give(&self, job: Job) {
+    /// Gives `job` to the thread that reads and writes the scene file.
+    pub(super) fn give(&self, job: Job) {
         let _ = self.jobs.send(job);
     }
 
-    fn give_autosave(&self, job: AutosaveJob) {
+    /// Gives `job` to the thread that writes the recovery file.
+    pub fn give_autosave(&self, job: AutosaveJob) {
         let _ = self.autosaves.send(job);
     }
 }
@@ -375,7 +362,7 @@ mod tests {
         files.save(Arc::new(scene), None, false);
         let refused = inbox.recv_timeout(PATIENCE).unwrap();
         assert!(matches!(refused, Message::Saved(_, Err(SaveError::Changed(_)))), "{refused:?}");
-        files.load();
+        files.give(Job::Load);
         assert_eq!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).unwrap().film.size, [640, 480]);
     }
 
@@ -385,14 +372,14 @@ mod tests {
         let path = folder.path().join("a.toml");
         fs::write(&path, "[camera").unwrap();
         let (files, inbox) = opened(&path);
-        files.load();
+        files.give(Job::Load);
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_err());
         files.save(Arc::default(), None, true);
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::Saved(_, Err(_))));
         assert_eq!(fs::read_to_string(&path).unwrap(), "[camera", "not ours to overwrite");
         fs::write(&path, starter()).unwrap();
         assert!(matches!(inbox.recv_timeout(PATIENCE).unwrap(), Message::ChangedOnDisk));
-        files.load();
+        files.give(Job::Load);
         assert!(loaded(inbox.recv_timeout(PATIENCE).unwrap()).is_ok());
         assert!(files.shared.get().is_some());
     }
@@ -416,7 +403,7 @@ mod tests {
             matches!(&offered, Message::OrphanedEdits(left) if left.scene == scene),
             "{offered:?}"
         );
-        files.recover();
+        files.give_autosave(AutosaveJob::Recover);
         files.autosave(Some(Arc::clone(&scene)));
         files.save(Arc::clone(&scene), None, false);
         assert_eq!(files.finish(), Ok(None));
@@ -467,7 +454,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (path, scene) = edited(folder.path());
         let (mut files, _inbox) = opened_blocking(&path, None);
-        files.load();
+        files.give(Job::Load);
         files.autosave(Some(Arc::clone(&scene)));
         files.flush(PATIENCE);
         let hidden = folder.path().join(".a.toml.unsaved");

@@ -7,7 +7,7 @@ use crate::dashboard::run::export_paths;
 use crate::dashboard::run::exporter::{exported, stem};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::film::file::FilmFileHeader;
-use crate::film::{Depth, Film, ImageData, ImageOutput, LinearImage, WholeFilm};
+use crate::film::{Depth, Film, ImageOutput, LinearImage};
 use crate::render::plan::WatchedFilms;
 use crate::render::session::{Report, Snapshot, WatchSession};
 use crate::terminal::Capabilities;
@@ -66,18 +66,10 @@ fn write(
     report: &Report,
     format: Format,
 ) -> Result<Exported, String> {
-    let source = header.metadata.iter().find(|(key, _)| key == "Source");
-    let stem = stem(None, source.map_or("", |(_, source)| source));
-    let image = ImageData {
-        size: [film.width(), film.height()].map(|n| n as u32),
-        mix: &header.weights,
-        group_names: &header.group_names,
-        display: header.display,
-        depth: Depth::Eight,
-    };
+    let stem = stem(None, header.source().unwrap_or_default());
     let create = |path: &Path| {
-        let mut bands = WholeFilm { film, metadata: &header.metadata };
-        ImageOutput::from_path(path)?.create_new().write(&image, &mut bands)
+        let output = ImageOutput::from_path(path)?.create_new();
+        header.write_picture(film, Depth::Eight, &output)
     };
     let path = export_paths::numbered(Path::new(""), &stem, format.extension(), create)?;
     Ok(exported(path, film, report))

@@ -57,12 +57,13 @@ impl UpdateContext<'_> {
         }
         let Some(layout) = self.model.layout() else { return };
         if is_in(mouse, layout.picture) {
-            let in_picture = is_in(mouse, layout.image);
             self.model.focus = Focus::Picture;
             if !self.moves_or_turns() {
                 self.end_gesture();
             }
-            self.start_drag(button, mouse, in_picture);
+            let Mouse { column, row, modified, .. } = mouse;
+            let (last, in_picture) = ([column, row], is_in(mouse, layout.image));
+            self.model.drag = Some(Drag { button, modified, last, moved: false, in_picture });
         } else if let Some((rows, _)) = self.model.inspector_rows()
             && is_in(mouse, layout.inspector)
         {
@@ -200,14 +201,6 @@ impl UpdateContext<'_> {
     /// picture.
     fn pixel_at(&self, mouse: Mouse) -> Option<[usize; 2]> {
         self.model.layout()?.film_pixel(self.scene().film.size, mouse.column, mouse.row)
-    }
-
-    /// Records the start of a drag: the press of `button` at the position of `mouse`. `in_picture`
-    /// is `true` if the position is inside of the picture.
-    pub(super) fn start_drag(&mut self, button: Button, mouse: Mouse, in_picture: bool) {
-        let Mouse { column, row, modified, .. } = mouse;
-        let last = [column, row];
-        self.model.drag = Some(Drag { button, modified, last, moved: false, in_picture });
     }
 
     pub(super) fn probe_at(&mut self, mouse: Mouse) {

@@ -78,12 +78,8 @@ impl UpdateContext<'_> {
         let quit = self.effects.iter().position(|effect| *effect == Effect::Quit);
         let unsaved = quit.is_none() && !self.model.file.unreadable && self.model.is_unsaved();
         let scene = unsaved.then(|| Arc::clone(self.model.history.scene()));
-        let same = match (&scene, &self.model.autosaved) {
-            (Some(now), Some(before)) => Arc::ptr_eq(now, before),
-            (None, None) => true,
-            _ => false,
-        };
-        if !same {
+        let [now, before] = [&scene, &self.model.autosaved].map(|s| s.as_ref().map(Arc::as_ptr));
+        if now != before {
             self.model.autosaved.clone_from(&scene);
             self.effects.insert(quit.unwrap_or(self.effects.len()), Effect::Autosave(scene));
         }

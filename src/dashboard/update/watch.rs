@@ -60,31 +60,24 @@ impl UpdateContext<'_> {
     /// select a row or scroll. In the picture, a click moves the pixel probe.
     pub(super) fn mouse_on_watch(&mut self, mouse: Mouse) {
         let Some(layout) = self.model.layout() else { return };
-        let in_picture = is_in(mouse, layout.image);
         let in_table = is_in(mouse, layout.outline);
         match mouse.kind {
-            MouseKind::Press(button) => {
-                self.start_drag(button, mouse, in_picture);
-                if in_table && let Some((rows, _)) = self.model.watch_rows() {
-                    self.model.focus = Focus::Outline;
-                    let table = self.model.watch.as_ref();
-                    let (cursor, scroll) = table.map_or((0, 0), |t| (t.cursor, t.scroll));
-                    if let Some(line) = line_at(rows, scroll, mouse) {
-                        self.move_watch_cursor(line as isize - cursor as isize);
-                    }
+            MouseKind::Press(_) if in_table => {
+                self.model.focus = Focus::Outline;
+                if let Some((rows, _)) = self.model.watch_rows()
+                    && let Some(table) = &self.model.watch
+                    && let Some(line) = line_at(rows, table.scroll, mouse)
+                {
+                    self.move_watch_cursor(line as isize - table.cursor as isize);
                 }
             }
-            MouseKind::Release(_) => self.model.drag = None,
-            MouseKind::Drag(_) => {}
-            MouseKind::Scroll(ticks) => {
-                if in_table {
-                    self.move_watch_cursor(-(ticks.clamp(-100, 100) * WHEEL_LINES) as isize);
-                }
+            MouseKind::Scroll(ticks) if in_table => {
+                self.move_watch_cursor(-(ticks.clamp(-100, 100) * WHEEL_LINES) as isize);
             }
-        }
-        let holds = matches!(mouse.kind, MouseKind::Press(_) | MouseKind::Drag(_));
-        if self.model.mode == Mode::Probe && in_picture && holds {
-            self.probe_at(mouse);
+            MouseKind::Press(_) | MouseKind::Drag(_) if self.model.mode == Mode::Probe => {
+                self.probe_at(mouse);
+            }
+            _ => {}
         }
     }
 }
