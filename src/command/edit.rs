@@ -9,7 +9,7 @@ use crate::dashboard::run::{DEFAULT_STOP, Ended, Setup, run as run_dashboard};
 use crate::disk::open_regular;
 use crate::film::Display;
 use crate::film::file::is_film_file;
-use crate::render::schedule::{Criterion, Settings};
+use crate::render::schedule::Settings;
 use crate::render::{Checkpoint, Options};
 use crate::sampling::{SampleSettings, SamplerKind};
 use crate::scene::{OPENING, OPENING_NAME, Recovery, SceneErrors, SceneFile, state_folder};
@@ -60,13 +60,7 @@ pub fn run(args: &EditArgs) -> Result<(), Failure> {
             sampling,
             display: Display::default(),
         },
-        settings: Settings {
-            adaptive: true,
-            criterion: Criterion::Codes,
-            // The dashboard replaces this 0 by the `rays_per_pixel` of the scene.
-            rays_per_pixel: 0,
-            stop: DEFAULT_STOP,
-        },
+        settings: Settings::new(true, DEFAULT_STOP),
         terminal: args.terminal.setup(environment),
         trace: args.trace.clone(),
     };
@@ -126,9 +120,7 @@ pub fn terminal_environment() -> Result<Environment, &'static str> {
 /// # Errors
 /// Fails if the scene in the checkpoint is not valid.
 fn scene_of(checkpoint: &Checkpoint, assets: Arc<Assets>) -> Result<SceneFile, Failure> {
-    let metadata = &checkpoint.header().metadata;
-    let source = metadata.iter().find(|(key, _)| key == "Source");
-    let source = source.map_or("", |(_, source)| source);
+    let source = checkpoint.header().source().unwrap_or_default();
     if let Ok(file) = SceneFile::open_with(Path::new(source), assets)
         && checkpoint.inputs().fit(file.document().scene())
     {

@@ -4,7 +4,7 @@
 use crate::command::Failure;
 use crate::disk::{Existing, WriteError, check_writable};
 use crate::film::file::{FilmFileHeader, encode_end, encode_tiles, tile_chunks, write_film_file};
-use crate::film::{Depth, Film, ImageData, ImageOutput, WholeFilm};
+use crate::film::{Depth, Film, ImageOutput};
 use crate::render::RenderState;
 use crate::render::export::{Provenance, metadata};
 use crate::render::plan::Part;
@@ -40,16 +40,7 @@ impl FilmOutput {
     pub fn write(&self, film: &Film, header: &FilmFileHeader) -> Result<(), WriteError> {
         match self {
             Self::Film(path) => write_film(path, film, header),
-            Self::Picture(output, depth) => {
-                let picture = ImageData {
-                    size: [film.width(), film.height()].map(|n| n as u32),
-                    mix: &header.weights,
-                    group_names: &header.group_names,
-                    display: header.display,
-                    depth: *depth,
-                };
-                output.write(&picture, &mut WholeFilm { film, metadata: &header.metadata })
-            }
+            Self::Picture(output, depth) => header.write_picture(film, *depth, output),
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::film::file::FilmReader;
 use crate::film::{Estimator, Noise};
 use crate::render::export::scene_hash;
 use crate::render::plan::{BASE, Part, PartShard, Plan, PlanSettings};
-use crate::render::schedule::{Criterion, Settings, Stop, USUAL_SLOPE};
+use crate::render::schedule::{Settings, Stop, USUAL_SLOPE};
 use crate::render::session::Report;
 use crate::render::{Options, SyncRender};
 use crate::sampling::SampleSettings;
@@ -158,9 +158,7 @@ fn stop(noise_codes: f64) -> Stop {
 }
 
 fn settings(noise_codes: f64) -> Settings {
-    let criterion = Criterion::Codes;
-    // The renderer replaces this 0 by the `rays_per_pixel` of the scene.
-    Settings { adaptive: true, criterion, rays_per_pixel: 0, stop: stop(noise_codes) }
+    Settings::new(true, stop(noise_codes))
 }
 
 fn spinner() -> ProgressBar {

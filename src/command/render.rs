@@ -307,13 +307,9 @@ fn schedule_settings(args: &RenderArgs) -> Settings {
     let noise_codes = if has_target { args.noise } else { Some(DEFAULT_NOISE_CODES) };
     let linear_file = args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
     let linear = noise_codes.is_none() && (args.rmse.is_some() || linear_file);
-    Settings {
-        adaptive: !args.uniform,
-        criterion: if linear { Criterion::Linear } else { Criterion::Codes },
-        // The renderer replaces this 0 by the `rays_per_pixel` of the scene.
-        rays_per_pixel: 0,
-        stop: Stop { spp: args.spp, noise_codes, rmse_linear: args.rmse, seconds: args.time },
-    }
+    let criterion = if linear { Criterion::Linear } else { Criterion::Codes };
+    let stop = Stop { spp: args.spp, noise_codes, rmse_linear: args.rmse, seconds: args.time };
+    Settings { criterion, ..Settings::new(!args.uniform, stop) }
 }
 
 /// Formats the result of a render, such as `room.png  640x480  212 spp (32-900)  noise 0.500 8-bit

@@ -2,7 +2,7 @@
 
 use crate::film::Display;
 use crate::material::Lobe;
-use crate::render::schedule::{Criterion, Settings, Stop};
+use crate::render::schedule::{Settings, Stop};
 use crate::render::{Options, SyncRender};
 use crate::sampling::{SampleSettings, SamplerKind};
 use crate::scene::{Acceleration, RayTypes, Scene};
@@ -145,12 +145,7 @@ impl Variant {
     /// # Errors
     /// Returns the error of the system if a thread cannot be started.
     pub fn start(&self) -> io::Result<SyncRender> {
-        let settings = Settings {
-            adaptive: self.adaptive,
-            criterion: Criterion::Codes,
-            rays_per_pixel: 0,
-            stop: Stop::default(),
-        };
+        let settings = Settings::new(self.adaptive, Stop::default());
         SyncRender::new(&self.scene, &self.options, settings, self.threads)
     }
 }

@@ -179,7 +179,7 @@ impl<R: Read> FilmReader<R> {
         if let Err(mismatch) = film.check_header(&self.header.film) {
             return Err(self.input.error(mismatch.to_string(), "name a file of the same render"));
         }
-        let groups = self.header.groups();
+        let groups = self.header.film.scales.len();
         self.visit_tiles(|fields, numbers| {
             for index in numbers {
                 if let Some(rest) = fields.0.strip_prefix(&[0; RECORD_BYTES as usize]) {
@@ -240,12 +240,6 @@ impl<R: Read> FilmReader<R> {
             return Err(input.damaged(format!("{} bytes follow its end", input.left)));
         }
         Ok(header)
-    }
-}
-
-impl FilmFileHeader {
-    fn groups(&self) -> usize {
-        self.film.scales.len()
     }
 }
 

@@ -39,9 +39,11 @@ mod tile_record;
 pub use decode::{Fields, FilmReader, ReadError, is_film_file};
 pub use encode::{encode_end, encode_tiles, tile_chunks, write_film_file};
 
+use crate::disk::WriteError;
 use crate::film::display::Display;
 use crate::film::light_weights::LightWeights;
 use crate::film::store::Header;
+use crate::film::{Depth, Film, ImageData, ImageOutput, WholeFilm};
 use std::collections::BTreeMap;
 
 /// First bytes of a film file.
@@ -77,4 +79,32 @@ pub struct FilmFileHeader {
     /// Further chunks of the film file by tag. The tags `HEAD`, `META`, `TILE` and `DONE` are not
     /// allowed.
     pub chunks: BTreeMap<Tag, Vec<u8>>,
+}
+
+impl FilmFileHeader {
+    /// Returns the name of the scene file that was rendered. Returns `None` if the metadata lack it.
+    pub fn source(&self) -> Option<&str> {
+        self.metadata.iter().find(|(key, _)| key == "Source").map(|(_, source)| source.as_str())
+    }
+
+    /// Writes the picture of `film` to `output`. This is the header of the film. `depth` is the
+    /// number of bits per channel of a PNG.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be written.
+    pub fn write_picture(
+        &self,
+        film: &Film,
+        depth: Depth,
+        output: &ImageOutput,
+    ) -> Result<(), WriteError> {
+        let picture = ImageData {
+            size: [film.width(), film.height()].map(|n| n as u32),
+            mix: &self.weights,
+            group_names: &self.group_names,
+            display: self.display,
+            depth,
+        };
+        output.write(&picture, &mut WholeFilm { film, metadata: &self.metadata })
+    }
 }

@@ -94,3 +94,11 @@ pub struct Settings {
     /// Stop criteria of the render.
     pub stop: Stop,
 }
+
+impl Settings {
+    /// Creates settings that minimise the error of the displayed picture. `rays_per_pixel` is 0; a
+    /// renderer replaces it by that of the scene.
+    pub fn new(adaptive: bool, stop: Stop) -> Self {
+        Self { adaptive, criterion: Criterion::Codes, rays_per_pixel: 0, stop }
+    }
+}

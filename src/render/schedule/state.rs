@@ -20,10 +20,7 @@ impl Schedule {
     /// Encodes everything on which the next samples depend, except for the settings.
     pub fn encode(&self) -> Vec<u8> {
         let mut out = Vec::new();
-        out.push(match self.settings.criterion {
-            Criterion::Codes => 0,
-            Criterion::Linear => 1,
-        });
+        out.push(u8::from(self.settings.criterion == Criterion::Linear));
         out.extend(self.samples.to_le_bytes());
         out.extend(self.rays.to_le_bytes());
         out.extend(self.estimated_at.to_le_bytes());
@@ -61,25 +58,19 @@ impl Schedule {
     /// not valid or does not belong to the film; the schedule may then have changed.
     pub fn restore(&mut self, state: &[u8], counts: &[[u32; 2]]) -> Option<()> {
         let mut fields = Fields::new(state);
-        let criterion = match fields.u8()? {
-            0 => Criterion::Codes,
-            1 => Criterion::Linear,
-            _ => return None,
-        };
+        let criterion = if flag(&mut fields)? { Criterion::Linear } else { Criterion::Codes };
         (self.samples, self.rays) = (fields.u64()?, fields.u64()?);
         self.estimated_at = fields.u32()?;
         self.estimate = flag(&mut fields)?;
         self.replicate = usize::from(flag(&mut fields)?);
         if flag(&mut fields)? {
-            let [rmse_linear, rmse_codes, p95_codes, worst_codes] = [
-                error(&mut fields)?,
-                error(&mut fields)?,
-                error(&mut fields)?,
-                error(&mut fields)?,
-            ];
-            let effective_pixels = decode_mse(&mut fields)?;
-            self.noise =
-                Some(Noise { rmse_linear, rmse_codes, p95_codes, worst_codes, effective_pixels });
+            self.noise = Some(Noise {
+                rmse_linear: error(&mut fields)?,
+                rmse_codes: error(&mut fields)?,
+                p95_codes: error(&mut fields)?,
+                worst_codes: error(&mut fields)?,
+                effective_pixels: decode_mse(&mut fields)?,
+            });
         }
         let points = fields.u32()?;
         let point = |_| Some((error(&mut fields)?, error(&mut fields)?));

@@ -291,10 +291,8 @@ impl WatchReport {
         }
         let settings = films.plan().map(|plan| &plan.settings);
         let header = films.header();
-        let source = header.and_then(|header| {
-            header.metadata.iter().find(|(key, _)| key == "Source").map(|(_, value)| value)
-        });
-        let source = source.or(settings.map(|settings| &settings.source));
+        let source = header.and_then(FilmFileHeader::source);
+        let source = source.or(settings.map(|settings| settings.source.as_str()));
         let film_size = header.map(|h| [h.film.width, h.film.height].map(|n| n as u32));
         let display = header.map(|header| header.display).or(settings.map(|s| s.display));
         Self {
@@ -304,7 +302,7 @@ impl WatchReport {
             target_codes: settings.map(|settings| settings.noise_codes),
             size: film_size.or(settings.map(|settings| settings.size)),
             display: display.unwrap_or_default(),
-            source: source.cloned().unwrap_or_default(),
+            source: source.unwrap_or_default().to_string(),
         }
     }
 }
