@@ -32,8 +32,8 @@ pub struct Wave {
 
 impl Wave {
     /// Cuts a piece from the wave (a set of concurrent jobs). Each job is shortened to at most
-    /// `longest` samples per pixel. Of these jobs the first are kept: as many as are needed for
-    /// `pixel_samples` samples over all pixels together, but at least one.
+    /// `longest` samples per pixel. The piece has the first of these jobs: as many as together
+    /// trace at least `pixel_samples` samples, summed over all pixels, and at least one job.
     pub fn cut(mut self, pixel_samples: u64, longest: u32) -> Self {
         let mut sum = 0;
         let mut jobs = 0;

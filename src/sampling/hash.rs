@@ -25,8 +25,8 @@ pub fn hash_words(words: &[u32]) -> u32 {
     })
 }
 
-/// Owen scrambling of binary fractions whose first digit is in bit 0. It flips each digit or not,
-/// depending on `seed` and on all preceding digits.
+/// Owen scrambling of binary fractions whose first digit is in bit 0. Whether a digit is flipped
+/// depends on `seed` and on all preceding digits.
 ///
 /// Laine-Karras construction with the constants of Vegdahl 2021, *Building a Better LK Hash*.
 #[inline(always)]

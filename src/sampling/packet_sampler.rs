@@ -48,7 +48,7 @@ pub struct SampleSettings {
 /// the first eight dimensions of a sample, stratified together.
 const CHOICES: u32 = 2;
 
-/// Number of surfaces on a path, at most, at which the sampled direction uses the joint set (the
+/// Largest number of surfaces on a path at which the sampled direction uses the joint set (the
 /// first eight Sobol dimensions of a sample).
 const MAX_JOINT_LOBES: u32 = 2;
 
@@ -171,12 +171,13 @@ impl<L: SimdFloat> SampleBlock<'_, L> {
     }
 }
 
-/// Number of directions, and of choices between reflection and transmission, for which random
-/// numbers are reserved in each segment of a path. Diffuse bounces divide a path into segments.
+/// Number of sampled directions for which each segment of a path has random numbers of its own. A
+/// segment has them for equally many choices between reflection and transmission. Diffuse bounces
+/// divide a path into segments.
 const PER_GENERATION: u32 = 1 << 16;
 
-/// Smallest number of a random choice by reservoir sampling, which selects the hit at which a
-/// diffuse bounce starts. Choices with smaller numbers are between reflection and transmission.
+/// First number of the random choices for reservoir sampling, which selects the hit at which a
+/// diffuse bounce starts. Smaller numbers belong to choices between reflection and transmission.
 const RESERVOIR: u32 = 1 << 31;
 
 /// Random numbers of the samples in one packet. Each method returns those for one purpose.

@@ -6,9 +6,8 @@
 //! ones on its diagonal. Such a matrix permutes the first 2^m indices for every m, so that each
 //! pair is still a (0, 2)-sequence (Faure and Tezuka 2002, *Another Random Scrambling of Digital
 //! (t,s)-Sequences*). With the usual direction numbers (Joe and Kuo 2008) only the first pair is a
-//! (0, 2)-sequence. This matters for images in a mirror, whose noise depends on two single pairs:
-//! one is the position in the pixel, and the other is the direction in the lobe. docs/accuracy.md
-//! has the measured benefit.
+//! (0, 2)-sequence. This matters for images in a mirror: their noise depends on only two pairs, the
+//! position in the pixel and the direction in the lobe. docs/accuracy.md has the measured benefit.
 //!
 //! The first columns of the matrices were found by search, one column after the other. The search
 //! minimised the errors of two estimates from 2^m randomly scrambled points. One is the volume of a
@@ -240,8 +239,8 @@ mod tests {
     }
 
     /// Checks the table of the worst pairs of Sobol dimensions in docs/accuracy.md. The worst pairs
-    /// are among dimensions 4 to 7. Without a lens, these are used for the second sampled direction
-    /// of a path and for the choices between reflection and transmission.
+    /// are among dimensions 4 to 7. Without a lens, these four dimensions are used for the second
+    /// sampled direction of a path and for the choices between reflection and transmission.
     #[test]
     fn worst_pairs_of_dimensions_are_the_documented_ones() {
         for (m, worst, first_lobes) in [
@@ -262,9 +261,9 @@ mod tests {
         assert!((0..4).all(|pair| gain(2 * pair, 2 * pair + 1, 6) <= 2.0));
     }
 
-    /// Checks the points of sixteen successive indices that begin at a multiple of 16. Each must be
-    /// the first of them XOR a constant, which is the same for every such run. [`Sampler::block`]
-    /// relies on this.
+    /// Checks runs of sixteen successive points that begin at a multiple of 16. Point i of a run
+    /// must be its first point XOR a constant that depends only on i. [`Sampler::block`] relies on
+    /// this.
     #[test]
     fn aligned_points_are_one_point_and_constants() {
         for d in 0..DIMENSIONS {

@@ -214,9 +214,9 @@ fn small_r_shift<L: SimdFloat>(rt: L, r2: L) -> L {
 ///
 /// The distribution function of visible slopes is erfc(-x) + r exp(-x^2) / sqrt(pi), up to
 /// constants. Newton's method inverts it. Below the median, it is applied to the logarithm of the
-/// function. Above, it is applied to the square root of the complement, because the derivative of
-/// the function falls to 0 at x = 1 / r. The iteration starts at a value that is exact to first
-/// order in r. It takes two steps for r <= 2, else three.
+/// function. Above the median, it is applied to the square root of the complement, because the
+/// derivative of the function falls to 0 at x = 1 / r. The iteration starts at a value that is
+/// exact to first order in r. It takes two steps for r <= 2, else three.
 #[inline(always)]
 fn visible_slope<L: SimdFloat>(t: L, r: L, v_cavity: bool) -> L {
     let (one, two) = (L::one(), L::from_f64(2.0));
@@ -265,8 +265,8 @@ fn visible_slope<L: SimdFloat>(t: L, r: L, v_cavity: bool) -> L {
     }
     if v_cavity {
         // For a large r the terms of the distribution function cancel. Where both sides of the
-        // groove are visible, x is within 1 / r of 0; there exp(-x^2) is 1 up to 1 / r^2. The
-        // density is therefore in proportion to 1 - r x, and is inverted in closed form.
+        // groove are visible, x is within 1 / r of 0, and exp(-x^2) is 1 with an error below 1 /
+        // r^2. The density is therefore in proportion to 1 - r x, and is inverted in closed form.
         let linear = (high * r * L::from_f64(PI.sqrt())).sqrt();
         x = L::select(r.gt(L::from_f64(24.0)), (end * (one - linear)).max(-end), x);
         // Only one side of the groove is visible.
@@ -315,7 +315,7 @@ fn erf_inverse<L: SimdFloat>(u: L) -> L {
     let w = -(L::from_f64(4.0) * positive * (L::one() - positive)).ln();
     let mut ratio = polynomial(&MIDDLE, w - L::from_f64(2.5));
     let in_tail = w.gt(L::from_f64(5.0));
-    // The probability of this case is 1 / 300.
+    // One of 300 uniform numbers is in a tail.
     if in_tail.any() {
         let root = w.max(L::zero()).sqrt();
         ratio = L::select(in_tail, polynomial(&TAILS, root - L::from_f64(3.5)), ratio);
@@ -358,7 +358,7 @@ pub fn ggx_visible_v_cavity<L: SimdFloat>(u: L, v: L, alpha: L, view: Vec3<L>) -
     let (x, y, _) = disk(u, v);
     let (away, side) = (-x.mul_add(ax, y * ay), y.mul_add(ax, -(x * ay)));
     let chord = (L::one() - side * side).max(L::from_f64(1e-30)).sqrt();
-    // Complement of the quantile on the chord.
+    // Share of the chord on the far side of the point: 1 minus the quantile of the point.
     let above = ((L::one() - away / chord) * L::from_f64(0.5)).max(L::zero()).min(L::one());
     // sin(a + theta) = 1 - 2 m.
     let m = above * stretched.z;
@@ -471,7 +471,7 @@ mod tests {
             let side = (2.0 * u - 1.0).abs().max((2.0 * v - 1.0).abs());
             assert!((r2 - side * side).abs() < max_error && (x * x + y * y - r2).abs() < max_error);
             let angle = y.atan2(x);
-            // Directions are visited in the order right, up, left, down.
+            // The expected angle is in eighths of a turn: 0 is right, 2 up, 4 left, 6 down.
             let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
             let (eighths, ahead) = if a.abs() > b.abs() { (b / a, a) } else { (2.0 - a / b, b) };
             let eighth = if ahead > 0.0 { eighths } else { eighths + 4.0 };

@@ -57,8 +57,9 @@ impl AssetResolver {
         self.assets.radiance_map(&self.folder().join(name))
     }
 
-    /// Returns `true` if the name `name` leads to a file from the current folder, and to no file or
-    /// another file from the folder of the scene file `scene`.
+    /// Returns `true` if the file name `name` breaks when the scene is saved as the file `scene`:
+    /// it leads to a file from the current folder, but to another file or none from the folder of
+    /// `scene`.
     pub(super) fn breaks_when_moved(&self, name: &str, scene: &Path) -> bool {
         let there = fs::canonicalize(folder_of(scene).join(name));
         fs::canonicalize(self.folder().join(name))

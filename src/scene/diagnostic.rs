@@ -124,9 +124,9 @@ impl FirstDiagnostics {
 const MAX_SHOWN: usize = 20;
 
 impl SceneErrors {
-    /// Creates the errors of a scene file. `messages` are at least one, sorted by location;
-    /// repetitions of the previous message are removed. `more` is the number of errors that are not
-    /// in `messages`.
+    /// Creates the errors of a scene file. `messages` has at least one entry and is sorted by
+    /// location. An entry that repeats the previous one is removed. `more` is the number of errors
+    /// that are not in `messages`.
     pub(super) fn new((mut messages, more): (Vec<Diagnostic>, usize)) -> Self {
         debug_assert!(!messages.is_empty(), "errors without a message");
         messages.dedup();

@@ -14,8 +14,9 @@ use std::path::Path;
 use std::sync::Arc;
 use toml_edit::DocumentMut;
 
-/// Text of a scene file and the scene that it describes. Edits of the scene change only the values
-/// that differ. Comments, order and layout of the rest of the text are kept.
+/// Text of a scene file and the scene that it describes. An edit of the scene changes only the
+/// values in the text that the edit concerns. Comments, order and layout of the rest of the text
+/// are kept.
 #[derive(Clone, Debug)]
 pub struct Document {
     name: String,

@@ -33,10 +33,11 @@ pub struct Report {
     pub generation: u64,
     /// State of the session that sends the report.
     pub state: State,
-    /// Numbers of samples per pixel in the picture, over both replicates (halves of the samples).
+    /// Smallest, mean and largest number of samples per pixel in the picture. The samples of both
+    /// replicates (the two halves of the samples) count.
     pub spp: Spp,
-    /// Number of samples traced for the picture so far, over all pixels and both replicates (halves
-    /// of the samples).
+    /// Number of samples traced for the picture so far. It is the sum over all pixels and over both
+    /// replicates (the two halves of the samples).
     pub samples: u64,
     /// Number of rays traced for the picture so far: camera, shadow, reflected and transmitted.
     pub rays: u64,
@@ -62,13 +63,13 @@ pub struct Report {
     /// Number of samples that were NaN or negative and were replaced by black.
     pub bad_samples: u64,
     /// Number of samples that were brighter than the largest value that the film can store. The
-    /// film has added this value instead.
+    /// film has added the largest value in place of each of them.
     pub saturated_samples: u64,
     /// Number of pixels in which an integer sum of the film has reached its largest value. Further
     /// samples make these pixels too dark.
     pub saturated_pixels: u64,
-    /// Number of samples (over all pixels) per second of tracing, measured over about the latest
-    /// second; 0 before the first measurement.
+    /// Throughput of about the latest second: samples traced per second, summed over all pixels. It
+    /// is 0 before the first measurement.
     pub recent_samples_per_second: f64,
     /// Number of threads that trace rays.
     pub threads: usize,
@@ -80,8 +81,9 @@ pub struct Report {
 }
 
 impl Report {
-    /// Creates the report of a film that no session renders, such as a merged one. Its error is
-    /// estimated for the picture with the light weights `mix` and the display transform `display`.
+    /// Creates the report of a film that no session renders, such as the sum of several films. The
+    /// error of the film is estimated for the picture with the light weights `mix` and the display
+    /// transform `display`.
     pub fn of_film(film: &Film, mix: &LightWeights, display: &Display) -> Self {
         Self { noise: film.noise(mix, display), ..Self::of_samples(film) }
     }
@@ -105,8 +107,8 @@ impl Report {
         }
     }
 
-    /// Returns the warnings to the user, such as `3 saturated samples`: one phrase for each of bad
-    /// samples, saturated samples and saturated pixels, if there are any.
+    /// Returns the warnings to the user, such as `3 saturated samples`. Bad samples, saturated
+    /// samples and saturated pixels each give one warning if their number is not 0.
     pub fn warnings(&self) -> Vec<String> {
         let plural = |n: u64, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
         let mut out = Vec::new();

@@ -13,8 +13,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Contents that a client requests of snapshots: the size of the picture, and the pixel to probe.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct View {
-    /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::first_hits`]. `None` requests
-    /// neither of them, and no [`Snapshot::tiles`].
+    /// Columns and rows of [`Snapshot::picture`] and [`Snapshot::first_hits`]. If it is `None`,
+    /// snapshots have neither of them, and no [`Snapshot::tiles`].
     pub raster: Option<[usize; 2]>,
     /// Column and row of the pixel whose samples and error are requested. `None` requests none.
     pub probe: Option<[usize; 2]>,

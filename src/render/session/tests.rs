@@ -103,8 +103,8 @@ fn newest_scene_is_never_lost() {
     }
 }
 
-/// Checks that the wake-up message of a snapshot that was taken without waiting does not end the
-/// next wait.
+/// Checks that a wait ignores old wake-up messages. Such a message belongs to a snapshot that the
+/// test has already taken without waiting.
 #[test]
 fn wait_ignores_messages_of_snapshots_already_taken() {
     let mut session = session(Stop { spp: Some(8), ..Stop::default() });
@@ -121,8 +121,8 @@ fn wait_ignores_messages_of_snapshots_already_taken() {
         let generation = session.set_scene(scene(128));
         let snapshot = session.wait(PATIENCE).expect("a snapshot in time");
         assert_eq!(snapshot.report.generation, generation);
-        // If this thread was late, `snapshot` is already that of the finished render; no other one
-        // follows.
+        // If this thread was late, `snapshot` already shows the finished render, and no other
+        // snapshot follows.
         if !matches!(snapshot.report.state, State::Finished(_)) {
             wait_for(&session, |s| matches!(s.report.state, State::Finished(_)));
         }
@@ -168,7 +168,8 @@ fn pause_stops_tracing_and_loses_no_sample() {
     wait_for(&session, |s| s.report.samples > 0);
     session.pause();
     let paused = wait_for(&session, |s| s.report.state == State::Paused);
-    // The load of the machine determines how many samples were traced before the pause.
+    // The target is the next multiple of 64 above the number of samples per pixel at the pause.
+    // This number depends on the load of the machine.
     let spp = 64 * (paused.report.spp.max / 64 + 1);
     session.set_stop(Stop { spp: Some(spp), ..Stop::default() });
     std::thread::sleep(Duration::from_millis(30));

@@ -23,8 +23,8 @@ impl Throughput {
         }
     }
 
-    /// Returns the number of samples (over all pixels) per second of tracing in the latest time
-    /// window. Returns `None` before there are two sample counts.
+    /// Returns the throughput in the latest time window: samples per second of tracing, summed over
+    /// all pixels. Returns `None` before there are two sample counts.
     pub fn samples_per_second(&self) -> Option<f64> {
         let (&(from, first), &(to, last)) = (self.marks.front()?, self.marks.back()?);
         (to > from).then(|| (last - first) as f64 / (to - from))

@@ -44,8 +44,8 @@ pub struct WatchReport {
     /// shards. The base, which holds the samples that the plan started from, counts as a shard.
     /// `None` without a plan.
     pub complete: Option<[usize; 2]>,
-    /// Number of samples in the picture divided by that of the whole plan, which divides the render
-    /// into shards; 0..=1. `None` without a plan or a film.
+    /// Number of samples in the picture, divided by the number of samples of the whole render that
+    /// a plan divides into shards; 0..=1. `None` without a plan or a film.
     pub progress: Option<f64>,
     /// Noise target of the plan: RMSE of the displayed picture in 8-bit levels. `None` without a
     /// plan.
@@ -69,8 +69,8 @@ pub struct WatchSession {
 }
 
 impl WatchSession {
-    /// Starts the thread that shows `films`, with `threads` threads for its computations. It calls
-    /// `on_report` with each report that differs from the previous one.
+    /// Starts the thread that shows `films`, with `threads` threads for its computations. The
+    /// thread calls `on_report` with each report that differs from the previous one.
     ///
     /// # Errors
     /// Returns the operating system's error if a thread cannot be started.

@@ -27,8 +27,8 @@ pub(super) struct Worker {
     /// `true` if the newest scene must start with an empty film, even if samples of the active
     /// render could be reused.
     restart: bool,
-    /// Scene to show and checkpoint whose render is to be continued. `None` if there is nothing to
-    /// continue.
+    /// Scene to show, and the checkpoint from which its render continues. `None` if there is
+    /// nothing to continue.
     resume: Option<(Arc<Scene>, Box<Checkpoint>)>,
     tasks: Vec<Task>,
     checkpoints: Vec<(Provenance, CheckpointTask)>,
@@ -80,8 +80,8 @@ impl Worker {
     /// Receives all queued commands of the client. Waits for one if there is no work. Returns
     /// `Break` if the session ends.
     fn listen(&mut self) -> ControlFlow<()> {
-        // The flags are lowered before commands are received. The documentation of the module
-        // `session` explains why.
+        // The cancel flags are lowered before commands are received. In the reverse order a flag
+        // could be lowered without its command being received; the module `session` explains this.
         self.context.shared.cancel_wave.swap(false, Ordering::AcqRel);
         self.context.shared.cancel_first_pass.swap(false, Ordering::AcqRel);
         if self.idle {
