@@ -21,7 +21,8 @@ pub struct SceneFile {
 /// State of a scene file on disk relative to the bytes that this program last read or wrote.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DiskState {
-    /// State: the file has the same bytes, or the scene has no file yet.
+    /// State: the file still has the bytes that this program last read or wrote, or the scene has
+    /// no file yet.
     Unchanged,
     /// State: another program has written the file, or it is no longer a readable regular file.
     Changed,
@@ -207,7 +208,9 @@ impl SceneFile {
     /// Writes the valid `scene` to another file, which becomes the scene's file.
     ///
     /// # Errors
-    /// Fails if the file exists (unless `overwrite` is `true`), or if the file cannot be written.
+    /// Fails if the file exists (unless `overwrite` is `true`), or if it cannot be written. Also
+    /// fails if a file name in the scene would lead to another file, or to none, from the new
+    /// folder.
     pub fn save_as(
         &mut self,
         path: &Path,

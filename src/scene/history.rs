@@ -50,7 +50,7 @@ impl History {
         Self { past: VecDeque::new(), now: scene, future: Vec::new(), open: false, saved }
     }
 
-    /// Returns the scene after the edits that are not undone.
+    /// Returns the current scene: the result of all edits that have not been undone.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.now
     }

@@ -97,8 +97,9 @@ impl Scene {
 /// Returns a warning if a material may reflect more light than it receives: if the weights of its
 /// diffuse, highlight, reflection and transmission parts may add up to more than 1. Otherwise
 /// returns `None`. The warning is `(key, phrase)`: the key that it refers to, and a statement of
-/// the sum. A Cook-Torrance highlight and the reflection stand for the same mirror reflection, of
-/// lights and of surfaces. Only the larger of their two weights is therefore added.
+/// the sum. A Cook-Torrance highlight is the mirror reflection of lights, and the reflection is
+/// that of surfaces. Both stand for one physical reflection; only the larger of the two weights is
+/// therefore added.
 fn brighter_than_its_light(m: &Material) -> Option<(&'static str, String)> {
     let mirrored = match m.highlight {
         Highlight::Phong => m.specular + m.reflection,

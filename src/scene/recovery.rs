@@ -25,8 +25,8 @@ const MAX_FILES: u32 = 9;
 const HEAD: &str = "# Unsaved edits, kept by zerkalo. The file was ";
 /// Word in the first line of a recovery file in place of the fingerprint, if the scene has no file.
 const NO_FILE: &str = "none";
-/// Time since the last modification of an unlocked temporary file from which the file is taken to
-/// be that of a killed process, and removed.
+/// Age (time since the last modification) from which an unlocked temporary file is taken to be that
+/// of a killed process. Such a file is removed.
 const STALE_AFTER: Duration = Duration::from_secs(60);
 
 /// Writer and finder of the recovery files of one scene.

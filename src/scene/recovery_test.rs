@@ -160,7 +160,7 @@ fn symbolic_links_share_recovery_and_planted_links_are_not_followed() {
 fn state_folder_is_used_if_the_scene_folder_is_not_writable() {
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("deep/state");
-    // The folder does not exist; files cannot be written there.
+    // The folder of the scene file does not exist; the recovery file cannot be written there.
     let gone = PathBuf::from("/proc/nowhere/a.toml");
     let with = |path: Option<&Path>| Recovery::new(path, "mirror/room.toml", Some(&state));
     let mut keeper = with(Some(&gone));

@@ -24,9 +24,8 @@ fn same_keys<T: TomlValue>(what: &str, fields: &[Field]) {
     assert_eq!(read_keys, documented, "{what}");
 }
 
-/// Checks that the documented defaults of `fields` are those of missing keys.
-/// `needed` is a TOML table with only the required keys. `what` is the name of the table in
-/// messages.
+/// Checks that the documented defaults of `fields` are the values that missing keys get. `needed`
+/// is a TOML table with only the required keys. `what` is the name of the table in messages.
 fn same_defaults<T: TomlValue>(what: &str, fields: &[Field], needed: &str) {
     let read = T::from_text(needed).unwrap_or_else(|e| panic!("{what}: {e:?}"));
     let written = read.to_table();
@@ -182,7 +181,7 @@ fn shape_examples_and_tables_are_valid() {
         let shape = read(kind, &given).unwrap_or_else(|e| panic!("{key}: {e:?}"));
         assert_eq!(shape.key(), *key);
         assert_eq!(shape.faults(), [], "{key}");
-        // Files in examples are relative to the folder of the project.
+        // The file names in examples are relative to the root folder of the project.
         let name = format!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../{}.toml"), key);
         let scene = Scene::parse(&format!("[[object]]\n{text}\n"), &name);
         assert!(scene.is_ok(), "{key}: {}", scene.unwrap_err());

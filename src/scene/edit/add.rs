@@ -36,7 +36,7 @@ const PALETTE: [[f64; 3]; 6] = [
 ];
 
 /// Returns a material with the first palette colour that no material of the scene has. If all are
-/// used, the number of materials modulo that of the colours selects one.
+/// used, the number of materials modulo the number of colours is the index of the colour.
 fn fresh_material(scene: &Scene) -> Material {
     let used = |color: &[f64; 3]| scene.materials.values().any(|m| m.color.0 == *color);
     let free = PALETTE.iter().find(|color| !used(color));
@@ -89,9 +89,9 @@ pub fn add_object(scene: &Scene, kind: &str, material: Option<&str>) -> Result<E
     Edit::checked(next, subject, format!("add {kind}"))
 }
 
-/// Returns transform steps that place `shape`, which has no key for its position, upright on the
-/// point `base` and scale the longest side of its bounding box to `size`. The list is empty if the
-/// shape has no bounds.
+/// Returns transform steps for `shape`, which has no key for its position. The steps scale the
+/// longest side of its bounding box to `size` and place the shape upright on the point `base`. The
+/// list is empty if the shape has no bounds.
 fn upright_steps(shape: &Shape, base: DVec3, size: f64) -> Vec<TransformOp> {
     // The axis of the canonical cylinder is z; meshes and compounds have y up, as scenes do.
     let mut steps = match shape {

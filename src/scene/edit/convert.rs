@@ -167,8 +167,8 @@ pub(super) fn set_kind(
 /// Converts a light to the kind `name`. The light keeps its position, direction and size where the
 /// new kind has them. A light that had no direction is aimed at the centre of the scene; one that
 /// had no position is placed at a distance of three scene radii from the centre. The irradiance at
-/// the centre is kept if the range of intensities allows it. Returns a note if it requires another
-/// intensity, otherwise `None`.
+/// the centre is kept if the range of intensities allows it. Returns a note if this irradiance
+/// requires another intensity, otherwise `None`.
 fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> {
     if light.kinds() == [name] {
         return None;
@@ -204,8 +204,8 @@ fn switch_light(light: &mut Light, scene: &Scene, name: &str) -> Option<String> 
     ((factor - 1.0).abs() > 1e-3 && factor.is_finite()).then(|| refit(light, factor))
 }
 
-/// Returns the irradiance that `light` with the intensity 1 would give a surface at `point` that
-/// faces it. A spot light is taken to be aimed at the point, an environment to be white. A light
+/// Returns the irradiance from `light`, with the intensity 1, at `point` on a surface that faces
+/// the light. A spot light is taken to be aimed at the point, an environment to be white. A light
 /// with a size counts as a light of the same area that is far away. The irradiance is at most that
 /// of a hemisphere of the light's radiance.
 fn irradiance_at(light: &Light, point: DVec3) -> f64 {

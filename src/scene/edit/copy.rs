@@ -11,9 +11,9 @@ use crate::value::truncated;
 use glam::DVec3;
 
 /// Duplicates an object, a light, a material or a stored camera. The copy has a unique name such as
-/// `cube 2`; a copy without a name is possible if the original has none. The copy of an object is
-/// moved horizontally to a free place, in the camera's view if possible; that of a plane is moved
-/// down. The copy of a light with a position is moved along x.
+/// `cube 2`. The copy of an object or a light without a name has no name either. The copy of an
+/// object is moved horizontally to a free place, in the camera's view if possible; that of a plane
+/// is moved down. The copy of a light with a position is moved along x.
 ///
 /// # Errors
 /// Fails for targets that every scene has exactly once, such as the current camera, and for targets

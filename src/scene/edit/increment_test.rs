@@ -179,7 +179,7 @@ fn choices_cycle() {
     assert!(edit.scene.camera.direction.is_some());
     let edit = toggle(&scene, &Target::Light(0), "on", true).unwrap();
     assert!(!edit.scene.lights[0].on);
-    // A step on a choice is a toggle.
+    // An arrow step of a key with choices sets the next choice, as `toggle` does.
     let edit = step(&scene, &Target::Light(0), "falloff", None, 1.0).unwrap();
     assert_eq!(value(&edit.scene, &Target::Light(0), "falloff"), "inverse-square");
     assert!(toggle(&scene, &ball, "name", true).is_err());

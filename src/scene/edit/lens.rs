@@ -186,7 +186,7 @@ mod tests {
         for focused in [&by_distance, &by_point] {
             assert!((distance(focused) / distance(&lens) - 1.0).abs() < 1e-4);
         }
-        // A camera that loses its target keeps its focus.
+        // A camera whose target is replaced by a direction keeps its focus distance.
         let free = set(&lens, "aim", "direction");
         assert!((distance(&free) / distance(&lens) - 1.0).abs() < 1e-4);
         // A camera without a target gets a plane in focus together with the lens.

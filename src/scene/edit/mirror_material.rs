@@ -63,7 +63,7 @@ fn find_mirror(scene: &Scene, selected: Option<&Target>) -> Result<Target, EditE
 /// of an arrow key, as [`step`] does.
 ///
 /// # Errors
-/// Fails if no material in the scene reflects.
+/// Fails if [`mirror`] finds no material.
 pub fn adjust_roughness(
     scene: &Scene,
     selected: Option<&Target>,
@@ -72,19 +72,20 @@ pub fn adjust_roughness(
     step(scene, &find_mirror(scene, selected)?, "roughness", None, steps)
 }
 
-/// Changes the mirror's reflection coefficient by `steps` arrow steps, as [`step`] does.
+/// Changes the reflection coefficient of the material that [`mirror`] finds for `selected`, by
+/// `steps` arrow steps, as [`step`] does.
 ///
 /// # Errors
-/// Fails if no material can be the mirror.
+/// Fails if [`mirror`] finds no material.
 pub fn reflect(scene: &Scene, selected: Option<&Target>, steps: f64) -> Result<Edit, EditError> {
     step(scene, &find_mirror(scene, selected)?, "reflection", None, steps)
 }
 
-/// Changes the mirror's lobe to the next one, or to the previous one if `forward` is `false`,
-/// cyclically.
+/// Changes the lobe of the material that [`mirror`] finds for `selected` to the next one, or to the
+/// previous one if `forward` is `false`, cyclically.
 ///
 /// # Errors
-/// Fails if no material in the scene reflects.
+/// Fails if [`mirror`] finds no material.
 pub fn next_lobe(
     scene: &Scene,
     selected: Option<&Target>,

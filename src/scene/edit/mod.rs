@@ -1,5 +1,5 @@
-//! Edits of scenes, as pure functions from a scene to a scene. They use no terminal and no clock,
-//! and read no files except those that a scene names, once each.
+//! Edits of scenes, as pure functions from a scene to a scene. They use no terminal and no clock.
+//! They read only the files that a scene names, each of them once.
 //!
 //! Every function takes a valid scene and returns an [`Edit`] whose scene is valid, or an
 //! [`EditError`] with the reason.
@@ -93,8 +93,9 @@ impl EditError {
 }
 
 impl Edit {
-    /// Creates the edit to `scene` if it is valid; otherwise returns the first validation error.
-    /// `subject` is selected after the edit. `label` is the name of the edit in the undo history.
+    /// Creates the edit whose result is `scene`, if `scene` is valid; otherwise returns the first
+    /// validation error. `subject` is selected after the edit. `label` is the name of the edit in
+    /// the undo history.
     fn checked(mut scene: Scene, subject: Target, label: String) -> Result<Self, EditError> {
         scene.resolve();
         match scene.faults().into_iter().next() {

@@ -14,8 +14,8 @@ use glam::{DVec2, DVec3};
 /// through the centre and the lowest corners of the object.
 ///
 /// # Errors
-/// Fails for targets other than objects, for a plane, which has no lowest point, and if there is no
-/// surface below or above the object.
+/// Fails for targets other than objects, and for a plane, because it has no lowest point. Also
+/// fails if there is no surface below or above the object.
 pub fn snap_to_ground(scene: &Scene, subject: &Target) -> Result<Edit, EditError> {
     let Target::Object(index) = subject else {
         return Err(EditError::new("only objects can be snapped to ground", "Select an object."));
@@ -88,8 +88,8 @@ fn support_points(form: &Form, (low, high): Extent) -> Vec<DVec2> {
     let corners = form.corners();
     let near = 1e-9 * (high - low).max_element();
     let lowest = corners.iter().filter(|c| c.y - low.y <= near).map(|c| flat(*c));
-    // Corners are moved slightly inwards, so that others that only touch the sides of the object do
-    // not count as support.
+    // Corners are moved slightly inwards, so that other objects that only touch the sides of this
+    // object do not count as its support.
     support_points.extend(lowest.map(|c| middle + (c - middle) * (1.0 - 1e-6)));
     support_points
 }
@@ -128,7 +128,8 @@ pub(super) fn place_for(scene: &Scene, size: DVec3) -> DVec3 {
         !walls.iter().any(|wall| intersects(wall, room))
             && !solids.iter().any(|solid| overlap(*solid, room))
     });
-    // A visible position is best, then a hidden one inside the picture, then one outside.
+    // A visible position is best. The second choice is a hidden position inside the picture, and
+    // the third is one outside of the picture.
     let (mut hidden, mut outside) = (None, None);
     for base in free {
         let middle = base + DVec3::Y * (size.y / 2.0);

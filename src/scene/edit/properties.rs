@@ -252,8 +252,8 @@ pub(super) fn words(kinds: &[Field]) -> Vec<Word> {
 }
 
 /// Returns a phrase for the accepted values of the type `takes`, such as `3 numbers, not all zero`.
-/// It differs from the phrase in the manual of the scene format where a user types values in
-/// another notation than files have.
+/// The phrase describes the notation that users type. The manual of the scene format has another
+/// phrase for types whose notation in files differs.
 fn expected(takes: ValueType) -> String {
     match takes {
         ValueType::Text => "text".to_string(),

@@ -103,8 +103,8 @@ pub(super) fn lookup(subject: &Target, key: &str) -> Result<&'static Field, Edit
     }
 }
 
-/// Sets `key` to `value`, removes the keys that exclude it, and validates the edited scene.
-/// `values` has the present values of the keys of `subject`.
+/// Sets `key` to `value`, removes the keys that cannot be given together with `key`, and validates
+/// the edited scene. `values` has the present values of the keys of `subject`.
 pub(super) fn replace(
     scene: &Scene,
     subject: &Target,

@@ -158,8 +158,9 @@ impl Target {
         scene.subject(&self.path())
     }
 
-    /// Returns the target for a material: for an object its material, for a material this target
-    /// itself. Returns `None` for other targets, or if the scene does not have the material.
+    /// Returns the target of a material: that of the object if this target is an object, or this
+    /// target itself if it is a material. Returns `None` for other targets, or if the scene does
+    /// not have the material.
     pub fn material(&self, scene: &Scene) -> Option<Self> {
         match self {
             Self::Material(_) => self.exists(scene).then(|| self.clone()),

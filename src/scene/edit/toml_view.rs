@@ -55,7 +55,8 @@ pub(super) fn write(scene: &Scene, subject: &Target, values: Table) -> Result<Sc
     fn fill<T: TomlValue>(part: Option<&mut T>, values: Table) -> Result<(), EditError> {
         let wrong = |e: TomlError| EditError::new(e.message(), "The scene is unchanged.");
         if let Some(part) = part {
-            // The values are passed as text: scenes are only read from parsed text.
+            // The table is converted to text, because the parts of a scene are read only from
+            // parsed text.
             *part = T::from_text(&values.to_string()).map_err(wrong)?;
         }
         Ok(())

@@ -5,11 +5,11 @@ use crate::scene::edit::parse_value::name;
 use crate::scene::edit::unique_name::free_view;
 use crate::scene::edit::{Edit, EditError, Target};
 
-/// Stores the current camera under the name `given`. A stored camera of that name is replaced.
-/// `None` means the first free name of `view`, `view 2` and so on.
+/// Stores the current camera under the name `given`. A stored camera of that name is replaced. If
+/// `given` is `None`, the name is the first free one of `view`, `view 2` and so on.
 ///
 /// # Errors
-/// Fails if the name is not printable.
+/// Fails if the name is empty, longer than 60 characters or not printable.
 pub fn store_view(scene: &Scene, given: Option<&str>) -> Result<Edit, EditError> {
     let name = match given {
         Some(given) => name("name", given)?,

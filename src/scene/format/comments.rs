@@ -91,7 +91,7 @@ fn prefix(table: &Table) -> &str {
 }
 
 /// Splits `above`, the text above a table, after its last empty line. Returns `(first part, second
-/// part)`: comments in the first part belong to the file, in the second part to the table.
+/// part)`: comments in the first part belong to the file, those in the second part to the table.
 fn split(above: &str) -> (&str, &str) {
     let mut cut = 0;
     let mut end = 0;

@@ -90,7 +90,8 @@ pub(crate) fn fresh_table(fields: &'static [Field], values: &toml::Table) -> Tab
     table
 }
 
-/// Parses `text`, the default value of a key as TOML. Returns `None` if it is not valid TOML.
+/// Parses `text`, the TOML notation of a key's default value. Returns `None` if `text` is not valid
+/// TOML.
 pub(crate) fn preset(text: &str) -> Option<Value> {
     format!("value = {text}").parse::<toml::Table>().ok()?.remove("value")
 }

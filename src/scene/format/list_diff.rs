@@ -10,8 +10,9 @@ use toml::Value;
 ///
 /// - an old entry of the same name,
 /// - an old entry that is equal to it,
-/// - an old entry between the origins of the previous and the next new entry that have one, if only
-///   the names differ or neither entry has a name.
+/// - the first old entry that differs from it only in the name, or that has no name if the new
+///   entry has none either. It must lie between two origins: those of the previous and of the next
+///   new entry that has one.
 ///
 /// The time is n log n for n entries.
 pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
@@ -23,8 +24,8 @@ pub(crate) fn align(old: &[Value], new: &[Value]) -> Vec<Option<usize>> {
     for (origin, entry) in from.iter_mut().zip(new).filter(|(origin, _)| origin.is_none()) {
         *origin = free.take_equal(entry);
     }
-    // For each new entry: the origin of the next entry behind it that has one, or else the length
-    // of `old`.
+    // `next[j]` is the origin of the first new entry after entry j that has an origin, or else the
+    // length of `old`.
     let mut next = vec![old.len(); new.len()];
     for j in (1..new.len()).rev() {
         next[j - 1] = from[j].unwrap_or(next[j]);
@@ -86,9 +87,9 @@ impl<'a> Free<'a> {
         Some(self.take(first))
     }
 
-    /// Takes the first unmatched old entry with an index in `after..before` that equals `entry`
-    /// except for its name, or that has no name if `entry` has none. Returns its index; `None` if
-    /// there is no such entry.
+    /// Takes the first unmatched old entry with an index in `after..before` that fits `entry`: it
+    /// differs from `entry` only in its name, or neither of the two has a name. Returns its index;
+    /// `None` if there is no such entry.
     fn take_edited(&mut self, entry: &Value, after: usize, before: usize) -> Option<usize> {
         let renamed = self.equal_but_name.get(&hash(entry, false)).and_then(|alike| {
             let mut between = alike.range(after..before).copied();

@@ -1,5 +1,5 @@
 //! Migration of scene files. Keys and values that were renamed since earlier versions of the format
-//! are called former words. Reading accepts a former word as the present one; saving writes the
+//! are called former words. Reading treats a former word like the present word; saving writes the
 //! present word.
 
 use crate::primitive::Acceleration;

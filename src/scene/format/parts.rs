@@ -36,7 +36,7 @@ impl Part {
         Self { ranges: vec![everything], first_object: 0 }
     }
 
-    /// Returns the text of this part; `text` is that of the whole file.
+    /// Returns the text of this part; `text` is the text of the whole file.
     pub fn text<'a>(&self, text: &'a str) -> Cow<'a, str> {
         match self.ranges.as_slice() {
             [range] => Cow::Borrowed(&text[range.clone()]),

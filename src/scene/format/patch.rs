@@ -227,8 +227,9 @@ impl Rewriter {
 }
 
 /// Finds the inner tables of `table` that were renamed between `old` and `new`, renames them in
-/// place and keeps their comments. Two tables with equal values are a renamed one if one name is
-/// only in `old` and the other only in `new`. Returns `old` with the new names.
+/// place and keeps their comments. A table counts as renamed if its name is only in `old`, and
+/// `new` has a table with equal values under a name that is only in `new`. Returns `old` with the
+/// new names.
 fn rename(table: &mut dyn TableLike, old: &toml::Table, new: &toml::Table) -> toml::Table {
     let mut renamed = old.clone();
     for (was, value) in old.iter().filter(|(key, _)| !new.contains_key(*key)) {

@@ -202,7 +202,7 @@ impl<'a> SourceScene<'a> {
 /// Result of reading a scene file part by part, if no error was found.
 enum Reading {
     Done,
-    /// The file has objects outside of `[[object]]` sections, so that it must be read as a whole.
+    /// The file has objects outside of `[[object]]` sections and must therefore be read as a whole.
     NotInParts,
 }
 

@@ -214,7 +214,7 @@ impl SchemaChecker<'_> {
 
     /// Validates a list of tables. Calls `each` for every entry that is a table; during the call,
     /// the current path ends with the index of the entry. Adds an error for any other entry;
-    /// `expected` describes valid ones.
+    /// `expected` describes valid entries.
     fn entries(
         &mut self,
         list: &[Spanned<DeValue>],

@@ -114,7 +114,8 @@ pub(crate) fn locate(
 }
 
 /// Returns the name that diagnostics use for the table at `path` in the file: `object "queen"`.
-/// `root` is a part of the file, in which the first object has the index `first_object`.
+/// `root` is a part of the file. `first_object` is the index of the first object of this part among
+/// all objects of the file.
 pub(crate) fn subject_in(root: &DeTable, path: &[String], first_object: usize) -> String {
     subject(path, |list, index| {
         let index = if list == "object" { index.checked_sub(first_object)? } else { index };

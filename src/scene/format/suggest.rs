@@ -17,7 +17,8 @@ pub(crate) fn nearest<'a>(
 }
 
 /// Returns the Damerau-Levenshtein distance (optimal string alignment) of `a` and `b`, ignoring
-/// case: the number of insertions, deletions, replacements and transpositions of neighbours.
+/// case: the smallest number of insertions, deletions, replacements and transpositions of adjacent
+/// characters that turn `a` into `b`.
 fn distance(a: &str, b: &str) -> usize {
     let [a, b]: [Vec<char>; 2] = [a, b].map(|s| s.to_lowercase().chars().collect());
     let mut rows = vec![vec![0; b.len() + 1]; a.len() + 1];
