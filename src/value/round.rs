@@ -7,8 +7,8 @@ pub fn rounded_to(x: f64, exponent: i32) -> f64 {
         return x;
     }
     let rounded = if exponent <= 0 {
-        // Formatting rounds the decimal digits. Arithmetic with a negative power of ten would be
-        // inexact: 35 * 0.01 is not 0.35.
+        // Formatting rounds the exact decimal value of `x`. Arithmetic with a negative power of ten
+        // would be inexact: 35 * 0.01 is not 0.35.
         format!("{x:.*}", exponent.unsigned_abs().min(340) as usize).parse().unwrap_or(x)
     } else {
         let unit = 10f64.powi(exponent.min(300));
@@ -40,9 +40,9 @@ pub fn round_nice(x: f64, scale: f64) -> f64 {
 
 /// Rotates the direction `v` by `degrees` about the vertical, counter-clockwise seen from above.
 ///
-/// The components of the result are rounded to about a millionth of its length. Its heading (angle
-/// about the vertical) is rounded to thousandths of a degree, so that rounding errors do not add up
-/// over repeated rotations.
+/// The horizontal components of the result are rounded to about a millionth of its horizontal
+/// length. The heading of the result, its angle about the vertical, is rounded to thousandths of a
+/// degree, so that rounding errors do not add up over repeated rotations.
 pub fn turned(v: [f64; 3], degrees: f64) -> [f64; 3] {
     let [x, y, z] = v;
     let horizontal = x.hypot(z);

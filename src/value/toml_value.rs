@@ -1,7 +1,8 @@
 //! Conversion of descriptions from and to the values of scene files.
 //!
-//! The conversions of `serde` would be compiled for each description and each kind of input. Here
-//! everything that does not depend on the type is a common function.
+//! This module replaces `serde`, whose conversions would be compiled again for each description and
+//! each kind of input. Here, code that does not depend on the type is compiled once, in shared
+//! functions.
 
 use crate::value::{Choice, Color, Field};
 use std::collections::BTreeMap;
@@ -23,7 +24,7 @@ pub trait TomlValue {
     /// Converts `self` to a value of a scene file.
     fn to_toml(&self) -> Value;
 
-    /// Parses `text`, the keys of a table and their values, as this type.
+    /// Parses `text` as a value of this type. `text` holds the keys and values of one table.
     ///
     /// # Errors
     /// Fails if `text` is not TOML, or for the reasons of [`TomlValue::from_toml`].
@@ -88,7 +89,8 @@ fn unknown(span: Range<usize>, what: &str, found: &str, known: &[&str]) -> TomlE
     TomlError::new(span, format!("unknown {what} `{found}`, {expected}"))
 }
 
-/// Reader of a table of a scene file whose keys are all known.
+/// Reader of a table of a scene file. All keys of the table are known, because the creation of the
+/// reader fails for an unknown key.
 pub(crate) struct TableReader<'a> {
     table: &'a DeTable<'a>,
     span: Range<usize>,
@@ -161,7 +163,7 @@ pub(crate) fn only_entry<'a>(
     }
 }
 
-/// Returns the index in `choices` of the word `value`.
+/// Returns the index of the choice in `choices` whose name is the string `value`.
 pub(crate) fn choice(value: &Spanned<DeValue>, choices: &[Choice]) -> Result<usize, TomlError> {
     let word = value.get_ref().as_str().ok_or_else(|| wrong(value, "a string"))?;
     choices.iter().position(|choice| choice.name == word).ok_or_else(|| {
@@ -170,8 +172,8 @@ pub(crate) fn choice(value: &Spanned<DeValue>, choices: &[Choice]) -> Result<usi
     })
 }
 
-/// Implements [`TomlValue`] for an enum whose variants have one value each. In scene files it is a
-/// table with one key, the name of the variant.
+/// Implements [`TomlValue`] for an enum whose variants have one value each. In scene files such an
+/// enum is a table with one key, the name of the variant.
 macro_rules! one_of {
     ($name:ident { $($key:literal => $variant:ident),+ $(,)? }) => {
         impl $crate::value::TomlValue for $name {
@@ -245,7 +247,7 @@ impl TomlValue for f64 {
     }
 
     fn to_toml(&self) -> Value {
-        // A NaN has no sign in files.
+        // NaN is written without a sign.
         Value::Float(if self.is_nan() { self.copysign(1.0) } else { *self })
     }
 }
@@ -320,7 +322,8 @@ impl<T: TomlValue> TomlValue for BTreeMap<String, T> {
     }
 }
 
-/// Value of a key that may be left out. `None` is an empty table; callers leave out the key.
+/// Value of an optional key. Callers leave out a key whose value is `None`, so the empty table that
+/// stands for `None` is never written.
 impl<T: TomlValue> TomlValue for Option<T> {
     fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
         T::from_toml(value).map(Some)
@@ -331,7 +334,7 @@ impl<T: TomlValue> TomlValue for Option<T> {
     }
 }
 
-/// In scene files `[r, g, b]` or `"#rrggbb"`; written as numbers.
+/// Colour in scene files. It is read from `[r, g, b]` or `"#rrggbb"`, and written as `[r, g, b]`.
 impl TomlValue for Color {
     fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
         match value.get_ref() {

@@ -92,7 +92,8 @@ impl Validator {
         self
     }
 
-    /// Adds the validation errors of the table that is the value of the key `outer`.
+    /// Adds `errors`, the validation errors of the nested table that is the value of the key
+    /// `outer`.
     pub fn nested(mut self, outer: &str, errors: Vec<ValidationError>) -> Self {
         self.errors.extend(errors.into_iter().map(|f| f.prefixed(outer)));
         self

@@ -128,8 +128,8 @@ impl AnyWorld {
         dispatch!(self, world => &world.inventory)
     }
 
-    /// Returns one sentence for each limit of the scene that ends paths early, such as `max_depth`,
-    /// with a bound of the lost light.
+    /// Returns one sentence for each limit of the scene that ends paths early, such as `max_depth`.
+    /// Each sentence gives an upper bound of the light that is lost.
     pub fn biases(&self) -> Vec<String> {
         dispatch!(self, world => world.truncation_biases.clone())
     }

@@ -167,8 +167,8 @@ fn emitter_lift<S: Float>(geometry: &RecenteredGeometry) -> f64 {
 
 /// Compiles the lights for which `compile` returns a result, such as all lights with a size; other
 /// lights are left out. `emitting` has three values for each light that emits: its index in the
-/// scene, the index of its light group, and its emission. The film's samples of the light are
-/// multiplied by the emission.
+/// scene, the index of its light group, and its emission. The tracer multiplies samples of the
+/// light by the emission.
 fn light_sources<T, S: Float>(
     scene: &Scene,
     emitting: &[(usize, usize, [f64; 3])],

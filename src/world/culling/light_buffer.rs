@@ -47,7 +47,8 @@ struct Cell<S> {
     complete_to: S,
 }
 
-/// Properties of a primitive of the BVH from which a light buffer is built.
+/// Possible occluder of a light: a primitive of the BVH. A light buffer is built from a list of
+/// possible occluders.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Occluder {
     /// Bounding sphere of the primitive.
@@ -71,9 +72,9 @@ struct Entry<S> {
 }
 
 impl<S: Float> LightBuffer<S> {
-    /// Creates the light buffer of a light. Returns `None` if at least half of the occluders
-    /// overlap more full cells than cells with room for them. Such a buffer would be too incomplete
-    /// to be useful.
+    /// Creates the light buffer of a light. Returns `None` if, for at least half of the occluders,
+    /// most of the cells that the occluder overlaps are already full. Such a buffer would be too
+    /// incomplete to be useful.
     pub fn new(target: &LightTarget, occluders: &[Occluder]) -> Option<Self> {
         let farthest = |ball: &BoundingSphere| ball.center.abs().max_element() + ball.radius;
         let light = match target {
@@ -176,7 +177,7 @@ impl<S: Float> LightBuffer<S> {
             let first_cell = L::splat(number);
             let in_cell = remaining & cell.le(first_cell) & cell.ge(first_cell);
             if in_cell.none() {
-                // The cell is NaN: the projection has no cell for the ray.
+                // A cell index of NaN means that the projection has no cell for the ray.
                 use_bvh = use_bvh | remaining;
                 break;
             }
@@ -305,8 +306,9 @@ mod tests {
         }
     }
 
-    /// Checks that rays traverse the BVH if their cell of the light buffer has a full list of
-    /// occluders, and if they start farther from the light than the list is complete.
+    /// Checks the shadows of a light buffer with cells whose list of occluders is full. Rays that
+    /// start beyond the distance from the light up to which such a list is complete must traverse
+    /// the BVH.
     #[test]
     fn light_buffer_falls_back_to_bvh_behind_full_cells() {
         let mut random = Random(4);

@@ -96,7 +96,7 @@ impl FaceRect {
     /// Returns the indices of the grid cells that the rectangle overlaps, on a face of `side` x
     /// `side` cells.
     pub fn cells(&self, side: usize) -> impl Iterator<Item = usize> + use<> {
-        // The conversion to integers saturates.
+        // The conversion to an integer saturates, so negative coordinates become cell 0.
         let cell = |x: f64| ((x * side as f64) as usize).min(side - 1);
         let span = |low: f64, high: f64| -> Range<usize> { cell(low)..cell(high) + 1 };
         let (columns, rows) = (span(self.low.x, self.high.x), span(self.low.y, self.high.y));
@@ -109,7 +109,7 @@ impl FaceRect {
 pub(crate) struct ProjectedBounds<S> {
     /// Projection of points from the light onto faces, which are divided into cells.
     pub projection: LightProjection<S>,
-    /// Bounding rectangles of each sphere, one for each face that it overlaps.
+    /// Bounding rectangles of each sphere, one for each face that the projected sphere overlaps.
     pub rects: Vec<Vec<FaceRect>>,
     /// Recommended number of cells along a side of a face of the projection.
     pub side: usize,

@@ -59,9 +59,9 @@ impl ScreenBounds {
             out.high = std::array::from_fn(|axis| out.high[axis].max(position[axis] + margin));
         }
         if let Some(lens) = camera.lens() {
-            // On the plane at unit distance from the eye, the blur of a point at depth z is r |1 /
-            // z - 1 / f|, for the lens radius r and the focus distance f. The blur is largest at
-            // one end of the interval of depths.
+            // On the plane at unit distance from the eye, the blur of a point at depth z has the
+            // radius `r |1/z - 1/f|`. Here r is the lens radius and f the focus distance. The blur
+            // is largest at one end of the interval of depths.
             let blur = [nearest, farthest].map(|depth| lens.blur(depth) / depth);
             let margin = blur[0].max(blur[1]) * (1.0 + F32_RAY_ERROR) / camera.pixel();
             out.low = out.low.map(|x| x - margin);
@@ -108,7 +108,8 @@ impl ScreenGrid {
         let [columns, rows] = size.map(|n| n.div_ceil(CELL_PX));
         let mut candidates = vec![Some(Vec::new()); columns * rows];
         for (primitive, ScreenBounds { low, high }) in primitives {
-            // The conversion to integers saturates: bounds outside of the raster span no cell.
+            // The conversion to an integer saturates, so bounds outside of the raster overlap no
+            // cell.
             let cell = |x: f64| (x / CELL_PX as f64).floor().max(-1.0) + 1.0;
             let span = |axis: usize, count: usize| {
                 let first = (cell(low[axis]) as usize).saturating_sub(1);
@@ -129,7 +130,8 @@ impl ScreenGrid {
 
     /// Returns the ids of the primitives that camera rays through the rectangle with corner
     /// `origin` and size `extent` \[pixels\] can hit, in ascending order. Returns `None` if there
-    /// are more than [`MAX_PER_CELL`] of them, or if one of the cells has more than that.
+    /// are more than [`MAX_PER_CELL`] of them, or if a cell that the rectangle overlaps has more
+    /// than that.
     pub fn candidates(&self, origin: [usize; 2], extent: [usize; 2]) -> Option<Vec<u32>> {
         let span = |axis: usize, count: usize| {
             let end = (origin[axis] + extent[axis]).div_ceil(CELL_PX);

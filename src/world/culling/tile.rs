@@ -171,9 +171,8 @@ impl FrustumCuller {
         };
         let parts: Vec<Option<BoundingSphere>> = self.bounds.iter().map(visible_part).collect();
         let primary = geometry.select(|item| parts[item as usize].is_some());
-        // Selects the primitives for which `occludes` is `true` together with the visible part of
-        // at least one primitive. `occludes` tests if a primitive can occlude one light from such a
-        // part.
+        // Selects the primitives that can occlude one light from the visible part of at least one
+        // primitive. `occludes` tests one possible occluder and one visible part.
         let occluders_of = |occludes: &dyn Fn(&BoundingVolume, &BoundingSphere) -> bool| {
             geometry.select(|item| {
                 let item = item as usize;

@@ -70,17 +70,17 @@ impl<S: Float> Contact<S> {
     }
 
     /// Returns the distance within which surfaces of the two primitives count as coincident: the
-    /// larger of the field `tie` and `rounding`, the result of the function [`rounding`] for the
-    /// points.
+    /// larger of the field `tie` and the parameter `rounding`. The parameter is the result of the
+    /// function [`rounding`] for the points that are tested.
     #[inline(always)]
     fn tie<L: SimdFloat<Scalar = S>>(&self, rounding: L) -> L {
         rounding.max(L::splat(self.tie))
     }
 
     /// Returns the lanes whose point may be on the touching primitive: its distance from the
-    /// bounding box is at most twice the distance within which surfaces count as coincident. One
-    /// half of this is the range of the search for coincident surfaces; the other half covers the
-    /// rounding error of the search.
+    /// bounding box is at most twice the distance within which surfaces count as coincident. Half
+    /// of this distance is the range of the search for coincident surfaces. The other half is a
+    /// margin for the rounding error of the search.
     #[inline(always)]
     fn is_near<L: SimdFloat<Scalar = S>>(&self, point: Vec3<L>, rounding: L) -> L::Mask {
         let distance =

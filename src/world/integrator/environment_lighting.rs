@@ -6,8 +6,8 @@
 //! the power heuristic, matt surfaces the first and the third. Highlights of lights use only the
 //! first. Mirrors and the camera use only the light at the end of their ray.
 //!
-//! A ray that starts at a diffuse bounce adds nothing where it escapes, because the surface that it
-//! left has the light of all environments already.
+//! A ray that starts at a diffuse bounce adds nothing where it escapes, because direct lighting at
+//! the start of the ray already includes all environments.
 
 use crate::bvh::Ray;
 use crate::lanes::{Frame, Mask, SimdFloat, Vec3};
@@ -19,8 +19,9 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::{EnvironmentSource, World};
 use std::f64::consts::FRAC_1_PI;
 
-/// Salt of the random numbers for the first environment. Each environment and each emitter has a
-/// salt of its own, so that its random numbers are independent. The salts of emitters are smaller.
+/// Salt of the random numbers for the first environment. A salt is a number that scrambles random
+/// numbers. Each environment and each emitter has a salt of its own, so that their random numbers
+/// are independent. The salts of emitters are smaller than this one.
 pub(crate) const ENVIRONMENT_SALT: u32 = 1 << 30;
 
 /// Adds the radiance of the visible environments to `out`, in `lanes`, whose rays hit no surface.

@@ -80,8 +80,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
 
     /// Offers the hits of `path` to the reservoir. `media` and `coincident` describe a ray that
     /// leaves a hit on the side from which the path arrived: its media, and the coincident surfaces
-    /// on which it starts. Returns the lanes that reflect diffusely. They get no ambient light,
-    /// because the diffuse bounce computes their indirect light.
+    /// on which it starts. Returns the lanes whose hit surface reflects diffusely. These surfaces
+    /// get no ambient light, because the diffuse bounce computes their indirect light.
     #[inline(never)]
     pub fn offer(
         &mut self,
@@ -92,8 +92,8 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
     ) -> L::Mask {
         let throughput = path.throughput.component_mul(interaction.diffuse);
         let weight = throughput.max_element();
-        // A surface behind a coincident surface gets no light from lights directly, but it has a
-        // diffuse bounce like other surfaces.
+        // Lights do not illuminate a surface behind a coincident surface, but it has a diffuse
+        // bounce like other surfaces.
         let lanes = interaction.has_bsdf & weight.gt(L::zero());
         if lanes.none() {
             return lanes;
@@ -136,8 +136,9 @@ impl<L: SimdFloat> DiffuseReservoir<L> {
     /// sampled with `u` and `v`, uniform in [0, 1).
     fn start(&self, world: &World<L>, (u, v): (L, L)) -> Branch<L> {
         let direction = Frame::around(self.normal).to_world(cosine_hemisphere(u, v));
-        // The throughput is divided by the probability of the choice, weight / sum. Its largest
-        // channel equals the weight, so it becomes the sum of all weights.
+        // The throughput is divided by the probability of the choice, weight / sum. The largest
+        // channel of the throughput equals the weight; after the division it equals the sum of all
+        // weights.
         let scale = self.sum / L::select(self.lanes, self.weight, L::one());
         let path = Path {
             ray: Ray { origin: self.origin, direction },

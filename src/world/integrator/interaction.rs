@@ -15,10 +15,10 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     pub geometric: Vec3<L>,
     /// Hit points of the packet's rays.
     pub point: Vec3<L>,
-    /// Lanes whose rays hit the front of the primitive: the side to which the primitive's normal
-    /// points.
+    /// Distance from the hit point, along the geometric normal, at which secondary rays start.
     pub offset: L,
-    /// Lanes whose rays hit the primitive from the side to which its own normal points.
+    /// Lanes whose rays hit the front of the primitive: the side to which the normal of the
+    /// primitive itself points.
     pub front: L::Mask,
     /// Ids of the primitives that are hit.
     pub item: L,
@@ -29,8 +29,8 @@ pub(crate) struct SurfaceInteraction<L: SimdFloat> {
     pub albedo_factor: Vec3<L>,
     /// Diffuse albedo at the hit points.
     pub diffuse: Vec3<L>,
-    /// Lanes whose hit point has a BSDF. All have one, except for those on the back of a one-sided
-    /// surface.
+    /// Lanes whose hit point has a BSDF. All hit points have one, except for those on the back of a
+    /// one-sided surface.
     pub has_bsdf: L::Mask,
     /// Lanes whose BSDF reflects light that arrives directly from lights.
     pub direct_mask: L::Mask,
@@ -112,9 +112,9 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
     }
 }
 
-/// Computes the surface properties at the hits of the active rays. `first` holds the id of one of
-/// the primitives that they hit, and the lanes that hit it. This pair is the first result of
-/// [`next_distinct`].
+/// Computes the surface properties at the hits of the active rays. `first` is the first result of
+/// [`next_distinct`]: the id of one of the primitives that are hit, and the lanes whose rays hit
+/// this primitive.
 #[inline(always)]
 pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,
@@ -133,7 +133,8 @@ pub(crate) fn interact<L: SimdFloat, const SIMPLE: bool>(
 }
 
 /// Computes the surface properties at the hits of a packet whose rays hit several primitives.
-/// `first` is one of them, in the lanes `first_lanes`. The lanes `remaining` hit other primitives.
+/// `first` is the id of one of these primitives. The lanes `first_lanes` hit this primitive, and
+/// the lanes `remaining` hit the others.
 #[inline(never)]
 fn interact_mixed<L: SimdFloat, const SIMPLE: bool>(
     world: &World<L>,

@@ -287,9 +287,9 @@ impl<L: SimdFloat> NestedDielectrics<L> {
     }
 }
 
-/// Returns exp(-coefficient x distance) per channel: the fraction of light that is left.
-/// `absorption` has the absorption coefficients of the solids by priority. `priority` selects the
-/// solid of each lane.
+/// Returns the fraction of light that is left after `distance`: exp(-coefficient x distance) for
+/// each channel. `absorption` has the absorption coefficients of the solids by priority. `priority`
+/// selects the solid of each lane.
 #[inline(never)]
 fn transmittance<L: SimdFloat>(absorption: &[[L::Scalar; 3]], priority: L, distance: L) -> Vec3<L> {
     let of = |lane| absorption[priority.lane(lane).to_f64() as usize];

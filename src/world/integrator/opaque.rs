@@ -17,8 +17,8 @@ use crate::world::integrator::path::{Counts, Path, Radiance};
 use crate::world::world::World;
 
 /// Traces paths in a world without transmissive surfaces, and adds their radiance to `out`. The
-/// paths start in the lanes `active`, end after `depth` reflections, and are overwritten.
-/// `reservoir` collects the hits from which indirect diffuse light may bounce.
+/// paths start in the lanes `active` and end after at most `depth` reflections. `path` is
+/// overwritten. `reservoir` collects the hits from which indirect diffuse light may bounce.
 ///
 /// `EMITTERS` is `true` if the world has emitters or indirect diffuse light. If `EMITTERS` is
 /// `true`, `SIMPLE` is `false`; otherwise it is the value of [`World::simple`]. `SIMPLE` has the

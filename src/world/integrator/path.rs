@@ -5,7 +5,8 @@ use crate::lanes::{SimdFloat, Vec3};
 use crate::world::light_groups::MAX_GROUPS;
 
 /// Radiance of a packet's samples in each light group (part of the picture that the film stores
-/// separately). Lights with a group of their own have unit colour and intensity here.
+/// separately). The radiance of a light with a group of its own is that of a white light of
+/// intensity 1.
 pub struct Radiance<L> {
     /// Radiance of each light group. Only the first [`World::groups`](crate::world::World::groups)
     /// entries are in use.
@@ -35,8 +36,8 @@ pub struct Path<L> {
 }
 
 impl<L: SimdFloat> Path<L> {
-    /// Largest throughput of a path. A larger one would saturate the film; an infinite one,
-    /// multiplied by black, would be NaN.
+    /// Largest throughput of a path. A larger throughput would saturate the film. An infinite
+    /// throughput times an albedo of 0 would be NaN.
     const MAX_THROUGHPUT: f64 = (1u64 << 60) as f64;
 
     /// Creates the paths of the camera rays `ray`, with throughput 1.
