@@ -1,4 +1,5 @@
-//! Check of a big picture against single pixels, which are traced without regions and tiles.
+//! Check of a big picture against single pixels, which are traced without tiles and without regions
+//! (bands that are rendered one after the other).
 
 use crate::support::test_film::TestFilm;
 use crate::support::{shipped, sized};
@@ -13,7 +14,8 @@ use zerkalo::world::{AnyWorld, Options, Radiance, TracedPacket, World};
 
 /// Side of the square picture in pixels.
 const SIDE: u32 = 16384;
-/// Number of samples of a pixel in each replicate (half of the samples): half of `--spp`.
+/// Number of samples of a pixel in each of the two replicates (halves of the samples). It is half
+/// of `--spp`.
 const SAMPLES: u32 = 4;
 /// Columns of the picture that are checked in every row.
 const COLUMNS: [u32; 16] =

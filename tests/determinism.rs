@@ -1,6 +1,6 @@
-//! Determinism: a sample is a pure function of seed, pixel, replicate (half of the samples) and
-//! index. The bytes of the film do not depend on threads, order, packet layout or division into
-//! parts.
+//! Determinism: a sample is a pure function of the seed, the pixel, the replicate (one of two
+//! halves of the samples) and the sample index. The bytes of the film do not depend on the number
+//! of threads, the order of tracing, the packet layout or the division into parts.
 
 use crate::common;
 use crate::common::report;
@@ -44,7 +44,8 @@ fn film_of_samples(scene: &Scene, precision: Precision, count: u32) -> Film {
     film_of_ranges(scene, precision, &[(0, count), (0, count)])
 }
 
-/// Returns the film of the given ranges of samples, one for each replicate: first index and count.
+/// Returns the film of two ranges of samples, one for each replicate. A range is a first index and
+/// a count.
 fn film_of_ranges(scene: &Scene, precision: Precision, ranges: &[(u32, u32)]) -> Film {
     let mut rendering = begin(scene, SEED, precision);
     let pool = pool(2);
@@ -101,9 +102,9 @@ fn extreme_29_sum_of_parts_does_not_depend_on_order() {
     report(29, "both", "parts in 6 orders: the same bytes");
 }
 
-/// Checks that a render that is stopped within a wave can be resumed. A second, restarted render
-/// traces the remaining jobs, as the successor of a killed process would. The bytes of both films
-/// are compared.
+/// Checks that a render that is stopped within a wave (a set of concurrent tracing jobs) can be
+/// resumed. A second render traces the remaining jobs, as the successor of a killed process would.
+/// The sum of both films must equal the film of an uninterrupted render.
 #[test]
 fn extreme_29_stopped_and_resumed() {
     let pool = pool(2);
@@ -159,8 +160,9 @@ fn sum_of_films_with_disjoint_tiles_is_the_whole_film() {
     assert!(sum.bytes() == expected);
 }
 
-/// Checks that packets of one pixel and of several pixels trace the same samples. Waves of one
-/// sample make packets of several pixels; a wave of sixteen samples makes packets of one pixel.
+/// Checks that packets of one pixel and of several pixels trace the same samples. A wave is a set
+/// of concurrent tracing jobs. Waves of one sample make packets of several pixels; a wave of
+/// sixteen samples makes packets of one pixel.
 #[test]
 fn film_does_not_depend_on_pixels_per_packet_in_any_scene() {
     let pool = pool(2);

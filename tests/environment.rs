@@ -61,8 +61,8 @@ const WHITE: &[&str] = &[
     "diffuse = 0.0\nreflection = 1.0\ntransmission = 1.0\nfresnel = \"dielectric\"\nior = 1.5",
 ];
 
-/// Checks that white objects in a white environment are white. The path depth is small and large,
-/// for glass large only.
+/// Checks that white objects in a white environment are white at small and at large path depths.
+/// Glass is checked only at the largest depth, because its paths lose light at the depth limit.
 #[test]
 fn white_objects_in_a_white_environment_are_white() {
     let threshold = two_sided_z(1e-4 / (WHITE.len() * 3 * 2) as f64);
@@ -167,8 +167,8 @@ fn diffuse_bounce_between_floor_and_wall_in_an_environment_has_its_form_factor()
     }
 }
 
-/// Checks lobes that lose light. They lose the same share of a white environment, whose light is
-/// sampled, as of a white background, which only rays find.
+/// Checks lobes that lose light. A white environment, whose light is sampled, gives the same
+/// reflected radiance as a white background, which only rays find.
 #[test]
 fn lobes_reflect_a_white_environment_like_a_white_background() {
     let background = "[background]\ncolor = [1.0, 1.0, 1.0]";

@@ -1,6 +1,6 @@
 //! Comparison with a second, independent implementation: a slow reference path tracer that shares
-//! the scene description only. The pictures agree within noise, and deliberate errors of the
-//! reference are detected.
+//! only the scene description with the program. The pictures agree within noise, and deliberate
+//! errors of the reference are detected.
 
 pub(crate) mod compare;
 pub(crate) mod compounds;
@@ -25,11 +25,13 @@ use zerkalo::scene::{BelowHorizon, Scale, Scene, TransformOp};
 
 /// Samples per pixel of the reference tracer.
 const REFERENCE_SAMPLES: u32 = 96;
-/// Samples per pixel that the program traces in each replicate (half of the samples).
+/// Number of samples per pixel that the program traces in each of the two replicates (halves of the
+/// samples).
 pub(crate) const SAMPLES: u32 = 512;
 
-/// Smaller number of samples per pixel and replicate (half of the samples). It is for slow scenes,
-/// and for pictures with rare bright samples, some of which more samples would find.
+/// Smaller number of samples per pixel in each of the two replicates (halves of the samples). It is
+/// for slow scenes, and for pictures with rare bright samples: with more samples, the program would
+/// find some that the reference tracer misses.
 const FEW_SAMPLES: u32 = 128;
 
 /// Files of scenes whose pictures take seconds with [`SAMPLES`] samples.
@@ -93,8 +95,9 @@ fn shipped_scenes_agree_with_reference_tracer() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Checks that a picture of `scene` with `samples` samples per pixel agrees with one by the
-/// reference tracer with `reference_samples` samples per pixel.
+/// Checks that a picture of `scene` by the program agrees with one by the reference tracer. The
+/// program traces `samples` samples per pixel in each of the two replicates (halves of the
+/// samples). The reference tracer traces `reference_samples` samples per pixel.
 fn check_agreement(name: &str, scene: &Scene, samples: u32, reference_samples: u32) {
     let reference = reference(scene, reference_samples, Mutation::None).unwrap();
     let verdict = Picture::new(scene, samples).beside(&reference, reference_samples);
@@ -102,8 +105,9 @@ fn check_agreement(name: &str, scene: &Scene, samples: u32, reference_samples: u
     assert!(verdict.agree(), "{name}: {verdict}");
 }
 
-/// Checks that each deliberate error of the reference tracer in `mutations` is detected, and that
-/// the picture without errors agrees at the same number of samples.
+/// Checks that the comparison detects each of `mutations`, the deliberate errors of the reference
+/// tracer. Also checks that the reference picture without errors, at the same number of samples,
+/// agrees with the program's picture.
 fn check_detection(mutations: &[Mutation], name: &str, scene: &Scene, samples: u32) {
     let picture = Picture::new(scene, FEW_SAMPLES.max(samples / 6));
     let beside = |m| picture.beside(&reference(scene, samples, m).unwrap(), samples);
@@ -161,8 +165,8 @@ fn deliberate_errors_are_detected() {
     let focused = compare::zoomed(&scene(name), [0.9, 1.5, -6.5], 6.0);
     let mutations = [Mutation::SquareLens, Mutation::UnfocusedLens];
     check_detection(&mutations, name, &focused, 16 * REFERENCE_SAMPLES);
-    // The camera is inside of the glass. For rays that cross the glass, the error of the index on
-    // the way out would cancel that on the way in.
+    // The camera is inside of the glass. For a camera outside, rays would enter and leave the
+    // glass, and the errors of the index at these two surfaces would cancel.
     let mut inside = scene("rough-glass.toml");
     inside.camera.eye = [0.1, 0.85, 0.1];
     let name = "rough-glass.toml from inside";
@@ -403,8 +407,9 @@ fn one_sided_transparent_objects_reflect_on_their_front_only() {
     }
 }
 
-/// Checks the back of a one-sided pane between a bright and a dark wall. It shows the dark wall,
-/// multiplied by k_t, and no reflection.
+/// Checks a pane in front of a black background. The camera sees the back of the pane, and a bright
+/// wall is behind the camera. A two-sided pane reflects the wall. A one-sided pane transmits the
+/// black background and reflects nothing.
 #[test]
 fn back_of_one_sided_pane_does_not_reflect() {
     for (two_sided, expected) in [(true, 0.75), (false, 0.0)] {

@@ -104,7 +104,8 @@ fn around(axis: DVec3) -> DMat3 {
 }
 
 /// Returns the texture frame of a flat shape with the given normal. Its up vector is the projection
-/// of y; on horizontal shapes it points away from the viewer.
+/// of the y axis onto the shape. For a horizontal shape it is -z if the normal points up, and +z if
+/// the normal points down.
 fn flat(normal: DVec3) -> DMat3 {
     let front = normal.normalize();
     let up = if front.y.abs() > 0.999 { DVec3::NEG_Z * front.y.signum() } else { DVec3::Y };
@@ -217,7 +218,8 @@ impl Spot<'_> {
             Mapping::Box => {
                 let n = view.transpose() * self.normal;
                 // Coordinates start at the lower left corner of a face of the box, as seen from
-                // outside. If two components of the normal are equal, the later axis counts.
+                // outside. The face is that of the largest component of the normal. If two
+                // components are equal, the later one in the order x, y, z is used.
                 let (back, p) = (high - seen, from_low);
                 match n.abs() {
                     a if a.z >= a.x.max(a.y) => {

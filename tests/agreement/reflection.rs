@@ -1,5 +1,5 @@
-//! Surface reflection of the reference tracer, an independent slow implementation, formula by
-//! formula. The program's reflection is compared with its results.
+//! Surface reflection of the reference tracer. It is an independent, slow implementation that
+//! evaluates the formulas literally. The program's reflection is compared with its results.
 
 use crate::agreement::tracer::Mutation;
 use crate::common::Numbers;
@@ -12,7 +12,8 @@ use zerkalo::scene::BelowHorizon;
 /// computed with at least this alpha.
 const SMOOTHEST: f64 = 1e-3;
 
-/// Returns the Fresnel reflectance at cosine `c` between light and microfacet normal.
+/// Returns the Fresnel reflectance. `c` is the cosine of the angle between the direction to the
+/// light and the microfacet normal.
 pub fn fresnel(material: &Material, c: f64) -> DVec3 {
     let channel = |f0: f64| match material.fresnel_mode() {
         Fresnel::Constant => f0,
@@ -34,8 +35,8 @@ pub fn fresnel(material: &Material, c: f64) -> DVec3 {
     DVec3::from(material.f0().0.map(channel))
 }
 
-/// Returns the density of microfacet normals at cosine `c` from the surface normal: GGX if `ggx` is
-/// `true`, otherwise Beckmann.
+/// Returns the density D of microfacet normals: GGX if `ggx` is `true`, otherwise Beckmann. `c` is
+/// the cosine of the angle between the microfacet normal and the surface normal.
 fn facet_density(ggx: bool, alpha: f64, c: f64) -> f64 {
     let tan2 = (1.0 - c * c).max(0.0) / (c * c);
     let shape =
@@ -69,8 +70,8 @@ fn lambda(ggx: bool, alpha: f64, c: f64) -> f64 {
     0.5 * (erf(a) - 1.0) + (-a * a).exp() / (2.0 * a * PI.sqrt())
 }
 
-/// Returns the fraction of the microfacets with normal `h` that are visible from `v`. `h` and `v`
-/// are on the same side of the surface.
+/// Returns the fraction of the microfacets with normal `h` that are visible from the direction `v`.
+/// `h` and `v` are on the same side of the surface.
 fn visible(material: &Material, n: DVec3, h: DVec3, v: DVec3) -> f64 {
     let (ggx, alpha) = (material.lobe == Lobe::Ggx, material.microfacet_alpha());
     match material.masking {
@@ -92,8 +93,9 @@ fn masking(material: &Material, ggx: bool, alpha: f64, n: DVec3, v: DVec3, l: DV
 /// Narrower lobes find it by reflected rays.
 const WIDE: f64 = 0.12;
 
-/// Returns the value of the reflection lobe, multiplied by the cosine of the light's direction.
-/// Returns `None` for narrow lobes and for square lobes, which find lamps by reflected rays.
+/// Returns the value of the reflection lobe, multiplied by the cosine of the angle between the
+/// normal `n` and the direction `l` to the light. Returns `None` for narrow lobes and for square
+/// lobes, which find lamps by reflected rays.
 pub fn wide_lobe(
     material: &Material,
     n: DVec3,
@@ -194,7 +196,7 @@ pub fn reflect(
         }
         direction -= 2.0 * direction.dot(n) * n;
     }
-    // Fresnel at the half vector of both directions.
+    // Fresnel reflectance at the half vector of `v` and `direction`.
     let f = fresnel(material, v.dot((v + direction).normalize()));
     Some((direction, f * k / if sharp { 1.0 } else { density_factor(mutation) }))
 }
@@ -228,8 +230,8 @@ pub fn spread(material: &Material, axis: DVec3, radius: f64, numbers: &mut Numbe
     a * local.x + b * local.y + axis * local.z
 }
 
-/// Samples a microfacet normal with a density of D cos: D is the distribution of microfacet
-/// normals.
+/// Samples a microfacet normal h with the density D(h) (n.h), where D is the distribution of
+/// microfacet normals.
 pub fn facet_normal(material: &Material, alpha: f64, n: DVec3, numbers: &mut Numbers) -> DVec3 {
     let u = numbers.unit();
     let ggx = material.lobe == Lobe::Ggx;
@@ -244,9 +246,9 @@ pub fn facet_normal(material: &Material, alpha: f64, n: DVec3, numbers: &mut Num
 /// Indices of refraction in front of and behind a surface.
 pub type Indices = (f64, f64);
 
-/// Samples light that is refracted at a microfacet, without Fresnel's factor. Returns its
-/// direction, its weight and the microfacet normal. Returns `None` if the microfacet reflects
-/// totally, or if the refracted ray stays in front of the surface.
+/// Samples a ray that is refracted at a microfacet. Returns its direction, its weight without the
+/// Fresnel factor, and the microfacet normal. Returns `None` if the microfacet reflects totally, or
+/// if the refracted ray stays in front of the surface.
 pub fn refracted_at_facet(
     material: &Material,
     n: DVec3,
@@ -275,8 +277,8 @@ pub fn refracted_at_facet(
     };
     let d = facet_density(material.lobe == Lobe::Ggx, alpha, nh);
     let jacobian = |n_t: f64| n_t * n_t * lh / (n_i * vh - n_t * lh).powi(2);
-    // Walter et al. 2007, eq. 21, times the cosine of the light. The factor by which refraction
-    // changes radiance is left out.
+    // Walter et al. 2007, eq. 21, times the cosine of the angle between the surface normal and `l`.
+    // The factor by which refraction changes radiance is left out.
     let f_cos = vh / nv * g * d * jacobian(n_t);
     let density = d
         * nh
@@ -288,8 +290,8 @@ pub fn refracted_at_facet(
     Some((l, f_cos / density, h))
 }
 
-/// Samples a microfacet normal with a density of D cos (D is the distribution of normals), and
-/// reflects the ray at it.
+/// Samples a microfacet normal h with the density D(h) (n.h), where D is the distribution of
+/// microfacet normals. Reflects the ray at the microfacet.
 fn microfacet(
     material: &Material,
     n: DVec3,

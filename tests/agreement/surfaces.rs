@@ -19,7 +19,8 @@ pub enum Piece {
     /// Side of a cone: start of the axis, its direction, its length, and the radii at both ends.
     Side(DVec3, DVec3, f64, [f64; 2]),
     /// Two of the up to four crossings of a torus with a line: the first two or the last two. The
-    /// values are centre, axis, radii of ring and tube, and index of the first crossing.
+    /// values are the centre, the axis, the radii of ring and tube, and a number: 0 for the first
+    /// two crossings, 1 for the last two.
     Torus(DVec3, DVec3, [f64; 2], usize),
 }
 
@@ -61,7 +62,7 @@ impl Piece {
                     let from_axis = across(f + direction * t);
                     let z = (f + direction * t).dot(*axis);
                     let normal = (from_axis.normalize() - *axis * slope).normalize();
-                    // `t` is NaN without a crossing.
+                    // Without a crossing, `t` and `z` are NaN, and both comparisons are false.
                     (z >= 0.0 && z <= *height).then_some((t, normal))
                 };
                 [hit_at((-b - root) / a), hit_at((-b + root) / a)]
@@ -157,8 +158,9 @@ fn torus_crossings(
         return Vec::new();
     }
     let place = |i: usize| middle + half * (2.0 * i as f64 / STEPS as f64 - 1.0);
-    // The height is a distance to the torus, and keeps its sign while the line advances by less
-    // than that. This is the number of steps per unit of height. The factor 0.999 covers rounding.
+    // The height is the distance from the torus. It keeps its sign while the point on the line
+    // advances by less than this distance. `steps_per_height` converts a height to a number of
+    // steps. The factor 0.999 covers rounding.
     let steps_per_height = 0.999 * STEPS as f64 / (2.0 * half * length2.sqrt());
     let mut out = Vec::new();
     let mut before = height(place(0));

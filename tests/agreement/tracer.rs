@@ -31,9 +31,10 @@ pub enum Mutation {
     ShadowOffset,
     /// Deliberate error: lobe directions below the horizon are absorbed.
     Absorb,
-    /// Deliberate error: the cosine of the first light is omitted.
+    /// Deliberate error: for the first light, the cosine at the lit surface is omitted.
     NoCosine,
-    /// Deliberate error: spot lights decrease linearly between the inner and the outer cone.
+    /// Deliberate error: the intensity of a spot light falls linearly, instead of by a smoothstep,
+    /// from the inner to the outer cone.
     LinearCone,
     /// Deliberate error: light that enters a solid is not refracted.
     NoBending,
@@ -52,10 +53,10 @@ pub enum Mutation {
     /// Deliberate error: refracted rays have the density of the microfacet normals, without
     /// Jacobian.
     NoJacobian,
-    /// Deliberate error: the Jacobian of the half vector of refraction has the index of the other
-    /// side.
+    /// Deliberate error: the Jacobian of the half vector of refraction contains the index of the
+    /// incident side instead of the transmitted side.
     OtherIndex,
-    /// Deliberate error: light is absorbed as over half of the distance.
+    /// Deliberate error: absorption is computed for half of the distance.
     HalfAbsorption,
     /// Deliberate error: the cosine at the surface of a lamp is omitted.
     NoLampCosine,
@@ -63,8 +64,9 @@ pub enum Mutation {
     NoEmissionCosine,
     /// Deliberate error: rays that miss all surfaces do not see environments.
     NoSky,
-    /// Deliberate error: reflected rays also see lamps whose light in the lobe was found at points
-    /// of the lamp. Two techniques are thus added without weights.
+    /// Deliberate error: reflected rays also see lamps whose reflected light was already found at
+    /// sampled points of the lamp. The results of two sampling techniques are thus added without
+    /// weights.
     LampSeenTwice,
 }
 
@@ -182,11 +184,11 @@ impl<'a> Tracer<'a> {
         let max_depth = if diffuse > 0 && !trace.caustics { 0 } else { trace.max_depth };
         let mut weight = DVec3::ONE;
         let mut radiance = DVec3::ZERO;
-        // `false` after a surface whose light of lamps was found at sampled points: after a diffuse
-        // bounce, or after a wide lobe.
+        // `false` after a surface at which the light of lamps was found by sampling points of the
+        // lamps: after a diffuse bounce, or after a wide lobe.
         let mut sees_lamps = diffuse == 0;
-        // `false` after a diffuse bounce, because the direct light of the surface contains the
-        // environments.
+        // `false` after a diffuse bounce, because the direct light at the surface already contains
+        // the light of environments.
         let mut sees_sky = diffuse == 0;
         for bounce in 0.. {
             let hit = self.meet(origin, direction);
@@ -201,8 +203,8 @@ impl<'a> Tracer<'a> {
                 let sky = if sees_sky { self.sky(direction) } else { DVec3::ZERO };
                 return radiance + weight * (sky + DVec3::from(self.scene.background.color.0));
             };
-            // After a diffuse bounce, only bodies from which no points are sampled are added. The
-            // direct light of the surface contains the others.
+            // After a diffuse bounce, the emission of a body is added only if no points of the body
+            // are sampled. Otherwise the direct light at the previous surface already contains it.
             if !hit.bare && (sees_sky || self.shines[hit.body].is_none()) {
                 own = DVec3::from(hit.material.emitted());
             }
@@ -367,8 +369,8 @@ impl<'a> Tracer<'a> {
         seen.sum()
     }
 
-    /// Returns the light of the visible lamps that a wide lobe reflects, from a sampled point of
-    /// each lamp. Returns `None` if reflected rays find the lamps instead.
+    /// Returns the light that a wide lobe reflects from the visible lamps, estimated at one sampled
+    /// point of each lamp. Returns `None` if reflected rays find the lamps instead.
     fn lamps_in_lobe(&self, hit: &Hit, view: DVec3, numbers: &mut Numbers) -> Option<DVec3> {
         let (m, horizon) = (hit.material, self.scene.trace.below_horizon);
         if hit.seen != hit.normal {
@@ -404,7 +406,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// Returns the reflected direct light plus the light of one more diffuse bounce. `diffuse` is
-    /// the number of diffuse bounces before it.
+    /// the number of diffuse bounces before the hit `hit`.
     fn lit(&self, hit: &Hit, view: DVec3, diffuse: u32, numbers: &mut Numbers) -> DVec3 {
         let trace = &self.scene.trace;
         let albedo = DVec3::from(hit.material.color.0) * hit.tint * hit.material.diffuse;
@@ -414,8 +416,8 @@ impl<'a> Tracer<'a> {
         let mut sum =
             self.shade(hit, view, !bounces || self.mutation == Mutation::AmbientTwice, numbers);
         if bounces {
-            // A uniform point of the unit sphere that touches the surface at the hit has a cosine
-            // distribution.
+            // The direction from the hit to a uniform point of the unit sphere that touches the
+            // surface there is cosine-distributed.
             let mut onward = (hit.seen + numbers.direction()).normalize_or(hit.seen);
             if self.mutation == Mutation::UniformBounce {
                 onward = numbers.direction();

@@ -1,6 +1,6 @@
-//! Light through surfaces in the reference tracer, an independent slow implementation: refraction
-//! and transmission. The media on both sides of a surface are found by point tests just in front of
-//! and just behind it.
+//! Refraction and transmission of the reference tracer, an independent slow implementation. It
+//! finds the media on both sides of a surface by testing two points, one just in front of the
+//! surface and one just behind it.
 
 use crate::agreement::compounds::Body;
 use crate::agreement::reflection::{
@@ -111,7 +111,8 @@ impl Tracer<'_> {
         let dielectric = material.fresnel_mode() == Fresnel::Dielectric;
         let f = match (dielectric, open) {
             (true, false) => polarised(i, t, n_i, n_t).iter().sum::<f64>() / 2.0,
-            // Sum over all internal reflections between the two sides of a pane.
+            // Mean of both polarisations. The term of each, 2 r / (1 + r), is the sum over all
+            // internal reflections between the two sides of a pane.
             (true, true) => polarised(i, t, n_i, n_t).iter().map(|r| r / (1.0 + r)).sum(),
             (false, _) => 1.0,
         };
@@ -159,8 +160,9 @@ impl Tracer<'_> {
         Way::On(way.map(|(d, k)| (d - 2.0 * d.dot(to).min(0.0) * to, k / chance)))
     }
 
-    /// Returns the reflectance of a smooth surface or a microfacet at the cosine `c`, and `true`
-    /// for total reflection.
+    /// Returns the reflectance of a smooth surface or a microfacet, and `true` for total
+    /// reflection. `c` is the cosine of the angle of incidence. The reflectance is 1 for a material
+    /// that is not dielectric.
     fn reflectance(&self, hit: &Hit, c: f64, (n_i, n_t): Indices) -> (f64, bool) {
         let i = c.clamp(0.0, 1.0).acos();
         let sin_t = n_i / n_t * i.sin();
@@ -193,8 +195,8 @@ impl Tracer<'_> {
             Material { fresnel: None, f0: None, metal: None, reflection: 1.0, ..material.clone() };
         let reflect_white =
             |numbers: &mut Numbers| reflect(&white, n, v, horizon, self.mutation, numbers);
-        // Cosine of the incident direction with the microfacet that reflects `v` to `l`. Without
-        // microfacets it is the cosine with the surface normal.
+        // Cosine of the angle between `v` and the normal of the microfacet that reflects `v` to
+        // `l`. Without microfacets, the surface normal is used.
         let cosine = |l: DVec3| v.dot(if facets { (v + l).normalize() } else { n });
         let mirrored = reflect_white(numbers).and_then(|(l, weight)| {
             let (f, total) = self.reflectance(hit, cosine(l), indices);
@@ -220,8 +222,8 @@ impl Tracer<'_> {
             material.transmission * if total { 0.0 } else { left }
         };
         let passed = if facets && open {
-            // A pane of microfacets transmits like it reflects: the reflected ray is mirrored to
-            // the other side.
+            // The ray that a pane of microfacets transmits is sampled as a reflected ray, which is
+            // then mirrored to the other side.
             reflect_white(numbers)
                 .map(|(l, weight)| (l - 2.0 * l.dot(n) * n, weight * k_t(cosine(l))))
         } else if facets {

@@ -5,7 +5,7 @@ use crate::support::test_film::TestFilm;
 use std::time::Duration;
 use zerkalo::film::file::FilmReader;
 
-/// Number of times that the render is killed at a random moment.
+/// Number of times that each round of the test kills the render at a random moment.
 const KILLS: u64 = 20;
 
 /// Size, stop criterion and threads of the interrupted renders. They take about a second.
@@ -31,12 +31,14 @@ fn killed_and_resumed_render_equals_an_uninterrupted_one() {
     let keep = ["--checkpoint", "part.zk", "--resume", "part.zk", "--checkpoint-interval", "0.02"];
     let mut resumed = 0;
     for kill in 0..4 * KILLS {
-        // A busy machine may start the program too late for a checkpoint. Later rounds wait longer.
+        // On a busy machine, the program may be killed before it writes its first checkpoint. If
+        // this happens too often, further rounds with longer waits follow.
         let round = kill / KILLS;
         if round > 0 && resumed > 2 {
             break;
         }
-        // A linear congruential generator gives moments from 50 to 450 ms.
+        // Milliseconds from the start to the kill: 50 to 450 in the first round, by a linear
+        // congruential generator, and four times as many in each further round.
         let random = (kill + 1).wrapping_mul(6_364_136_223_846_793_005) >> 33;
         let mut child = desk
             .command(&args("part.png", &keep))
@@ -142,7 +144,8 @@ fn checkpoints_of_other_renders_are_refused_with_a_remedy() {
         assert!(!desk.path("b.png").exists(), "{more:?}");
     }
     assert!(fs::read(desk.path("a.zk")).unwrap() == bytes);
-    // A checkpoint can be resumed with other light weights. The picture is that of a new render.
+    // A checkpoint can be resumed with other light weights. The picture then equals that of a new
+    // render with these weights.
     let relit = render("lit.toml", &["--size", "64x48", "--uniform", "--resume", "a.zk"]);
     assert_eq!(relit.status, 0, "{}", relit.err);
     assert!(relit.err.contains("the lights of the scene differ"), "{}", relit.err);

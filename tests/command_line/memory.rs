@@ -53,13 +53,13 @@ fn regions_equal_the_picture_as_a_whole() {
                 let stats: serde_json::Value = serde_json::from_slice(&stats).unwrap();
                 let peak = stats["peak_rss_bytes"].as_u64();
                 let cap = (least + more_memory) * 1_000_000;
-                // This also holds in builds with a larger program, such as that of the tests: the
-                // memory of program and scene is measured.
+                // This also holds for larger executables, such as those of test builds, because the
+                // program measures the memory that it and the scene take.
                 assert!(peak.is_none_or(|peak| peak <= cap), "{memory}: {peak:?} bytes");
                 assert_eq!(stats["stopped_by"], "spp");
             }
-            // The program rounds the least memory up, by at most 2 MB. These 2 MB hold up to a
-            // third of the film.
+            // The program rounds the least memory up by at most 2 MB, which hold up to a third of
+            // the film. With the least memory, there are therefore more than two regions.
             let falls = counts.is_sorted_by(|fewer, more| fewer >= more);
             assert!(counts[0] > 2 && falls && counts[3] == 1, "{counts:?}");
         }
@@ -68,7 +68,7 @@ fn regions_equal_the_picture_as_a_whole() {
 
 /// Checks that a lack of memory first puts all lights into one light group. Only then is the
 /// picture divided into regions. Samples of a shared group are multiplied by the lights' colours
-/// before they are added; the picture therefore differs by rounding.
+/// before they are added. The picture therefore differs by rounding from one with separate groups.
 #[test]
 fn lights_are_merged_first() {
     let desk = Desk::new();

@@ -60,8 +60,8 @@ fn full_stdout_is_a_failure_and_a_closed_pipe_is_none() {
     assert_eq!(run.err.trim(), "0");
 }
 
-/// Checks that results that cannot be written are refused before the work begins, and those on a
-/// full device after it.
+/// Checks that a result file that cannot be created is refused before the work begins. An error
+/// while a result is written, on a full device, is reported after the work.
 #[test]
 fn unwritable_results_are_failures() {
     let desk = Desk::new();

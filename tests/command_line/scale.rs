@@ -69,7 +69,8 @@ fn mesh_scene(desk: &Desk, (name, mesh): (&str, Vec<u8>)) -> String {
 /// Returns the processor time in seconds of all child processes that have ended.
 fn child_seconds() -> f64 {
     let text = fs::read_to_string("/proc/self/stat").unwrap();
-    // Fields 16 and 17 of proc(5) in hundredths of a second; the name before may contain spaces.
+    // Fields 16 and 17 of proc(5) are the times of child processes in hundredths of a second. The
+    // process name in field 2 may contain spaces.
     let fields = text.rsplit_once(") ").unwrap().1.split(' ').skip(13).take(2);
     fields.map(|field| field.parse::<f64>().unwrap() / 100.0).sum()
 }

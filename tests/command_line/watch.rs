@@ -112,7 +112,8 @@ fn unfinished_shards_are_running_and_then_late() {
     assert!(row.total.unwrap() > 0);
     let row = at(&films, 200);
     assert!(row.state == WatchedState::Late && row.age.unwrap().as_secs() >= 199, "{row:?}");
-    // The clock of the reader is behind that of the writer: no age is negative.
+    // If the clock of the reader is behind that of the writer, the age of a file is 0, not
+    // negative.
     let early = films.shards(SystemTime::UNIX_EPOCH);
     assert!(early.iter().all(|row| row.age.is_none_or(|age| age.is_zero())));
     assert!(films.film().unwrap().bytes() == film(&desk, "job-0.zk").bytes());

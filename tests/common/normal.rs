@@ -8,8 +8,8 @@ pub fn tail(z: f64) -> f64 {
     2.0 * (-0.5 * z * z).exp() / (std::f64::consts::TAU.sqrt() * fraction)
 }
 
-/// Returns the inverse of [`tail`], found by bisection: the number above 1.5 whose magnitude a
-/// standard normal number exceeds with the probability `p`.
+/// Returns the inverse of [`tail`], found by bisection: the number above 1.5 that the magnitude of
+/// a standard normal number exceeds with the probability `p`.
 pub fn two_sided_z(p: f64) -> f64 {
     let (mut low, mut high) = (1.5, 20.0);
     for _ in 0..100 {

@@ -19,7 +19,7 @@ pub type Line = (DVec3, DVec3);
 #[derive(Clone, Copy, Debug)]
 pub struct LineHit {
     pub t: f64,
-    /// Index of the primitive's form in the list from which the aggregate was built.
+    /// Index of the hit form (geometric shape) in the list from which the aggregate was built.
     pub form: usize,
     pub point: DVec3,
     pub normal: DVec3,

@@ -1,4 +1,4 @@
-//! Example of each kind of shape. The unit tests of the descriptions of shapes include this file, too.
+//! Example of each kind of shape. The unit tests of shape descriptions also include this file.
 
 /// Pairs `(key, example)`: the key of every kind of shape, and an example in TOML for an
 /// `[[object]]`. The order is that of the table of shape kinds.

@@ -29,9 +29,9 @@ pub fn scene(table: &Table, resolver: &AssetResolver) -> Option<Scene> {
     scene.faults().is_empty().then_some(scene)
 }
 
-/// Returns every key that the field tables define for the tables that `scene` contains, whether the
-/// scene sets the key or not. Elements of a list and named tables have keys of their own. A table
-/// or list is returned as a key, and so are its members.
+/// Returns every key that the field tables define for `scene`, whether the scene sets the key or
+/// not. Keys within a table or list element are returned only if `scene` contains that table or
+/// element. A table or list is itself returned as a key.
 pub fn keys(scene: &Table) -> Vec<Key> {
     let mut out = Vec::new();
     walk(FIELDS, scene, &[], &mut out);

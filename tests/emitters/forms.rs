@@ -35,8 +35,8 @@ pub fn polygon(corners: &[DVec3], normal: DVec3) -> f64 {
     (0.5 * (0..above.len()).map(side).sum::<f64>()).abs()
 }
 
-/// Returns the part of a polygon on the side of a plane through the origin to which `normal`
-/// points.
+/// Cuts a polygon by the plane through the origin with the normal `normal`. Returns the part on the
+/// side to which `normal` points.
 pub fn clipped(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
     let mut out = Vec::new();
     for (i, a) in corners.iter().enumerate() {
@@ -52,8 +52,8 @@ pub fn clipped(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
     out
 }
 
-/// Returns the irradiance by a disk of unit radiance on a parallel surface. The surface is at
-/// distance `height` from the disk's plane and `aside` from its axis.
+/// Returns the irradiance by a disk of unit radiance at a point of a parallel surface. The point is
+/// at the distance `height` from the disk's plane and at the distance `aside` from the disk's axis.
 ///
 /// Howell, Mengüç, Siegel, *Thermal Radiation Heat Transfer*, configuration B-15.
 pub fn parallel_disk(radius: f64, height: f64, aside: f64) -> f64 {

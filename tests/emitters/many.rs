@@ -1,4 +1,5 @@
-//! Many point lights, of which each path samples a few, against the sum over all of them.
+//! Scenes with many point lights, of which each path samples only a few. The mean radiance is
+//! compared with the sum over all lights.
 
 use crate::common::Numbers;
 use crate::common::normal::two_sided_z;

@@ -162,7 +162,7 @@ fn irradiance_of_emissive_objects_is_that_of_lights_of_the_same_size() {
     check(&cases, 1 << 15, ROUNDING);
 }
 
-/// Checks that the face of an emissive box that stands on a surface lights nothing behind that
+/// Checks an emissive box that stands on a surface. Its lower face must light nothing behind the
 /// surface.
 #[test]
 fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
@@ -212,8 +212,8 @@ fn box_lights_nothing_behind_the_surface_that_it_stands_on() {
     agree("box beside a square", &alone, &with_square, 4096);
 }
 
-/// Checks that a flat emissive object with a two-sided material lights both sides, and one with a
-/// one-sided material its front.
+/// Checks that a flat emissive object emits on both sides if its material is two-sided, and only on
+/// its front if its material is one-sided.
 #[test]
 fn back_of_a_flat_emissive_object_follows_two_sided() {
     let (text, corners) = rectangle(DVec3::Y, [1.0, 0.7]);
@@ -271,8 +271,8 @@ fn reflection_of_emissive_objects_is_that_of_lights_of_the_same_size() {
 }
 
 /// Checks that white objects inside of a closed surface of radiance 1 have the radiance 1. The
-/// emission is found by sampled points, by rays, or by both. Objects need a diffuse bounce if no
-/// points of the surface are sampled.
+/// emission is found by sampled points, by rays, or by both. If no points of the emissive surface
+/// are sampled, matt objects need a diffuse bounce.
 #[test]
 fn furnace_of_emissive_walls_shows_white() {
     let walls = [

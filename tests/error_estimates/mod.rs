@@ -113,7 +113,7 @@ fn sheet_share(x: f64, y: f64) -> f64 {
     let t = -eye[2] / toward[2];
     let apex = [0, 1, 2].map(|i| eye[i] + t * toward[i]);
     let axis = unit([toward[0], toward[1], -toward[2]]);
-    // The plane through the apex and the edge, its normal on the sheet's side.
+    // Normal, on the sheet's side, of the plane through the apex and the edge.
     let (s, c) = TILT.to_radians().sin_cos();
     let edge = [-s, c, 0.0];
     let to_edge = [EDGE_X - apex[0], -apex[1], SHEET_Z];
@@ -273,9 +273,10 @@ fn assert_honest(filter: Filter, adaptive: bool, spp: u32) -> f64 {
         assert!((0.9..=1.1).contains(&ratio), "{case}: true/estimated {name} {ratio}");
     }
 
-    // Spread over the seeds of each tile's estimated error, relative to the tile's true error. Only
-    // tiles with many blurred pixels are tested. If the error is concentrated in a few pixels, the
-    // estimate has few degrees of freedom and spreads by more than 20 %.
+    // For each tile, the estimated error is divided by the tile's true error. The spread of this
+    // ratio over the seeds must be small. Only tiles with many blurred pixels are tested. If the
+    // error is concentrated in a few pixels, the estimate has few degrees of freedom and spreads by
+    // more than 20 %.
     let blurred = blurred_pixels(&truth(filter));
     let mut tested = 0;
     for (tile, blurred) in blurred.into_iter().enumerate() {

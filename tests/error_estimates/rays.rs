@@ -42,9 +42,9 @@ pub struct RayRatio {
 }
 
 /// Returns the number of rays of `adaptive` pictures, divided by that of uniform pictures with the
-/// same true error. `adaptive` has one picture for each of `seeds`. The sample count of the uniform
-/// pictures, one for each seed, doubles until the first of them has at least as many rays as the
-/// mean adaptive picture.
+/// same true error. `adaptive` has one picture for each of `seeds`. There is also one uniform
+/// picture for each seed. The sample counts of the uniform pictures double until the picture of the
+/// first seed has at least as many rays as the adaptive pictures have on average.
 pub fn ray_ratio(
     sample: &Sample,
     seeds: &[u64],
@@ -80,8 +80,9 @@ pub fn ray_ratio(
     RayRatio { ratio: all.exp(), error }
 }
 
-/// Returns the convergence curve of a uniform picture: numbers of rays and errors after 4, 8, 16
-/// and so on samples in each replicate (half of the samples), until `ends` returns `true`.
+/// Returns the convergence curve of a uniform picture: the numbers of rays and the errors after 4,
+/// 8, 16 and so on samples per pixel in each of the two replicates (halves of the samples). The
+/// curve ends when `ends` returns `true`.
 fn uniform_curve(
     sample: &Sample,
     seed: u64,

@@ -32,8 +32,8 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Creates the reference of a scene. `count` is the number of samples of each replicate (half
-    /// of the samples) if the scene has no closed form.
+    /// Creates the reference of a scene. If the scene has no closed form, the reference picture has
+    /// `count` samples per pixel in each of the two replicates (halves of the samples).
     pub fn new(sample: &Sample, count: u32) -> Self {
         if let Some(balls) = &sample.balls {
             let radiance = balls.pixels(sample.scene.film.size.map(|n| n as usize));
@@ -157,7 +157,7 @@ fn assert_honest(outcomes: &[Outcome]) {
     assert!(mean.abs() < 1.0, "the mean of {count} scores is {mean}");
 }
 
-/// Checks 13 scenes of the eight kinds that are cheap to render.
+/// Checks 13 scenes. They are of eight of the ten kinds, the kinds that are cheap to render.
 #[test]
 fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     let cheap = [8, 9, 10, 11, 21, 22, 32, 33, 3, 14, 24, 25, 35];
@@ -165,9 +165,9 @@ fn reported_error_is_the_true_one_in_sparse_and_dense_pictures() {
     assert_honest(&outcomes);
 }
 
-/// Checks pictures of stars, whose true error once was 1.55 times the reported one. A tile whose
-/// validation estimate (the reported one) is low by chance must not therefore get the fewest
-/// samples in repeated allocation rounds.
+/// Checks pictures of stars, whose true error once was 1.55 times the reported one. The validation
+/// estimate of a tile (the one that is reported) may be low by chance. This must not reduce the
+/// number of samples that allocation rounds give to the tile.
 #[test]
 fn reported_error_of_stars_is_not_selected() {
     let Outcome { ratio, .. } = examine(62, 0, 24);
