@@ -33,7 +33,8 @@ impl fmt::Display for Problem {
 }
 
 /// Returns the name that diagnostics use for the table at `path`: `object "queen"`, `light 2`.
-/// `name` returns the name of the entry at an index in a list; `None` if there is no such entry.
+/// `name(list, index)` returns the name of the entry at `index` in the scene's list `list`, and
+/// `None` if there is no such entry.
 pub(super) fn subject(path: &[String], name: impl Fn(&str, usize) -> Option<String>) -> String {
     match path {
         [list, index, ..] if list == "object" || list == "light" => {
@@ -85,9 +86,9 @@ impl Problems<'_> {
         self.is_full_with(0)
     }
 
-    /// Returns `true` if no further problem can be stored after the stored ones and the next
-    /// `others` problems. The caller must then drop one problem, which is already counted in
-    /// `more`.
+    /// Returns `true` if no further problem can be stored. `others` is the number of problems that
+    /// the caller has found but not stored yet; they count as stored. If the result is `true`, the
+    /// caller must then drop one problem, which is already counted in `more`.
     fn is_full_with(&mut self, others: usize) -> bool {
         let is_full = self.found.len() + others >= MAX_REPORTED;
         self.more += usize::from(is_full);
@@ -164,8 +165,9 @@ impl Scene {
         (problems.found, problems.more)
     }
 
-    /// Adds a problem for each object whose material needs texture coordinates (for a texture or a
-    /// bump map) that the shape does not have. The shapes must be valid.
+    /// Adds at most one problem for each object: a material of the object maps a texture or a bump
+    /// map by texture coordinates (`mapping = "uv"`), and the shape has none. The shapes must be
+    /// valid.
     fn missing_coordinates(&self, problems: &mut Problems) {
         let uv_key = |name: &str| {
             let material = self.materials.get(name)?;

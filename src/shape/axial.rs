@@ -34,10 +34,10 @@ pub(super) fn axes_between(base: [f64; 3], top: [f64; 3]) -> DMat3 {
     around_axis(unit(axis).unwrap_or(DVec3::Y))
 }
 
-/// Returns the errors of `checks` and those of the axis from `base` to `top`. A length of 0 is an
-/// error. Coordinates that are too large relative to the length of the axis, or to a value in
-/// `sizes`, are errors. `sizes` are pairs `(key, value)`. `name` is the key of `top` in scene
-/// files.
+/// Returns the errors of `checks` and the errors of the axis from `base` to `top`. It is an error
+/// if the axis has length 0. It is also an error if a coordinate is too large relative to the
+/// length of the axis or to one of `sizes`, which are pairs `(key, value)`. `name` is the key of
+/// `top` in scene files.
 pub(super) fn axis_faults(
     checks: Validator,
     [base, top]: [[f64; 3]; 2],
@@ -91,8 +91,8 @@ mod tests {
             let r = s.max(1.0);
             assert!((low - DVec3::new(1.0 - r, -r, 0.0)).length() < 1e-15, "{s}: {low}");
             assert!((high - DVec3::new(1.0 + r, r, 1.0)).length() < 1e-15, "{s}: {high}");
-            // A point of the rim at z = 1 is mapped to the distance `s` from the axis. If `s` is
-            // greater than 1, this rim is the canonical base, because the base is the wider end.
+            // The rim at z = 1 has radius `s`. If `s` is greater than 1, this is the wider end, and
+            // therefore the base (z = 0) of the canonical form.
             let Form::ConicalFrustum(ConicalFrustumForm { scene_from_unit: m, top_radius: top }) =
                 form
             else {

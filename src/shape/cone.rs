@@ -1,4 +1,4 @@
-//! Cone: from a disc to its apex.
+//! Right circular cone between the centre of its flat base and its apex.
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;

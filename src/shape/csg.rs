@@ -1,7 +1,8 @@
 //! Compound objects: union, intersection and difference of solids, nested up to 64 deep.
 //!
 //! A part is written like an object, with `shape` and optionally `material` and `transform`, so
-//! that objects and parts can be copied into each other.
+//! that users can copy the text of an object into a compound, and the text of a part into an
+//! object.
 
 use crate::primitive::Form;
 use crate::primitive::csg_tree::{CsgSolid, CsgTree};
@@ -16,7 +17,7 @@ use glam::DVec3;
 use toml::de::DeValue;
 use toml::{Spanned, Value};
 
-/// Largest depth of compounds nested in compounds.
+/// Largest nesting depth of compounds. A compound that is no part of another one has depth 1.
 pub const MAX_DEPTH: usize = 64;
 
 /// Part of a compound: a solid with its own material and transform.
@@ -30,8 +31,9 @@ pub struct CsgOperand {
     pub transform: Vec<TransformOp>,
 }
 
-// `description!` would declare constants, and constants cannot refer to each other in a cycle. The
-// fields of shapes contain the fields of parts, and the fields of parts contain those of shapes.
+// These fields are a static. The macro `description!` would declare a constant, and constants
+// cannot refer to each other in a cycle. The fields of shapes contain the fields of parts, and the
+// fields of parts contain those of shapes.
 static PART_FIELDS: [Field; 3] = [
     Field::required(
         "shape",
@@ -183,8 +185,8 @@ fn parts_of_mut(shape: &mut Shape) -> &mut [CsgOperand] {
     }
 }
 
-/// Combines the parts of a compound to one solid. `join` creates the CSG tree of the compound from
-/// those of its parts.
+/// Combines the parts of a compound into one solid. `join` creates the CSG tree of the compound
+/// from the CSG trees of its parts.
 fn combined(of: &[CsgOperand], join: fn(Vec<CsgTree>) -> CsgTree) -> CsgSolid {
     let mut parts = Vec::new();
     let mut trees = Vec::new();
@@ -255,14 +257,16 @@ fn part_faults(of: &[CsgOperand], depth: usize) -> Vec<ValidationError> {
     faults
 }
 
-/// Reference to a material from a part of a compound: `(key, material)`. The key is the dotted key
-/// in scene files, relative to the shape; the material is given by its name.
+/// Material that a part of a compound names, as `(key, material)`. `key` is the dotted key of the
+/// name in scene files, relative to the shape, such as `union.of.0.material`. `material` is the
+/// name.
 pub type Named<'a> = (String, &'a str);
 
 impl Shape {
-    /// Returns the material name of each solid of which the shape consists, in the order of
-    /// [`CsgSolid::parts`]. A solid without a material has that of the innermost enclosing compound
-    /// with one, or `whole` if there is none. A shape that is no compound is one solid.
+    /// Returns the material name of each solid in the shape, in the order of [`CsgSolid::parts`]. A
+    /// solid without a material of its own has the material of the innermost enclosing compound
+    /// that has one. If there is no such compound, its material is `whole`. A shape that is no
+    /// compound is one solid.
     pub fn part_materials<'a>(&'a self, whole: &'a str) -> Vec<&'a str> {
         match parts_of(self) {
             None => vec![whole],

@@ -1,8 +1,8 @@
 //! Box with sides parallel to the axes.
 //!
-//! A box is described by its centre and sizes, as platform and rectangle are. One key moves the
-//! box, and the description cannot be inside out, as a pair of corners could. A `transform` rotates
-//! the box.
+//! A box is described by its centre and size, like the shapes `platform` and `rectangle`. A change
+//! of the key `center` alone moves the box. Two opposite corners would need two changes, and could
+//! be given in the wrong order. A `transform` rotates the box.
 
 use crate::primitive::Form;
 use crate::shape::ShapeDesc;

@@ -24,7 +24,7 @@ macro_rules! by_corner_and_rotation {
 }
 pub(super) use by_corner_and_rotation;
 
-/// Returns a convex solid over a horizontal polygon (a prism, a pyramid, or a frustum).
+/// Returns the convex solid over a horizontal polygon: a prism, a pyramid or a frustum.
 ///
 /// `base` is the list of the polygon's corners in order along its boundary, as (x, z) offsets from
 /// `corner`. `top_over_base` is the ratio of the side lengths of top and base, from 0 (an apex) to

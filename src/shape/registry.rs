@@ -13,7 +13,7 @@ use crate::value::{
 };
 use glam::{DMat3, DVec3};
 
-/// Description of one kind of shape, as scene files have it.
+/// Description of one kind of shape, with the keys that users write in scene files.
 pub trait ShapeDesc: Description {
     /// Converts the description to its canonical form: the geometry as one of the kinds of
     /// primitives, in double precision. The description must be valid.
@@ -55,8 +55,9 @@ pub(super) fn turned_rotation(rotation: f64, degrees: f64) -> f64 {
 }
 
 /// Expands to the keys of the shape kind `$kind`, for the table of kinds. The keys of a compound
-/// are the static `$fields`. They refer to the table of kinds itself, because the parts of a
-/// compound can be of any kind. A constant cannot refer to itself, but a static can.
+/// are in the static `$fields`. These keys refer to the table of kinds, because the parts of a
+/// compound can be of any kind. Such a cycle is possible between statics, but not between
+/// constants.
 macro_rules! keys {
     ($kind:ident) => {
         $kind::FIELDS

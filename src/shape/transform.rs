@@ -10,8 +10,8 @@ use glam::{DAffine3, DMat3, DVec3};
 use toml::de::DeValue;
 use toml::{Spanned, Value};
 
-/// One step of a transform. Angles are in degrees, counter-clockwise as seen from the tip of the
-/// axis.
+/// One step of a transform. Angles are in degrees, counter-clockwise for a viewer at whom the axis
+/// points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TransformOp {
     /// Moves the object by this vector, in scene units.
@@ -174,9 +174,9 @@ pub fn compose(steps: &[TransformOp]) -> DAffine3 {
     steps.iter().fold(DAffine3::IDENTITY, |map, step| step.map() * map)
 }
 
-/// Returns an error if the composition of `steps` is not usable for `shape`. It must not flatten
-/// the shape, stretch it out of range, or move it beyond the largest coordinate. The shape must not
-/// become too small for its distance from the origin. Returns `None` if there is no error. Each
+/// Returns an error if the composition of `steps` is not usable for `shape`, otherwise `None`.
+/// There are four errors: the composition flattens the shape, stretches it out of range, moves it
+/// beyond the largest coordinate, or makes it too small for its distance from the origin. Each
 /// single step must be valid.
 pub fn ill_conditioned(shape: &Shape, steps: &[TransformOp]) -> Option<ValidationError> {
     if steps.is_empty() {

@@ -3,7 +3,7 @@
 //!
 //! All requests are sent in one write, and terminals reply in the order of the requests. The last
 //! request is for the device attributes, to which every terminal replies. The reply to it ends the
-//! query. If replies come after the timeout, later readers ignore them.
+//! query. A reply that arrives after the timeout is still decoded as a reply and not as keys.
 
 use crate::terminal::capabilities::{Capabilities, Environment, Multiplexer};
 use crate::terminal::cells::Colors;
@@ -46,8 +46,8 @@ const TRUE_COLOR: [&str; 3] = ["2::1:2:3", "2:1:2:3", "2;1;2;3"];
 const SYNCHRONISED: u16 = 2026;
 
 /// Returns the request of the cursor position. A terminal replies when it has processed all earlier
-/// bytes. If `through` is a multiplexer, the request is wrapped: the multiplexer then passes it on
-/// to the terminal outside, and this terminal replies.
+/// bytes. If `through` is a multiplexer, the request is wrapped, so that the multiplexer passes it
+/// on. The terminal outside of the multiplexer then replies.
 pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
     match through {
         None => "\x1b[6n",
@@ -57,12 +57,12 @@ pub(crate) fn cursor_request(through: Option<Multiplexer>) -> &'static str {
 }
 
 /// Queries the capabilities of the terminal. This takes about one round trip, or two inside of a
-/// multiplexer over SSH. Keys that are pressed meanwhile are kept in `input`. `is_ending` returns
-/// `true` if the query should stop.
+/// multiplexer over SSH. Keys that are pressed during the query are kept in `input`. `is_ending`
+/// returns `true` if the query should stop.
 ///
-/// Inside of a local tmux, some requests are passed on to the terminal outside of tmux, which may
-/// never reply. The query does not wait for replies of this terminal. The caller passes those that
-/// arrive after the query to [`Capabilities::learn`].
+/// Inside of a local tmux, some requests are passed on to the terminal outside of tmux. The query
+/// does not wait for the replies of this outer terminal, because it may never reply. If such a
+/// reply arrives after the query, the caller passes it to [`Capabilities::learn`].
 ///
 /// # Errors
 /// Fails if the terminal is closed.

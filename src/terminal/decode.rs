@@ -2,12 +2,14 @@
 //!
 //! `vte` divides the input into characters, control sequences and strings (ECMA-48), and
 //! [`Interpreter`] interprets each of them as a unit. An unknown reply is therefore skipped as a
-//! unit: it is never decoded as keys and never hides later keys. `vte` is made for the output of
-//! programs, not for keyboard input. The decoder therefore handles these cases before `vte` does:
+//! whole: none of its bytes is decoded as a key, and no key after it is lost. `vte` is made for the
+//! output of programs, not for keyboard input. The decoder therefore handles these cases before
+//! `vte` does:
 //!
 //! - A lone ESC is the key Escape and `ESC c` is Alt-c for any `c`. After ESC `vte` waits without
 //!   limit, executes a control character at once, and takes `ESC X` and `ESC ^` for the start of a
-//!   string. The decoder passes ESC on only together with a byte that proves a sequence.
+//!   string. The decoder passes ESC to `vte` only after later bytes have proved that a sequence
+//!   begins.
 //! - `ESC O c` (SS3), `ESC [ [ c` (Linux console) and `ESC [ M b x y` (X10 mouse) have further
 //!   bytes after the byte that `vte` takes for the final one.
 //! - Pasted text may hold any bytes and may arrive with pauses. Its end sequence (`ESC [ 201 ~`)
@@ -16,8 +18,8 @@
 //! - `vte` discards the data of APC strings (`ESC _`), in which kitty replies. The decoder passes
 //!   them on as DCS strings (`ESC P`).
 //! - `vte` ends a DCS string at the byte 9C, which is also part of UTF-8 characters such as Ü.
-//! - `vte` keeps a control sequence open across control characters. A key typed after an incomplete
-//!   sequence would be lost.
+//! - `vte` keeps a control sequence open across control characters. Without special treatment, a
+//!   key typed after an incomplete sequence would be lost.
 
 use crate::terminal::event::Code;
 use crate::terminal::sequence::{Interpreter, console_key, single_shift, x10_mouse};
@@ -57,7 +59,8 @@ enum State {
     /// State after ESC and this byte. Both together either begin a sequence or are a key pressed
     /// with Alt.
     Introducer(u8),
-    /// State after `ESC O` and a number, which gives the modifiers of the key that follows.
+    /// State after `ESC O` and decimal digits. The value is the number that the digits form, 0
+    /// without digits. It encodes the modifiers of the key that follows.
     SingleShift(u16),
     /// State inside of a control sequence, which began with `ESC [`.
     ControlSequence,
@@ -67,7 +70,8 @@ enum State {
     X10Mouse,
     /// State inside of a control string, which began with ESC and this byte.
     String(u8),
-    /// State after ESC inside of a control string, which began with ESC and this byte.
+    /// State after an ESC inside of a control string. A backslash after this ESC ends the string.
+    /// The value is the byte after the ESC with which the string began.
     StringEscape(u8),
     Paste,
     /// State inside of pasted text whose first part was reported after a pause.
@@ -292,9 +296,9 @@ impl Decoder {
         self.complete(Some(Event::Paste(text)));
     }
 
-    /// Reports the pasted text so far. The caller calls this after a pause in the paste. If this is
-    /// not the first pause, and the last byte before it is Escape or Ctrl-C, the paste ends and
-    /// this key is reported too.
+    /// Reports the pasted text so far. The caller calls this after a pause in the paste. From the
+    /// second pause on, the key Escape or Ctrl-C ends the paste if its byte is the last one before
+    /// the pause. This key is then reported too.
     fn pause_paste(&mut self) {
         let is_paused = self.state == State::PausedPaste;
         let key = self.taken.pop_if(|last| is_paused && [ESC, ETX].contains(last));
@@ -322,9 +326,9 @@ impl Decoder {
     }
 }
 
-/// Returns `true` if `bytes`, the result of one read, can only be a reply of the terminal without
-/// its first byte. This byte, an ESC, was read alone before. Typed characters would not arrive in
-/// one read.
+/// Returns `true` if `bytes`, the result of one read, can only be the remainder of a reply of the
+/// terminal. The first byte of the reply, an ESC, was the result of an earlier read. Typed
+/// characters would not arrive together in one read.
 fn is_reply_without_escape(bytes: &[u8]) -> bool {
     matches!(
         bytes,

@@ -10,9 +10,9 @@ use crate::terminal::cells::palette_quantisation::{nearest_xterm, xterm_lightnes
 
 /// Number of palette colours that are mixed for a pixel, one per position of the dither pattern.
 const MIXED: usize = 4;
-/// Bayer's ordered pattern of 2 x 2 pixels. Each pixel has a list of colours that are mixed for it,
-/// sorted from dark to light. The number at the pixel's position in the pattern is the index of the
-/// colour in this list that the pixel shows.
+/// Bayer's ordered pattern of 2 x 2 pixels, repeated over the image. For each pixel, a list of
+/// palette colours is chosen, sorted from dark to light. The pixel shows one colour of this list:
+/// its index is the number at the pixel's position in the pattern.
 const PATTERN: [[usize; 2]; 2] = [[0, 2], [3, 1]];
 /// Share, from 0 to 1, of the accumulated error that is added to the target colour before a palette
 /// colour is chosen. The palette colours of a pixel are chosen one after the other. The error is

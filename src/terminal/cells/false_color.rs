@@ -1,7 +1,9 @@
-//! False-colour images of numbers such as depth and noise, with the scales of their colours.
+//! False-colour images of numbers such as depth and noise, with the scales that map numbers to
+//! colours.
 //!
 //! Magnitudes use the colour map *inferno* (Stéfan van der Walt and Nathaniel Smith, 2015). The
-//! lightness of this map rises evenly, so that equal steps look equal, even without colour vision.
+//! lightness of this map rises evenly. Equal steps on the scale therefore look equal, even to
+//! viewers without colour vision.
 
 /// Logarithmic mapping of a range of positive numbers to the colours of a colour map.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,8 +63,8 @@ pub fn magnitude(part: f64) -> [u8; 3] {
 /// False colour of a difference of 0.
 const DIFFERENCE_MIDDLE: [u8; 3] = [24, 24, 27];
 
-/// Returns the false colour of a signed difference. If `part` is -1 (darker), it is blue. If `part`
-/// is 0, it is nearly black. If `part` is 1 (brighter), it is orange. Other values are clamped.
+/// Returns the false colour of the signed difference `part`: blue at -1 (darker), nearly black at
+/// 0, orange at 1 (brighter). Values outside of -1..=1 are clamped.
 pub fn difference(part: f64) -> [u8; 3] {
     const LESS: [u8; 3] = [96, 178, 255];
     const MORE: [u8; 3] = [255, 152, 64];
@@ -165,8 +167,8 @@ mod tests {
 
     #[test]
     fn object_colors_are_distinguishable() {
-        // The colours of any two of the first 12 numbers must differ. Those of two consecutive
-        // numbers must differ more.
+        // The colours of any two of the first 12 numbers must differ by more than 0.06 in OKLab.
+        // Those of two consecutive numbers must differ by more than 0.15.
         let distance = |a, b| Oklab::of(object_color(a)).distance(Oklab::of(object_color(b)));
         for a in 0..12 {
             for b in 0..a {

@@ -24,9 +24,9 @@ const SHADES: [char; 3] = ['░', '▒', '▓'];
 /// Background colours of cells that mix two colours: black, two greys and white. They leave the hue
 /// of the foreground unchanged.
 const NEUTRAL: [u8; 4] = [0, 7, 8, 15];
-/// Smallest gain for which a half block is preferred to a shading glyph. The gain is the decrease
-/// of the sum of the OKLab errors of both halves. Without this limit, a changing picture would
-/// flicker between half blocks and shades.
+/// Smallest gain for which a half block is preferred to a shading glyph. The gain is the sum of the
+/// OKLab errors of both halves with the shading glyph, minus the same sum with the half block.
+/// Without this limit, a changing picture would flicker between half blocks and shades.
 const HALVES_GAIN: f32 = 0.05;
 
 /// Returns the share of the cell that `glyph` covers, 0..=1. Returns 0.5 for glyphs that are not in

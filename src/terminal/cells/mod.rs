@@ -33,7 +33,7 @@ pub enum Colors {
 }
 
 impl Colors {
-    /// All sets of colours, in the order in which the colour key cycles through them.
+    /// All sets of colours, in the order in which a key of the dashboard cycles through them.
     pub const ALL: [Self; 4] = [Self::True, Self::Indexed, Self::Sixteen, Self::Mono];
 
     /// Returns the name of this set of colours, as it is displayed to users.

@@ -2,10 +2,10 @@
 
 use crate::terminal::cells::oklab::{code, linear};
 
-/// Replaces the colour of each half cell (upper or lower half of a terminal cell) by the mean, in
-/// linear light, of the block of `side` x `side` half cells that contains it. `pixels` holds the
-/// colours of the half cells in rows of `width`. A half cell that is `None` stays `None` and does
-/// not count in the mean.
+/// Replaces the colour of each half cell by the mean of its block, in linear light. A half cell is
+/// the upper or lower half of a terminal cell, and a block is a square of `side` x `side` half
+/// cells. `pixels` holds the colours of the half cells in rows of `width`. A half cell that is
+/// `None` stays `None` and does not count in the mean.
 pub fn blocks(pixels: &[Option<[u8; 3]>], width: usize, side: usize) -> Vec<Option<[u8; 3]>> {
     if width == 0 {
         return Vec::new();

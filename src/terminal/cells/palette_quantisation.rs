@@ -39,8 +39,8 @@ impl QuantisedPalette {
         // index.
         match known.load(Ordering::Relaxed) {
             0 => {
-                // The 64 steps of a channel are spread over 0..=255, so that black and white are
-                // exact.
+                // Each channel has 64 rounded levels. They are spread over 0..=255, so that black
+                // and white are exact.
                 let index = self.search(Oklab::of(coarse.map(|c| ((c * 255 + 31) / 63) as u8)));
                 known.store(index as u16 + 1, Ordering::Relaxed);
                 index
