@@ -32,8 +32,8 @@ pub struct InputReader {
 }
 
 impl InputReader {
-    /// Creates a reader of stdin. `environment` describes the terminal, in particular if it is
-    /// connected by SSH.
+    /// Creates a reader of stdin. `environment` describes the terminal. If the terminal is
+    /// connected by SSH, the reader waits longer for the byte after an ESC.
     pub fn new(environment: &Environment) -> Self {
         let wait = if environment.ssh.is_some() { ESCAPE_WAIT_OVER_SSH } else { ESCAPE_WAIT };
         Self {
@@ -80,8 +80,8 @@ impl InputReader {
         }
     }
 
-    /// Stores `early`, terminal events that were read during the query of the terminal. The next
-    /// [`InputReader::wait`] returns them first.
+    /// Stores `early`, terminal events that were read during the query of the terminal's
+    /// capabilities. The next [`InputReader::wait`] returns them.
     pub fn keep(&mut self, early: Vec<TimedEvent>) {
         self.early.extend(early);
     }

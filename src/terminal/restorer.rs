@@ -1,9 +1,10 @@
 //! Restoration of the terminal if the program ends without restoring it. Examples are SIGKILL, an
-//! allocation in a library that fails and aborts, and a processor exception.
+//! abort after a failed allocation in a library, and a processor exception such as SIGILL.
 //!
-//! A helper process, a shell that runs a script, reads from a pipe. The pipe closes when the
-//! program ends. Signal handlers of the program cannot replace the helper process: SIGKILL has no
-//! handler, and after the handler of SIGABRT returns, the process ends at once.
+//! The terminal is restored by a helper process, a shell that runs a script and reads from a pipe.
+//! When the program ends, the pipe closes, and the script continues. Signal handlers of the program
+//! cannot replace the helper process: SIGKILL has no handler, and after the handler of SIGABRT
+//! returns, the process ends at once.
 
 use crate::terminal::LEAVE;
 use rustix::termios::{InputModes, LocalModes, OutputModes, Termios};
@@ -52,7 +53,8 @@ impl Restorer {
 }
 
 /// Returns the arguments with which POSIX `stty` restores all modes that raw mode changes. Each
-/// mode gets its value in `modes`: `echo` if the mode `echo` is set there, `-echo` if it is not.
+/// mode is set to its value in `modes`: the argument is `echo` if `echo` is set there, otherwise
+/// `-echo`.
 fn stty_arguments(modes: &Termios) -> Vec<String> {
     let inputs = [
         ("ignbrk", InputModes::IGNBRK),

@@ -116,8 +116,8 @@ fn uninterrupted(mut change: impl FnMut() -> io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Sets raw mode. crossterm stores the terminal modes that it finds here, and restores them when
-/// raw mode ends. While the program was suspended, a shell may have changed the modes.
+/// Sets raw mode. When raw mode begins, crossterm stores the current terminal modes; when raw mode
+/// ends, it restores them. A shell may have changed the modes while the program was suspended.
 /// `modes_before` is therefore set first, so that crossterm stores these modes.
 fn set_raw_mode(modes_before: &Termios) -> io::Result<()> {
     uninterrupted(terminal::disable_raw_mode)?;
@@ -208,8 +208,8 @@ impl Tty {
         }
     }
 
-    /// Restores the terminal until [`Tty::resume`]. Returns `false` if the terminal is restored
-    /// already.
+    /// Suspends full-screen use and restores the terminal, until [`Tty::resume`] is called. Returns
+    /// `false` if the terminal is restored already.
     pub fn suspend(&self) -> bool {
         if !self.entered.swap(false, Ordering::AcqRel) {
             return false;

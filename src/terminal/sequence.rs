@@ -221,9 +221,9 @@ fn modified(key: Key, modifiers: u16) -> Key {
     }
 }
 
-/// Interprets a mouse report. `button` is a number from 0 to 2 plus bits: 4 for Shift, 8 for Alt,
-/// 16 for Control, 32 for motion and 64 for the wheel. The number is that of the button; for the
-/// wheel it is the direction. `column` and `row` count from 1. Returns `None` for an unknown
+/// Interprets a mouse report. The lowest two bits of `button` are the number of the button, 0 to 2,
+/// or for the wheel its direction. The other bits are 4 for Shift, 8 for Alt, 16 for Control, 32
+/// for motion and 64 for the wheel. `column` and `row` count from 1. Returns `None` for an unknown
 /// button.
 fn mouse(button: u16, [column, row]: [u16; 2], is_release: bool) -> Option<Mouse> {
     let pressed = match button & 0b11 {

@@ -20,7 +20,7 @@ pub trait Description {
 
 /// Rust type to which the values of keys in scene files are converted.
 pub trait FieldValue {
-    /// Type in which declarations write the default values of keys, such as `[f64; 3]` for a
+    /// Rust type of a default value in a `description!` declaration, such as `[f64; 3]` for a
     /// colour.
     type Written;
 
@@ -244,10 +244,10 @@ pub(crate) use choices;
 /// ```
 ///
 /// Ranges are those of [`NumberRange`]. If every key may be left out, the struct is declared as
-/// `Example: Default` and gets the declared defaults. If some key is required, a default of another
-/// key must equal the default of its Rust type. Any other default is declared in the form
-/// `up: [f64; 3] => up "[0.0, 1.0, 0.0]"`, with a function that returns it and the result of this
-/// function as TOML.
+/// `Example: Default`, and its `Default` consists of the declared defaults. If some key is
+/// required, a default declared by `=` must equal the default of the key's Rust type. Any other
+/// default is declared in the form `up: [f64; 3] => up "[0.0, 1.0, 0.0]"`: the function `up`
+/// returns the default, and the string is the same default as TOML.
 macro_rules! description {
     ($(#[doc = $doc:literal])+ pub struct $name:ident: Default { $($fields:tt)+ }) => {
         $crate::value::description!(@struct [all] [$($doc)+] [] $name $($fields)+);
@@ -257,7 +257,8 @@ macro_rules! description {
         $crate::value::description!(@struct [] [$($doc)+] [$($derived)?] $name $($fields)+);
     };
 
-    // `$all` is given if the struct has a `Default`: missing keys then have its values.
+    // `$all` is given if the declaration has `: Default`. The values of missing keys are then taken
+    // from the `Default` of the struct.
     (
         @struct [$($all:ident)?] [$($doc:literal)+] [$($derived:ident)?] $name:ident
         $(
@@ -351,7 +352,8 @@ macro_rules! description {
         $table.optional(stringify!($key))?.unwrap_or_else($($function)::+)
     };
 
-    // A value of a key without a default value is written if it is not absent.
+    // The first rule is for keys that are always written. The second is for keys declared with
+    // `or`, which may be left out: their values are written only if they are present.
     (@write ($value:expr)) => {
         Some($value as &dyn $crate::value::TomlValue)
     };

@@ -1,6 +1,6 @@
-//! Encoding of terminal cells in few bytes. Colours are sent only when they change. Among glyphs
-//! that look the same, the one with the fewest colour changes is chosen. The cursor moves by the
-//! shortest sequence.
+//! Encoding of terminal cells in few bytes. Colours are sent only when they change. An upper half
+//! block and a lower half block with exchanged colours look the same; the one with fewer colour
+//! changes is sent. The cursor moves by the shortest sequence.
 
 use ratatui::buffer::Cell;
 use ratatui::style::{Color, Modifier};

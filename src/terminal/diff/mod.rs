@@ -1,10 +1,11 @@
-//! Frame difference: selects the cells that a frame sends.
+//! Frame difference: selects the cells that the next frame sends to the terminal.
 //!
 //! Text is sent first, row by row. Cells of the picture with a visible difference follow, the
-//! largest difference first, within the byte budget of the frame. A new picture that does not fit
-//! is sent as a mosaic of coarse blocks first. While samples accumulate, all cells are compared
-//! again only after the number of samples per pixel has grown by a factor of 2^(1/4), or 2^(1/2)
-//! from 64 samples on. Invisible differences are sent when the connection is otherwise idle.
+//! largest difference first, within the byte budget of the frame. If a new picture does not fit
+//! into this budget, a mosaic of coarse blocks is sent first. While samples accumulate, not every
+//! frame compares all cells. The next full comparison is due when the number of samples per pixel
+//! has grown by a factor of 2^(1/4), or of 2^(1/2) from 64 samples on. Invisible differences are
+//! sent when the connection is otherwise idle.
 
 mod encode;
 mod perceptual;
@@ -139,7 +140,8 @@ impl FrameDiff {
             frame = self.send_picture(target, now, FrameBudget { bytes: room, ..allowance }, out);
         }
         if out.len() == before && target.cursor == self.cursor {
-            // The frame is empty: the sequence that hides the cursor (6 bytes) is removed.
+            // No cell is sent. If the sequence that hides the cursor (6 bytes) was appended, it is
+            // removed again.
             out.truncate(if self.cursor.is_some() { before - 6 } else { before });
             return frame;
         }
@@ -292,9 +294,9 @@ impl FrameDiff {
         };
         let mut best = Part { bytes: Vec::new(), encoder: self.encoder.clone(), cells: Vec::new() };
         let mut count = order.len();
-        // The estimate assumes the same number of bytes for each cell. Fewer cells lie farther
-        // apart and need more bytes each, so that the true number of cells that fit is rarely
-        // larger.
+        // The estimate assumes that every cell needs the same number of bytes. A smaller selection
+        // of cells needs more bytes for each cell, because its cells are farther apart. The
+        // estimate is therefore rarely too low.
         while count > 0 {
             let part = encoded(count);
             if part.bytes.len() <= room {

@@ -133,12 +133,12 @@ impl PerceptualDiff {
         self.cells.iter().any(|cell_colors| !cell_colors.visible && cell_colors.error > 0.0)
     }
 
-    /// Creates a mosaic of the target: an image of blocks of `side` x `side` half cells, each block
-    /// of one colour. A half cell is the upper or lower half of a cell. Returns `(cells,
-    /// improved)`. `cells` has all cells of the picture; only those with a visible difference show
-    /// the mosaic, and the others are those of the target. `improved` has `(gain, index)` for each
-    /// mosaic cell that is closer to the target than the cell on the terminal. The gain is the
-    /// decrease in OKLab distance from the target.
+    /// Creates a mosaic of the target: blocks of `side` x `side` half cells, each block of one
+    /// colour. A half cell is the upper or lower half of a cell. Returns `(cells, improved)`.
+    /// `cells` has all cells of the picture. A cell with a visible difference shows the mosaic;
+    /// every other cell equals the target. `improved` has `(gain, index)` for each mosaic cell that
+    /// is closer to the target than the cell on the terminal. The gain is the decrease in OKLab
+    /// distance from the target.
     pub fn coarse(&self, target: &TargetFrame, side: usize) -> (Vec<Cell>, Vec<(f32, usize)>) {
         let width = usize::from(self.area.width);
         let rows = usize::from(self.area.height);

@@ -43,7 +43,8 @@ const MAX_TEXT: usize = 1500;
 /// Size in bytes below which a frame is small. The time of a small frame is mostly latency. Its
 /// acknowledgement may therefore raise the measured rate, but not lower it.
 const SMALL: usize = 1000;
-/// Time after which the acknowledgement of a frame is treated as lost.
+/// Time after the sending of a frame at which its acknowledgement, if still missing, is treated as
+/// lost.
 const LOST_AFTER: Duration = Duration::from_secs(3);
 /// Number of consecutive lost acknowledgements after which the program requests no more of them.
 const MAX_LOSSES: u32 = 3;
@@ -125,8 +126,8 @@ pub struct FlowControl {
     round_trip_at: Duration,
     /// Half of the connection's rate at the last measurement of the round trip, in bytes per
     /// second. With [`PacingMode::SendQueue`], a rate below this value causes a new measurement of
-    /// the round trip. If the round trip has become longer, the limit of the send queue is too low
-    /// for it, and this lowers the rate.
+    /// the round trip. A longer round trip may have lowered the rate: the limit of the send queue
+    /// is then too low, because it is derived from the old round trip.
     doubtful_rate: f64,
     in_flight: FramesInFlight,
     losses: u32,
@@ -151,15 +152,16 @@ pub struct FlowControl {
     ack_sample: Option<AckSample>,
 }
 
-/// Measurement of the connection's rate: a number of bytes, the time of their last acknowledgement,
-/// and bounds of the time at which a reply to the first of these bytes would have arrived.
+/// Measurement of the connection's rate by acknowledgements. It holds a number of bytes, the time
+/// of their last acknowledgement, and two bounds (`earliest_start`, `latest_start`) of the time at
+/// which a reply to the first of these bytes could have arrived.
 #[derive(Clone, Copy, Debug)]
 struct AckSample {
     earliest_start: Duration,
     latest_start: Duration,
-    /// Time at which the frame before these bytes was sent. `None` if there is no such frame. Also
-    /// `None` if its acknowledgement arrived before a reply to these bytes was possible; the
-    /// connection was then idle between that frame and these bytes.
+    /// Time at which the previous frame was sent. `None` if there is no previous frame. Also `None`
+    /// if the connection was idle between the previous frame and these bytes: the acknowledgement
+    /// of that frame arrived before a reply to these bytes was possible.
     sent_from: Option<Duration>,
     at: Duration,
     bytes: usize,
@@ -249,8 +251,8 @@ impl FlowControl {
     }
 
     /// Returns the limits of a frame that may be sent at the time `now`. Returns `None` if no frame
-    /// may be sent yet. If the frame shows the effect of user input, `answers` is `true`, and the
-    /// usual interval between frames is not required.
+    /// may be sent yet. `answers` is `true` if the frame shows the effect of user input. Such a
+    /// frame need not keep the usual interval to the last frame.
     pub fn allowance(&self, now: Duration, answers: bool) -> Option<FrameBudget> {
         // While the round trip is measured, a frame is small, so that its transmission adds little
         // time.
@@ -313,9 +315,9 @@ impl FlowControl {
         }
     }
 
-    /// Records that `bytes` bytes were sent without an acknowledgement request, because they end
-    /// inside of an escape sequence. The time of their transmission is estimated by the rate of the
-    /// connection.
+    /// Records that `bytes` bytes were sent without an acknowledgement request. They end inside of
+    /// an escape sequence, where no request can be inserted. The time of their transmission is
+    /// estimated by the rate of the connection.
     pub fn sent_unasked(&mut self, now: Duration, bytes: usize) {
         if let PacingMode::AckClocked(_) = self.mode {
             self.last_frame = Some(now);
@@ -350,11 +352,11 @@ impl FlowControl {
         }
         let known = self.round_trip.filter(|least| *least <= elapsed);
         self.round_trip = self.round_trip.map(|least| least.min(elapsed));
-        // The rate follows from the bytes of a frame and the time in which replies to them could
-        // arrive. This time ends with the acknowledgement. It begins 0.9 to 1 round trips after the
-        // frame was sent, when a reply to its first byte could arrive, but not before the previous
-        // acknowledgement. If the acknowledgement comes sooner than the known round trip, this
-        // round trip was measured too long and is not used.
+        // The rate is the number of bytes of a frame divided by the time in which replies to these
+        // bytes could arrive. This time ends with the acknowledgement of the frame. It begins when
+        // a reply to the first byte could arrive, 0.9 to 1 round trips after the frame was sent,
+        // but not before the previous acknowledgement. If the acknowledgement arrives sooner than
+        // the known round trip allows, the known round trip is too long and is not used.
         let idle_start =
             |round_trips: f64| frame.sent + known.unwrap_or_default().mul_f64(round_trips);
         let previous = last_acked.filter(|[_, acked_at]| *acked_at > idle_start(0.9));
@@ -375,9 +377,9 @@ impl FlowControl {
             },
         };
         self.ack_sample = Some(sample);
-        // If the connection held back the first of two acknowledgements, they arrive closer
-        // together than the frames were sent. The longest possible time is therefore at least the
-        // time between the sending of both frames.
+        // If the connection delays the first of two acknowledgements, both arrive closer together
+        // than the frames were sent. The upper bound of the time is therefore at least the time
+        // between the sending of the two frames.
         let sending = sample.sent_from.map(|from| frame.sent.saturating_sub(from));
         let longest = at.saturating_sub(sample.earliest_start).max(sending.unwrap_or_default());
         let shortest = at.saturating_sub(sample.latest_start);
@@ -470,8 +472,8 @@ impl FlowControl {
                 }
                 let is_active = now < self.active_until;
                 // While the user is active and the connection is busy, at most one frame is in
-                // flight, or two if the second shows the effect of input. Input then waits for at
-                // most the frame being transmitted.
+                // flight, or two if the second shows the effect of input. The effect of an input
+                // then waits for at most one frame, the one in transmission.
                 let limit = match is_active && self.clear_at > now {
                     true => 1 + usize::from(answers),
                     false => self.target_in_flight(),
@@ -511,8 +513,8 @@ impl FlowControl {
         (self.rate * time.as_secs_f64()).max(BUDGET[0])
     }
 
-    /// Returns the number of frames in flight with which the connection is always busy: one frame
-    /// in transmission, and as many as the connection transmits in one round trip.
+    /// Returns the number of frames in flight that keeps the connection always busy: one frame in
+    /// transmission, and as many frames as the connection transmits in one round trip.
     fn target_in_flight(&self) -> usize {
         let round_trips =
             self.round_trip.unwrap_or_default().as_secs_f64() / FRAME_SPAN.as_secs_f64();

@@ -26,9 +26,9 @@ pub struct SendQueueEstimate {
     /// Time at which the last frame was sent.
     sent_at: Duration,
     busy: Option<Busy>,
-    /// Last measurement of the rate, if the queue became empty before the measurement had lasted
-    /// for [`SAMPLE`]. The next busy period may continue it. The pair is `(time at which the
-    /// measurement began, total number of bytes that had left the queue until then)`.
+    /// Beginning of the last measurement of the rate, if this measurement was too short: the queue
+    /// became empty before [`SAMPLE`] had passed. The next busy period may continue it. The pair is
+    /// `(time, total number of bytes that had left the queue until then)`.
     short_sample: Option<(Duration, f64)>,
 }
 
@@ -36,10 +36,10 @@ pub struct SendQueueEstimate {
 #[derive(Debug)]
 struct Busy {
     since: Duration,
-    /// Beginning of the measurement of the rate over the whole busy period. If the previous busy
-    /// period was too short for a measurement and began less than [`SAMPLE`] before this one, it is
-    /// the beginning of the previous one. The pair is `(time, total number of bytes that had left
-    /// the queue until then)`.
+    /// Beginning of the measurement of the rate over the whole busy period. The pair is `(time,
+    /// total number of bytes that had left the queue until then)`. Two busy periods count as one if
+    /// the first was too short for a measurement and began less than [`SAMPLE`] before the second.
+    /// The measurement then begins with the first.
     whole: (Duration, f64),
     /// Size in bytes of the only frame that was sent in the busy period; `None` for several frames.
     alone: Option<usize>,
@@ -47,7 +47,8 @@ struct Busy {
     /// `(time, total number of bytes that had left the queue until then)`.
     sample: Option<(Duration, f64)>,
     /// `true` if the send queue was full at some time during the current measurement of the rate.
-    /// Bytes then left it at the rate of the connection.
+    /// The queue is full if it holds as many bytes as flow control permits. Bytes then leave it at
+    /// the rate of the connection.
     is_full: bool,
     /// Time at which bytes last left the send queue; initially the start of the busy period.
     progress: Duration,
@@ -98,8 +99,8 @@ impl SendQueueEstimate {
         }
     }
 
-    /// Returns the earliest time of the next measurement of the send queue, `interval` after the
-    /// last one. Returns `None` if the queue is empty.
+    /// Returns the time of the next measurement of the send queue: `interval` after the last one,
+    /// but at least `SETTLING` after the last frame was sent. Returns `None` if the queue is empty.
     pub fn next_at(&self, interval: Duration) -> Option<Duration> {
         self.busy.as_ref()?;
         let settled = self.sent_at + SETTLING;
@@ -127,8 +128,8 @@ impl SendQueueEstimate {
             self.bytes = bytes as f64;
             return QueueSample::default();
         };
-        // Before `filled_at` the other host cannot have acknowledged any bytes of this busy period.
-        // Earlier measurements are therefore ignored.
+        // Measurements before `filled_at` are ignored, because the other host cannot have
+        // acknowledged any bytes of this busy period yet.
         let filled_at = busy.since + round_trip.map_or(BELIEVED_AFTER, |time| time.mul_f64(0.9));
         if now < filled_at {
             return QueueSample::default();
@@ -141,9 +142,10 @@ impl SendQueueEstimate {
             busy.most_drained = drained;
         }
         busy.is_full |= self.bytes >= limit;
-        // Rate over the whole busy period. Pauses of the connection lower it but cannot raise it.
-        // Less than `SAMPLE` gives no rate, because a relay, or the buffers of the other host, may
-        // have taken the first bytes at once.
+        // Rate over the whole busy period. Pauses of the connection lower it but cannot raise it. A
+        // busy period shorter than `SAMPLE` gives no rate. Its bytes may have been taken at once by
+        // a relay or by the buffers of the other host, without being transmitted at the rate of the
+        // connection.
         let (start, before) = busy.whole;
         let span = now.saturating_sub(start);
         let whole = (span >= SAMPLE).then(|| (drained - before) / span.as_secs_f64());

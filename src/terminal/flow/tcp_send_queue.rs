@@ -1,6 +1,6 @@
-//! TCP send queue of the SSH connection: number of bytes in the kernel that the other host has not
-//! acknowledged (proc(5), `/proc/net/tcp`). It describes only the path to the host at the other end
-//! of the TCP connection, such as a jump host.
+//! Length of the SSH connection's TCP send queue: the number of bytes that the kernel holds because
+//! the other host has not acknowledged them (proc(5), `/proc/net/tcp`). This length describes only
+//! the path to the host at the other end of the TCP connection, such as a jump host.
 
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
@@ -14,7 +14,8 @@ pub struct TcpSendQueue {
 
 impl TcpSendQueue {
     /// Finds the TCP connection of SSH. `ssh_connection` is the value of the environment variable
-    /// `SSH_CONNECTION`, which has its addresses. Returns `None` if the kernel does not list it.
+    /// `SSH_CONNECTION`, which has the addresses of both ends. Returns `None` if the kernel does
+    /// not list the connection.
     pub fn find(ssh_connection: &str) -> Option<Self> {
         let queue = Self::parse(ssh_connection)?;
         queue.bytes().is_some().then_some(queue)

@@ -283,7 +283,7 @@ fn rate_stays_true_after_convergence() {
         let found = flow.reading().unwrap().rate;
         assert!((0.7..1.2).contains(&(found / rate)), "{found:.0} of {rate}");
     }
-    // Two acknowledgements that arrive at the same time prove no rate.
+    // Two acknowledgements that arrive at the same time must not change the estimated rate much.
     let mut flow = FlowControl::new(start(PacingMode::AckClocked(None)));
     let mut wire = Wire { rate: 125e3, round_trip: ms(100), free_at: Duration::ZERO };
     saturate(&mut flow, &mut wire, 40, false);

@@ -65,10 +65,10 @@ pub fn placeholder(row: u16) -> String {
     [Some(PLACEHOLDER), mark.and_then(char::from_u32)].into_iter().flatten().collect()
 }
 
-/// Returns the bytes that show the image file `png` in the cells `place`. If `stretched` or
-/// `through_tmux` is `true`, the terminal scales the image to the size of these cells. If
-/// `through_tmux` is `true`, tmux passes the bytes on to the terminal outside of tmux. This
-/// terminal then shows the image in the cells that contain placeholders.
+/// Returns the bytes that show the image file `png` in the cells `place`. If `through_tmux` is
+/// `true`, tmux passes the bytes on to the terminal outside of tmux, which shows the image in the
+/// cells that contain placeholders. If `stretched` or `through_tmux` is `true`, the terminal scales
+/// the image to the size of the cells `place`.
 pub fn transfer(png: &[u8], place: Rect, stretched: bool, through_tmux: bool) -> Transfer {
     let wrap = |sequence: String| if through_tmux { wrapped(&sequence) } else { sequence };
     let letters = STANDARD.encode(png);

@@ -2,8 +2,8 @@
 //! terminal by kitty's protocol, by sixel, or as half blocks.
 //!
 //! An image is sent in slices within the byte budget of a frame, because a transfer can take
-//! seconds and a key must take effect in tenths of a second. Existing widgets for images send them
-//! as a whole.
+//! seconds and a key must take effect in tenths of a second. Existing widgets for images send an
+//! image as a whole and are therefore not used.
 
 mod kitty;
 mod shrink;
@@ -23,8 +23,8 @@ pub use transfer::Transfer;
 const SIXEL_PX: usize = 1000;
 /// Assumed width and height of a cell in pixels if the terminal does not report them.
 const CELL_PX: [u16; 2] = [8, 16];
-/// Estimated number of bytes per pixel of an encoded image. It gives the size to which an image is
-/// scaled down before it is encoded, so that it keeps the limit of bytes.
+/// Estimated number of bytes per pixel of an encoded image. It determines how far an image is
+/// scaled down before it is encoded, so that the encoded image does not exceed its byte limit.
 const BYTES_PER_PIXEL: f64 = 1.6;
 
 /// Protocol by which images are shown in the terminal.
@@ -58,10 +58,10 @@ pub struct ImageViewport {
     pub max_bytes: Option<f64>,
 }
 
-/// Image prepared for the screen of an [`ImageViewport`].
+/// Image that was scaled and encoded for the screen of an [`ImageViewport`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewerImage {
-    /// Columns and rows of the screen for which the image was prepared.
+    /// Columns and rows of the screen for which the image was scaled and encoded.
     pub screen: [u16; 2],
     /// Width and height of the image in the file, in pixels.
     pub size: [usize; 2],
@@ -141,8 +141,8 @@ impl ImageViewport {
 }
 
 impl ViewerImage {
-    /// Reads the image at `path` and prepares it for `viewport`. `display` converts the linear
-    /// light of an EXR file to 8-bit levels.
+    /// Reads the image at `path`, then scales and encodes it for `viewport`. `display` converts the
+    /// linear light of an EXR file to 8-bit levels.
     ///
     /// # Errors
     /// Fails if the file cannot be read or the screen is too small.
@@ -156,7 +156,8 @@ impl ViewerImage {
         Self::of(size, &pixels, viewport)
     }
 
-    /// Prepares an image of `size` (width, height) pixels for `viewport`. `pixels` are row by row.
+    /// Scales and encodes an image of `size` (width, height) pixels for `viewport`. `pixels` are
+    /// row by row.
     fn of(size: [usize; 2], pixels: &[[u8; 3]], viewport: &ImageViewport) -> Result<Self, String> {
         if size.contains(&0) || viewport.screen[1] < 2 {
             return Err("the screen is too small for a picture".to_string());
@@ -193,10 +194,10 @@ impl ViewerImage {
         Ok(Self { screen, size, shown, protocol, place, raster, transfer })
     }
 
-    /// Returns `(text, color)` for the cells in row `row` of `place`. The text is a placeholder,
-    /// and `color` is the index of its foreground colour. In place of such cells the terminal draws
-    /// the image that was sent to it. Returns `None` if the protocol draws the image without
-    /// placeholders.
+    /// Returns `(text, color)` for each cell in row `row` of `place`. `text` is a placeholder
+    /// character with a mark, and `color` is the index of its foreground colour. The terminal shows
+    /// the image, which was sent before, in place of such cells. Returns `None` if the protocol
+    /// shows the image without placeholders.
     pub fn placeholder(&self, row: u16) -> Option<(String, u8)> {
         let has_placeholders = self.protocol == Protocol::KittyThroughTmux;
         has_placeholders.then(|| (kitty::placeholder(row), kitty::IMAGE))

@@ -57,8 +57,8 @@ mod tests {
             assert!(sixel.starts_with("\x1bP") && sixel.ends_with("\x1b\\"));
             let image = SixelImage::decode(sixel.as_bytes()).unwrap();
             assert_eq!(image.width, width);
-            // Sixel encodes six rows of pixels at a time. The rows of the last six that are below
-            // the strip are transparent.
+            // A sixel encodes a column of six pixels. If the height of a strip is no multiple of 6,
+            // the surplus rows of pixels below the strip are transparent.
             let drawn = image.pixels[..].chunks_exact(4).filter(|pixel| pixel[3] > 0);
             shown.extend(drawn.map(|p| [p[0], p[1], p[2]]));
         }

@@ -1,5 +1,4 @@
-//! Encoded image on its way to the terminal: its bytes, and the positions at which they may be
-//! divided.
+//! Image encoded as terminal output: its bytes, and the positions at which they may be divided.
 
 use std::ops::Range;
 
@@ -11,8 +10,9 @@ pub struct Transfer {
     /// Offsets between escape sequences, in ascending order, at which other output may be sent. The
     /// last offset is the length of `bytes`.
     pub stops: Vec<usize>,
-    /// `true` if the escape sequences of the image may be divided at any byte, and ended early by
-    /// ST (string terminator). Other output may follow only after such an end.
+    /// `true` if the image's escape sequences may be divided at any byte and ended early by ST
+    /// (string terminator). Other output may follow a divided sequence only after its last byte or
+    /// such an early end.
     pub divisible: bool,
     /// Bytes that remove the image from the screen, even if only a part of it was sent.
     pub remove: Vec<u8>,
