@@ -39,8 +39,9 @@ fn shipped_scenes_are_equal_under_every_acceleration_in_double_precision() {
     }
 }
 
-/// Returns a scene with objects of every transformable kind and all sizes, rotated and stretched.
-/// They are around and behind the camera, which may be inside of one of them.
+/// Returns a scene with objects of every shape that allows transforms. The objects have all sizes
+/// and are rotated and stretched. They are around and behind the camera, which may be inside of one
+/// of them.
 fn crowd(numbers: &mut Numbers, count: usize) -> Scene {
     let shapes = [
         "sphere = { center = [0.0, 0.0, 0.0], radius = 0.5 }",
@@ -143,8 +144,9 @@ fn view_angles_are_equal_under_every_acceleration() {
     }
 }
 
-/// Compares the acceleration structures with lenses from tiny to larger than the scene. The lenses
-/// are focused at any distance. The cameras have any view angle, and some are inside of objects.
+/// Compares the acceleration structures for cameras with a lens. The lenses are from tiny to larger
+/// than the scene. The lenses are focused at any distance. The cameras have any view angle, and
+/// some are inside of objects.
 #[test]
 fn lenses_are_equal_under_every_acceleration() {
     check_lenses(0..96);
@@ -193,8 +195,8 @@ const CUBE: &str = "v -0.5 -0.5 -0.5\nv 0.5 -0.5 -0.5\nv 0.5 0.5 -0.5\nv -0.5 0.
     v -0.5 -0.5 0.5\nv 0.5 -0.5 0.5\nv 0.5 0.5 0.5\nv -0.5 0.5 0.5\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 3 4 8 7\nf 1 5 8 4\nf 2 3 7 6\n";
 
-/// Returns a scene with objects of every kind on a coarse grid, so that faces are coplanar with
-/// others. Eye and light are on the grid as well, mostly exactly on surfaces.
+/// Returns a scene with objects of every kind on a coarse grid, so that some faces are coplanar
+/// with faces of other objects. Eye and light are on the grid as well, mostly exactly on surfaces.
 fn coplanar(numbers: &mut Numbers, count: usize, folder: &Path) -> Scene {
     let shapes = [
         "box = { center = [0.0, 0.0, 0.0], size = [1.0, 1.0, 1.0] }",

@@ -155,8 +155,8 @@ impl<'a, S: Float> CompiledMaterials<'a, S> {
 
 /// Height of emitters (lights with a size) above the surfaces that they touch. The unit is the
 /// larger of two rounding errors: that of the scene's extent, and that of the coordinates in the
-/// scene file. Rays that leave a surface start at about half this height, which is below the
-/// emitter; they can therefore hit it.
+/// scene file. Rays that leave a surface start at about half this height, below the emitter, so
+/// they can hit the emitter.
 const EMITTER_LIFT: f64 = 16.0;
 
 /// Returns the distance by which lights with a size are moved off the surfaces that they touch; see

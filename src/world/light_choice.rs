@@ -51,11 +51,12 @@ struct Stratum<S> {
     /// one path traces shadow rays at a surface). If a set has no light of the stratum, its
     /// coordinates are NaN; the test whether the surface faces the light then fails.
     positions: [Table<S>; 3],
-    /// Irradiance of the stratum's lights (one for each set) at normal incidence, if it is the same
-    /// at every distance. 0 for lights whose irradiance decreases with the square of the distance.
+    /// Irradiance of the stratum's lights at normal incidence, one value for each set. It is 0 for
+    /// lights whose irradiance decreases with the square of the distance. The irradiance of other
+    /// lights is the same at every distance.
     constant: Table<S>,
-    /// Red, green and blue of the emission (colour times intensity) by which the lights' samples
-    /// are multiplied in the film.
+    /// Red, green and blue of the emission (colour times intensity) by which the tracer multiplies
+    /// the lights' samples.
     emission: [Table<S>; 3],
 }
 
@@ -76,8 +77,9 @@ pub(super) struct ChosenSets<'a, S> {
 }
 
 impl<S: Float> LightChoice<S> {
-    /// Removes from `sources` the lights of which paths choose a few: point lights that are not on
-    /// a surface. Returns `None` if they are so few that shadow rays go to all of them.
+    /// Removes from `sources` the lights among which paths choose: point lights that emit in all
+    /// directions and are not on a surface. Returns `None`, and removes nothing, if there are fewer
+    /// than `MIN_LIGHTS` of them.
     pub fn take(sources: &mut Vec<DeltaSource<S>>) -> Option<Self> {
         let is_point = |source: &DeltaSource<S>| {
             matches!(source.light.light, DeltaLight::Point { cone: None, .. })
@@ -119,7 +121,7 @@ impl<S: Float> LightChoice<S> {
     /// Chooses a set of lights for each lane. `number` is uniform in [0, 1).
     #[inline(always)]
     pub fn choose<L: SimdFloat<Scalar = S>>(&self, number: L) -> ChosenSets<'_, S> {
-        // The product with a power of two is exact.
+        // The product with a power of two is exact, so it is less than the number of sets.
         let place = number * L::from_f64(self.sets as f64);
         let set = |lane: usize| if lane < L::WIDTH { place.lane(lane).to_u32() } else { 0 };
         ChosenSets { choice: self, sets: array_from_fn(set) }
@@ -128,7 +130,8 @@ impl<S: Float> LightChoice<S> {
 
 impl<S: Float> Table<S> {
     /// Creates a table of one property of lights, with a value for each of `sets` sets. `values`
-    /// are the values of the lights; `absent` is the value of sets without a light.
+    /// are the values of the lights, and `absent` is the value for sets without a light of the
+    /// stratum.
     fn new(values: impl Iterator<Item = S> + Clone, absent: f64, sets: usize) -> Self {
         let absent = S::from_f64(absent);
         let is_full = values.clone().count() == sets;
@@ -209,8 +212,8 @@ impl<S: Float> ChosenSets<'_, S> {
     }
 
     /// Returns the emission (colour times intensity) of each lane's chosen light in the stratum
-    /// number `stratum` (a spatial group of lights). The emission is 1 if the lights' samples are
-    /// not multiplied by an emission.
+    /// number `stratum` (a spatial group of lights). The emission is 1 if the tracer does not
+    /// multiply the lights' samples by an emission.
     #[inline(always)]
     pub fn emission<L: SimdFloat<Scalar = S>>(&self, stratum: usize) -> Vec3<L> {
         self.gather(&self.choice.strata[stratum].emission)

@@ -24,8 +24,8 @@ pub const MAX_GROUPS: usize = MAX_LIGHT_GROUPS + 2;
 /// size; further lights share the last group.
 const FILM_BYTES: u64 = 1 << 30;
 
-/// Bytes per pixel and light group: a sum of eight bytes for each of two replicates (halves of the
-/// samples) and three channels.
+/// Bytes that the film stores per pixel for one light group. Each of the two replicates, which are
+/// halves of the samples, has one sum of eight bytes for each of three channels.
 const GROUP_BYTES: u64 = 2 * 3 * 8;
 
 /// Source of the light in one light group.
@@ -79,8 +79,8 @@ pub struct LightGroups {
 impl LightGroups {
     /// Creates the light groups of `scene`. If `merge_lights` is `true`, all lights and emissive
     /// materials share one group. Otherwise each has a group of its own, with two exceptions that
-    /// share the last group: the point lights of a scene with `MIN_LIGHTS` or more of them, and
-    /// the lights and materials for which the film has no further group.
+    /// share the last group: the point lights of a scene with `MIN_LIGHTS` or more of them, and the
+    /// lights and materials beyond the largest number of groups.
     ///
     /// `lit` is `true` if some surface reflects direct light, and `ambient` if some surface
     /// reflects ambient light. A light that no surface reflects has a group only if the camera can
@@ -96,8 +96,8 @@ impl LightGroups {
         let mut emitting: Vec<usize> = (0..scene.lights.len()).collect();
         emitting.retain(|i| contributes(&scene.lights[*i], lit));
         let is_point = |i: &usize| scene.lights[*i].point.is_some();
-        // If a scene has many point lights, separate sums for seven of them would take a quarter of
-        // the rendering time.
+        // Many point lights share one group, because separate sums for seven of them would take a
+        // quarter of the rendering time.
         let is_shared = emitting.iter().filter(|i| is_point(i)).count() >= MIN_LIGHTS;
         let (shared, separate): (Vec<_>, Vec<_>) =
             emitting.into_iter().partition(|i| is_shared && is_point(i));
@@ -138,7 +138,7 @@ impl LightGroups {
     }
 
     /// Returns three values for each light in a light group: its index in the scene, the index of
-    /// the group, and its emission. The film's samples of the light are multiplied by the emission,
+    /// the group, and its emission. The tracer multiplies the light's samples by the emission,
     /// which is 1 for a light with a group of its own.
     pub fn lights(&self, scene: &Scene) -> Vec<(usize, usize, [f64; 3])> {
         let light = |source: &LightGroupSource| match source {
@@ -149,8 +149,8 @@ impl LightGroups {
     }
 
     /// Returns three values for each emissive material: its name, the index of its light group, and
-    /// its emission. The film's samples of the material are multiplied by the emission, which is 1
-    /// for a material with a group of its own.
+    /// its emission. The tracer multiplies the material's samples by the emission, which is 1 for a
+    /// material with a group of its own.
     pub fn materials(&self, scene: &Scene) -> Vec<(String, usize, [f64; 3])> {
         let material = |source: &LightGroupSource| match source {
             LightGroupSource::Material(name) => Some(name.clone()),
@@ -160,8 +160,8 @@ impl LightGroups {
     }
 
     /// Returns three values for each light or emissive material that `select` accepts: the result
-    /// of `select`, the index of the light group, and the emission. The film's samples are
-    /// multiplied by the emission, which is 1 for a source with a group of its own.
+    /// of `select`, the index of the light group, and the emission. The tracer multiplies the
+    /// source's samples by the emission, which is 1 for a source with a group of its own.
     fn emitting<T>(
         &self,
         scene: &Scene,
@@ -283,8 +283,8 @@ pub(super) fn emits(light: &Light) -> bool {
     emission(light) != [0.0; 3]
 }
 
-/// Returns `true` if the light changes the picture: it emits, and surfaces reflect its light or it
-/// is visible. `lit` is `true` if some surface reflects direct light.
+/// Returns `true` if the light changes the picture: it emits, and either surfaces reflect its light
+/// or the camera sees it. `lit` is `true` if some surface reflects direct light.
 pub(super) fn contributes(light: &Light, lit: bool) -> bool {
     let has_radiance = light.surface().is_some() || light.environment.is_some();
     emits(light) && (lit || light.visible && has_radiance)
@@ -401,8 +401,8 @@ mod tests {
         assert!(!reusable(|s| lamp(s).diffuse = 0.5));
         assert!(!reusable(|s| s.materials.get_mut("matt").unwrap().emission = 1.0));
         assert!(!reusable(|s| s.objects[1].material = "lamp".to_string()));
-        // The light group is that of the material's name, so samples cannot be reused under another
-        // name.
+        // A light group is identified by the name of its material, so the samples cannot be reused
+        // if the material has another name.
         assert!(!reusable(|s| {
             let lamp = s.materials.remove("lamp").unwrap();
             s.materials.insert("bulb".to_string(), lamp);

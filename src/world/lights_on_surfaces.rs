@@ -80,8 +80,8 @@ impl<S: Float> OnSurface<S> {
                 inward = inward - normal;
             }
             let lift = Vec3::select(outside, out, inward);
-            // Smallest height above the surfaces in front of which the ray ends, for a point
-            // displaced by `lift` from the light.
+            // Height of the point that is displaced from the light by `lift`: the smallest height
+            // above any of the surfaces in front of which the ray ends.
             let mut least = L::from_f64(L::MAX);
             for normal in normals.iter().map(|n| Vec3::splat(*n)) {
                 let before = to.dot(normal).lt(L::zero()) | !outside;

@@ -10,15 +10,16 @@
 //!   brightest spot is white at 2^16 steps has 20 steps at that level; rounding costs 0.03 8-bit
 //!   levels.
 //! - *The bright end.* With 2^44 steps for the brightest spot, a pixel that shows only this spot
-//!   holds 2^19 samples of each replicate (half of the samples) before its sum saturates: a million
-//!   per pixel. Five bits remain for single samples that are brighter.
+//!   holds 2^19 samples in each replicate before its sum saturates. A replicate is one half of the
+//!   samples, so a pixel holds a million samples. Five bits remain for single samples that are
+//!   brighter.
 //!
-//! The two bounds are 28 bits apart. By default light of typical intensity has 2^28 steps. The
-//! brightest spot may then be 2^16 times as bright, and the brightest spot of the dimmest surface
-//! 2^-12 times. If a scene exceeds both bounds, the bright end has precedence: a saturated sample
-//! changes the picture visibly, a sample smaller than a step does not. The dim end has precedence
-//! over two kinds of bright light: spots smaller than a pixel, and light amplified by mirrors. Such
-//! samples may saturate; the film counts saturated samples.
+//! The two bounds are 28 bits apart. By default the typical radiance has 2^28 steps. The brightest
+//! spot may then be up to 2^16 times as bright as the typical radiance. The brightest spot of the
+//! dimmest surface may be down to 2^-12 times as bright. If a scene exceeds both bounds, the bright
+//! end has precedence: a saturated sample changes the picture visibly, a sample smaller than a step
+//! does not. The dim end has precedence over two kinds of bright light: spots smaller than a pixel,
+//! and light amplified by mirrors. Such samples may saturate; the film counts saturated samples.
 
 use crate::asset::RadianceMap;
 use crate::camera::PerspectiveCamera;
@@ -53,14 +54,13 @@ const SPOT_BITS: f64 = 12.0;
 /// scale of the film is chosen for this range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct RadianceRange {
+    /// Radiance of a white surface in the middle of the scene, lit by the light group.
+    pub typical: f64,
     /// Radiance of the brightest spot of the dimmest surface: the minimum, over all surfaces, of
     /// the radiance of their brightest spots.
-    pub typical: f64,
+    pub dimmest: f64,
     /// Radiance of the brightest spot of the brightest surface: the maximum, over all surfaces, of
     /// the radiance of their brightest spots. Spots smaller than a quarter of a pixel are ignored.
-    pub dimmest: f64,
-    /// Radiance of the brightest spot of each surface: the largest value over all surfaces. Spots
-    /// smaller than a quarter of a pixel are ignored.
     pub brightest: f64,
     /// Radiance of the brightest spot of the picture outside of highlights, including spots smaller
     /// than a pixel.
@@ -222,8 +222,8 @@ impl<'a> SceneDistances<'a> {
         };
         let without_direct = materials.iter().filter(|m| Response::new(m).is_none());
         let faintest = least_of(without_direct.copied().filter_map(passed_on).flatten());
-        // Fresnel's equations divide the light between reflection and transmission. Constant
-        // coefficients may have a sum above 1.
+        // Fresnel's equations for a dielectric divide the light between reflection and
+        // transmission. In the other modes the coefficients of both may have a sum above 1.
         let max_factors = materials.iter().map(|m| match m.fresnel_mode() {
             Fresnel::Dielectric => m.reflection.max(m.transmission),
             _ => m.reflection + m.transmission,
@@ -280,8 +280,8 @@ impl<'a> SceneDistances<'a> {
             RadianceRange { typical, dimmest: f64::INFINITY, brightest: 0.0, spots, extreme: 0.0 };
         for (form, response) in self.forms.iter().zip(&self.responses) {
             let Some(response) = response else { continue };
-            // A light on a surface does not illuminate that surface, because rays that leave it
-            // start above the light.
+            // A light on a surface does not illuminate that surface, because shadow rays from the
+            // surface start above the light.
             if let Some(distance) = form.clearance(position).filter(|d| *d > self.ray_offset) {
                 let radiance = radiance_at(distance.max(min_distance));
                 out.brightest = out.brightest.max(radiance * response.most);
@@ -319,7 +319,7 @@ impl<'a> SceneDistances<'a> {
                 let (center, radius) = (0.5 * (low + high), 0.5 * low.distance(high));
                 self.emitting_surface((center, radius), 4.0 * PI * radius * radius, 1.0, true)
             }
-            // The light of an infinite plane is the same everywhere.
+            // The irradiance from an infinite emissive plane is the same at every distance.
             None => {
                 let Response { least, most, peak } = self.response();
                 self.range_of(1.0, (least, most.max(1.0), peak.max(1.0)))
@@ -386,8 +386,9 @@ impl<'a> SceneDistances<'a> {
         if !visible {
             return range;
         }
-        // Bright pixels of the environment's image may be smaller than a pixel of the picture. They
-        // count as `spots`; for `brightest`, the mean of the image counts.
+        // Bright pixels of the environment's image may be smaller than a pixel of the picture.
+        // Their radiance therefore counts as `spots` but not as `brightest`, which is at least the
+        // mean of the image.
         let dimmest = map.min().unwrap_or(typical).max(1e-6 * typical);
         RadianceRange {
             dimmest: range.dimmest.min(dimmest * self.faintest),
@@ -446,8 +447,8 @@ mod tests {
         assert_eq!(exponent(&|b| b.dimmest = 2f64.powi(-12)), 28.0);
         assert_eq!(exponent(&|b| (b.brightest, b.spots) = (bright, bright)), 24.0);
         assert_eq!(exponent(&|b| (b.brightest, b.spots) = (far, far)), -16.0);
-        // Spots smaller than a pixel and amplified light do not lower the scale below the bound of
-        // the dim end, 2^16.
+        // Spots smaller than a pixel and amplified light do not lower the scale below the bound for
+        // dim surfaces, 2^16 steps.
         assert_eq!(exponent(&|b| b.spots = far), 16.0);
         assert_eq!(exponent(&|b| b.spots = f64::INFINITY), 16.0);
         assert_eq!(exponent(&|b| b.extreme = bright), 28.0);

@@ -106,7 +106,7 @@ impl LightGroups {
     }
 }
 
-/// Returns a copy of the material that emits nothing.
+/// Returns a copy of `material` without its emission.
 fn without_emission(material: &Material) -> Material {
     Material { emission: 0.0, emission_color: Color::WHITE, ..material.clone() }
 }

@@ -30,8 +30,8 @@ use std::collections::{HashMap, HashSet};
 /// single precision.
 const MAX_TRIANGLES: usize = 1 << 16;
 
-/// Largest distance between a point sampled on an emissive object and the surface of a touching
-/// object, as a multiple of the point's height above its own surface.
+/// Largest distance behind the surface of a touching object at which a point sampled on an emissive
+/// object counts as covered by it. The unit is the height of the point above the emissive surface.
 const CONTACT_LIFTS: f64 = 4.0;
 
 /// Emission of an object, with its light group. The emitter is `None` if points of the object

@@ -145,8 +145,8 @@ impl Reach {
     }
 
     /// Returns the largest possible sum of the throughputs of paths that end because their
-    /// throughput is below `least`. The scene has up to `bounces` diffuse bounces, and `depth`
-    /// surfaces per generation (the part of a path between two diffuse bounces).
+    /// throughput is below `least`. A path has up to `bounces` diffuse bounces, and up to `depth`
+    /// surfaces in each generation. A generation is the part of a path between two diffuse bounces.
     fn ended_by_generation(&self, least: f64, depth: u32, bounces: u32) -> f64 {
         let rest = if self.through { 8.0 * least * f64::from(depth) } else { least };
         (least + rest) * (f64::from(bounces) + 1.0)
@@ -154,8 +154,9 @@ impl Reach {
 
     /// Returns the largest possible sum of the throughputs of paths that end because their
     /// throughput is below `least`, at up to `depth` surfaces after the first. A path that never
-    /// splits ends once. If paths split, each surface ends at most two branches of each of at most
-    /// four simultaneous paths.
+    /// splits ends once. If paths split, at most four branches of a path have hit the same number
+    /// of surfaces. Each of them ends at most two rays at its next surface: the reflected and the
+    /// transmitted one.
     fn ended(&self, least: f64, depth: u32) -> f64 {
         if !self.through {
             return least;
@@ -288,7 +289,7 @@ mod tests {
         assert_eq!(truncation_bounds(&scene("[0.0, 0.0, 5.0]", &[(0.9, BALL)])), [""; 0]);
         assert_eq!(truncation_bounds(&scene("[0.0, 0.0, 5.0]", &[(0.9, FLOOR)])), [""; 0]);
         let inside = truncation_bounds(&scene("[0.0, 0.0, 0.5]", &[(0.9, BALL)]));
-        // 0.9^17 / (1 - 0.9)
+        // The bound is 0.9^17 / (1 - 0.9).
         assert_eq!(
             inside,
             ["max_depth 16 cuts longer paths (at most 1.67e0 of the brightest surface)"]
@@ -305,7 +306,7 @@ mod tests {
     fn a_weak_partner_makes_long_paths_weak() {
         let mut two = scene("[0.0, 0.0, 5.0]", &[(0.9, BALL), (0.1, FLOOR)]);
         two.trace.max_depth = 3;
-        // Four reflections: 0.09^2 (1 + 0.9) / (1 - 0.09)
+        // The bound for paths of four or more reflections is 0.09^2 (1 + 0.9) / (1 - 0.09).
         assert_eq!(
             truncation_bounds(&two),
             ["max_depth 3 cuts longer paths (at most 1.70e-2 of the brightest surface)"]
@@ -332,7 +333,7 @@ mod tests {
                 assert!(told(&solid).contains("no bound"), "{shape} from {eye}");
             }
         }
-        // 0.5^17 / (1 - 0.5)
+        // The bound is 0.5^17 / (1 - 0.5).
         assert_eq!(
             truncation_bounds(&with(0.4, Fresnel::Dielectric, outside, BALL)),
             ["max_depth 16 cuts longer paths (at most 1.53e-5 of the brightest surface)"]
@@ -407,7 +408,8 @@ mod tests {
     fn least_weights_end_paths_that_divide_more_than_once() {
         let mut opaque = scene("[0.0, 0.0, 5.0]", &[(0.5, BALL), (0.5, FLOOR)]);
         opaque.trace.min_throughput = 0.01;
-        // `min_throughput` times the sum of all w(n): 0.01 (1 + 0.5) / (1 - 0.25)
+        // `min_throughput` times the sum of all w(n), the largest throughputs after n surfaces:
+        // 0.01 (1 + 0.5) / (1 - 0.25)
         assert_eq!(
             truncation_bounds(&opaque)[1],
             "min_throughput 0.01 cuts weaker paths (at most 2.00e-2 of the brightest surface)"

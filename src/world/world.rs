@@ -27,8 +27,8 @@ pub(super) struct LightSource<T, S> {
     /// Index of the light group (part of the picture that the film stores separately) that the
     /// light belongs to.
     pub group: usize,
-    /// Emission (colour times intensity) by which the light's samples are multiplied in the film,
-    /// for a light that shares its light group. `None` for a light with a group of its own.
+    /// Emission (colour times intensity) by which the tracer multiplies the light's samples, for a
+    /// light that shares its light group. `None` for a light with a group of its own.
     pub emission: Option<[S; 3]>,
     /// `true` if the camera and reflected rays see the light. Lights without a size are never
     /// visible; the field has no effect on them.
@@ -46,7 +46,7 @@ impl<T, S: Float> LightSource<T, S> {
         }
     }
 
-    /// Returns the same light group and emission with the light replaced by `light`.
+    /// Returns a copy of this source in which `light` takes the place of the light.
     #[inline(always)]
     pub fn with_light<U>(&self, light: U) -> LightSource<U, S> {
         let Self { group, emission, visible, .. } = *self;
@@ -57,8 +57,8 @@ impl<T, S: Float> LightSource<T, S> {
 /// Light without a size, and the end points of shadow rays to it.
 pub(super) struct ShadowRayTarget<S> {
     pub light: DeltaLight<S>,
-    /// End points of shadow rays to a light that is located on a surface. `None` for a light that
-    /// is not; shadow rays end at the light itself then.
+    /// End points of shadow rays to a light that is located on a surface. `None` for other lights,
+    /// whose shadow rays end at the light itself.
     pub on_surface: Option<OnSurface<S>>,
 }
 
@@ -76,8 +76,8 @@ pub(super) type EnvironmentSource<S> = LightSource<EnvironmentLight, S>;
 pub struct World<L: SimdFloat> {
     /// All primitives of the scene, in coordinates relative to the scene's centre.
     pub(super) geometry: Aggregate<L>,
-    /// `true` for each primitive that rays hit only from outside: a convex solid that contains
-    /// neither the eye nor a transmitted ray.
+    /// `true` for each primitive that rays hit only from outside: a convex solid in which no camera
+    /// ray starts and no transmitted ray runs.
     pub(super) outside_only: Vec<bool>,
     /// Index of the BSDF of each primitive in `bsdfs`, the world's list of BSDFs.
     pub(super) bsdf_of: Vec<u32>,
@@ -112,10 +112,10 @@ pub struct World<L: SimdFloat> {
     pub(super) nested_dielectrics: Option<NestedDielectrics<L>>,
     /// Largest number of surfaces on a path after the first; 0 if no surface reflects or transmits.
     pub(super) depth: u32,
-    /// Smallest throughput, in the brightest channel, with which a path continues.
+    /// Limits of diffuse bounces. `None` if the scene has no indirect diffuse light.
     pub(super) diffuse_limits: Option<DiffuseLimits>,
-    /// Smallest throughput with which a path continues. The throughput is that of its largest
-    /// channel.
+    /// Smallest throughput with which a path continues. The throughput of a path is that of its
+    /// largest channel.
     pub(super) min_weight: f64,
     /// `true` if sampled directions that point into the surface are mirrored at its tangent plane.
     pub(super) fold: bool,
@@ -134,8 +134,8 @@ pub struct World<L: SimdFloat> {
     /// `true` if samples are distributed over the area of their pixel instead of its centre.
     pub(super) jitter: bool,
     pub(super) inventory: String,
-    /// One sentence for each limit of the scene that ends paths early, with a bound of the lost
-    /// light.
+    /// One sentence for each limit of the scene that ends paths early, with an upper bound of the
+    /// light that is lost.
     pub(super) truncation_biases: Vec<String>,
 }
 

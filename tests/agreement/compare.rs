@@ -51,7 +51,7 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// Cache of results by their inputs. Tests that compare the same pictures share it.
+/// Cache that maps inputs to results. Tests that compare the same pictures share one cache.
 pub struct Memo<K, V>(Mutex<Vec<(K, Slot<V>)>>);
 
 /// Cached result, which is computed when a test first asks for it.
@@ -84,11 +84,11 @@ impl<K: PartialEq, V: Clone> Memo<K, V> {
 pub struct Picture {
     size: [u32; 2],
     mean: Vec<DVec3>,
-    /// Half the difference of the two replicates (halves of the samples) of each pixel: the noise
-    /// of `mean`.
+    /// Estimate of the noise of `mean`: half the difference of the two replicates (halves of the
+    /// samples) of each pixel.
     half: Vec<DVec3>,
-    /// Half the difference of the two replicates of each pixel, in a picture with independent
-    /// random numbers.
+    /// Estimate of the noise of a second picture, which is rendered with independent random
+    /// numbers: half the difference of its two replicates at each pixel.
     random: Vec<DVec3>,
     samples: u32,
 }
@@ -213,8 +213,9 @@ fn blocks([width, height]: [u32; 2]) -> Vec<Vec<usize>> {
     corners.flat_map(|y| (0..width).step_by(BLOCK).map(move |x| block(x, y))).collect()
 }
 
-/// Returns the difference between the variances of the two programs' single samples, pooled over
-/// the picture, in standard errors. The standard error is estimated from the spread of the blocks.
+/// Compares the variance of single samples between the two programs. Returns the difference of the
+/// variances, pooled over the picture, in standard errors. The standard error is estimated from the
+/// spread of the differences over the blocks.
 pub fn variances_differ_by(
     reference: &[Estimate],
     reference_samples: u32,

@@ -40,8 +40,8 @@ pub struct Body {
     tree: Tree,
 }
 
-/// Distance from a crossing to the two tested points before and behind it, as a multiple of the
-/// length of the ray's direction.
+/// Distance of the two tested points, before and behind a crossing, from the crossing. The unit is
+/// the length of the ray's direction.
 const ASIDE: f64 = 1e-7;
 
 /// Hit of a ray on an object: distance, normal, index of the simple shape, and index of the

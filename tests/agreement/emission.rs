@@ -53,8 +53,8 @@ impl Shine {
         (!corners.is_empty()).then_some(Self::Triangles(corners))
     }
 
-    /// Returns a uniform random point of the surface, the normal of the front there, and the area
-    /// of the surface.
+    /// Returns three values: a uniform random point of the surface, the unit normal of the
+    /// surface's front at this point, and the area of the surface.
     pub fn point(&self, numbers: &mut Numbers) -> (DVec3, DVec3, f64) {
         match self {
             Self::Sphere(center, radius) => {

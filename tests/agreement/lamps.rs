@@ -86,9 +86,9 @@ impl Lamp {
         }
     }
 
-    /// Samples a uniform random point of the lamp. Returns the light that arrives from it at `from`
-    /// if the lamp has unit radiance. Returns `None` if the front of the lamp at this point faces
-    /// away from `from`.
+    /// Samples a uniform random point of the lamp. Returns the light that arrives at `from` from
+    /// this point if the lamp has unit radiance. Returns `None` if the front of the lamp at this
+    /// point faces away from `from`.
     pub fn sample(
         &self,
         from: DVec3,

@@ -11,8 +11,8 @@ use crate::world::culling::light_projection::{LightProjection, ProjectedBounds};
 /// the light. If more primitives overlap the cell, those closest to the light are kept.
 const MAX_PER_CELL: usize = 16;
 
-/// Value of [`Entry::exempt_item`] for a primitive that is not exempt from any test. It can occlude
-/// even shadow rays that start on its own outside, so all rays are tested against it.
+/// Value of [`Entry::exempt_item`] for a primitive against which all shadow rays are tested,
+/// because it can occlude even shadow rays that start on the outside of the primitive itself.
 const NO_ITEM: u32 = u32::MAX;
 
 /// Light buffer: lists of the primitives that can occlude one light. Each list belongs to a cell: a

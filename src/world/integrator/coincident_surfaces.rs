@@ -5,9 +5,9 @@
 //! them starts beyond the others. Paths therefore cross coincident surfaces in a fixed order if at
 //! least one of them transmits. The order is that of primitives with a gap of zero width: a ray
 //! first leaves the solids that it is inside, then crosses flat primitives, then enters the solids
-//! behind. Several solids on the same side are nested: transparent ones enclose opaque ones, and
-//! transparent solids that are listed later enclose those listed earlier. Flat transparent
-//! primitives are on both sides of opaque ones.
+//! behind. Several solids on the same side of a surface count as nested. Transparent solids enclose
+//! opaque ones, and a transparent solid encloses those that the scene file lists before it. Flat
+//! transparent primitives are on both sides of opaque ones.
 //!
 //! The *layer* of a surface is a number that gives its position in this order along the ray.
 //! Surfaces where the ray leaves a solid have negative layers, surfaces where it enters a solid

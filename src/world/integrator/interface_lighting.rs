@@ -5,8 +5,8 @@
 //! ray to it. The second one samples the direction of the reflected or transmitted ray, which may
 //! hit the emitter. A shadow ray does not pass through glass: inside a solid, it ends at the far
 //! side. Rays that enter a solid therefore use the second strategy only, with full weight. Both
-//! strategies are used, and weighted, for reflected rays, for rays that leave a solid and at thin
-//! surfaces.
+//! strategies are combined, with weights, in three cases: for reflected rays, for rays that leave a
+//! solid, and at thin surfaces.
 
 use crate::bvh::Ray;
 use crate::lanes::{Mask, SimdFloat, Vec3};

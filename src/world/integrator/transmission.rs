@@ -91,7 +91,7 @@ impl<L: SimdFloat> TransmissionIntegrator<'_, L> {
         let mut counts = Counts::default();
         // Reflected branches that are traced after the transmitted branches of the same interface.
         // Entry i starts at interface i + 1. Branches are large, so they are traced where they are
-        // stored. The array literal leaves the bytes of unused entries uninitialised.
+        // stored, and the array literal leaves the bytes of unused entries uninitialised.
         let mut waiting: [Option<Branch<L>>; SPLIT_DEPTH] = [None, None];
         // Number of the entry of `waiting` whose branch is traced, counted from 1; 0 stands for
         // `start`.
