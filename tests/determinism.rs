@@ -168,7 +168,7 @@ fn film_does_not_depend_on_pixels_per_packet_in_any_scene() {
     let pool = pool(2);
     let mut differing = Vec::new();
     for (name, scene) in all_shipped() {
-        // Four tiles, three of them narrower or lower than a whole one.
+        // The picture has four tiles. Three of them are narrower or lower than a full tile.
         let scene = sized(scene, [21, 19]);
         for precision in PRECISIONS {
             let expected = film_of_samples(&scene, precision, 16).bytes();
@@ -191,8 +191,8 @@ fn film_does_not_depend_on_pixels_per_packet_in_any_scene() {
 #[test]
 fn interleaved_first_pass_equals_a_plain_wave() {
     let pool = pool(2);
-    // This scene is so wide that some tiles of a row share no packet. It is black in parts, and has
-    // a BVH.
+    // The picture of this scene is so wide that some pairs of tiles in a row have no packet in
+    // common. Parts of the picture are black, and the scene has a BVH.
     let wide = ("wide".to_string(), sized(shipped("reflecting-tracks.toml"), [300, 40]));
     for (name, scene) in scenes().into_iter().chain([wide]) {
         for precision in PRECISIONS {

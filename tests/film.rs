@@ -58,8 +58,8 @@ fn trace_pixel(tile: &mut Tile, [x0, y0]: [usize; 2], replicate: usize, pixel: u
     }
 }
 
-/// Adds the samples `range` of one replicate (half of the samples) to the tiles `tiles`, in that
-/// order.
+/// Adds the samples `range` of one of the two replicates (halves of the samples) to the tiles
+/// `tiles`, in the order of the list.
 fn trace(film: &mut Film, tiles: &[usize], replicate: usize, range: Range<u32>) {
     for slot in film.slots(tiles) {
         trace_slot(slot, replicate, range.clone());
@@ -213,7 +213,7 @@ fn extreme_28_milliard_samples() {
 
 #[test]
 fn extreme_28_saturation_is_flagged() {
-    // The limit is (2^63 - 1) / 2^28, about 3.4e10 radiance times samples.
+    // The sum of the radiance of a pixel's samples is limited to (2^63 - 1) / 2^28, about 3.4e10.
     let (scale, white) = (2f64.powi(28), LightWeights { weights: vec![[1.0; 3]] });
     let mut film = film_of(1, 1, &[scale]);
     let tile = film.slots(&[0]).remove(0).prepare();

@@ -127,8 +127,8 @@ pub fn wide_lobe(
     }
 }
 
-/// Returns the highlight of a light in direction `l`: radiance towards `v` per irradiance of a
-/// surface that faces the light.
+/// Returns the highlight of a light in direction `l`: the radiance towards `v`, divided by the
+/// irradiance that a surface facing the light would receive.
 pub fn highlight(material: &Material, n: DVec3, v: DVec3, l: DVec3) -> DVec3 {
     let k = material.specular;
     if k == 0.0 {

@@ -1,6 +1,6 @@
-//! Shapes of the reference tracer as simple pieces: spheres, polygons, infinite planes, discs and
-//! the sides of cones, in the coordinates of their descriptions. No code is shared with the
-//! program.
+//! Shapes of the reference tracer as simple pieces: spheres, polygons, infinite planes, discs, tori
+//! and the sides of cones, in the coordinates of the shapes' descriptions. No code is shared with
+//! the program.
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use zerkalo::scene::TransformOp;

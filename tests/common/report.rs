@@ -1,5 +1,6 @@
-//! Output for the table of extremes (scenes at which renderers fail) in docs/accuracy.md. A test
-//! prints its result once it has passed, and `benches/accuracy.sh extremes` collects the output.
+//! Output for the table of extremes (scenes that renderers often render wrongly) in
+//! docs/accuracy.md. A test prints its result once it has passed, and `benches/accuracy.sh
+//! extremes` collects the output.
 #![allow(dead_code, reason = "each of the two test programs uses a part")]
 
 use zerkalo::lanes::SimdFloat;

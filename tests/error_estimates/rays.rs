@@ -117,8 +117,9 @@ fn rays_at(curve: &[Point], square: f64) -> f64 {
 }
 
 /// Prints the number of rays of adaptive pictures, divided by that of uniform pictures with the
-/// same true error. It takes 200 scenes, or `ZERKALO_SCENES` scenes from number `ZERKALO_FIRST` on.
-/// `ZERKALO_SEEDS` is the number of seeds (default 4, for single balls 48 times as many).
+/// same true error. The survey covers 200 scenes, or `ZERKALO_SCENES` scenes from number
+/// `ZERKALO_FIRST` on. `ZERKALO_SEEDS` is the number of seeds for each scene, by default 4. Scenes
+/// of single balls get 48 times as many seeds.
 #[test]
 #[ignore = "twenty minutes: cargo test --test engine error_estimates::rays::survey_of_rays -- --ignored --nocapture"]
 fn survey_of_rays() {

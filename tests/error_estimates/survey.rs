@@ -1,5 +1,5 @@
-//! Survey over random sparse and dense scenes. Compares the reported with the true error, and the
-//! rays of adaptive pictures with those of uniform pictures of the same true error.
+//! Survey over random sparse and dense scenes. Compares the reported error with the true error, and
+//! the number of rays of adaptive pictures with that of uniform pictures of the same true error.
 //!
 //! The short form runs with all tests. The long form prints a table of 200 scenes: `cargo test
 //! --test engine error_estimates::survey -- --ignored --nocapture`.
@@ -98,9 +98,10 @@ pub fn target_of(number: u64) -> f64 {
 }
 
 /// Compares the reported and the true error of adaptive pictures of a scene. If k pixels carry the
-/// noise of a picture, its true error scatters by the share 1 / sqrt(2 k), and so does any estimate
-/// of the error. Seeds are therefore added until their pictures together have [`ENOUGH`] such
-/// pixels, but at most `seeds`. The first eight seeds are compared with uniform pictures.
+/// noise of a picture, its true error has the relative standard deviation 1 / sqrt(2 k), and so has
+/// any estimate of this error. Seeds are therefore added until their pictures together have
+/// [`ENOUGH`] such pixels, but at most `seeds`. The first eight seeds are compared with uniform
+/// pictures.
 fn examine(number: u64, reference_count: u32, seeds: u64) -> Outcome {
     let sample = scene(number);
     let reference = Reference::new(&sample, reference_count);
@@ -139,8 +140,9 @@ fn examine(number: u64, reference_count: u32, seeds: u64) -> Outcome {
 }
 
 /// Checks that the true error agrees with the reported one within their uncertainty. Each error is
-/// the root of a mean of k squares, for k effective pixels, and uncertain by the share 1 / sqrt(2
-/// k). Also checks that adaptive sampling takes at most 1.5 times the rays of uniform sampling.
+/// the root of a mean of k squares, where k is the number of effective pixels (pixels that carry
+/// the noise). Its relative standard deviation is 1 / sqrt(2 k). Also checks that adaptive sampling
+/// takes at most 1.5 times the rays of uniform sampling.
 fn assert_honest(outcomes: &[Outcome]) {
     let mut scores = Vec::new();
     for Outcome { name, ratio, pixels, rays, .. } in outcomes.iter().filter(|o| o.pixels >= 16.0) {

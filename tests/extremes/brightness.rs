@@ -31,7 +31,7 @@ fn mean(rendering: &RenderState) -> f64 {
 const MATT: f64 = 0.8;
 
 /// Returns a scene that looks straight down on a surface from `height`, with a lamp beside the eye.
-/// The view angle is small, so that every pixel has the radiance [`MATT`] intensity / (pi
+/// The view angle is small. Every pixel therefore has the radiance [`MATT`] x intensity / (pi x
 /// height^2).
 fn below_a_lamp(height: f64, place: [f64; 3], object: &str) -> Scene {
     parsed(&to_toml(height, place, object))
@@ -215,8 +215,9 @@ fn distant_object_leaves_surface_near_lamp_unchanged() {
     assert!((alone - both).abs() < 1e-4 && (alone - 1.0).abs() < 0.01, "{alone} {both}");
 }
 
-/// Checks that lights 2^40 times as strong or as weak give the same picture, multiplied by that
-/// factor. One of the films has a scale other than the default.
+/// Checks that multiplying the intensity of a light by 2^40 or 2^-40 multiplies every pixel by
+/// exactly this factor. One of the films has a scale of its fixed-point numbers other than the
+/// default.
 #[test]
 fn light_intensity_in_powers_of_two_scales_picture_exactly() {
     let scenes = [

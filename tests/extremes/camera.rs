@@ -123,7 +123,7 @@ fn check_frames<L: SimdFloat>(bound: f64) {
                         2 => {
                             DVec3::new(0.0, side.y * tilt * 1e-6, pole * (1.0 - f64::EPSILON / 2.0))
                         }
-                        // Normals near the equator, where the sign changes.
+                        // Normals near the equator, where the sign of z changes.
                         _ => DVec3::new(side.x, side.y, pole * tilt).normalize(),
                     }
                 }

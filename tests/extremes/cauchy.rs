@@ -157,8 +157,8 @@ impl Tally {
     }
 }
 
-/// Returns a random line through a ball, with a uniform direction and a uniform point of the disc
-/// perpendicular to it.
+/// Returns a random line through a ball, with a uniform direction, and through a uniform point of
+/// the disc that contains the centre and is perpendicular to the direction.
 fn through_ball(numbers: &mut Numbers, center: DVec3, radius: f64) -> Line {
     let d = numbers.direction();
     let (u, v) = d.any_orthonormal_pair();
@@ -193,8 +193,8 @@ fn through_box(numbers: &mut Numbers, center: DVec3, half: DVec3) -> Line {
 }
 
 const LINES: usize = 62 << 14;
-/// Number of lines traced together. It is small because the allocator returns large blocks to the
-/// system after each use.
+/// Number of lines traced together. It is small because the allocator returns large blocks of
+/// memory to the system after each use, which takes time.
 const BLOCK: usize = 1 << 9;
 
 fn tally<L: SimdFloat>(
@@ -215,7 +215,8 @@ fn tally<L: SimdFloat>(
     tally
 }
 
-/// Checks Cauchy's laws on all kinds of shapes (closed form 8).
+/// Checks the laws of Cauchy and Crofton on all kinds of convex shapes: the share of lines that hit
+/// a shape, and the mean length of chords.
 #[test]
 fn extreme_07_cauchy() {
     let mut worst = [0f64; 2];

@@ -14,7 +14,7 @@ fn nudged(x: f64, units: i32, epsilon: f64) -> f64 {
     x * (1.0 + f64::from(units) * epsilon)
 }
 
-/// Checks a box with a hole from its top. The top of the shape that cuts the hole is `units` times
+/// Checks a box with a hole in its top. The top of the shape that cuts the hole is `units` times
 /// the rounding error above or below the top of the box. No ray from above hits a surface in the
 /// opening.
 fn check_flush<L: SimdFloat>(units: i32, rays: usize) {
@@ -95,7 +95,8 @@ fn check_fused<L: SimdFloat>(units: i32) {
     if units > -2 {
         return;
     }
-    // Rays from outside at the common face, where the boxes overlap by more than a rounding error.
+    // Rays from above to the edge of the common face. The boxes overlap there by more than a
+    // rounding error.
     let lines: Vec<Line> = (0..60_000)
         .map(|n| {
             let off = numbers.between(-40.0, 40.0) * L::EPSILON;

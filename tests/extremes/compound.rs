@@ -64,7 +64,8 @@ fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<Li
             let Some(hit) = hit else { continue };
             let t = t + hit.t;
             out[*i].push(LineHit { t, ..hit });
-            // The next ray starts past the surface by more than its rounding error, grazing or not.
+            // The next ray starts past the surface by more than the rounding error of the hit, even
+            // at grazing incidence.
             let cosine = hit.normal.dot(lines[*i].1).abs().max(1e-7);
             next.push((*i, t + 64.0 * L::EPSILON * 8.0 / cosine));
             assert!(out[*i].len() < 200, "{:?} has no end", lines[*i]);
@@ -155,9 +156,9 @@ fn tree_contains(tree: &Tree, parts: &[Form], p: DVec3) -> bool {
     }
 }
 
-/// Checks random trees of set operations of depth 8. Their surfaces are entered and left
-/// alternately, and the points between surfaces agree with the parts. Half a million rays are
-/// traced in each precision.
+/// Checks random trees of set operations with at most 8 levels. Rays enter and leave the solid
+/// alternately. A point between two hits is inside or outside of the solid, as the set operations
+/// on the parts say. Half a million rays are traced in each precision.
 #[test]
 fn extreme_08_parity() {
     let (mut seen, mut odd, mut line_count) = (0, 0, 0);
@@ -188,8 +189,8 @@ fn extreme_08_parity() {
                 }
                 let t = gap[0] + numbers.between(0.01, 0.99) * (gap[1] - gap[0]);
                 let inside = tree_contains(&tree, &parts, line.0 + line.1 * t);
-                // The tie tolerance hides very thin slivers of the solid. It is very improbable
-                // that a random point lies in one.
+                // The tie tolerance, within which surfaces count as coincident, hides very thin
+                // slivers of the solid. It is very improbable that a random point lies in a sliver.
                 assert_eq!(inside, n % 2 == 1, "{name}: {line:?} at {t} of {ends:?}");
             }
         }
@@ -224,8 +225,8 @@ fn alternates(line: &Line, hits: &[LineHit]) -> bool {
 }
 
 /// Returns the number of lines on which the surfaces of two forms differ in single precision. They
-/// differ if their numbers of hits are unequal, or if distances t differ by more than 1e-5 t
-/// divided by the cosine.
+/// differ if their numbers of hits are unequal, or if the distances t of two hits differ by more
+/// than 1e-5 t, divided by the cosine of the angle of incidence.
 fn differing(a: &Form, b: &Form, lines: &[Line]) -> usize {
     let (a, b) = (geometry::<Single>(a), geometry::<Single>(b));
     let apart = |line: &Line, a: &LineHit, b: &LineHit| {

@@ -12,7 +12,8 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
-/// Width of the gap with which objects in contact are compared.
+/// Width of the gap between the objects in the scene with which the scene of objects in contact is
+/// compared.
 const GAP: f64 = 1e-4;
 
 /// Shapes on the plane y = 0 that reach up to y = 1 or are in that plane.

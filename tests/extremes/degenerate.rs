@@ -43,7 +43,8 @@ fn inside(numbers: &mut Numbers, form: &Form) -> DVec3 {
 fn check_inside<L: SimdFloat>(name: &str, form: &Form, seed: u64, rays: usize) {
     let geometry = Aggregate::<L>::new(std::slice::from_ref(form));
     let mut numbers = Numbers::new(seed);
-    // Small blocks, because the allocator returns large ones to the system.
+    // Number of rays traced together. It is small because the allocator returns large blocks of
+    // memory to the system after each use, which takes time.
     const BLOCK: usize = 500;
     assert_eq!(rays % BLOCK, 0);
     for _ in 0..rays / BLOCK {

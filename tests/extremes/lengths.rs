@@ -79,7 +79,7 @@ fn length_of_directions_does_not_change_the_picture() {
     let base = parsed(TEXT);
     for precision in [Precision::Single, Precision::Double] {
         let expected = rendered(&base, 1, precision, 4).film.bytes();
-        // Powers of two change no digit.
+        // Powers of two change no bit of the mantissas of directions.
         for exponent in [-1000, -664, -512, 512, 664, 1000] {
             let other = stretched(&base, f64::from(exponent).exp2());
             let found = rendered(&other, 1, precision, 4).film.bytes();

@@ -45,7 +45,8 @@ fn disk_share(t: f64) -> f64 {
 }
 
 /// Returns the expected radiance of each column: the share of the circle of confusion that is on
-/// the half-plane. At the depth z the circle has the radius r |1 - z / f|.
+/// the half-plane. At the depth z, the circle has the radius r |1 - z / f|, where r is the radius
+/// of the lens and f the focus distance.
 fn profile(depth: f64, radius: f64, focus: f64) -> Vec<f64> {
     let confusion = radius * (1.0 - depth / focus).abs();
     let pixel = 2.0 * 20f64.to_radians().tan() / f64::from(EDGE[0]);
@@ -57,9 +58,9 @@ fn profile(depth: f64, radius: f64, focus: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Compares two pictures of a scene, by independent random numbers and by Sobol points, with
-/// `expected`, the radiance of each column. Returns the largest deviation of a pixel with random
-/// numbers, in standard errors, and the root mean square errors of both pictures.
+/// Renders two pictures of a scene, one with independent random numbers and one with Sobol points.
+/// Compares both with `expected`, the radiance of each column. Returns the largest deviation of a
+/// pixel with random numbers, in standard errors, and the root mean square errors of both pictures.
 fn compare(scene: &Scene, expected: &[f64], precision: Precision) -> (f64, [f64; 2]) {
     const SAMPLES: u32 = 1024;
     let mut worst = 0.0f64;
@@ -72,8 +73,8 @@ fn compare(scene: &Scene, expected: &[f64], precision: Precision) -> (f64, [f64;
             let p = expected[i % expected.len()];
             let error = (value - p).abs();
             squares += error * error;
-            // Each sample is 0 or 1, so that the variance is p (1 - p). Film and edge are rounded
-            // to 1e-6.
+            // Each sample is 0 or 1, and its variance is therefore p (1 - p). Film and edge are
+            // rounded to 1e-6.
             let deviation = (p * (1.0 - p) / f64::from(SAMPLES)).sqrt();
             if kind == SamplerKind::Random {
                 worst = worst.max(error / (deviation + 1e-6));

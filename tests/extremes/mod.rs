@@ -1,6 +1,6 @@
-//! Sizes, places and proportions at which renderers fail: the thirty numbered tests (`audit.rs`
-//! lists the file of each), the choice of precision, scaled and shifted scenes, and the rate at
-//! which the error falls.
+//! Extreme sizes, places and proportions, at which renderers often fail: the thirty numbered tests
+//! (`audit.rs` lists the file of each), the choice of precision, scaled and shifted scenes, and the
+//! rate at which the error falls.
 
 mod audit;
 mod brightness;

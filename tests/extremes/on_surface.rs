@@ -10,7 +10,7 @@ use zerkalo::world::Precision;
 
 /// Surfaces on which the lamp at (0, 3, 0) lies. The second value is a distance from the y axis.
 /// The lamp lights those points of the plane y = 4, above the ceiling, that are farther from the
-/// axis.
+/// axis than this distance.
 const CEILINGS: [(&str, f64); 9] = [
     ("platform = { center = [0, 3, 0], size = [4, 4] }", 0.0),
     ("plane = { point = [0, 3, 0], normal = [0, -1, 0] }", 0.0),

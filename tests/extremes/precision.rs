@@ -1,6 +1,7 @@
 //! Choice of precision by `auto`: double where errors of single precision would be visible, single
-//! elsewhere. In each family of scenes one proportion shrinks. The error of single precision is the
-//! RMSE against double precision with the same samples, in 8-bit levels.
+//! elsewhere. In each family of scenes, one proportion, such as the ratio of a ball's radius to the
+//! size of the floor, becomes smaller and smaller. The error of single precision is the RMSE
+//! against double precision with the same samples, in 8-bit levels.
 
 use crate::common::report::report;
 use crate::support::{all_shipped, parsed, picture, rendered, shipped, sized};
@@ -10,9 +11,9 @@ use zerkalo::scene::Scene;
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 const SIZE: [u32; 2] = [32, 24];
-/// Samples per pixel in each replicate (half of the samples). Rounding diverts some paths, as often
-/// to one side of an edge as to the other. With this number of samples, diverted paths add no
-/// visible noise.
+/// Number of samples per pixel in each of the two replicates (halves of the samples). Rounding
+/// diverts some paths, as often to one side of an edge as to the other. With this number of
+/// samples, diverted paths add no visible noise.
 const SAMPLES: u32 = 128;
 
 /// Largest error of single precision in scenes for which `auto` selects it, in 8-bit levels: a
@@ -23,8 +24,8 @@ fn takes_single(scene: &Scene) -> bool {
     matches!(AnyWorld::compile(scene, &Options::default()), AnyWorld::Single(_))
 }
 
-/// Returns the RMSE of single precision against double precision in 8-bit levels. Each replicate
-/// (half of the samples) has `samples` samples per pixel.
+/// Returns the RMSE of single precision against double precision in 8-bit levels. Each of the two
+/// replicates (halves of the samples) has `samples` samples per pixel.
 fn error(scene: &Scene, samples: u32) -> f64 {
     let display = Display::default();
     let levels_of_picture = |precision| -> Vec<f64> {
@@ -38,7 +39,8 @@ fn error(scene: &Scene, samples: u32) -> f64 {
     (sum / single.len() as f64).sqrt()
 }
 
-/// Family of scenes that differ in one proportion.
+/// Family of scenes that differ in one proportion, such as the ratio of a ball's radius to the size
+/// of the floor.
 struct Family {
     name: &'static str,
     /// Function that returns the scene text for a proportion, which is at most 1/4.
@@ -391,7 +393,8 @@ fn shipped_scenes_stay_in_single_precision() {
     let mut wrong = Vec::new();
     let mut worst = (0.0, String::new());
     for (name, scene) in all_shipped() {
-        // More samples while the difference is visible: noise falls, an error stays.
+        // While the difference is visible, it is measured again with more samples. Noise then
+        // falls, but an error stays.
         let mut levels = f64::INFINITY;
         for samples in [SAMPLES / 8, SAMPLES / 2, 2 * SAMPLES, 8 * SAMPLES, 16 * SAMPLES] {
             if levels > INVISIBLE {

@@ -18,8 +18,8 @@ enum ConvexShape {
     Cone,
 }
 
-/// Scene text and surface points. Half the size of flat shapes and solids is 1 in units of the
-/// scale; so is the radius of the sphere.
+/// Scene text and surface points. All shapes but the infinite plane are 2 wide, in units of the
+/// scale.
 impl ConvexShape {
     fn scene_text(self, scale: f64, place: DVec3) -> String {
         let [x, y, z] = place.to_array();
@@ -66,7 +66,8 @@ impl ConvexShape {
         }
     }
 
-    /// Returns a random point of the surface and its outward normal, for the scale 1 at the origin.
+    /// Returns a random point of the surface and its outward normal. The shape is at the origin and
+    /// has the scale 1.
     fn point(self, numbers: &mut Numbers) -> (DVec3, DVec3) {
         let square = |n: &mut Numbers| [n.between(-1.0, 1.0), n.between(-1.0, 1.0)];
         match self {
@@ -178,7 +179,9 @@ fn check_self_shadow(precision: Precision, place: DVec3, scales: &[f64], points:
     for shape in SHAPES {
         for scale in scales {
             for towards in [
-                // Light 0.01 degrees above the ground, the cube's top, the pyramid's side.
+                // The first two directions to the light are 0.01 degrees above the planes of
+                // horizontal faces, such as the cube's top. The third is 0.01 degrees above the
+                // plane of a side of the pyramid.
                 DVec3::new(cos, sin, 0.0),
                 DVec3::new(cos * 0.6, sin, cos * 0.8),
                 (up_side * cos + pyramid_side * sin).normalize(),
@@ -205,8 +208,8 @@ fn extreme_15_self_shadow() {
 }
 
 /// Checks self-shadowing a million units from the origin, where numbers in the scene file are
-/// rounded to 1e-10. Shapes are as small as 1e-4. Compilation moves the scene to the origin, so
-/// that single precision is as good as for a scene at the origin.
+/// rounded to 1e-10. Shapes are as small as 1e-4. Compilation moves the scene to the origin. Single
+/// precision is therefore as accurate as for a scene at the origin.
 #[test]
 fn extreme_15_self_shadow_far_from_the_origin() {
     let place = DVec3::new(1e6, -1e6, 1e6);
@@ -237,8 +240,8 @@ fn check_gap(scale: f64, precision: Precision) {
     let traced = Traced::new(&scene, precision);
     let mut numbers = Numbers::new(16);
     let down = |x: f64, y: f64, z: f64| -> Line { (DVec3::new(x, y, z), DVec3::NEG_Y) };
-    // The light comes from +x at 45 degrees: the strip lies behind the edge x = scale / 2, the
-    // shadow ends at x = -scale / 2 - (scale + gap).
+    // The light comes from +x at 45 degrees. The lit strip under the box is therefore next to the
+    // edge x = scale / 2, and the shadow ends at x = -scale / 2 - (scale + gap).
     let edge = 0.5 * scale;
     let mut deep = Vec::new();
     let mut shaded = Vec::new();

@@ -10,7 +10,8 @@ use zerkalo::scene::Scene;
 use zerkalo::world::Precision;
 
 const SIZE: [u32; 2] = [24, 16];
-/// Samples per pixel of the first point, over both replicates (halves of the samples).
+/// Number of samples per pixel of the first point of the fit, in both replicates (halves of the
+/// samples) together.
 const FIRST: u32 = 64;
 const LAST: u32 = 2048;
 /// Number of samples of the reference picture, divided by that of the picture with the most

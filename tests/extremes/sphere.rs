@@ -189,10 +189,11 @@ fn extreme_02_sphere_as_ground() {
     report(2, "single", LEFT_TO_DOUBLE);
 }
 
-/// Checks rays through points of the square around the image of `center` on z = -1. The share that
-/// hits the sphere is pi r^2 sqrt(D^2 - r^2) / (c_z^2 - r^2)^(3/2) over the area. Each ray agrees
-/// with the exact mask (v.c)^2 >= (c^2 - r^2) v^2. Returns the measured share, divided by the
-/// expected one.
+/// Checks rays from the origin through random points of a square in the plane z = -1, around the
+/// image of the sphere. Let c be the centre of the sphere, r its radius and D its distance. The
+/// share of rays that hit is pi r^2 sqrt(D^2 - r^2) / (c_z^2 - r^2)^(3/2), divided by the area of
+/// the square. A ray in the direction v must hit if (v.c)^2 >= (D^2 - r^2) v^2, and otherwise miss.
+/// Returns the measured share, divided by the expected one.
 fn check_silhouette(center: DVec3, radius: f64, rays: usize, seed: u64) -> f64 {
     let geometry = Aggregate::<Double>::new(&[Form::Sphere(SphereForm { center, radius })]);
     let distance = center.length();
@@ -290,8 +291,8 @@ fn closed_form_10_every_pixel_of_a_sphere() {
 }
 
 /// Returns the longest chord that rounding can give a tangent. Rounding moves a line that starts at
-/// distance 8 across its direction, by up to 4 x 8 times the rounding error. A line this far below
-/// the surface has the returned chord.
+/// the distance 8 sideways, by up to 4 x 8 times the rounding error. The returned chord is that of
+/// a line at this depth below the surface.
 fn longest_touch<L: SimdFloat>() -> f64 {
     2.0 * (2.0 * 32.0 * L::EPSILON).sqrt()
 }

@@ -16,8 +16,8 @@ fn closest_hits<L: SimdFloat>(form: &Form, lines: &[Line]) -> Vec<Option<LineHit
     closest(&Aggregate::<L>::new(std::slice::from_ref(form)), lines)
 }
 
-/// Returns the distances at which a line enters and leaves a solid, found by a ray from each of its
-/// ends.
+/// Returns the distances at which a line enters and leaves a solid, found by one ray from each end
+/// of the line.
 fn ends(form: &Form, (p, d): Line, far: f64) -> Option<(f64, f64)> {
     let hits = closest_hits::<Double>(form, &[(p - d * far, d), (p + d * far, -d)]);
     Some((hits[0]?.t - far, far - hits[1]?.t))
@@ -99,8 +99,8 @@ fn extreme_11_tapered_cylinders() {
                     assert!((b.normal.length() - 1.0).abs() < 1e-14, "{hair}: {line:?}");
                 }
                 (None, None) => {}
-                // The limb moves by about `hair`, so that a grazing line may hit one of the solids
-                // only.
+                // The limb moves by about `hair`. A grazing line may therefore hit only one of the
+                // two solids.
                 (Some(m), None) | (None, Some(m)) => {
                     assert!(m.normal.dot(line.1).abs() < 1e-5, "{hair}: {line:?} {m:?}")
                 }
@@ -245,7 +245,7 @@ fn check_tangents<L: SimdFloat>(limit: f64) {
             }
             if let (Some(a), Some(b)) = (a, b) {
                 // A line whose depth below the surface is the share e of the radius has a chord of
-                // about sqrt(8 e) / sin(turn).
+                // about sqrt(8 e) / sin(turn), where `turn` is its angle to the generator.
                 longest = longest.max(6.0 - a.t - b.t);
                 assert!(6.0 - a.t - b.t <= limit, "{}", context());
             }

@@ -38,7 +38,7 @@ fn volume(name: &str, form: &Form, half: f64, seed: u64) -> (f64, f64) {
     (sum * area, squares.sqrt() * area)
 }
 
-/// Checks the volumes of compounds (closed form 9).
+/// Checks the volumes of compounds against closed forms.
 #[test]
 fn extreme_09_volumes() {
     let mut worst = 0f64;
@@ -146,7 +146,7 @@ fn extreme_09_inclusion_and_exclusion() {
                 let sum = alone[i][n] + alone[j][n];
                 let context = || format!("{i} {j} {:?}", lines[n]);
                 // Intervals thinner than the tie tolerance (within which surfaces count as
-                // coincident) are dropped. A grazing line has a longer part in such an interval.
+                // coincident) are dropped. Along grazing lines, the tolerance is larger.
                 let close = |a: f64, b: f64| (a - b).abs() < 1e-5;
                 assert!(close(either[n] + both[n], sum), "{}: {}", context(), either[n] + both[n]);
                 assert!(close(first[n] + both[n], alone[i][n]), "{}", context());

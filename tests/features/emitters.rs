@@ -7,8 +7,8 @@ use crate::support::{parsed, shipped};
 use zerkalo::light::{Environment, Falloff, Light, LightUnit, Point};
 use zerkalo::scene::{RayTypes, Scene};
 
-/// Checks that the picture of `file` agrees with the reference tracer, and that the picture of none
-/// of its `mutations` does.
+/// Checks that the picture of `file` agrees with the reference tracer. The picture of each of
+/// `mutations`, changed versions of the scene, must disagree.
 fn alike(file: &str, mutations: &[(&str, Change)]) {
     let original = shipped(file);
     row(file, |tested| agrees(&original, tested, 128), mutations);
@@ -68,7 +68,7 @@ fn d5_rectangle_light() {
         (format!("height {height}"), scene, 0.7)
     };
     // A light that fills the cone lobe. Sampled points of the light and reflected rays both find
-    // all of its light. Their weights are 0.22 and 0.78.
+    // all of its light. The weights of these two techniques are 0.22 and 0.78.
     check(&[filled(0.5), filled(1.0), filled(20.0)], 1 << 14, [1e-4, 1e-9]);
 }
 

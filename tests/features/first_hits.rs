@@ -157,7 +157,7 @@ fn check_hit(ray: &PixelRay, near: f64, shapes: &[AnalyticShape], hit: &FirstHit
                 let slope = |axis: DVec3| (inside(end + axis * h) - f) / h;
                 DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).normalize()
             });
-            // At edges the two gradients differ.
+            // At edges, the two gradients differ and the normal is not compared.
             let is_smooth = gradients[0].dot(gradients[1]) > 1.0 - 1e-5;
             if is_smooth && normal.dot(gradients[0]).abs() < 1.0 - 1e-3 {
                 return Err(format!("normal {normal} of object {object}, not {}", gradients[0]));

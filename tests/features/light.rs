@@ -11,8 +11,8 @@ use zerkalo::material::{Fresnel, Highlight, Lobe, Masking, Metal};
 use zerkalo::scene::{RayTypes, Scene};
 use zerkalo::value::Color;
 
-/// Checks that the picture of `file` agrees exactly with the reference tracer, and that the picture
-/// of none of its `mutations` does.
+/// Checks that the picture of `file` agrees exactly with the reference tracer. The picture of each
+/// of `mutations`, changed versions of the scene, must disagree.
 fn exact(file: &str, mutations: &[(&str, crate::features::row::Change)]) {
     let original = shipped(file);
     row(file, |tested| agrees_exactly(&original, tested), mutations);
@@ -166,7 +166,7 @@ fn b11_cook_torrance() {
 
 #[test]
 fn b12_metals() {
-    // The published reflectances in place of the names.
+    // The names of metals are replaced by their published reflectances.
     let mut original = shipped("metals.toml");
     for (name, f0) in [
         ("gold", [0.989, 0.876, 0.349]),
@@ -243,7 +243,8 @@ fn background_is_seen(original: &Scene, tested: &Scene) -> Verdict {
             None => 1.0,
             Some(0) => continue,
             Some(ball) => {
-                // A ray reflected upwards misses the floor and the balls, whose centres are level.
+                // A ray that is reflected steeply upwards misses the floor. It also misses the
+                // other balls, because the centres of all balls have the same height.
                 let ray = pixel_ray(&original.camera, RASTER, *center);
                 let n = DVec3::from(hit.normal.map(f64::from));
                 let reflected = ray.direction - 2.0 * n * n.dot(ray.direction);

@@ -109,8 +109,8 @@ fn a6_flat_mirror() {
     });
     println!("contrast by roughness: {by_roughness:?}");
     assert!(by_roughness.is_sorted_by(|a, b| a > b), "{by_roughness:?}");
-    // Even the roughest mirror keeps some contrast, because each of its points sees more of the
-    // floor or of the sky.
+    // Even the roughest mirror keeps some contrast, because some of its points see more of the
+    // floor, and others see more of the sky.
     assert!(by_roughness[4] < 0.5 * by_roughness[0], "{by_roughness:?}");
 }
 
@@ -119,7 +119,8 @@ const FINE: [u32; 2] = [96, 64];
 
 /// Ball as seen from a point of the mirror.
 struct Spot {
-    /// Angle between the ball's centre and the mirrored view direction, in radians.
+    /// Angle between the direction to the ball's centre and the mirrored view direction, in
+    /// radians.
     angle: f64,
     /// Angular radius of the ball, in radians.
     half: f64,
@@ -166,9 +167,10 @@ fn footprints(original: &Scene, tested: &Scene) -> Vec<Footprint> {
     mirrors.map(pixel).collect()
 }
 
-/// Checks that each pixel has the sum of 0.9 x share x radiance over its balls (k_r = 0.9). `share`
-/// returns the share of the lobe that a ball covers. Pixels with a ball for which it returns `None`
-/// are left out. Pixels whose sum is 0 must be exactly black.
+/// Compares each pixel with its expected radiance: the sum over its balls of k_r x share x
+/// radiance, where k_r is 0.9. `share` returns the share of the lobe that a ball covers. Pixels
+/// with a ball for which `share` returns `None` are left out. A pixel whose expected radiance is 0
+/// must be exactly black. The differences of the other pixels must add up to 0, apart from noise.
 fn shows_shares(pixels: &[Footprint], share: impl Fn(&Spot) -> Option<f64>) -> Verdict {
     let (mut sum, mut variance, mut expected_sum) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
     let (mut bright, mut dark) = (0, 0);
@@ -193,7 +195,7 @@ fn shows_shares(pixels: &[Footprint], share: impl Fn(&Spot) -> Option<f64>) -> V
     ensure(bright > 100 && dark > 100, || format!("{bright} pixels inside, {dark} outside"))?;
     let z = (sum / variance.map(f64::sqrt)).abs().max_element();
     let off = (sum / expected_sum).abs().max_element();
-    // Three channels: exceeded by chance in one of five thousand seeds.
+    // The largest z of the three channels exceeds 4 by chance in one of five thousand renders.
     ensure(z < 4.0, || format!("inside off by {off:.4}, {z:.1} standard errors"))
 }
 
@@ -224,8 +226,8 @@ fn spreads_over_a_cone(original: &Scene, tested: &Scene) -> Verdict {
 }
 
 /// Checks that reflected directions are uniform on the square: a ball's share is the area of its
-/// ellipse in the plane at unit distance. The corners of the square extend beyond the cone; its
-/// sides are within the cone.
+/// ellipse in the plane at unit distance. The corners of the square are outside of the cone, and
+/// the middles of its sides are inside.
 fn spreads_over_a_square(original: &Scene, tested: &Scene) -> Verdict {
     let half = half_side();
     let pixels = footprints(original, tested);

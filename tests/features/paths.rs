@@ -105,8 +105,9 @@ fn traces_the_whole_tree(original: &Scene, tested: &Scene) -> Verdict {
     Ok(())
 }
 
-/// Checks two facing mirrors with sides of 1e4 units that emit radiance 1. Every pixel has the sum
-/// of `terms`, the throughputs with which a path reaches its successive surfaces.
+/// Checks two facing square mirrors, each 1e4 units wide, to whose reflection ambient light adds
+/// the radiance 1. Every pixel has the sum of `terms`, the throughputs with which a path reaches
+/// its successive surfaces.
 fn sums_reflections(
     tested: &Scene,
     mirrors: [&str; 2],

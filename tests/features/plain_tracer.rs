@@ -42,7 +42,7 @@ pub fn agrees_exactly(original: &Scene, tested: &Scene) -> Verdict {
     for (i, pixel) in pixels.iter().enumerate() {
         let (x, y) = (i as u32 % RASTER[0], i as u32 / RASTER[0]);
         let expected = tracer.pixel(x, y, 2, &mut numbers).mean;
-        // Rounding of the film and of two different computations.
+        // Allowed difference: the film rounds, and the two programs round differently.
         let difference = (*pixel - expected).abs().max_element();
         if difference > 1e-6 * (expected.abs().max_element() + 1e-3) {
             wrong.push(format!("pixel {x}, {y}: {pixel} instead of {expected}"));

@@ -91,8 +91,8 @@ fn a13_rays_per_pixel() {
     println!("16 for none: {}", caps_rays(&capped, 0, 1.0).unwrap_err());
 }
 
-/// Checks that the scene has the objects and materials of the thread experiment, so that times on
-/// it are comparable.
+/// Checks that the scene has the objects and materials of the thread experiment, which measures
+/// times with different numbers of threads. Only times of the same scene are comparable.
 fn is_the_experiment(scene: &Scene) -> Verdict {
     let materials_of = |key: &str| -> Vec<&Material> {
         let objects = scene.objects.iter().filter(|o| o.shape.key() == key);

@@ -57,8 +57,8 @@ fn ball(scene: &Scene, name: &str) -> (DVec3, f64) {
     }
 }
 
-/// Checks that the pixels of the picture on the wall and of the ball are their images times the
-/// untextured radiance.
+/// Checks the pixels that show the picture on the wall, and those that show the ball. Their
+/// radiance must be the colour of the texture image times the untextured radiance.
 fn has_images(original: &Scene, tested: &Scene) -> Verdict {
     let mut bare = plain(original);
     bare.materials.values_mut().for_each(|m| m.texture = None);
@@ -68,7 +68,7 @@ fn has_images(original: &Scene, tested: &Scene) -> Verdict {
     let (center, radius) = ball(original, "ball");
     let mut pixels: Vec<(usize, DVec3)> = Vec::new();
     for (i, p) in points(original, "picture") {
-        // 1.1 wide and 0.8 high around (-0.75, 1.55).
+        // The picture on the wall is 1.1 wide and 0.8 high. Its centre is at x = -0.75, y = 1.55.
         let uv = DVec2::new((p.x + 0.75) / 1.1 + 0.5, (p.y - 1.55) / 0.8 + 0.5);
         pixels.push((i, color(&sheet, uv)));
     }
