@@ -6,6 +6,7 @@ use crate::asset::image::Image;
 use crate::asset::mesh::{Mesh, TriangleMesh};
 use crate::asset::radiance_map::RadianceMap;
 use crate::process_memory::missing_memory;
+use crate::value::sort_by_number;
 use std::collections::HashMap;
 use std::fmt;
 use std::hash::Hash;
@@ -99,7 +100,7 @@ impl<T> Cache<T> {
     /// Evicts files that no scene uses, the least recently used first, until the remaining unused
     /// files take at most [`UNUSED_BYTES`]. `bytes_of` returns the memory of a file's content.
     fn evict(&mut self, bytes_of: impl Fn(&T) -> usize) {
-        let mut unused: Vec<(u64, usize, Key)> = self
+        let unused: Vec<(u64, usize, Key)> = self
             .files
             .iter()
             .filter_map(|(key, (entry, last_used))| {
@@ -111,15 +112,22 @@ impl<T> Cache<T> {
                 Some((*last_used, bytes, key.clone()))
             })
             .collect();
-        unused.sort_by_key(|(last_used, ..)| std::cmp::Reverse(*last_used));
-        let mut sum = 0usize;
-        for (_, bytes, key) in unused {
-            sum = sum.saturating_add(bytes);
-            if sum > UNUSED_BYTES {
-                self.files.remove(&key);
-            }
+        for key in beyond_limit(unused) {
+            self.files.remove(&key);
         }
     }
+}
+
+/// Returns the keys of the files to evict. `unused` has the unused files, each as `(time of last
+/// use, memory in bytes, key)`.
+fn beyond_limit(mut unused: Vec<(u64, usize, Key)>) -> Vec<Key> {
+    sort_by_number(&mut unused, |(last_used, ..)| -(*last_used as i64));
+    let mut sum = 0usize;
+    let exceeds = |(_, bytes, key): (u64, usize, Key)| {
+        sum = sum.saturating_add(bytes);
+        (sum > UNUSED_BYTES).then_some(key)
+    };
+    unused.into_iter().filter_map(exceeds).collect()
 }
 
 /// Cache of all asset files that scenes name. All scenes and threads share the content of a file.

@@ -9,6 +9,7 @@ use crate::asset::file::FileContents;
 use crate::asset::image::{Image, check_size};
 use crate::asset::radiance_distribution::RadianceDistribution;
 use crate::value::Fnv1a64;
+use exr::io::Tracking;
 use exr::meta::MetaData;
 use image::codecs::hdr::HdrDecoder;
 use image::codecs::openexr::OpenExrDecoder;
@@ -200,7 +201,9 @@ fn decode(
 /// Checks the size of all layers of an OpenEXR file. A wrong size could make the decoder run out of
 /// memory, because it allocates a block of rows of a layer before it reads the block.
 fn check_layers(source: &FileContents) -> Result<(), AssetError> {
-    let data = MetaData::read_from_buffered(&source.bytes[..], false).map_err(|error| {
+    // The type of the reader is that of the decoder, so that its functions are not compiled twice.
+    let reader = Tracking::new(Cursor::new(&source.bytes[..]));
+    let data = MetaData::read_from_buffered(reader, false).map_err(|error| {
         let found = format!("the header cannot be read: {error}");
         source.error(FileLocation::Whole, found, EXPECTED)
     })?;

@@ -77,7 +77,7 @@ fn largest_nodes(tree: &Bvh2, count: usize) -> Vec<usize> {
     let end = tree.nodes.len().min(2 * (count + 1));
     let area = |node: usize| tree.nodes[node].aabb().half_area();
     let mut nodes: Vec<(f32, usize)> = (1..end).map(|node| (area(node), node)).collect();
-    nodes.sort_by(|a, b| b.0.total_cmp(&a.0));
+    nodes.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     nodes.into_iter().take(count).map(|(_, node)| node).collect()
 }
 

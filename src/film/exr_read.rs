@@ -1,6 +1,9 @@
 //! OpenEXR reader for reference pictures.
 
+use exr::io::Tracking;
 use exr::prelude::*;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
 /// Picture that was read from an OpenEXR file, in linear radiance.
@@ -19,13 +22,19 @@ pub struct ReadPicture {
 /// because the whole picture is read into memory.
 const MAX_PIXELS: usize = 1 << 26;
 
+/// Reads the headers of an OpenEXR file.
+pub(super) fn read_exr_meta(path: &Path) -> Result<MetaData> {
+    // The type of the reader is that of `from_file`, so that its functions are not compiled twice.
+    MetaData::read_from_buffered(Tracking::new(BufReader::new(File::open(path)?)), false)
+}
+
 /// Reads the channels `R G B` of an OpenEXR file, and the channels `A.R ..` and `B.R ..` of the two
 /// replicates (halves of the samples) if they exist.
 ///
 /// # Errors
 /// Fails if the file cannot be read, is too large, or lacks `R G B`.
 pub fn read_exr(path: &Path) -> std::result::Result<ReadPicture, String> {
-    let meta = MetaData::read_from_file(path, false).map_err(|e| e.to_string())?;
+    let meta = read_exr_meta(path).map_err(|e| e.to_string())?;
     let largest = meta.headers.iter().map(|h| h.layer_size.area()).max().unwrap_or(0);
     if largest > MAX_PIXELS {
         return Err(format!("it has {largest} pixels; expected at most {MAX_PIXELS}"));

@@ -2,8 +2,8 @@
 //! that is known only at the end of a render then fits into the place reserved for it.
 
 use crate::disk::open_regular;
+use crate::film::exr_read::read_exr_meta;
 use crate::film::file::{FilmFileHeader, FilmReader, is_film_file};
-use exr::meta::MetaData;
 use exr::meta::attribute::AttributeValue;
 use png::Decoder;
 use std::io::BufReader;
@@ -75,7 +75,7 @@ impl FileMetadata {
                 film: None,
             });
         }
-        let meta = MetaData::read_from_file(path, false)
+        let meta = read_exr_meta(path)
             .map_err(|_| format!("cannot read {shown}: it is no PNG, OpenEXR or film file"))?;
         let header = meta.headers.first().ok_or(format!("{shown} has no picture"))?;
         let text = |value: &AttributeValue| match value {
@@ -86,7 +86,7 @@ impl FileMetadata {
         let mut entries: Vec<_> = all
             .filter_map(|(key, value)| Some(unpadded((key.to_string(), text(value)?))))
             .collect();
-        entries.sort();
+        entries.sort_unstable();
         let size = [header.layer_size.width(), header.layer_size.height()];
         Ok(Self { format: "OpenEXR", size, entries, film: None })
     }

@@ -15,6 +15,7 @@ use crate::primitive::form::{Form, cast_compiled};
 use crate::primitive::item_box::ItemBox;
 use crate::primitive::keep_visible;
 use crate::primitive::triangle_mesh;
+use crate::value::insertion_sort;
 use glam::{DAffine3, DVec3};
 use std::ops::Range;
 use std::sync::Arc;
@@ -186,7 +187,7 @@ fn surface_distance(mesh: &asset::Mesh, scene_from_mesh: &DAffine3, point: DVec3
             }
         }
         // The nearest box is last and popped first.
-        stack[first..].sort_by(|a, b| b.1.total_cmp(&a.1));
+        insertion_sort(&mut stack[first..], |(_, distance)| -distance);
     }
     least
 }

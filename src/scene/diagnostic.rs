@@ -1,7 +1,7 @@
 //! Diagnostics: errors and warnings about a scene file, as users read them.
 
 use crate::scene::format::source_map::LineCounter;
-use crate::value::sanitized;
+use crate::value::{sanitized, sort_by_number};
 use std::fmt;
 
 /// Error or warning about a scene file.
@@ -94,7 +94,7 @@ impl FirstDiagnostics {
     }
 
     fn keep_first(&mut self) {
-        self.found.sort_by_key(|(at, _)| *at);
+        sort_by_number(&mut self.found, |(at, _)| *at as i64);
         self.more += self.found.len().saturating_sub(MAX_REPORTED);
         self.found.truncate(MAX_REPORTED);
         if self.found.len() == MAX_REPORTED {

@@ -8,7 +8,7 @@
 
 use crate::disk::{TEMPORARY, is_own, lock, open_regular_with, user_name};
 use crate::scene::format::read::MAX_BYTES;
-use crate::value::fnv1a64;
+use crate::value::{fnv1a64, sort_by_number};
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, DirBuilder, File, Metadata, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
@@ -182,7 +182,11 @@ impl Recovery {
                 }
             }
         }
-        found.orphans.sort_by_key(|lost| std::cmp::Reverse(lost.written));
+        let age = |lost: &Orphan| match lost.written.duration_since(SystemTime::UNIX_EPOCH) {
+            Ok(since) => -(since.as_nanos() as i64),
+            Err(before) => before.duration().as_nanos() as i64,
+        };
+        sort_by_number(&mut found.orphans, age);
         found
     }
 
@@ -346,7 +350,7 @@ pub fn kept_in(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let is_kept = |entry: &fs::DirEntry| entry.file_name().to_string_lossy().contains(".unsaved");
     let mut kept: Vec<_> = entries.filter(is_kept).map(|entry| entry.path()).collect();
-    kept.sort();
+    kept.sort_unstable();
     kept
 }
 

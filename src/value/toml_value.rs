@@ -137,10 +137,15 @@ impl<'a> TableReader<'a> {
 
 /// Returns the table of `entries`, each a key with its value. Entries without a value are left out.
 pub(crate) fn written(entries: &[(&str, Option<&dyn TomlValue>)]) -> Value {
-    let entry = |(name, value): &(&str, Option<&dyn TomlValue>)| {
-        value.map(|value| (name.to_string(), value.to_toml()))
-    };
-    Value::Table(entries.iter().filter_map(entry).collect())
+    table(&mut entries.iter().filter_map(|(name, value)| Some((*name, (*value)?))))
+}
+
+fn table(entries: &mut dyn Iterator<Item = (&str, &dyn TomlValue)>) -> Value {
+    let mut table = Table::new();
+    for (name, value) in entries {
+        table.insert(name.to_string(), value.to_toml());
+    }
+    Value::Table(table)
 }
 
 /// Returns the only entry of the table `value` as the index of its key in `names` and its value.
@@ -311,14 +316,15 @@ impl<T: TomlValue> TomlValue for Vec<T> {
 impl<T: TomlValue> TomlValue for BTreeMap<String, T> {
     fn from_toml(value: &Spanned<DeValue>) -> Result<Self, TomlError> {
         let table = value.get_ref().as_table().ok_or_else(|| wrong(value, "a table"))?;
-        let entry = |(name, value): (&Spanned<toml::de::DeString>, &Spanned<DeValue>)| {
-            Ok((name.get_ref().to_string(), T::from_toml(value)?))
-        };
-        table.iter().map(entry).collect()
+        let mut map = Self::new();
+        for (name, value) in table {
+            map.insert(name.get_ref().to_string(), T::from_toml(value)?);
+        }
+        Ok(map)
     }
 
     fn to_toml(&self) -> Value {
-        Value::Table(self.iter().map(|(name, value)| (name.clone(), value.to_toml())).collect())
+        table(&mut self.iter().map(|(name, value)| (name.as_str(), value as &dyn TomlValue)))
     }
 }
 

@@ -15,6 +15,7 @@
 use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
 use crate::light::DeltaLight;
 use crate::primitive::BoundingSphere;
+use crate::value::sort_by_number;
 use crate::world::world::DeltaSource;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -92,7 +93,7 @@ impl<S: Float> LightChoice<S> {
         *sources = others;
         let low = chosen.iter().map(place).reduce(DVec3::min)?;
         let high = chosen.iter().map(place).reduce(DVec3::max)?;
-        chosen.sort_by_key(|source| morton(place(source), low, high));
+        sort_by_number(&mut chosen, |source| morton(place(source), low, high) as i64);
 
         let group = chosen[0].group;
         assert!(chosen.iter().all(|light| light.group == group), "many point lights share a group");

@@ -12,6 +12,7 @@ use crate::camera::PerspectiveCamera;
 use crate::light::EmitterSurface;
 use crate::primitive::{BoundingSphere, Form, HalfSpace, Proxy, ProxyFace};
 use crate::scene::Scene;
+use crate::value::{sort_by_number, total_order};
 use crate::world::clearance::clearance;
 use glam::DVec3;
 use std::ops::Range;
@@ -163,7 +164,7 @@ fn has_gap(forms: &[Form], narrow: Range<f64>, pixel: impl Fn(DVec3) -> f64) -> 
         gaps(a, b).iter().flatten().any(|gap| gap.is_seen(&narrow, &pixel))
     };
     let mut proxies: Vec<Proxy> = forms.iter().flat_map(|form| form.proxies()).collect();
-    proxies.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
+    sort_by_number(&mut proxies, |proxy| total_order(proxy.low.x));
     let mut pairs = 0;
     for (i, a) in proxies.iter().enumerate() {
         for b in proxies[i + 1..].iter().take_while(|b| b.low.x <= a.high.x + narrow.end) {

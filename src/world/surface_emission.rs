@@ -20,6 +20,7 @@ use crate::primitive::{
     Aggregate, CanonicalShape, ConvexPolyhedronForm, Form, MeshForm, ParallelogramForm, PrimitiveId,
 };
 use crate::scene::Scene;
+use crate::value::{sort_by_number, total_order};
 use crate::world::integrator::coincident_surfaces::touching_pairs;
 use crate::world::light_groups::LightGroups;
 use crate::world::world::LightSource;
@@ -302,7 +303,7 @@ fn triangles_of_polyhedron(form: &ConvexPolyhedronForm) -> Vec<[DVec3; 3]> {
             let from_middle = *corner - middle;
             (side * from_middle.dot(up)).atan2(from_middle.dot(right))
         };
-        corners.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+        sort_by_number(&mut corners, |corner| total_order(angle(corner)));
         triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
     }
     triangles

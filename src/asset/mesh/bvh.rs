@@ -5,6 +5,7 @@
 use crate::asset::mesh::TriangleMesh;
 use crate::asset::mesh::normals::smooth;
 use crate::bvh::build::{BVH_WIDTH, BuildQuality, Bvh8, Bvh8Build, LEAF_FLAG};
+use crate::value::insertion_sort;
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -145,7 +146,7 @@ impl Mesh {
                     }
                 }
             }
-            stack[first..].sort_by(|a, b| a.1.total_cmp(&b.1));
+            insertion_sort(&mut stack[first..], |(_, bound)| *bound);
         }
         best
     }

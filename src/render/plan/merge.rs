@@ -6,6 +6,7 @@ use crate::film::file::{FilmFileHeader, FilmReader};
 use crate::render::plan::merge_inputs::{Plans, ShardFiles, join, shard_name};
 use crate::render::plan::part::{Part, PartShard, ranges};
 use crate::render::plan::{BASE, Plan};
+use crate::value::sort_by_number;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -44,7 +45,7 @@ impl Merged {
         }
         let rays = inputs.iter().map(|input| input.rays).sum();
         let mut files: Vec<_> = inputs.iter().zip(readers).collect();
-        files.sort_by_key(|(input, _)| input.shards[0].number);
+        sort_by_number(&mut files, |(input, _)| input.shards[0].number.into());
         let shards: Vec<PartShard> = shards.into_values().map(|(_, shard)| shard).collect();
         let mut sum: Option<(Film, FilmFileHeader)> = None;
         for (_, reader) in files {

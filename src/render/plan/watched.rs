@@ -13,6 +13,7 @@ use crate::render::plan::merge::without_plan;
 use crate::render::plan::merge_inputs::{MergeInput, Plans, join};
 use crate::render::plan::part::{Part, PartShard, ranges};
 use crate::render::plan::{BASE, Plan, is_plan_file};
+use crate::value::{sort_by_number, total_order};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -231,9 +232,8 @@ impl WatchedFilms {
             (2 | 3, Some(total)) if total > 0 => row.samples as f64 / total as f64,
             _ => 0.0,
         };
-        rows.sort_by(|a, b| {
-            a.state.rank().cmp(&b.state.rank()).then(share(a).total_cmp(&share(b)))
-        });
+        sort_by_number(&mut rows, |row| total_order(share(row)));
+        sort_by_number(&mut rows, |row| row.state.rank().into());
         rows
     }
 
@@ -340,8 +340,8 @@ impl WatchedFilms {
             return Ok(());
         };
         let header = self.open_film(first)?.header().clone();
-        let stamps: BTreeMap<usize, FileStamp> =
-            complete.iter().filter_map(|i| Some((*i, self.files[*i].stamp?))).collect();
+        let mut stamps: BTreeMap<usize, FileStamp> = BTreeMap::new();
+        stamps.extend(complete.iter().filter_map(|i| Some((*i, self.files[*i].stamp?))));
         let (mut added, mut film) = match self.complete.take() {
             Some((old, film))
                 if film.check_header(&header.film).is_ok()

@@ -17,6 +17,7 @@ use crate::film::TILE_PIXELS;
 use crate::render::schedule::tile::Tile;
 use crate::render::schedule::{Criterion, MAX_SAMPLES, SAMPLE_ALIGNMENT, Schedule, to_packet};
 use crate::render::wave::Job;
+use crate::value::ascending;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 
@@ -202,9 +203,7 @@ impl<'a> Allocation<'a> {
     /// Allocates one block of samples to one tile after another, starting with the tile that has
     /// the fewest samples. Ends when the allocation round has about `rays` rays in total.
     pub fn explore(&mut self, rays: f64) {
-        let mut order: Vec<usize> = (0..self.counts.len()).collect();
-        order.sort_by_key(|tile| self.counts[*tile]);
-        for tile in order {
+        for tile in ascending(self.counts.iter().map(|count| i64::from(*count)).collect()) {
             if self.spent >= rays {
                 break;
             }
@@ -307,10 +306,10 @@ impl Schedule {
             let sum = classes.entry(class_of(tile, models)).or_default();
             sum.add(f64::from(tile.pixels), variance(&models.validation, tile));
         }
-        let widened: BTreeMap<Class, WeightedSum> =
-            classes.keys().map(|class| (*class, widened(*class, &classes))).collect();
+        let mut wide: BTreeMap<Class, WeightedSum> = BTreeMap::new();
+        wide.extend(classes.keys().map(|class| (*class, widened(*class, &classes))));
         let calibrate = |(tile, models): (&Tile, &TileModels)| {
-            let mut expected = widened[&class_of(tile, models)];
+            let mut expected = wide[&class_of(tile, models)];
             expected.add(OWN_WEIGHT * f64::from(tile.pixels), variance(&models.allocation, tile));
             models.allocation.through(tile.done, expected.mean() / f64::from(tile.done))
         };

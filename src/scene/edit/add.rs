@@ -11,7 +11,9 @@ use crate::scene::edit::unique_name::{free_light, free_material, free_object};
 use crate::scene::edit::{Edit, EditError, Target};
 use crate::scene::{Object, Scale, Scene, TransformOp};
 use crate::shape::{KINDS, Shape, compose};
-use crate::value::{Color, number, round_nice, round_significant, rounded_to, unit};
+use crate::value::{
+    Color, number, round_nice, round_significant, rounded_to, sort_by_number, total_order, unit,
+};
 use glam::DVec3;
 
 /// Returns the name and a description of each kind of object that can be added.
@@ -120,7 +122,7 @@ fn usual_size(scene: &Scene) -> f64 {
         form.is_solid().then(|| (high - low).max_element())
     };
     let mut sizes: Vec<f64> = scene.objects.iter().filter_map(solid).collect();
-    sizes.sort_by(f64::total_cmp);
+    sort_by_number(&mut sizes, |size| total_order(*size));
     let size = match sizes.get(sizes.len() / 2) {
         Some(middle) => middle.clamp(0.01 * radius, radius),
         None if scene.objects.is_empty() => 1.0,

@@ -1,6 +1,7 @@
 //! Order of the tables in scene files, and comments above removed tables. An empty line between a
 //! comment and the table below it means that the comment belongs to the file, not to the table.
 
+use crate::value::sort_by_number;
 use toml_edit::{DocumentMut, Item, Table};
 
 /// Comments that stay in a scene file although the tables below them are removed. A comment stays
@@ -39,7 +40,7 @@ impl CommentKeeper {
     /// the end of the file.
     pub(crate) fn put_back(self, document: &mut DocumentMut) {
         let mut comments = self.comments;
-        comments.sort_by_key(|(position, _)| -position);
+        sort_by_number(&mut comments, |(position, _)| -*position as i64);
         for (position, comment) in comments {
             let mut after: Option<isize> = None;
             for_each_table(document.as_table_mut(), &mut |table| {

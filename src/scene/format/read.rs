@@ -7,7 +7,7 @@ use crate::scene::format::parts::{PART_BYTES, Part, split};
 use crate::scene::format::schema;
 use crate::scene::format::source_map::{line_column, locate};
 use crate::scene::{AssetResolver, Object, Scene};
-use crate::value::{TomlError, TomlValue};
+use crate::value::{TomlError, TomlValue, sort_by_number};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -188,7 +188,8 @@ impl<'a> SourceScene<'a> {
         locate((self.name, self.text), &self.parts, self.scene.warnings(), &mut found);
         let mut warnings = found.located(self.text).0;
         warnings.extend(self.migration_warning());
-        warnings.sort_by_key(|warning| warning.line_column);
+        let place = |(line, column): (usize, usize)| (line << 32 | column) as i64;
+        sort_by_number(&mut warnings, |warning| warning.line_column.map_or(0, place));
         warnings
     }
 

@@ -6,7 +6,9 @@ use crate::scene::format::parts::Part;
 use crate::scene::format::source_map::subject_in;
 use crate::scene::format::suggest::nearest;
 use crate::scene::{Ambient, Background, FilmSettings, IntegratorSettings, Object};
-use crate::value::{Color, DefaultValue, Description, Field, NumberRange, ValueType, truncated};
+use crate::value::{
+    Color, DefaultValue, Description, Field, NumberRange, ValueType, sort_by_number, truncated,
+};
 use crate::{camera, light, material};
 use std::ops;
 use toml::Spanned;
@@ -191,7 +193,7 @@ impl SchemaChecker<'_> {
                 }
             }
         }
-        known.sort_by_key(|(key, ..)| key.span().start);
+        sort_by_number(&mut known, |(key, ..)| key.span().start as i64);
         for (_, value, field) in known.iter().take(1) {
             self.field(field, value);
         }

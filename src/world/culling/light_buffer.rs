@@ -5,6 +5,7 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, next_distinct};
 use crate::primitive::{Aggregate, BoundingSphere, F32_RAY_ERROR, LightTarget, PrimitiveSet};
+use crate::value::{ascending, total_order};
 use crate::world::culling::light_projection::{LightProjection, ProjectedBounds};
 
 /// Largest number of possible occluders in the list of a cell, which is a range of directions from
@@ -95,8 +96,8 @@ impl<S: Float> LightBuffer<S> {
             LightTarget::Point(_) => ball.center.length() - ball.radius,
             LightTarget::Direction(direction) => -ball.center.dot(*direction) - ball.radius,
         };
-        let mut order: Vec<(f64, u32)> = balls.iter().map(near_depth).zip(0..).collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let near: Vec<f64> = balls.iter().map(near_depth).collect();
+        let order = ascending(near.iter().copied().map(total_order).collect());
 
         let ProjectedBounds { projection, rects, side } = ProjectedBounds::new(target, &balls);
         let count = projection.faces() * side * side;
@@ -104,16 +105,16 @@ impl<S: Float> LightBuffer<S> {
             (vec![0; count], vec![S::from_f64(f64::INFINITY); count]);
         let mut placed: Vec<(usize, Entry<S>)> = Vec::new();
         let mut overflowed = 0;
-        for (near, number) in order {
-            let near = S::from_f64(near);
-            let exempt_item = occluders[number as usize].exempt_item.unwrap_or(NO_ITEM);
+        for number in order {
+            let near = S::from_f64(near[number]);
+            let exempt_item = occluders[number].exempt_item.unwrap_or(NO_ITEM);
             // Number of cells that hold the occluder, minus the number of cells that are too full
             // for it.
             let mut balance = 0;
-            for cell in rects[number as usize].iter().flat_map(|rect| rect.cells(side)) {
+            for cell in rects[number].iter().flat_map(|rect| rect.cells(side)) {
                 if counts[cell] < MAX_PER_CELL {
                     counts[cell] += 1;
-                    placed.push((cell, Entry { number, exempt_item, near }));
+                    placed.push((cell, Entry { number: number as u32, exempt_item, near }));
                     balance += 1;
                 } else {
                     complete_to[cell] =

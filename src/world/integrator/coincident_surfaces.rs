@@ -18,6 +18,7 @@
 use crate::bvh::Ray;
 use crate::lanes::{Float, Mask, SimdFloat, Vec3, next_distinct};
 use crate::primitive::{Aggregate, Form, PrimitiveId, SphereForm};
+use crate::value::{ascending, total_order};
 use crate::world::integrator::nested_dielectrics::MediumStack;
 use glam::DVec3;
 
@@ -385,8 +386,7 @@ pub(crate) fn pairs(forms: &[Form], wanted: impl Fn(usize, usize) -> bool) -> Ve
         })
     };
     let boxes: Vec<_> = forms.iter().map(padded_box).collect();
-    let mut order: Vec<usize> = (0..forms.len()).collect();
-    order.sort_by(|a, b| boxes[*a].0.x.total_cmp(&boxes[*b].0.x));
+    let order = ascending(boxes.iter().map(|(low, _)| total_order(low.x)).collect());
     for (i, a) in order.iter().enumerate() {
         let (low, high) = boxes[*a];
         for b in order[i + 1..].iter().take_while(|b| boxes[**b].0.x <= high.x) {

@@ -1,0 +1,68 @@
+//! Stable sorting with little machine code.
+//!
+//! The sorts of the standard library are compiled for each type of items and keys, into 8 KB each.
+//! The functions of this module sort numbers only, or few items.
+
+/// Sorts `items` by ascending keys. Items with equal keys keep their order.
+pub fn sort_by_number<T>(items: &mut Vec<T>, key: impl Fn(&T) -> i64) {
+    let order = ascending(items.iter().map(key).collect());
+    let mut unsorted: Vec<Option<T>> = items.drain(..).map(Some).collect();
+    items.extend(order.into_iter().filter_map(|i| unsorted[i].take()));
+}
+
+/// Returns the indices of `keys`, sorted by ascending keys. Indices of equal keys are in ascending
+/// order.
+pub fn ascending(keys: Vec<i64>) -> Vec<usize> {
+    let mut order: Vec<(i64, usize)> = keys.into_iter().zip(0..).collect();
+    order.sort_unstable();
+    order.into_iter().map(|(_, i)| i).collect()
+}
+
+/// Sorts the few `items` by ascending keys. Items with equal keys keep their order. The time grows
+/// with the square of the number of items.
+pub fn insertion_sort<T>(items: &mut [T], key: impl Fn(&T) -> f64) {
+    for end in 1..items.len() {
+        let mut i = end;
+        while i > 0 && key(&items[i]).total_cmp(&key(&items[i - 1])).is_lt() {
+            items.swap(i - 1, i);
+            i -= 1;
+        }
+    }
+}
+
+/// Returns a number whose order is that of [`f64::total_cmp`].
+pub fn total_order(x: f64) -> i64 {
+    let bits = x.to_bits() as i64;
+    // The bits of negative numbers ascend with the absolute value.
+    bits ^ ((bits >> 63) as u64 >> 1) as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{insertion_sort, sort_by_number, total_order};
+
+    #[test]
+    fn items_with_equal_numbers_keep_their_order() {
+        let mut items: Vec<(i64, usize)> =
+            [3, -1, 3, 0, -1, i64::MIN].into_iter().zip(0..).collect();
+        let mut sorted = items.clone();
+        sorted.sort_by_key(|(key, _)| *key);
+        let mut few = items.clone();
+        sort_by_number(&mut items, |(key, _)| *key);
+        assert_eq!(items, sorted);
+        insertion_sort(&mut few, |(key, _)| *key as f64);
+        assert_eq!(few, sorted);
+    }
+
+    #[test]
+    fn total_order_is_that_of_the_standard_library() {
+        let numbers = [f64::NEG_INFINITY, -2.5, -f64::MIN_POSITIVE, -0.0, 0.0, 1e-300, 7.0];
+        let numbers = numbers.into_iter().chain([f64::INFINITY, f64::NAN, -f64::NAN]);
+        let numbers: Vec<f64> = numbers.collect();
+        for a in &numbers {
+            for b in &numbers {
+                assert_eq!(total_order(*a).cmp(&total_order(*b)), a.total_cmp(b), "{a} {b}");
+            }
+        }
+    }
+}
