@@ -1,5 +1,5 @@
 //! Truncation bias that the program reports for `max_depth` and `min_throughput`. It is compared
-//! with the difference from pictures without these limits.
+//! with the true bias, the difference between pictures with and without these limits.
 
 use crate::common;
 use crate::common::shape_examples::EXAMPLES;

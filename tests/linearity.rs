@@ -199,14 +199,15 @@ shape.box = { center = [0.75, 0.5, 0.0], size = [0.5, 1.0, 0.5] }
     // Other coordinates are rounded to 2^-32 of a unit, which is visible in double precision.
     // Single precision hides this, unless a number is so close to the middle between two floats
     // that it is rounded to the other one. This happens to a coefficient of a thin ellipsoid in
-    // extents.toml (2.7e-8).
+    // extents.toml, and changes the picture by 2.7e-8 of its light.
     //
-    // A sample at an edge may change sides. Near the horizon of the checked floor of
-    // gallery-glass.toml one sample in ten thousand does. One in 500 of its pixels may therefore
-    // differ, by at most one sample each. In all other scenes no sample changes sides.
+    // A sample close to an edge may fall on its other side after the translation. This happens to
+    // one sample in ten thousand near the horizon of the checked floor of gallery-glass.toml. One
+    // in 500 pixels of this scene may therefore differ, by at most one sample each. It happens in
+    // no other scene.
     //
     // The picture of a lamp in a rough mirror changes more than others, because the lobe is steep
-    // where the lamp is small: 7.6e-8 of the light in lamp-and-mirror.toml.
+    // where the lamp is small. In lamp-and-mirror.toml the change is 7.6e-8 of the light.
     for (name, scene) in all_shipped() {
         let scene = sized(scene, SIZE);
         for precision in PRECISIONS {
@@ -265,8 +266,8 @@ fn ray_types_add_shadows_and_reflections() {
     assert!(!has(&Scene { lights: Vec::new(), ..shadows }, "shadows only"));
 }
 
-/// Checks that the bias of a depth limit is bounded. Paths of more than K reflections add at most
-/// rho^(K+1) / (1 - rho) of the radiance of the brightest surface.
+/// Checks that the bias of a depth limit is bounded. With the depth limit K and the reflectance
+/// rho, longer paths add at most rho^(K+1) / (1 - rho) of the radiance of the brightest surface.
 #[test]
 fn depth_limits_paths_and_its_bias_is_bounded() {
     const RHO: f64 = 0.9;
@@ -306,7 +307,8 @@ fn min_throughput_limits_paths_and_its_bias_is_bounded() {
     };
     let all = values(&with_least(0.0), Precision::Double);
     for least in [0.95, 0.89, 0.5, 0.01] {
-        // Paths up to this depth have a throughput of at least `least`; deeper paths have less.
+        // Paths up to this depth have at least the throughput `least`, which is the limit. Deeper
+        // paths have less.
         let depth = (f64::ln(least) / RHO.ln()).floor() as u32;
         let mut by_depth = with_least(0.0);
         by_depth.trace.max_depth = depth;
@@ -332,8 +334,8 @@ fn horizon_folds_or_absorbs_rays() {
                 ..absorb.trace
             }
         );
-        // Rays above the surface are equal in both scenes. Rays below it are lost only with
-        // absorption.
+        // Reflected rays above the surface are equal in both scenes. Those below it are mirrored up
+        // in the scene `fold`, and lost in the scene `absorb`.
         let [folded, absorbed] = [&fold, &absorb].map(|s| values(s, precision));
         assert!(absorbed.iter().zip(&folded).all(|(absorbed, folded)| absorbed <= folded));
         assert!(difference(&folded, &absorbed) > 0.2);
@@ -360,7 +362,8 @@ fn rays_per_pixel_caps_glossy_tiles() {
             rendering.film.touched().map(|(_, tile)| tile.counts().iter().sum()).collect();
         let capped = counts.iter().filter(|n| **n == 16).count();
         assert!(capped > counts.len() / 2, "adaptive {adaptive}: {counts:?}");
-        // Tiles without a glossy lobe have no cap and get more than 16 samples. No tile gets fewer.
+        // Tiles without a glossy lobe have no cap and get more than 16 samples. No tile gets fewer
+        // than 16.
         assert!(counts.iter().all(|n| *n >= 16), "adaptive {adaptive}: {counts:?}");
         let uncapped =
             follow(&mut begin(&scene, 1, Precision::Auto), settings(adaptive, 0, stop), &pool(2));

@@ -41,7 +41,7 @@ fn knot() -> Vec<u8> {
         for k in 0..AROUND {
             let (sin, cos) = (TAU * k as f64 / AROUND as f64).sin_cos();
             for x in (here + (inward * cos + side * sin) * 0.45).to_array() {
-                // Decimals that hide rounding differences between machines.
+                // Rounding to five decimals hides the differences between machines.
                 out.extend((((x * 1e5).round() / 1e5) as f32).to_le_bytes());
             }
         }

@@ -29,9 +29,9 @@ fn extreme_29_picture_files_are_the_same_for_any_number_of_threads() {
     }
 }
 
-/// Compares pictures that `zerkalo render` writes, most of them with adaptive sampling, with stored
-/// hashes. The hashes are equal for 8 and for 16 lanes. The test requires fused multiply-add,
-/// because the last bits differ without it.
+/// Compares hashes of pictures that `zerkalo render` writes with stored ones. Most of the pictures
+/// use adaptive sampling. The hashes are equal for 8 and for 16 lanes. The test requires fused
+/// multiply-add, because the last bits differ without it.
 #[cfg(all(target_arch = "x86_64", target_feature = "fma"))]
 #[test]
 fn golden_pictures_do_not_depend_on_lane_count() {

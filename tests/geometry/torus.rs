@@ -132,9 +132,9 @@ fn hits_are_roots<L: SimdFloat>(tube: f64, count: usize) {
         };
         let normal = hit.normal.dot(line.1).abs();
         let apart = (hit.t - (start + first)).abs();
-        // The root moves by the error of the height, divided by the cosine at the surface. Near a
-        // double root the cosine vanishes, and the root moves at most by the square root of the
-        // error.
+        // The root moves by the error of the distance from the surface, divided by the cosine of
+        // the angle between line and normal. Near a double root this cosine vanishes, and the root
+        // moves at most by the square root of the error.
         let allowed = (2.0 * margin / normal.max(1e-9)).min(8.0 * margin.sqrt());
         assert!(apart <= allowed, "{tube} {}: {line:?} {hit:?} {apart} > {allowed}", L::NAME);
     }
@@ -256,8 +256,8 @@ fn rays_that_leave_a_torus_do_not_hit_where_they_start() {
     }
 }
 
-/// Checks compounds (CSG) of a torus, a ball and a half-space. The middle of each interval between
-/// two hits is inside exactly if the set operation on the parts says so.
+/// Checks compounds (CSG) of a torus, a ball and a half-space. For the middle of each interval
+/// between two hits, hits and set operation agree on whether it is inside.
 #[test]
 fn torus_in_compounds_has_two_intervals() {
     let contains = |part: usize, p: DVec3| match part {
@@ -309,8 +309,9 @@ fn torus_in_compounds_has_two_intervals() {
     assert!(several > 30, "{several}");
 }
 
-/// Checks a torus under three affine maps. Its bounds touch the image of the surface, its clearance
-/// is at most the distance of its points, and normals exist where rays hit.
+/// Checks a torus under three affine maps. Its bounds touch the image of the surface. Its
+/// clearance, a lower bound of the distance between a point and the surface, is not too large.
+/// Normals exist where rays hit.
 #[test]
 fn torus_bounds_clearance_and_normals_agree_with_its_points() {
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -1.1, 2.0);

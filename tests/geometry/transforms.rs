@@ -60,7 +60,7 @@ fn transformed_objects_are_hit_at_images_of_original_hits() {
                 let normals: DMat3 = map.matrix3.inverse().transpose();
                 let normal = (normals * truth.normal).normalize();
                 // The tolerance is the rounding error of all lengths involved, divided by the
-                // cosine at the surface.
+                // cosine of the angle between ray and normal.
                 let lengths = radius + center.length() + got.t;
                 let tolerance = 1e-12 * lengths / normal.dot(d).abs();
                 assert!(
@@ -77,8 +77,8 @@ fn transformed_objects_are_hit_at_images_of_original_hits() {
 }
 
 /// Checks the transform steps of a scene file against the equation of an ellipsoid. A unit sphere
-/// at the origin, scaled by (2, 0.5, 1), turned 90 degrees about z, and moved by (1, 2, 3), is (x -
-/// 1)^2 / 0.25 + (y - 2)^2 / 4 + (z - 3)^2 = 1.
+/// at the origin, scaled by (2, 0.5, 1), turned 90 degrees about z, and moved by (1, 2, 3),
+/// satisfies (x - 1)^2 / 0.25 + (y - 2)^2 / 4 + (z - 3)^2 = 1.
 #[test]
 fn stretched_sphere_satisfies_its_equation() {
     let text = "[[object]]\nshape.sphere = { center = [0.0, 0.0, 0.0], radius = 1.0 }\n\

@@ -1,6 +1,7 @@
-//! Crash tests. 200 programs end at random moments while their scene is edited, saved and exported:
-//! by SIGTERM, SIGHUP, SIGKILL, or a closed terminal. No file is damaged, no edit older than a
-//! limit is lost, and the terminal is restored unless SIGKILL prevents it.
+//! Crash tests. 200 programs are ended at random moments while their scene is edited, saved and
+//! exported. They are ended by SIGTERM, SIGHUP, SIGKILL, or a closed terminal. No file is damaged,
+//! and no edit is lost that was made at least a given time before the end. The terminal is
+//! restored, except after SIGKILL.
 //!
 //! The message of a failure contains the number of its run. `ZERKALO_KILL=17 cargo test --test
 //! program kills::` repeats run 17 alone, with the same keys at the same times as far as the
@@ -28,13 +29,14 @@ const RUNS: usize = 200;
 /// Number of concurrent programs per processor. It is limited because each program also traces with
 /// several threads, and must still process keys as fast as they are typed.
 const RUNS_PER_PROCESSOR: usize = 4;
-/// Number of consecutive runs of which four are followed by a recovery: one run for each cause of
-/// the end. In a recovery the program is started again and restores the unsaved edits.
+/// Period of the recoveries: of so many consecutive runs, the first four are followed by a
+/// recovery, one for each cause of the end. In a recovery the program is started again and restores
+/// the unsaved edits.
 const RECOVERY_PERIOD: usize = 20;
 /// Smallest time from an edit's key press to SIGKILL after which the edit must not be lost.
 const KEPT_AFTER: Duration = Duration::from_secs(2);
-/// Smallest time from an edit's key press to any other end of the program after which the edit must
-/// not be lost.
+/// Smallest time from an edit's key press to SIGTERM, SIGHUP or the closing of the terminal after
+/// which the edit must not be lost.
 const READ_AFTER: Duration = Duration::from_millis(300);
 
 /// Cause of the program's end.
@@ -74,8 +76,8 @@ impl Plan {
     fn of(number: usize) -> Self {
         let mut numbers = Numbers::new(0x5eed_0000 + number as u64);
         let end = ENDS[number % ENDS.len()];
-        // The test checks edits only if they are two seconds old at SIGKILL, so that these runs
-        // last longer.
+        // Runs that end by SIGKILL last longer, because after SIGKILL only edits that are at least
+        // two seconds old must be kept.
         let [shortest, longest] = if end == End::Kill { [1.0, 4.5] } else { [0.0, 1.6] };
         let moment = numbers.between(shortest, longest);
         // Half of the runs never save, because saved edits do not test recovery.
@@ -98,8 +100,8 @@ impl Plan {
     }
 }
 
-/// Stalls of the machine: the start of each short sleep that lasted too long, and the excess of its
-/// duration.
+/// Stalls of the machine. A stall is a short sleep that lasted too long: its start, and the time by
+/// which it exceeded the requested duration.
 static STALLS: Mutex<Vec<(Instant, Duration)>> = Mutex::new(Vec::new());
 
 /// Measures short sleeps until `over` is `true`. Records a stall of the machine if a sleep lasts
@@ -137,7 +139,8 @@ fn run(number: usize) -> Result<Duration, String> {
     let scene = folder.path().join("scene.toml");
     fs::write(&scene, SCENE).map_err(|error| error.to_string())?;
     let mut pty = Pty::open(folder.path());
-    // The first picture counts as shown when 2000 bytes have followed the sequences of `ENTER`.
+    // `ENTER` contains the control sequences that enter the alternate screen. The first picture
+    // counts as shown when 2000 bytes have followed them.
     pty.wait_for("first picture", |bytes| bytes.len() > ENTER.len() + 2000)?;
     let start = Instant::now();
     let mut sent = Vec::new();

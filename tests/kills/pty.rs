@@ -1,5 +1,5 @@
-//! Pseudo-terminal that replies to one kind of request only. It can be closed like a lost
-//! connection, and several can run concurrently.
+//! Pseudo-terminal that replies to only one request, that for the terminal's device attributes. It
+//! can be closed like a lost connection, and several can run concurrently.
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
 use std::io::{Read, Write};
@@ -154,8 +154,8 @@ impl Pty {
         }
     }
 
-    /// Returns all output of the program, and `true` if the modes of the terminal are those before
-    /// the program's start.
+    /// Returns all output of the program, and `true` if the modes of the terminal equal those
+    /// before the program's start.
     pub fn afterwards(mut self) -> (Vec<u8>, bool) {
         let restored = self.master.as_deref().is_some_and(|master| modes(master) == self.modes);
         // Closing the last slave end closes the terminal and the output.

@@ -92,7 +92,7 @@ impl Connection {
     /// Simulates the duration `time`, during which `target` is the frame to be shown.
     pub fn pass(&mut self, target: &TargetFrame, time: Duration) {
         let end = self.now + time;
-        // Frames are computed at most once in a frame interval.
+        // At most one frame is computed in each frame interval.
         let mut next = self.now;
         while self.now < end {
             self.now += STEP;
@@ -130,9 +130,9 @@ impl Connection {
         }
     }
 
-    /// Simulates a key press. The terminal shows `old` before it, and `new` is the target frame
-    /// with its effect. Returns the time from the key press until the first kilobyte of the first
-    /// new frame arrives.
+    /// Simulates a key press. Before the key press the target frame is `old`. The frame `new` shows
+    /// the effect of the key. Returns the time from the key press until the first kilobyte of the
+    /// first new frame arrives.
     pub fn press(&mut self, old: &TargetFrame, new: &TargetFrame) -> Duration {
         let pressed = self.now;
         self.pass(old, self.one_way);
@@ -159,7 +159,7 @@ impl Connection {
         self.queue.iter().map(in_queue).sum::<f64>().ceil() as usize
     }
 
-    /// Delivers all frames in transmission to the terminal.
+    /// Delivers to the terminal all frames that are still in transmission.
     pub fn drain(&mut self) {
         for (_, bytes) in self.in_transit.drain(..) {
             self.parser.process(&bytes);

@@ -55,8 +55,7 @@ struct Figures {
     flushed: usize,
     first_64: usize,
     largest: usize,
-    /// Mean over all waves (sets of concurrent jobs) of the screen's OKLab error at the end of the
-    /// wave.
+    /// Mean OKLab error of the screen, measured at the end of each wave (set of concurrent jobs).
     mean_error: f64,
     /// Seconds from the end of the last wave until the screen shows the picture exactly.
     exact_after: f64,
@@ -66,7 +65,7 @@ struct Figures {
     busy: f64,
 }
 
-/// Renders a scene wave by wave (set of concurrent jobs). The next wave starts when no visible
+/// Renders a scene in waves (sets of concurrent jobs). The next wave starts when no visible
 /// difference and no text waits to be sent.
 fn converge(scene: &Scene) -> Figures {
     let mut work = Work::new(scene, SPP);
@@ -189,7 +188,8 @@ fn new_picture_shows_in_its_first_frame() {
 }
 
 /// Checks that the connection is busy for at least 60 % of the time in which visible differences
-/// wait. Also checks that no frame is so long that user input would wait for more than 0.15 s.
+/// wait to be sent. Also checks that no frame is so long that user input would wait for more than
+/// 0.15 s.
 #[test]
 fn connection_is_busy_while_differences_wait() {
     let scenes = ["mirror-room.toml", "viewpoint-left.toml"].map(support::shipped);
@@ -213,9 +213,9 @@ fn connection_is_busy_while_differences_wait() {
 }
 
 /// Checks the latency of key presses while the effects of earlier ones are being sent. The bound of
-/// the median is the sum of the round trip, 0.1 s for the frame in transmission, 0.05 s for the
-/// error of the measured round trip, and the time of a kilobyte. At 1 Mbit/s this is the goal of
-/// 0.25 s.
+/// the median is the sum of the round-trip time, 0.1 s for the frame in transmission, 0.05 s for
+/// the error of the measured round-trip time, and the transmission time of a kilobyte. At 1 Mbit/s
+/// and a round trip of 0.1 s this is about 0.25 s, the required latency.
 #[test]
 fn keys_wait_for_one_frame_only() {
     use zerkalo::terminal::flow::PacingMode::{AckClocked, SendQueue};

@@ -78,7 +78,7 @@ impl Work {
         self.cells.set_string(0, PICTURE.height, text, Style::new());
     }
 
-    /// Replaces the scene, to be rendered up to `spp` samples per pixel.
+    /// Replaces the scene by `scene`, which is rendered up to `spp` samples per pixel.
     pub fn edit(&mut self, scene: &Scene, spp: u32) {
         let Self { subject, version, .. } = *self;
         *self = Self { subject: subject + 1, version, ..Self::new(scene, spp) };

@@ -1,5 +1,6 @@
-//! Changes by a client during a session: lights, stop criteria, display, threads. Samples are kept
-//! where possible, and noise estimates equal those of a fresh render.
+//! Changes that a client makes while a session (background renderer) runs: lights, stop criteria,
+//! display, threads. Samples are kept where possible, and noise estimates equal those of a fresh
+//! render.
 
 mod noise;
 
@@ -140,7 +141,7 @@ fn light_changes_keep_samples() {
     let newer = relit();
     let mix = before.mix_for(&newer).expect("the film serves the scene");
     let generation = session.set_scene(Arc::new(newer.clone()));
-    // All snapshots after the light change have all samples of the first render.
+    // All snapshots after the light change contain all samples of the first render.
     let after = wait(&session, |s| {
         assert_eq!(s.report.samples, before.report.samples);
         s.report.generation == generation && s.report.noise.is_some()
@@ -188,7 +189,7 @@ fn noisy_light_change_resumes_finished_session() {
     // The reported estimate equals the one that the current film gives if it is computed anew.
     let film = session.with(|r, _| r.film.noise(&r.mix, &Display::default())).unwrap().unwrap();
     assert_eq!(report.noise.unwrap(), film);
-    // With the first lights the noise is lower again, so that the session stays finished.
+    // With the original lights the noise is lower again, so that the session stays finished.
     let back = finish(&mut session, &scene()).report;
     assert_eq!(back.samples, report.samples);
     assert!(back.noise.unwrap().rmse_codes < 0.15);

@@ -1,5 +1,5 @@
-//! Chi-square tests of sampled directions against the integrated density of their lobe (test 22 of
-//! the tests of extreme inputs).
+//! Chi-square tests of sampled directions against the integrated density of their lobe (the tests
+//! named `extreme_22_*`).
 
 use crate::common::report::{precision, report};
 use crate::lobes::setup::*;
@@ -11,8 +11,8 @@ use zerkalo::material::{Bsdf, Lobe, Material, ReflectionLobe};
 const ALPHAS: [f64; 5] = [1e-3, 0.05, 0.3, 1.0, 2.0];
 const DEGREES: [f64; 4] = [0.0, 60.0, 85.0, 89.9];
 const GRID: [usize; 2] = [16, 24];
-/// Number of points per bin and coordinate in the midpoint rule that integrates densities. Cells
-/// with a discontinuity of the density are divided into eight times as many points per coordinate.
+/// Number of cells per bin and coordinate in the midpoint rule that integrates densities. A cell
+/// has one point, or eight points per coordinate if the density jumps in the cell.
 const FINE: usize = 8;
 const COUNT: u32 = 100_000;
 
@@ -73,7 +73,7 @@ impl Chart {
     /// totally, and the ray is behind the surface.
     fn exists(&self, crossing: &Crossing) -> bool {
         if !matches!(self.spread, ReflectionLobe::MicrofacetDistribution(_)) {
-            // The density includes rays in front of the surface.
+            // The density of the lobes `cone` and `square` includes rays in front of the surface.
             return true;
         }
         let h = unit(combine(&[(1.0, self.view), (1.0, crossing.reflected.0)]));
@@ -144,7 +144,8 @@ impl Chart {
                 if self.through.is_some() && dot(d, self.n) >= 0.0 {
                     return (d, 0.0);
                 }
-                // An area dp dq covers alpha^2 pi d(r^2) dq in slope space, with d(r^2) = 2 dp / (1
+                // If r is the slope divided by alpha, an area dp dq covers alpha^2 pi d(r^2) dq in
+                // slope space, with d(r^2) = 2 dp / (1
                 // - p)^3. The solid angle of facet normals per area in slope space is cos^3.
                 let slopes = facets.alpha.powi(2) * PI * 2.0 / (1.0 - p).powi(3);
                 (d, per_facet * dot(h, self.n).powi(3) * slopes)
@@ -203,8 +204,8 @@ fn expected(chart: &Chart, material: &Material) -> Vec<f64> {
     shares
 }
 
-/// Returns the map (coordinates) for a lobe seen at an angle, and the expected fraction of
-/// directions in each bin.
+/// Returns the chart (map between directions and coordinates) for a lobe seen at an angle, and the
+/// expected fraction of directions in each bin.
 fn expectation(material: &Material, degrees: f64, through: Option<Sides>) -> (Chart, Vec<f64>) {
     let n = tilted_normal();
     let view = at_angle(n, degrees.to_radians(), 0.7);
@@ -222,7 +223,8 @@ fn p_value<L: SimdFloat>(drawn: &Material, (chart, shares): &(Chart, Vec<f64>), 
     let incident = combine(&[(-1.0, view)]);
     let mut take = |d: Option<Vector>| {
         let at = d.map_or([f64::NAN; 2], |d| chart.coordinates(d));
-        // Samples at the rim of cone and square may be outside by a rounding error.
+        // Samples at the rim of the lobes `cone` and `square` may be outside of all bins by a
+        // rounding error.
         let bin = |x: f64, n: usize| {
             let inside = x > -1e-4 && x < 1.0 + 1e-4;
             inside.then(|| ((x * n as f64) as usize).min(n - 1))
@@ -272,8 +274,8 @@ fn transmitted_cases() -> Vec<Case> {
         for alpha in [1e-3, 0.05, 0.3, 1.0] {
             for (n_i, n_t, thin) in sides {
                 for degrees in [0.0, 35.0, 80.0] {
-                    // The axis of the lobe is beyond the critical angle, as are nearly all of the
-                    // microfacets of a smooth surface.
+                    // Skipped: the axis of the lobe is beyond the critical angle, and nearly all
+                    // microfacets of a smooth surface reflect totally.
                     if n_i > n_t && degrees > 40.0 && (!has_facets(lobe) || alpha < 0.1) {
                         continue;
                     }
@@ -312,9 +314,9 @@ fn extreme_22_chi_square() {
 }
 
 /// Checks reflected directions in single precision. At 89.9 degrees a half vector has an error of
-/// 2e-5, which is a fiftieth of the smallest alpha and of the width of its bins. The error is
-/// negligible if alpha is at least 0.05, or if the angle is at most 60 degrees; only these cases
-/// are tested.
+/// 2e-5. This is a fiftieth of the smallest alpha, and of the width of the bins for this alpha. The
+/// error is negligible if alpha is at least 0.05, or if the angle is at most 60 degrees; only these
+/// cases are tested.
 #[test]
 fn extreme_22_chi_square_in_single_precision() {
     let mut cases = cases();

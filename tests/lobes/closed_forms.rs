@@ -13,8 +13,9 @@ use zerkalo::sampling::warp;
 /// is inside.
 ///
 /// For |delta| < theta < pi / 2 the fraction is [pi - acos(sin delta / sin theta) - cos theta
-/// acos(-tan delta / tan theta)] / [pi (1 - cos theta)]. For cones so narrow that this cancels, it
-/// is the fraction of a flat disc, within theta^2 / 20.
+/// acos(-tan delta / tan theta)] / [pi (1 - cos theta)]. For very narrow cones this difference
+/// loses digits by cancellation. The function then returns the fraction of a flat disc, which is
+/// equal within theta^2 / 20.
 pub fn cone_share(theta: f64, delta: f64) -> f64 {
     if delta.abs() >= theta {
         return if delta > 0.0 { 1.0 } else { 0.0 };
@@ -35,8 +36,9 @@ fn disc_share(r: f64, d: f64) -> f64 {
     0.5 + (d * (1.0 - d * d).sqrt() + d.asin()) / PI
 }
 
-/// Returns the fraction of a square with the side `side`, at unit distance, within an edge at
-/// distance `d` in its plane. `phi` is the angle between the edge's normal and a side.
+/// Returns the fraction of a square that is inside of a straight edge in its plane. The square has
+/// the side `side` and is at unit distance. `d` is the distance of the edge from its centre, and
+/// `phi` the angle between the edge's normal and a side.
 pub fn square_share(side: f64, d: f64, phi: f64) -> f64 {
     let h = 0.5 * side;
     let (c, s) = (phi.cos().abs(), phi.sin().abs());
@@ -140,7 +142,7 @@ fn spread_of(lobe: Lobe, roughness: f64) -> ReflectionLobe<f64> {
 }
 
 /// Checks the fraction of a cone lobe in a half-space for all half-angles and in both precisions.
-/// Single precision rotates a direction by half a rounding, 6e-8. This changes the fraction by a
+/// In single precision, rounding rotates a direction by up to 6e-8. This changes the fraction by a
 /// few millionths at the half-angle 0.01. For narrower cones the rounding of the rotated axis
 /// limits the precision. They are tested with a normal along z only, which is exact.
 #[test]
@@ -262,8 +264,8 @@ fn largest_difference(side: f64) -> f64 {
 }
 
 /// Compares four sizes of the square lobe with the cone lobe. The square with the area of the cone
-/// differs least. The reference values are rounded ones for a flat disc, which differs from the
-/// cone by 0.002 at this angle.
+/// differs least. The reference values are those of a flat disc, rounded. At this angle they differ
+/// from those of the cone by 0.002.
 #[test]
 fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
     let r = 0.2;
@@ -343,8 +345,8 @@ fn horizon<L: SimdFloat>(tolerance: f64) {
             material.reflection = rho;
             let share = match spread_of(lobe, roughness) {
                 ReflectionLobe::Square { side } => {
-                    // The square is aligned with the frame about the mirror direction as the
-                    // program computes it.
+                    // The sides of the square are those of the frame that the program computes
+                    // about the mirror direction.
                     let kernel = Vec3::<L>::of(incident).reflect(Vec3::of(n)).normalize();
                     let frame = Frame::around(kernel);
                     let up = [frame.t, frame.b].map(|v| dot(v.lane(0).map(Float::to_f64), n));

@@ -12,8 +12,8 @@ use zerkalo::sampling::{SampleSettings, Sampler, SamplerKind};
 use zerkalo::value::{Color, TomlValue, ValueType};
 use zerkalo::world::World;
 
-/// Checks that the words of the field table and the lists of variants have the same order, so that
-/// these tests cover every word.
+/// Checks that the words that the scene format accepts and the lists of enum variants have the same
+/// order, so that these tests cover every word.
 #[test]
 fn variants_match_words_of_fields() {
     let words = |key: &str| -> Vec<&str> {
@@ -32,8 +32,8 @@ fn variants_match_words_of_fields() {
 }
 
 /// Checks energy and reciprocity of the interface, reflection and transmission together, for light
-/// from outside and from inside. Also checks that a Fresnel mode without one of these properties
-/// violates it here.
+/// from outside and from inside. Also checks that each property that a Fresnel mode is declared not
+/// to have is violated.
 #[test]
 fn transparent_surfaces_have_declared_properties() {
     for mode in Fresnel::ALL {
@@ -90,7 +90,7 @@ fn highlight_f(material: &Material, v: Vector, l: Vector) -> f64 {
 }
 
 /// Returns the value f (BRDF) of a reflection lobe for light from `l` seen from `v`: the weight of
-/// a sample, times its density, divided by the cosine of the light.
+/// a sample, times its density, divided by the cosine of the angle between the normal and `l`.
 fn lobe_f(material: &Material, v: Vector, l: Vector) -> f64 {
     let n = tilted_normal();
     let finish = Bsdf::<f64>::new(material, true);
@@ -177,7 +177,7 @@ fn mirror_is_reciprocal(material: &Material) {
 }
 
 /// Checks the reciprocity of Lambert's law in traced paths: if light and eye are exchanged, the
-/// radiance divided by the cosine of the light stays the same.
+/// radiance divided by the cosine of the light's angle to the normal stays the same.
 #[test]
 fn closed_form_13_lambert_is_reciprocal_and_keeps_energy() {
     assert_eq!(
@@ -306,8 +306,8 @@ fn closed_form_13_weight_times_density_is_the_highlight() {
                     let shine = finish.highlight(vn, Vec3::of(v), vd, dot(n, d), dot(n, v));
                     for (w, f_cos) in weight.into_iter().zip(vector(shine)) {
                         // The first term is the error of exp(-tan^2 / alpha^2), because the slope
-                        // comes from rounded directions. The second is the error of the light's
-                        // cosine, which is tiny at grazing angles.
+                        // comes from rounded directions. The second is the error of the cosine
+                        // between the normal and the light, which is tiny at grazing angles.
                         let error = (w * density / f_cos - 1.0).abs();
                         let limit = 1e-12 / (alpha * degrees.to_radians().cos());
                         let limit = limit + 1e-15 / dot(n, d);

@@ -24,9 +24,9 @@ macro_rules! for_every_instance {
     };
 }
 
-/// Returns the largest error of `f` against `exact` over `inputs`. If `of_one` is `true`, the unit
-/// is the spacing of numbers (ulp) at 1, otherwise that at the exact result. `exact` gets the input
-/// rounded to the precision of `L`.
+/// Returns the largest error of `f` against `exact` over `inputs`, in ulps (spacings of numbers) at
+/// 1 if `of_one` is `true`, otherwise at the exact result. `exact` gets the input rounded to the
+/// precision of `L`.
 fn worst_ulps<L: SimdFloat>(
     inputs: impl Fn(u32) -> f64,
     f: impl Fn(L) -> L,
@@ -57,8 +57,8 @@ fn sine_and_cosine<L: SimdFloat>() {
     assert!(sin <= 1.5 && cos <= 1.5, "{}: sin {sin}, cos {cos}", L::NAME);
 }
 
-/// Checks the angles (atan2) of points in all directions. Their absolute error is at most three ulps
-/// of 1. At the origin and on the positive x axis the angle is 0, not NaN.
+/// Checks the angles (atan2) of points in all directions. Their absolute error is at most three
+/// ulps of 1. At the origin and on the positive x axis the angle is 0, not NaN.
 fn arc_tangent<L: SimdFloat>() {
     let angle = |i: u32| std::f64::consts::PI * (2.0 * uniform(i) - 1.0);
     let rounded = |x: f64| L::from_f64(x).lane(0).to_f64();

@@ -36,8 +36,8 @@ pub trait ReflectionModel {
 
 impl ReflectionModel for Lobe {
     // The lobes `cone` and `square` are uniform about the mirror direction, so that their density
-    // is symmetric in light and view. The BSDF is this density divided by the cosine of the light;
-    // it is therefore not symmetric.
+    // is symmetric in light and view. The BSDF is this density divided by the cosine of the angle
+    // between normal and light; it is therefore not symmetric.
     fn properties(self) -> BsdfProperties {
         match self {
             Self::Mirror => BsdfProperties { reciprocal: true, energy: Energy::Conserving },

@@ -1,4 +1,5 @@
-//! Rough interfaces: energy, Walter's formula, extremes, and scenes with rough and absorbing glass.
+//! Rough interfaces: energy, Walter's formula for their BTDF, extreme inputs, and scenes with rough
+//! and absorbing glass.
 
 use crate::lobes::setup::*;
 use std::f64::consts::{PI, TAU};
@@ -9,7 +10,8 @@ fn glossy_lobes() -> impl Iterator<Item = (Lobe, Masking)> {
     every_lobe().into_iter().filter(|(lobe, _)| *lobe != Lobe::Mirror)
 }
 
-/// Returns the Fresnel reflectance of unpolarised light at the cosine `c`.
+/// Returns the Fresnel reflectance of unpolarised light. `c` is the cosine of the angle of
+/// incidence.
 fn fresnel(c: f64, n_i: f64, n_t: f64) -> f64 {
     let sin_t = n_i / n_t * (1.0 - c * c).max(0.0).sqrt();
     if sin_t >= 1.0 {
@@ -38,7 +40,8 @@ fn erf(x: f64) -> f64 {
     (0..=steps).map(term).sum::<f64>() * h / 3.0 * 2.0 / PI.sqrt()
 }
 
-/// Microfacet distribution, implemented for this test a second time from the papers.
+/// Microfacet distribution, implemented from the papers a second time, independently of the
+/// program.
 struct Facets {
     ggx: bool,
     masking: Masking,
@@ -95,8 +98,8 @@ impl Facets {
         let (rings, turns) = (300, 120);
         let mut sums = [0.0; 2];
         for i in 0..rings {
-            // With s = 1 - (1 - q)^2, tan^2 = alpha^2 s / (1 - s). The square removes the
-            // singularity at grazing microfacets.
+            // The slopes are sampled at tan^2 = alpha^2 s / (1 - s) with s = 1 - (1 - q)^2, for
+            // evenly spaced q. The square removes the singularity at grazing microfacets.
             let q = (f64::from(i) + 0.5) / f64::from(rings);
             let rest = (1.0 - q) * (1.0 - q);
             let tan2 = self.alpha * self.alpha * (1.0 - rest) / rest;

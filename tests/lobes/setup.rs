@@ -61,7 +61,7 @@ pub fn reflector(lobe: Lobe, masking: Masking, roughness: f64) -> Material {
     }
 }
 
-/// Returns `true` if the lobe is one of microfacets, which have masking.
+/// Returns `true` if the lobe is a microfacet distribution. Only these have masking.
 pub fn has_facets(lobe: Lobe) -> bool {
     let finish = Bsdf::<f64>::new(&reflector(lobe, Masking::Smith, 1.0), true);
     matches!(finish.reflection, Some((_, ReflectionLobe::MicrofacetDistribution(_))))
@@ -140,7 +140,8 @@ pub fn rough_glass(lobe: Lobe, masking: Masking, alpha: f64, ior: f64) -> Materi
     }
 }
 
-/// Smooth or rough interface: the indices of refraction on both sides, and `true` for a thin pane.
+/// Smooth or rough interface: the indices of refraction on the side of the incident ray and on the
+/// side of the transmitted ray, and `true` for a thin pane.
 #[derive(Clone, Copy, Debug)]
 pub struct Sides {
     pub n_i: f64,

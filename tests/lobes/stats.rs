@@ -91,7 +91,8 @@ pub fn slope(points: &[(f64, f64)]) -> f64 {
     sxy / sxx
 }
 
-/// Checks 97.5 % points of chi-square from the usual tables, and Q(1, x) = exp(-x).
+/// Compares the tail probability with tabulated 97.5 % points of chi-square distributions. Also
+/// checks Q(1, x) = exp(-x).
 #[test]
 fn chi_square_tail_matches_tables() {
     for (chi2, dof) in [(5.024, 1), (20.483, 10), (129.561, 100), (1_089.531, 1000)] {

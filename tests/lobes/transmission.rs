@@ -21,8 +21,8 @@ const GLASS: &str = "ambient = 0.0\ndiffuse = 0.0\nreflection = 1.0\ntransmissio
 ///
 /// The slab displaces a ray by t sin i (1 - cos i / sqrt(n^2 - sin^2 i)) and keeps its direction.
 /// Two rounding errors bound the difference. The first is that of the direction, times the length
-/// of the path through the slab, which is up to 430 at 89.9 degrees. The second is that of the two
-/// ray offsets, each 8 roundings of the slab's half width.
+/// of the path through the slab. The path is up to 430 long, at 89.9 degrees. The second is that of
+/// the two ray offsets, each 8 roundings of the slab's half width.
 fn check_slab<L: SimdFloat>() -> f64 {
     /// Half width of the slab. It is large enough for a ray at 89.9 degrees if the index is 1.
     const HALF_WIDTH: f64 = 450.0;
@@ -254,7 +254,7 @@ fn glass_is_invisible_in_white_furnace() {
         [materials.air]\nindex = 1.0\n";
     for index in [0.7, 1.0, 1.5, 1e3] {
         let inner = format!("{GLASS}ior = {index:?}\n");
-        // With glass of index 1000 there is no bubble: total reflection would trap light in the
+        // Glass of index 1000 gets no bubble, because total reflection would trap light in the
         // glass around it.
         let bubble = if index < 100.0 { format!("{nested}{GLASS}") } else { String::new() };
         for more in [String::new(), bubble] {
@@ -376,7 +376,8 @@ fn camera_inside_glass_starts_in_its_medium() {
         assert_eq!(look(41.82, near, "", ""), 0.0);
         assert_eq!(look(60.0, near, "fresnel = \"dielectric\"", ""), 0.0);
         let f = 0.04;
-        // The ray leaves the glass at the first surface, or after one reflection at the second.
+        // The ray leaves the glass at the first surface, or is reflected there and leaves at the
+        // opposite one.
         let seen = look(0.0, near, "fresnel = \"dielectric\"", "");
         assert!((seen - (1.0 - f * f)).abs() < 1e-9, "{near}: {seen}");
     }
