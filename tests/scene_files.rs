@@ -73,7 +73,7 @@ fn every_scene_reads_and_has_a_title_comment() {
                 assert!(warnings.len() == 1 && warnings[0].contains(words), "{warnings:?}")
             }
         }
-        // Scenes that a comment refers to exist.
+        // The comments refer only to scenes that exist.
         for word in text.split('`').filter(|w| w.ends_with(".toml")) {
             assert!(Path::new("scenes").join(word).exists(), "{} names {word}", path.display());
         }
@@ -153,7 +153,7 @@ fn unreadable_scene_files_are_reported() {
     assert!(scene(marked).is_ok());
     let error = scene(&marked.replace("[[object]]", "wrong = 1")).unwrap_err();
     assert_eq!(error.messages()[0].line_column, Some((1, 1)));
-    // Defaults apply without a material, a camera and a light.
+    // Without a material, a camera and a light, the defaults apply.
     let bare = scene(marked).unwrap();
     assert_eq!(bare.objects[0].material, "");
     assert_eq!(bare.faults(), []);

@@ -153,7 +153,7 @@ fn every_scene_renders_its_golden_picture() {
     let references = parse_references(&text);
     let values = references.values().flatten().count() * 3;
     let threshold = threshold(values);
-    // The reference is a rounded mean over this many renderings.
+    // The reference is the mean over the renders with `REFERENCE_SEEDS`, rounded.
     let with_reference = (1.0 + 1.0 / REFERENCE_SEEDS.count() as f64).sqrt();
     let rounding = 10f64.powi(-(DECIMALS as i32));
     let mut wrong = Vec::new();
@@ -224,7 +224,7 @@ fn auto_precision_is_double_for_extreme_proportions() {
     for (name, scene) in all_shipped() {
         assert_eq!(chosen(&scene), Precision::Single, "{name}");
     }
-    // A floor of 10 x 10 and a ball on it, with the floor's corner 5 from the centre.
+    // A floor of 10 x 10 around the origin and a ball on it. The largest coordinate is 5.
     let with_ball = |radius: f64| {
         parsed(&format!(
             "[[object]]\n\
@@ -234,7 +234,8 @@ fn auto_precision_is_double_for_extreme_proportions() {
              [camera]\neye = [0.0, 0.1, 1.0]\ntarget = [0.0, 0.0, 0.0]\n"
         ))
     };
-    // 8192 balls side by side reach from the centre to the corner.
+    // Single precision requires a diameter of the ball of at least 1/8192 of the largest
+    // coordinate.
     let limit = 5.0 / 8192.0 / 2.0;
     assert_eq!(chosen(&with_ball(1.01 * limit)), Precision::Single);
     assert_eq!(chosen(&with_ball(0.99 * limit)), Precision::Double);

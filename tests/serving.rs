@@ -237,8 +237,8 @@ struct Bench {
     pool: Pool,
     tried: usize,
     served: usize,
-    /// Last components of the keys in two sets: those after whose edits the film was not reused,
-    /// and those after whose edits it was.
+    /// Last components of the edited keys in two sets. The first set contains the keys after whose
+    /// edits the film was not reused, the second those after whose edits it was reused.
     by_key: [BTreeSet<String>; 2],
 }
 

@@ -1,4 +1,5 @@
-//! Films of sessions, which do not depend on threads, interruptions or earlier scenes.
+//! Films of sessions (background renderers), which do not depend on threads, interruptions or
+//! earlier scenes.
 
 use crate::support;
 use crate::support::test_film::TestFilm;

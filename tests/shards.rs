@@ -175,12 +175,13 @@ fn planned(name: &str, size: Option<[u32; 2]>, seed: u64, target: f64) -> Planne
 fn planned_noise_is_near_the_target() {
     for (name, size) in [("mirror-room", [320, 240]), ("reflecting-tracks", [320, 240])] {
         let result = planned(name, Some(size), 0, 0.25);
-        // The picture has a quarter of the usual number of pixels. Its noise estimate is therefore
-        // twice as uncertain, and the bounds are wide.
+        // The picture has a quarter of the usual number of pixels. The bounds are wide, because the
+        // noise estimate of so few pixels is twice as uncertain as usual.
         assert!((0.8..=1.1).contains(&result.noise), "{name}: {}", result.noise);
         assert!(result.rays < 1.15, "{name}: {}", result.rays);
-        // A shard has 40 to 110 blocks of work. Their numbers of rays differ by a factor of three,
-        // so that the largest shard may be 25 % above the mean.
+        // A shard gets 40 to 110 blocks (ranges of samples of one tile). Their numbers of rays
+        // differ by a factor of three. The largest shard may therefore have 25 % more rays than the
+        // mean.
         assert!(result.imbalance < 0.25, "{name}: {}", result.imbalance);
     }
 }

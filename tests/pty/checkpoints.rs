@@ -22,7 +22,7 @@ fn wait_for_file(fixture: &Fixture, name: &str) {
 fn kill(terminal: Terminal) {
     let kill = Command::new("kill").args(["-9", &terminal.process_id().to_string()]).status();
     assert!(kill.unwrap().success());
-    // A killed program does not restore its terminal, which `end` would demand.
+    // `Terminal::end` would fail, because a killed program does not restore its terminal.
     drop(terminal);
 }
 
@@ -122,8 +122,8 @@ fn dashboard_killed_at_twenty_random_moments_ends_with_the_same_film() {
     kill_at_random_moments(20, &text, 2);
 }
 
-/// Checks a dashboard that is killed after a checkpoint and one that continues from it. The film of
-/// the second one equals that of `zerkalo render`.
+/// Kills a dashboard after it has written a checkpoint, and continues the render in a second
+/// dashboard. The film of the second one equals that of `zerkalo render`.
 #[test]
 fn killed_dashboard_continues_from_its_checkpoint() {
     let fixture = Fixture::with_room();

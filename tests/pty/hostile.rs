@@ -33,7 +33,7 @@ fn names_with_control_sequences_are_escaped() {
     terminal.wait_for_text("-1.png");
     terminal.send("y");
     terminal.wait_for_text("not copied");
-    // A faulty file: the messages quote it.
+    // The file becomes invalid, and the error messages quote its text.
     terminal.send("]");
     terminal.wait_for_text("toml ●");
     fs::write(fixture.path(&name), format!("[camera]\n\"{escaped}\" = 1\n")).unwrap();

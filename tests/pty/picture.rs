@@ -24,8 +24,8 @@ impl Picture {
         Self { size: [info.width as usize, info.height as usize], rgb }
     }
 
-    /// Returns the mean, in linear light, over one of `cells` equal boxes of the picture, as 8-bit
-    /// sRGB. `index` selects the box by column and row.
+    /// Divides the picture into equal boxes, as many as `cells` says. Returns the mean colour of
+    /// the box in column and row `index`, averaged in linear light, as 8-bit sRGB.
     fn averaged(&self, cells: [usize; 2], index: [usize; 2]) -> [u8; 3] {
         let edge = |i: usize, n: usize| (n * self.size[i]) as f64 / cells[i] as f64;
         let overlap = |i: usize, pixel: usize| {
@@ -148,8 +148,8 @@ fn pending_export_is_written_before_the_end() {
     Picture::of_png(&fs::read(fixture.path("room-1.png")).unwrap());
 }
 
-/// Restarts the render with the stop criterion of `spp` samples per pixel and waits until it is
-/// reached. The render may have had more samples before.
+/// Restarts the render with the stop criterion of `spp` samples per pixel and waits until the
+/// criterion is reached. Before the restart the render may have had more samples.
 fn restart_rendering(terminal: &mut Terminal, spp: u32) {
     let condition = format!("spp {spp}");
     terminal.send("T");

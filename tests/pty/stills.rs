@@ -87,7 +87,8 @@ fn kitty_protocol_shows_the_exported_file() {
     terminal.wait_for_text("outline");
     let after = String::from_utf8_lossy(&terminal.bytes()).into_owned();
     assert_eq!(after.matches(REMOVAL).count(), 1);
-    // When a later frame is visible, the frame with the removal has certainly been written.
+    // A later frame shows the help. When it is visible, the frame that removes the image has
+    // certainly been written.
     terminal.send("?");
     terminal.wait_for_text("orbit left");
     terminal.send("?");

@@ -105,7 +105,8 @@ fn rapid_resizing_is_debounced() {
     let (status, bytes) = terminal.end();
     assert_eq!(status, 0);
     // Each applied size clears the screen; forty sizes are merged into few. A size takes effect
-    // after 90 ms without a change: a busy machine may pause that long between two changes.
+    // after 90 ms without a change. On a busy machine the test may pause for that long between two
+    // changes; each such pause allows one more size.
     let pauses = elapsed.as_millis() as usize / 90;
     let clear_count = bytes.matches("\x1b[2J").count();
     assert!((2..12 + pauses).contains(&clear_count), "{clear_count} times in {elapsed:?}");
@@ -220,7 +221,7 @@ fn pipe_in_place_of_the_scene_blocks_neither_edits_nor_the_end() {
 }
 
 /// Checks that the terminal is restored after an abort, for example after a failed allocation, and
-/// after a kill. The killed program cannot restore it by itself.
+/// after a kill. After a kill, a helper process restores it.
 #[test]
 fn abort_and_kill_leave_a_restored_terminal() {
     for name in ["ABRT", "KILL"] {

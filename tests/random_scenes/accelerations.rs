@@ -8,7 +8,8 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::{Acceleration, Scene};
 use zerkalo::world::Precision;
 
-/// Samples per pixel and replicate (half of the samples); not a multiple of the packet width.
+/// Number of samples per pixel in each of the two replicates (halves of the samples). It is not a
+/// multiple of the packet width.
 const SAMPLES: u32 = 3;
 
 fn same_bytes(scene: &Scene) -> Verdict {

@@ -116,7 +116,7 @@ fn with_gaps(scene: &Scene, numbers: &mut Numbers, aside: DVec3) -> Option<Scene
 }
 
 /// Returns `true` if two coincident opaque surfaces are visible. This is the case if the picture
-/// changes with the size of opaque objects: slightly smaller or slightly larger.
+/// with slightly smaller opaque objects differs from that with slightly larger ones.
 pub fn shows_coincident_opaque(scene: &Scene) -> bool {
     let variants = [Change::OpaqueShrink, Change::OpaqueGrow]
         .map(|change| changed(scene.clone(), &mut Numbers::new(1), change));
@@ -128,8 +128,8 @@ pub fn shows_coincident_opaque(scene: &Scene) -> bool {
     matches!(verdict, Verdict::Different(_))
 }
 
-/// Returns directions in which the eye is moved. If the eye is on surfaces, they include both sides
-/// of each.
+/// Returns directions in which the eye is moved. For each surface that the eye is on, they include
+/// both directions along its normal.
 fn asides(scene: &Scene, numbers: &mut Numbers) -> Vec<DVec3> {
     let eye = DVec3::from_array(scene.camera.eye);
     let normals: Vec<DVec3> = scene
@@ -163,16 +163,17 @@ fn same_with_gaps(scene: &Scene) -> Verdict {
         paired(size, ["touching", "with gaps"], [&render(other), &gap_picture], FLOOR)
     };
     let equals_gap = |other: &Scene| matches!(against_gap(other), Verdict::Same);
-    // Shrinking does not separate two coincident surfaces that face the same side: that of the
-    // larger object is visible. An eye exactly on a surface is moved to one of its sides.
+    // If two coincident surfaces have the same outward normal, the object that shrinks less hides
+    // the surface of the other one. An eye exactly on a surface is moved to one side of it, which
+    // depends on the variant.
     if !variants[1..].iter().all(equals_gap) {
         return Verdict::Skipped(
             "the picture depends on which of two objects is larger, or on the side of the eye",
         );
     }
     let touching = against_gap(&scene);
-    // Rounding decides which of two coincident opaque surfaces is visible. Both are visible only
-    // from inside of an opaque solid.
+    // Rounding decides which of two coincident opaque surfaces a ray hits. Where opaque solids
+    // touch, both surfaces are visible only if the eye is inside of one of the solids.
     if matches!(touching, Verdict::Different(_)) && shows_coincident_opaque(&scene) {
         return Verdict::Skipped("two coincident opaque surfaces are visible");
     }

@@ -89,7 +89,8 @@ pub enum Finish {
     Glowing,
 }
 
-/// Returns a random material without validation errors. It emits nothing: see [`emission`].
+/// Returns a random material without validation errors. Its emission is 0; the function
+/// [`emission`] chooses it.
 pub fn material(numbers: &mut Numbers, finish: Finish) -> Material {
     let emits_nothing = |field: &&Field| !field.name.starts_with("emission");
     let fields: Vec<Field> = material::FIELDS.iter().filter(emits_nothing).copied().collect();
@@ -164,9 +165,9 @@ fn compound(key: &str, of: Vec<CsgOperand>) -> Option<Shape> {
     Shape::from_text(&whole.to_string()).ok().filter(|shape| shape.faults().is_empty())
 }
 
-/// Returns a shape of a kind with random values of its keys. The shape is approximately in a box of
-/// the size `size` that stands on the point `base`. Returns `None` if the shape has validation
-/// errors.
+/// Returns a shape of the kind `kind` whose keys have random values. The shape is approximately in
+/// a box of the size `size` that stands on the point `base`. Returns `None` if the shape has
+/// validation errors.
 fn by_keys(numbers: &mut Numbers, kind: &Field, base: DVec3, size: DVec3) -> Option<Shape> {
     let key_value = |numbers: &mut Numbers, field: &Field| {
         let least = size.min_element();

@@ -9,11 +9,11 @@ use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::{AnyWorld, Options, Precision};
 
 const SEEDS: u64 = 8;
-/// Samples per pixel and replicate (half of the samples).
+/// Number of samples per pixel in each of the two replicates (halves of the samples).
 const SAMPLES: u32 = 4;
 /// Allowed error of single precision in the mean of a block of pixels, in 8-bit levels. At the most
-/// unfavourable ratio of sizes for which `auto` selects it, docs/accuracy.md measures an error of
-/// 0.12 over a whole picture.
+/// unfavourable ratio of sizes for which `auto` still selects single precision, the error over a
+/// whole picture is 0.12 (docs/accuracy.md).
 const FLOOR: f64 = 0.5;
 
 /// Returns the displayed values of every pixel, in 8-bit levels: one picture for each seed.
@@ -30,8 +30,8 @@ pub fn codes(scene: &Scene, precision: Precision, samples: u32) -> Vec<Vec<[f64;
         .collect()
 }
 
-/// Compares block means of two sets of pictures. Pictures with the same seed have the same samples
-/// in both sets, so that their differences are tested.
+/// Compares block means of two sets of pictures. Two pictures with the same seed have the same
+/// samples. The test therefore uses the differences of these pairs.
 pub fn paired(
     size: [u32; 2],
     names: [&str; 2],

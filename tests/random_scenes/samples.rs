@@ -23,22 +23,24 @@ const SAMPLES: u32 = 32;
 const REFERENCE_PICTURES: u64 = 8;
 /// Samples per pixel of each picture of the reference in the first comparison.
 const REFERENCE: u32 = 128;
-/// Factor by which the second comparison has more seeds, and its reference more samples, than the
-/// first. A scene that differs is compared a second time with other seeds, and only this result
-/// counts. The standard error of eight numbers with a skewed distribution is often far too small:
-/// if one of 20 pictures contains a rare bright sample, eight pictures without it agree.
+/// Factor from the first to the second comparison, for the number of seeds and for the sample count
+/// of the reference. A scene that differs in the first comparison is compared a second time with
+/// other seeds, and only this result counts. The first is unreliable, because the standard error of
+/// eight numbers with a skewed distribution is often far too small: if one of 20 pictures contains
+/// a rare bright sample, eight pictures without it agree.
 const REPETITION: u32 = 8;
 /// Allowed range of the true error, divided by the reported one.
 const HONEST: [f64; 2] = [0.9, 1.15];
-/// Largest squared error of the reference, relative to that of the uniform pictures. In the first
-/// comparison a uniform picture has a 32nd of the reference's samples. This is also the largest
-/// relative change of the uniform pictures' squared error if half of the reference is left out.
+/// Largest squared error of the reference, relative to that of the uniform pictures. The expected
+/// value is 1/32, because a uniform picture of the first comparison has a 32nd of the reference's
+/// samples. The constant also limits the relative change of the uniform pictures' squared error if
+/// half of the reference is left out.
 const MAX_REFERENCE_ERROR: f64 = 0.125;
 /// Largest number of rays of an adaptive picture, divided by that of a uniform one with the same
 /// true error.
 const MAX_RAY_RATIO: f64 = 1.5;
-/// Factor of the uniform pictures' mean number of rays. A picture that has not reached its noise
-/// target after so many rays is stopped.
+/// Number of rays after which a picture that has not reached its noise target is stopped, divided
+/// by the mean number of rays of the uniform pictures.
 const STOP_FACTOR: u64 = 4;
 /// Largest allowed deviation of a measurement from its limit, in standard deviations of a normal
 /// distribution.
@@ -154,9 +156,9 @@ impl Reference {
     }
 
     /// Returns `true` if the reference is good enough to measure the error of the pictures `shots`.
-    /// It is not if its own error is too large. It is not either if the measured error changes when
-    /// half of the reference is left out, because bright samples that are rare even in the
-    /// reference make its own error look too small.
+    /// Its own error must be small, and the measured error must not change much when half of the
+    /// reference is left out. The second condition finds bright samples that are rare even in the
+    /// reference; they make its own error look too small.
     fn is_sufficient(&self, shots: &[Shot]) -> bool {
         let mean =
             |of: &dyn Fn(&Shot) -> f64| mean_and_error(&shots.iter().map(of).collect::<Vec<_>>()).0;
@@ -188,8 +190,8 @@ impl Reference {
                     |v: &[[f64; 3]]| mean_and_error(&v.iter().map(|m| m[c]).collect::<Vec<_>>());
                 let ((wanted, error), (found, shot_error)) =
                     (channel(&reference_means), channel(&shot_means));
-                // The error of the reference is scaled to the number of pictures and to their
-                // sample counts.
+                // The error of the reference is scaled to the number and to the sample count of the
+                // compared pictures.
                 let spread = error * (self.pictures.len() as f64 / shots.len() as f64).sqrt();
                 let expected = spread * (f64::from(self.samples) / count).sqrt();
                 let chance = (error.powi(2) + shot_error.max(expected).powi(2)).sqrt();
@@ -253,8 +255,8 @@ impl Errors {
         let count = self.truths.len() as f64;
         let growth = if reported > 0.0 { (truth / (factor * reported)).max(1.0) } else { 1.0 };
         let of_pixels = factor * (self.squares * growth).sqrt() / count;
-        // Half of the reference's squared error is added, because that error is itself uncertain,
-        // by about a quarter.
+        // The reference's squared error is uncertain by about a quarter. Twice this uncertainty is
+        // added.
         (mean, spread.max(of_pixels).hypot(0.5 * self.reference) + 1e-6)
     }
 
@@ -272,8 +274,8 @@ impl Errors {
 ///
 /// A picture that stops at a noise target stops when its noise estimate is low by chance. The
 /// reported error is therefore too small even for uniform pictures. `usual` contains the errors of
-/// uniform pictures with the same target. If their ratio is out of range, it replaces the limit for
-/// the adaptive pictures.
+/// uniform pictures with the same target. If the ratio of true to reported error of these pictures
+/// is out of range, this ratio replaces the limit for the adaptive pictures.
 fn dishonest(
     name: &str,
     errors: &Errors,
@@ -353,8 +355,8 @@ fn differences(
     Ok(wrong)
 }
 
-/// Compares how many seeds do not reach a noise target: those with which only the adaptive picture
-/// fails, and those with which only the uniform one fails. Returns a text with both numbers if the
+/// Compares two numbers of seeds: those for which only the adaptive picture fails to reach a noise
+/// target, and those for which only the uniform one fails. Returns a text with both numbers if the
 /// first is significantly larger by a sign test (McNemar 1947). Some failures are normal: a picture
 /// with a rare bright sample reports more noise than the mean picture does.
 fn unfinished(
@@ -376,8 +378,8 @@ fn unfinished(
     })
 }
 
-/// Compares the pictures of a scene, and a second time if they differ or if the reference is too
-/// noisy.
+/// Compares the pictures of a scene. If they differ, or if the reference is too noisy, compares
+/// them a second time with other seeds.
 fn matches_reference(scene: &Scene) -> Verdict {
     let outcome = match differences(scene, 0..SEEDS, REFERENCE, SUSPICIOUS) {
         Ok(wrong) if wrong.is_empty() => return Verdict::Same,

@@ -111,15 +111,15 @@ fn draw(numbers: &mut Numbers, layout: Layout) -> Option<Scene> {
     }
     scene.resolve();
     if !scene.faults().is_empty() {
-        // A shape may lack the texture coordinates of its texture.
+        // One cause of errors is a shape without the texture coordinates that its texture needs.
         scene.materials.values_mut().for_each(|m| (m.texture, m.bump) = (None, None));
     }
     if !scene.faults().is_empty() {
         return None;
     }
-    // Highlights of emissive objects are sampled only by points that are chosen on the objects.
-    // Sharp ones consist of few bright samples, whose error is reported too low. Objects therefore
-    // emit light only if no material has a highlight.
+    // Highlights of emissive objects are sampled only by points that are chosen on the objects. In
+    // a sharp highlight few samples are bright, and the reported error is too low. Objects
+    // therefore emit light only if no material has a highlight.
     if scene.materials.values().all(|material| material.specular == 0.0) {
         for material in scene.materials.values_mut() {
             (material.emission, material.emission_color) = emission(numbers);
@@ -282,7 +282,7 @@ fn spot(numbers: &mut Numbers, position: DVec3, target: DVec3) -> Spot {
     Spot { position: position.to_array(), direction, outer_angle, inner_angle }
 }
 
-/// Scales and translates some of the scenes as a whole.
+/// Scales the whole scene, translates it, or both, in some of the cases.
 fn displace(numbers: &mut Numbers, scene: &mut Scene) {
     let scale = match numbers.below(3) {
         0 => log(numbers, 1e-4, 1e4),
@@ -314,7 +314,8 @@ fn displace(numbers: &mut Numbers, scene: &mut Scene) {
     }
 }
 
-/// Returns the seeds of the scenes of one layout with the given numbers.
+/// Returns seeds of scenes with the layout `layout`. `numbers` are the numbers of these scenes
+/// among all scenes with this layout.
 pub fn seeds_of(layout: Layout, numbers: Range<u64>) -> impl Iterator<Item = u64> {
     let index = Layout::ALL.iter().position(|l| *l == layout).expect("a layout");
     numbers.map(move |i| i * Layout::ALL.len() as u64 + index as u64)

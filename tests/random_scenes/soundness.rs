@@ -62,7 +62,7 @@ fn soundness() {
     compare("soundness", 0..160, sound);
 }
 
-/// Checks scenes of all proportions.
+/// Checks scenes whose objects have positions and sizes from 1e-6 to 1e6.
 #[test]
 fn wild_soundness() {
     compare("soundness", seeds_of(Layout::Wild, 20..320), sound);

@@ -1,6 +1,6 @@
 //! Comparison of pictures with several seeds, by the means of blocks of pixels. Pictures with
-//! different seeds are independent. The spread of their means therefore estimates the error of the
-//! overall mean, for every sampler.
+//! different seeds are independent. For every sampler, the spread of a block's means over the seeds
+//! therefore estimates the error of the mean over all seeds.
 
 use crate::common::normal::{two_sided_z, z_of_t};
 

@@ -73,7 +73,7 @@ fn check_growth(fewest: usize, limit: f64) {
 
 /// Checks the growth of the time from 2,000 to 8,000 objects. The limit for a doubling is halfway
 /// between linear (2) and quadratic (4), on a logarithmic scale. The growth is not exactly linear,
-/// because few objects fit into the caches.
+/// because only small scenes fit into the caches.
 #[test]
 #[cfg(target_os = "linux")]
 fn edits_of_many_objects_are_written_in_linear_time() {

@@ -10,7 +10,7 @@ fn aimed() -> Camera {
 }
 
 /// Returns the camera of the mirror room with a direction instead of a target, and the distance of
-/// the target.
+/// that target from the eye.
 fn free() -> (Camera, f64) {
     let view = aimed().view().unwrap();
     let direction = Some(view.to_array());

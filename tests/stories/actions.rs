@@ -28,7 +28,8 @@ struct Story {
     /// Label of the command that the story tests.
     label: String,
     select: Target,
-    /// Keys that are pressed. `:` alone runs the command from the command palette.
+    /// Keys that are pressed. The text `:` alone means that the story runs the command from the
+    /// command palette.
     keys: String,
     expect: Box<Expect>,
 }
@@ -153,7 +154,7 @@ fn camera_stories() -> Vec<Story> {
             d.scene().camera.focus == Some(LensFocus::Point([0.0, 1.0, 0.0]))
         }),
         story("focus on the probe or the selection", BALL, "i F", |_, d| {
-            // The focus is on the front of the ball, which the probe shows.
+            // The probe shows the front of the ball, and the focus is there.
             (d.scene().camera.focus_depth() - 4.5).abs() < 0.01
         }),
         story("reset the camera to the file", c(), "Left Up Home", |a, d| {

@@ -1,4 +1,4 @@
-//! Stories of typing, forms, drags and refusals.
+//! Stories (user input and expected state) of typing, forms, drags and refusals.
 
 use crate::stories::simulated_dashboard::{Desk, ROOM};
 use std::time::Duration;

@@ -1,4 +1,5 @@
-//! Stories of files: saving, changes by other programs, errors in the file, quitting.
+//! Stories (user input and expected state) of files: saving, changes by other programs, errors in
+//! the file, quitting.
 
 use crate::stories::simulated_dashboard::{Desk, FILE, ROOM};
 use std::path::{Path, PathBuf};
@@ -228,7 +229,7 @@ fn image_viewer_closes_on_any_key() {
     desk.keys("p o");
     let looked = |desk: &Desk| matches!(&desk.model.overlay, Some(Overlay::ViewerImage(looked)) if looked.path.ends_with("room-1.png"));
     assert!(looked(&desk));
-    // A resize prepares the image again; the result for the old size is ignored.
+    // After a resize the image is encoded again, for the new screen size.
     desk.effects.clear();
     let screen = [100, 30];
     desk.effects.extend(update(&mut desk.model, Message::Resize(screen), Duration::ZERO));

@@ -1,4 +1,4 @@
-//! Stories of mouse events.
+//! Stories (user input and expected state) of mouse events.
 
 use crate::stories::simulated_dashboard::{Desk, ROOM};
 use zerkalo::dashboard::layout::Focus;
@@ -48,7 +48,7 @@ fn right_or_modified_click_focuses_lens() {
             }
         };
         press(&mut desk, x, y);
-        // The front of the ball.
+        // The lens is focused on the front of the ball.
         assert!((desk.scene().camera.focus_depth() - 4.5).abs() < 0.01);
         assert!(desk.notice().contains("pinhole"), "{:?}", desk.notice());
         assert_eq!(desk.model.selection, Target::Camera, "it selects nothing");
@@ -87,7 +87,7 @@ fn drag_moves_selection_under_mouse() {
     let columns = f64::from(desk.model.layout().unwrap().image.width);
     desk.drag(Button::Left, cell, [10, 0]);
     let [x, y, z] = center(&desk);
-    // At distance 5 the picture is 5 x 2 tan 20° x 4/3 wide.
+    // At the distance 5 from the eye the picture is 5 x 2 tan 20° high and 4/3 as wide.
     let expected = 10.0 / columns * 10.0 * 20f64.to_radians().tan() * 4.0 / 3.0;
     assert!((x - expected).abs() < 0.02 && y == 1.0 && z == 0.0, "{x} {expected}");
     desk.drag(Button::Left, cell, [0, 6]);
@@ -135,7 +135,7 @@ fn click_selects_lines_of_outline_and_inspector() {
     desk.select(Target::Object(1));
     desk.keys("Enter");
     let (rows, _) = desk.model.inspector_rows().unwrap();
-    // Name, material, shape, center x.
+    // The rows are name, material, shape and center x. The last of these is clicked.
     desk.click(rows.x + 3, rows.y + 3).click(rows.x + 3, rows.y + 3);
     desk.keys("Ctrl-u `0.25`");
     // A click elsewhere applies the typed value.

@@ -1,4 +1,5 @@
-//! Stories of unsaved edits: autosave, and recovery at the next start.
+//! Stories (user input and expected state) of unsaved edits: autosave, and recovery at the next
+//! start.
 
 use crate::stories::simulated_dashboard::{Desk, ROOM};
 use std::sync::Arc;

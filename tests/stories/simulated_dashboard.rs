@@ -73,8 +73,8 @@ pub struct Desk {
     pub fired: HashSet<&'static str>,
     pub document: Document,
     begun_with: Document,
-    /// `true` if the desk answers requests to load the file. Each load would restart the undo
-    /// history.
+    /// `true` if requests of the dashboard to load the file are answered. If it is `false`, they
+    /// are ignored, because each load restarts the undo history.
     pub reads: bool,
 }
 

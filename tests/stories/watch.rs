@@ -1,4 +1,5 @@
-//! Stories of `zerkalo watch`: reports change the table of files, and no key edits or renders.
+//! Stories (user input and expected state) of `zerkalo watch`. Reports change the table of files,
+//! and no key edits the scene or starts a render.
 
 use crate::stories::simulated_dashboard::Desk;
 use std::time::Duration;

@@ -73,8 +73,8 @@ pub fn session(threads: usize, seed: u64, stop: Stop, adaptive: bool) -> Session
 /// Thread pools that no test uses at present.
 static FREE_POOLS: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
 
-/// Thread pool that other tests reuse after it is dropped. To start and end threads takes longer
-/// than to trace a small picture, because each end of a thread unmaps its stack in all threads of
+/// Thread pool that other tests reuse after it is dropped. Starting and ending threads takes longer
+/// than tracing a small picture, because each end of a thread unmaps its stack in all threads of
 /// the process.
 pub struct Pool(Option<ThreadPool>);
 
@@ -101,8 +101,8 @@ impl Drop for Pool {
     }
 }
 
-/// Returns the wave (set of concurrent jobs) of the samples `first .. first + count` of one
-/// replicate in every tile, in the order of the film.
+/// Returns a wave (set of concurrent jobs) with one job for each tile, in the order of the film.
+/// The jobs trace the samples `first .. first + count` of one replicate (half of the samples).
 pub fn wave(film: &Film, replicate: usize, first: u32, count: u32) -> Wave {
     let jobs = (0..film.tile_count() as u32).map(|tile| Job { tile, first, count }).collect();
     Wave { replicate, jobs, estimate: false }
@@ -122,16 +122,16 @@ pub fn uniform(rendering: &mut RenderState, first: u32, count: u32, pool: &Threa
     }
 }
 
-/// Renders `scene` by two threads, with `count` samples in each of both replicates (halves of the
-/// samples).
+/// Renders `scene` by two threads, with `count` samples per pixel in each of the two replicates
+/// (halves of the samples).
 pub fn rendered(scene: &Scene, seed: u64, precision: Precision, count: u32) -> RenderState {
     let mut rendering = begin(scene, seed, precision);
     uniform(&mut rendering, 0, count, &pool(2));
     rendering
 }
 
-/// Renders `scene` by one thread with the given acceleration structure, with `count` samples in
-/// each of both replicates (halves of the samples).
+/// Renders `scene` by one thread with the given acceleration structure. Each of the two replicates
+/// (halves of the samples) gets `count` samples per pixel.
 pub fn accelerated(
     scene: &Scene,
     acceleration: Acceleration,

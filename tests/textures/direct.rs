@@ -146,7 +146,8 @@ fn mapped(solid: &Solid, lay: &Lay, p: DVec3, n: DVec3) -> DVec2 {
     let middle = 0.5 * (low + high);
     let around = |x: f64, z: f64| 0.5 + x.atan2(z) / TAU;
     let q = p - middle;
-    // The permuted axes: right, up or axis, front.
+    // Coordinates along the permuted axes: to the right, along the axis of the mapping, and to the
+    // front.
     let (right, up, front) = match lay.axis {
         Some('x') => (q.z, q.x, q.y),
         Some('z') => (q.y, q.z, q.x),
@@ -268,8 +269,9 @@ fn bumped(object: &TexturedObject, p: DVec3, n: DVec3) -> DVec3 {
     out.normalize()
 }
 
-/// Returns the picture from `eye` towards `target`, 40 degrees high, row by row. A pixel is NaN if
-/// it is seen at such a grazing angle that the program bends the normal back to the viewer.
+/// Returns the picture from `eye` towards `target` with a vertical view angle of 40 degrees, row by
+/// row. A pixel is NaN if it is seen at such a grazing angle that the program bends the normal back
+/// to the viewer.
 pub fn picture(object: &TexturedObject, eye: DVec3, target: DVec3) -> Vec<DVec3> {
     let view = (target - eye).normalize();
     let right = view.cross(DVec3::Y).normalize();

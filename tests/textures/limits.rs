@@ -48,7 +48,7 @@ fn ramp_tilts_normals_by_its_slope() {
     let ramp = ImageBuffer::from_fn(64, 2, |x, _| Luma([((x * 65535 + 31) / 63) as u16]));
     ramp.save(folder.path().join("ramp.png")).unwrap();
     let (height, width) = (0.7, 2.0);
-    // From the first to the last pixel's centre.
+    // The ramp rises from the centre of the first pixel to that of the last.
     let slope: f64 = height / (width * 63.0 / 64.0);
     let leaning = DVec3::new(-slope, 0.0, 1.0).normalize();
     let towards = |light: DVec3| {
@@ -164,7 +164,8 @@ fn texture_edits_read_each_file_once() {
     scene = step(&scene, &m, "bump.image.height", None, -1.0).unwrap().scene;
     assert_eq!(row(&scene, "bump.image.height").unwrap().value, "0.095");
 
-    // With another kind of texture the placement stays. The cycle of kinds also contains `none`.
+    // If the kind of the texture changes, its placement stays the same. The cycle of kinds also
+    // contains `none`.
     let checker = toggle(&scene, &m, "texture", true).unwrap().scene;
     assert_eq!(row(&checker, "texture.checker.mapping").unwrap().value, "planar");
     let none = toggle(&checker, &m, "texture", true).unwrap().scene;
@@ -189,7 +190,7 @@ fn texture_edits_read_each_file_once() {
     assert!(shown(&sized(moved, [8, 8]), Precision::Auto).len() == 64);
     assert_eq!(reads.load(Ordering::SeqCst), before);
 
-    // The files are missing in another folder.
+    // The other folder does not contain the image files.
     let elsewhere = tempfile::tempdir().unwrap();
     let refused = file.save_as(&elsewhere.path().join("s.toml"), &scene, false).unwrap_err();
     assert!(refused.to_string().contains("a.png"), "{refused}");
@@ -275,8 +276,8 @@ fn faces_in_edges_of_a_texture_have_one_color() {
     }
 }
 
-/// Checks that pictures with textures are equal, whether a packet holds one pixel's samples or
-/// those of neighbouring pixels.
+/// Checks that pictures with textures do not depend on whether a packet holds one pixel's samples
+/// or those of neighbouring pixels.
 #[test]
 fn textures_do_not_depend_on_packets() {
     let mut glass = shipped("bump.toml");

@@ -1,5 +1,5 @@
-//! Textures and bumps: pictures against a direct evaluation, the files of the shipped scenes, rejected
-//! files.
+//! Textures and bumps: pictures against a direct evaluation, the files of the shipped scenes,
+//! rejected files.
 
 mod cases;
 mod direct;
