@@ -1,7 +1,7 @@
 //! Crash tests. 200 programs are ended at random moments while their scene is edited, saved and
 //! exported. They are ended by SIGTERM, SIGHUP, SIGKILL, or a closed terminal. No file is damaged,
-//! and no edit is lost that was made at least a given time before the end. The terminal is
-//! restored, except after SIGKILL.
+//! and no edit is lost that was made at least a given time before the end. After SIGTERM and SIGHUP
+//! the terminal is restored.
 //!
 //! The message of a failure contains the number of its run. `ZERKALO_KILL=17 cargo test --test
 //! program kills::` repeats run 17 alone, with the same keys at the same times as far as the
@@ -131,8 +131,8 @@ fn stall_allowance(start: Instant) -> Duration {
 /// Executes the run `number`. Returns the time from the key press of the oldest lost edit to the
 /// program's end, or 0 if no edit is lost.
 ///
-/// # Errors
-/// Fails if a file is damaged, an edit that must be kept is lost, or the terminal is not restored.
+/// # Errors Fails if a file is damaged, if an edit that must be kept is lost, or if the terminal is
+/// not restored after SIGTERM or SIGHUP.
 fn run(number: usize) -> Result<Duration, String> {
     let plan = Plan::of(number);
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
