@@ -131,8 +131,9 @@ fn stall_allowance(start: Instant) -> Duration {
 /// Executes the run `number`. Returns the time from the key press of the oldest lost edit to the
 /// program's end, or 0 if no edit is lost.
 ///
-/// # Errors Fails if a file is damaged, if an edit that must be kept is lost, or if the terminal is
-/// not restored after SIGTERM or SIGHUP.
+/// # Errors
+/// Fails if a file is damaged, if an edit that must be kept is lost, or if the terminal is not
+/// restored after SIGTERM or SIGHUP.
 fn run(number: usize) -> Result<Duration, String> {
     let plan = Plan::of(number);
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
