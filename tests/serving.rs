@@ -115,7 +115,8 @@ fn rendered(scene: &Scene, pool: &rayon::ThreadPool) -> RenderState {
     rendering
 }
 
-/// Returns another value for `key` of `scene`, which may be invalid.
+/// Returns a changed value for `key` of `scene`. The value may be invalid. Returns `None` if the
+/// scene has no such key.
 fn proposal(key: &Key, scene: &mut Table, numbers: &mut Numbers) -> Option<Value> {
     // An earlier edit may have removed the table.
     let materials = scene.get("materials").and_then(Value::as_table).into_iter();
@@ -317,7 +318,8 @@ fn relit_film_equals_render_of_the_edited_scene() {
     }
 }
 
-/// Checks edits of a material that only a part of a compound uses.
+/// Checks that a film does not serve a scene in which a material has changed that only a part of a
+/// compound names.
 #[test]
 fn material_of_a_compound_part_prevents_relighting() {
     let mut bench = Bench::new();

@@ -182,8 +182,8 @@ const ROWS: [Row; 7] = [
     Row { name: "screen", host: Host::Screen, options: "--color 256", replies: Replies::Always },
 ];
 
-/// Measures the latency of a row of the printed table: opens the dashboard, lets the picture
-/// converge, presses keys.
+/// Measures the latency from a key press to the new picture under the conditions of `row`, a row of
+/// the printed table. Opens the dashboard, lets the picture converge, and presses keys.
 fn measure(
     name: &str,
     row: &Row,

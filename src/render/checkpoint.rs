@@ -158,7 +158,8 @@ pub(super) struct Resumed {
     pub state: RenderState,
     schedule: Vec<u8>,
     path: PathBuf,
-    /// Seconds that the render had taken, in all processes, when the checkpoint was written.
+    /// Seconds that the render had taken when the checkpoint was written: the sum over all runs of
+    /// the program that continued it.
     pub seconds: f64,
     /// `true` if the light weights or the display transform of the resumed render differ from those
     /// of the checkpoint.

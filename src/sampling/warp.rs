@@ -122,12 +122,12 @@ fn azimuth<L: SimdFloat>(view: Vec3<L>) -> (L, L, L) {
 /// vector with a positive z). The density is D_v(h) = G_1(view, h) D(h) view.h / view.z. G_1 is
 /// that of V-cavities if `v_cavity` is `true`, otherwise Smith's.
 ///
-/// First, the slopes of any microfacet along x and y are sampled, in units of `alpha`. They are
-/// independent normal deviates with the variance 1/2, one computed from `u` and one from `v`. Then
-/// the component of the slope along the azimuth of the view is replaced by the slope that has the
-/// same quantile among the visible microfacets. For views near the normal, the replacement changes
-/// the slope little. Reflections of edges along the mirror's axes then depend almost entirely on
-/// one random number.
+/// First, the slopes of a microfacet along x and y are sampled, in units of `alpha`, whether it is
+/// visible or not. They are independent normal deviates with the variance 1/2: the slope along x is
+/// computed from `u`, the slope along y from `v`. Then the component of the slope along the azimuth
+/// of the view is replaced by the slope that has the same quantile among the visible microfacets.
+/// For views near the normal, the replacement changes the slope little. The reflection of an edge
+/// along x or y then depends almost only on one of the two numbers, and is stratified as well.
 #[inline(always)]
 pub fn beckmann_visible<L: SimdFloat>(
     u: L,

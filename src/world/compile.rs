@@ -244,8 +244,8 @@ impl<S: Float> CompiledLights<S> {
         self.sources.iter().map(target_of_source).collect()
     }
 
-    /// Returns the bounding spheres of the lights with a size, then of the objects from which light
-    /// is sampled, then of the strata (spatial groups) of lights in `choice`.
+    /// Returns bounding spheres in this order: lights with a size, emissive objects on which points
+    /// are sampled, and the spatial groups (strata) of lights in `self.choice`.
     fn emitter_bounds(&self) -> Vec<BoundingSphere> {
         let emitters = self.emitters.iter().map(|source| &source.light);
         let emitters = emitters.map(|light| (light.center(), light.radius()));

@@ -263,7 +263,8 @@ impl<'a> SceneDistances<'a> {
         self.range_of(1.0, (1.0, 1.0, 1.0))
     }
 
-    /// Returns the range of the radiance that a light without a size causes at intensity 1.
+    /// Returns the range of the radiance that surfaces reflect in the light of `light` alone, at
+    /// intensity 1.
     pub fn light<S: Float>(&self, light: &DeltaLight<S>) -> RadianceRange {
         let typical = light.typical_irradiance(self.radius) * FRAC_1_PI;
         let Some(position) = light.position().filter(|_| light.is_inverse_square()) else {

@@ -333,9 +333,9 @@ fn extreme_30_noise_target_is_reached() {
 }
 
 /// Checks that `--noise 0.5` gives an RMSE of at most 0.55 8-bit levels before rounding to
-/// integers, against a reference of another seed. The picture has 300 tiles, because the estimate
-/// is uncertain by some 6 % with a few dozen tiles. With 96 x 72 pixels, 24 seeds gave 0.40 to 0.56
-/// levels.
+/// integers, against a reference of another seed. The program stops by its own noise estimate. With
+/// a few dozen tiles this estimate has a standard error of about 6 %: at 96 x 72 pixels (30 tiles),
+/// 24 seeds gave 0.40 to 0.56 levels. The picture of this test therefore has 300 tiles.
 #[test]
 fn noise_target_of_half_a_level_is_met_in_the_mirror_room() {
     let scene = sized(shipped("mirror-room.toml"), [320, 240]);

@@ -14,8 +14,8 @@ const SIZE: [u32; 2] = [24, 16];
 /// samples) together.
 const FIRST: u32 = 64;
 const LAST: u32 = 2048;
-/// Number of samples of the reference picture, divided by that of the picture with the most
-/// samples.
+/// Ratio of two sample counts: that of the reference, and the largest of the compared pictures,
+/// [`LAST`].
 const REFERENCE: u32 = 64;
 
 /// Returns the slope of log RMSE against log samples, over several pictures with different seeds.

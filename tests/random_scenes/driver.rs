@@ -50,8 +50,9 @@ fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<&str>().map(|t| t.to_string())).unwrap_or_default()
 }
 
-/// Compares the pictures of the scenes with the seeds `seeds`. If `ZERKALO_SEED` is set, compares
-/// only the scene of that seed. `name` is the name of the test.
+/// Applies `check` to the random scene of each seed in `seeds`: `check` renders it in several ways
+/// and compares the pictures. If `ZERKALO_SEED` is set, checks only the scene of that seed. `name`
+/// is the name of the test.
 pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
     let (mut wrong, mut skipped) = (Vec::new(), BTreeMap::<&str, u32>::new());
     let mut count = 0;
@@ -88,7 +89,7 @@ pub fn compare(name: &str, seeds: impl IntoIterator<Item = u64>, check: Check) {
     assert!(wrong.is_empty(), "{} of {count} scenes differ:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// Compares the pictures of the scenes with the seeds that [`many`] returns.
+/// Applies [`compare`] to the seeds that [`many`] returns.
 pub fn compare_many(name: &str, check: Check) {
     compare(name, many(), check);
 }

@@ -301,9 +301,9 @@ fn dishonest(
     })
 }
 
-/// Compares pictures of `seeds` with a reference of `reference_samples` samples per pixel and
-/// picture. Returns the differences of at least `max_deviation`, or the reason for which there is
-/// no comparison.
+/// Renders pictures with each of `seeds` and compares them with a reference, the mean of several
+/// pictures of `reference_samples` samples per pixel. Returns the differences of at least
+/// `max_deviation`, or the reason for which there is no comparison.
 fn differences(
     scene: &Scene,
     seeds: Range<u64>,

@@ -17,24 +17,24 @@ use {Chapter as C, HintLine as H};
 /// Chapter of the help, which groups commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Chapter {
-    /// Chapter of commands on the camera and on stored cameras.
+    /// Commands on the camera and on stored cameras.
     Camera,
-    /// Chapter of commands on lights.
+    /// Commands on lights.
     Light,
-    /// Chapter of commands on the mirror. This is a reflecting material of the selection if there
+    /// Commands on the mirror. This is a reflecting material of the selection if there
     /// is one, otherwise a reflecting material elsewhere in the scene.
     Mirror,
-    /// Chapter of commands on objects.
+    /// Commands on objects.
     Objects,
-    /// Chapter of commands on panels, on properties and on the selection.
+    /// Commands on panels, on properties and on the selection.
     Panels,
-    /// Chapter of commands on undo, files and quitting.
+    /// Commands on undo, files and quitting.
     File,
-    /// Chapter of commands on display, export and comparison of the picture.
+    /// Commands on display, export and comparison of the picture.
     Picture,
-    /// Chapter of commands on progress and resources of rendering.
+    /// Commands on progress and resources of rendering.
     Render,
-    /// Chapter of commands that open the help.
+    /// Commands that open the help.
     Help,
 }
 

@@ -341,11 +341,11 @@ impl Schedule {
         self.jobs(samples)
     }
 
-    /// Returns the number of samples that each pixel gets next in each replicate (half of the
-    /// samples), if all tiles have `done` samples per pixel in each. With an error target it is
-    /// half of the estimated remaining samples, at most `done`. Without an error target it is an
-    /// eighth of `done`. With a time limit it is at most an eighth of `done`, because tracing more
-    /// samples at a time would exceed the limit.
+    /// Returns the number of samples that each pixel gets next in each of the two replicates. Every
+    /// pixel has `done` samples in each replicate. With an error target the number is half of the
+    /// estimated remaining samples, at most `done`. Without an error target it is an eighth of
+    /// `done`. With a time limit it is at most an eighth of `done`, because a larger step could
+    /// exceed the limit by much.
     fn uniform_growth(&self, done: u32) -> u32 {
         let eighth = done / 8;
         let Some((criterion, target)) = self.target() else { return eighth };

@@ -77,8 +77,8 @@ impl<L: SimdFloat> SurfaceInteraction<L> {
         self.reflecting = self.reflecting.and_not(lanes);
     }
 
-    /// Excludes the hit points in `lanes` from direct lighting, and from the sampling of points on
-    /// emitters.
+    /// Treats the hit points in `lanes` as unlit: neither lights nor emissive objects are sampled
+    /// for them.
     #[inline(always)]
     pub fn shade(&mut self, lanes: L::Mask) {
         self.direct_mask = self.direct_mask.and_not(lanes);

@@ -51,7 +51,8 @@ fn caps_hold_for_glossy_tiles_only() {
             "the noise is that of the whole picture"
         );
 
-        // All tiles are glossy. At the cap, their largest number of samples, no work is left.
+        // All tiles are glossy, and noisy. When each has the largest number of samples per pixel
+        // (the cap), no work is left.
         let mut model = Model::exact(vec![NOISY; 25]);
         let (schedule, reason) = model.finish(settings);
         assert_eq!((reason, schedule.spp().max), (StoppedBy::RaysPerPixel, 40));
