@@ -79,8 +79,9 @@ fn blocks(rendering: &RenderState) -> Vec<[(f64, f64); 3]> {
     blocks
 }
 
-/// Returns the reference of a scene as text. Each line contains the means of a block's three
-/// channels over all seeds, and their standard errors in the render of one seed.
+/// Returns the reference of a scene as text. Each line is for one block of pixels. It contains six
+/// numbers: for the three channels the mean over the renders with all seeds, and for the three
+/// channels the standard error of the block in a single render.
 fn reference(scene: &Scene) -> String {
     let pool = pool(2);
     let seeds = REFERENCE_SEEDS.count() as f64;

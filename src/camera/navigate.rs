@@ -88,8 +88,8 @@ impl Camera {
         self.shifted(translation, self.pivot_distance(translation.length().max(1e-3)))
     }
 
-    /// Rotates the view about the eye, `right` degrees to the right and `up` degrees upwards. A
-    /// target is moved on a circle around the eye.
+    /// Rotates the view about the eye, `right` degrees to the right and `up` degrees upwards. If
+    /// the camera has a target, the target moves on a circle around the eye.
     pub fn look(&self, right: f64, up: f64) -> Self {
         let distance = self.pivot_distance(1.0);
         match self.turned(right, up) {

@@ -160,8 +160,8 @@ pub struct RenderArgs {
     /// Trace only this shard of the plan, into a .zk file; 0 is the base, the pilot's samples
     #[arg(long, value_name = "K", requires = "plan", allow_negative_numbers = true)]
     pub shard: Option<u32>,
-    /// Stay below this much memory, such as 4GB: lights share a light group, then the picture is
-    /// rendered in regions and written row by row
+    /// Stay below this much memory, such as 4GB: if needed, lights share a light group; if that is
+    /// not enough, the picture is rendered in regions and written row by row
     #[arg(long, value_name = "SIZE", value_parser = memory, conflicts_with = "plan", allow_negative_numbers = true)]
     pub memory: Option<u64>,
     /// Bits per channel of a PNG

@@ -1,5 +1,6 @@
-//! Film: storage of samples as tiles of integer sums. After a restart, each tile is cleared when it
-//! is next written. Two films are added without rounding, because their sums are integers.
+//! Film: storage of samples as tiles of integer sums. When the render restarts, such as after an
+//! edit, each tile is cleared only when it is next written. Two films are added without rounding,
+//! because their sums are integers.
 
 use crate::film::TILE;
 use crate::film::display::Display;

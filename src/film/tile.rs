@@ -251,7 +251,7 @@ impl Tile {
         self.saturated_samples += samples;
     }
 
-    /// Returns the number of samples that were above the film's largest sample value.
+    /// Returns the number of samples above the film's limit, which were clamped to it.
     pub fn saturated_samples(&self) -> u64 {
         self.saturated_samples
     }

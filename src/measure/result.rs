@@ -50,8 +50,8 @@ pub struct Measured {
     /// Share of the processors' time that other programs used, for each repetition of the render.
     /// `None` if unknown.
     pub stolen: Vec<Option<f64>>,
-    /// Bias of the picture against the reference picture at the end of the error curve. `None` for
-    /// settings whose pictures have the same expectation as with default settings.
+    /// Bias of the picture at the end of the error curve, relative to the reference picture. `None`
+    /// for settings whose pictures have the same expectation as with default settings.
     pub bias: Option<Bias>,
 }
 

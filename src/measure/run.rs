@@ -43,8 +43,8 @@ const STEADY: f64 = 0.05;
 /// Largest number of rounds of a measurement with steady times, unless its plan requests more. A
 /// round repeats the render of each variant once.
 const MAX_STEADY_ROUNDS: usize = 7;
-/// Largest number of rounds of a measurement with unsteady times, unless its plan requests more. A
-/// round repeats the render of each variant once.
+/// Largest number of rounds of a measurement whose times vary too much, unless its plan requests
+/// more. A round repeats the render of each variant once.
 const MAX_ROUNDS: usize = 31;
 
 /// Measures `scene`, which must be valid. `reference` is the reference picture; if it is `None`, a

@@ -34,7 +34,7 @@ description! {
     pub struct Rotate: Copy {
         /// Direction of the axis.
         axis: [f64; 3], as Direction;
-        /// Angle, counter-clockwise against the axis.
+        /// Angle, counter-clockwise for a viewer at whom the axis points.
         degrees: f64, in FINITE "degrees";
     }
 }

@@ -159,9 +159,9 @@ impl LightGroups {
         self.emitting(scene, material)
     }
 
-    /// Returns three values for each light or emissive material that `select` accepts: the result
-    /// of `select`, the index of the light group, and the emission. The tracer multiplies the
-    /// source's samples by the emission, which is 1 for a source with a group of its own.
+    /// Returns three values for each source (light or emissive material) that `select` accepts: the
+    /// result of `select`, the index of the light group, and the emission. The tracer multiplies
+    /// the source's samples by the emission, which is 1 for a source with a group of its own.
     fn emitting<T>(
         &self,
         scene: &Scene,

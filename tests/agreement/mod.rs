@@ -353,8 +353,8 @@ fn rough_and_absorbing_glass_agrees_with_reference_tracer() {
     }
 }
 
-/// Checks that the variance of single samples is equal in both programs with independent random
-/// numbers, in scenes where both sample their lobes with equal densities.
+/// Checks that the variance of single samples is equal in the renderer and in the reference tracer
+/// with independent random numbers, in scenes where both sample their lobes with equal densities.
 #[test]
 fn variances_agree_under_independent_random_numbers() {
     for name in ["lobe-cone.toml", "lobe-square.toml", "mirror-room.toml"] {

@@ -249,8 +249,9 @@ fn sizes_are_checked_before_allocation() {
     }
 }
 
-/// Checks that a scene or mesh that does not fit into the address space is refused, at limits from
-/// 30 to 150 MB. The message states the sum of the needed memory. No allocation may fail.
+/// Checks that a scene or mesh that does not fit into the address space is refused. The address
+/// space is limited to several sizes from 30 to 150 MB. The message states how much memory is
+/// needed in total. No allocation may fail.
 #[test]
 #[cfg(target_os = "linux")]
 fn scenes_and_meshes_that_do_not_fit_are_refused() {

@@ -21,7 +21,8 @@ pub fn table(scene: &Scene) -> Table {
     scene.to_table()
 }
 
-/// Returns the scene in `table`, with the files of `resolver`. Returns `None` if it has errors.
+/// Returns the scene in `table`, whose asset files `resolver` finds. Returns `None` if it has
+/// errors.
 pub fn scene(table: &Table, resolver: &AssetResolver) -> Option<Scene> {
     let mut scene = Scene::from_text(&table.to_string()).ok()?;
     scene.resolver = resolver.clone();

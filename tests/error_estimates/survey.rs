@@ -141,8 +141,9 @@ fn examine(number: u64, reference_count: u32, seeds: u64) -> Outcome {
 
 /// Checks that the true error agrees with the reported one within their uncertainty. Each error is
 /// the root of a mean of k squares, where k is the number of effective pixels (pixels that carry
-/// the noise). Its relative standard deviation is 1 / sqrt(2 k). Also checks that adaptive sampling
-/// takes at most 1.5 times the rays of uniform sampling.
+/// the noise). Its relative standard deviation is 1 / sqrt(2 k), and that of the ratio of two
+/// errors is 1 / sqrt(k). Also checks that adaptive sampling takes at most 1.5 times the rays of
+/// uniform sampling.
 fn assert_honest(outcomes: &[Outcome]) {
     let mut scores = Vec::new();
     for Outcome { name, ratio, pixels, rays, .. } in outcomes.iter().filter(|o| o.pixels >= 16.0) {

@@ -52,7 +52,8 @@ pub fn lines(seed: u64, count: usize) -> Vec<Line> {
     (0..count).map(|_| line(&mut numbers)).collect()
 }
 
-/// Returns all hits along each line. Each ray is traced from one hit to the next.
+/// Returns all hits along each line. They are found one after another: each ray starts at the
+/// previous hit.
 fn surfaces<L: SimdFloat>(geometry: &Aggregate<L>, lines: &[Line]) -> Vec<Vec<LineHit>> {
     let mut out = vec![Vec::new(); lines.len()];
     let mut open: Vec<(usize, f64)> = (0..lines.len()).map(|i| (i, 0.0)).collect();

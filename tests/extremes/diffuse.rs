@@ -27,8 +27,9 @@ fn moments(scene: &Scene, precision: Precision) -> [f64; 3] {
     [mean, deviation, (variance / n).sqrt()]
 }
 
-/// Checks that white surfaces in a white furnace are white after every number of bounces, also in
-/// mirrors and behind glass. Ambient light of the same radiance stands for further bounces.
+/// Checks that white surfaces in a white furnace are white for every limit on the number of diffuse
+/// bounces, also in mirrors and behind glass. Ambient light of the same radiance replaces the
+/// bounces beyond the limit.
 #[test]
 fn furnace_is_white_at_every_diffuse_depth() {
     let text = "film.size = [24, 18]

@@ -16,7 +16,7 @@ use zerkalo::world::{AnyWorld, Options};
 
 /// Returns an icosahedron around the origin, each triangle of which is divided into four, `times`
 /// times. The corners are on the ellipsoid with the half-axes `axes`. The second value is `true` if
-/// `auto` traces a scene of the mesh in double precision.
+/// the precision setting `auto` selects double precision for a scene that consists of the mesh.
 fn icosphere(times: u32, axes: DVec3) -> (Arc<Mesh>, bool) {
     let golden = 0.5 * (1.0 + 5f64.sqrt());
     let mut corners = Vec::new();

@@ -46,9 +46,9 @@ fn dot(a: [Dd; 3], b: [Dd; 3]) -> Dd {
     a[0].times(b[0]).plus(a[1].times(b[1])).plus(a[2].times(b[2]))
 }
 
-/// Returns two values, computed exactly for the given numbers: the signed distance of the line
-/// beyond the sphere's limb, and the nearer hit point relative to the centre. The hit point is not
-/// finite for a miss.
+/// Returns two values, computed with twice the digits of double precision: the distance of the line
+/// from the sphere's centre minus the radius, which is positive for a miss, and the nearer hit
+/// point relative to the centre. The hit point is not finite for a miss.
 fn exact((origin, d): Line, center: DVec3, radius: f64) -> (f64, DVec3) {
     let f: [Dd; 3] = std::array::from_fn(|i| Dd::sum(origin[i], -center[i]));
     let d: [Dd; 3] = std::array::from_fn(|i| Dd(d[i], 0.0));
@@ -190,10 +190,10 @@ fn extreme_02_sphere_as_ground() {
 }
 
 /// Checks rays from the origin through random points of a square in the plane z = -1, around the
-/// image of the sphere. Let c be the centre of the sphere, r its radius and D its distance. The
-/// share of rays that hit is pi r^2 sqrt(D^2 - r^2) / (c_z^2 - r^2)^(3/2), divided by the area of
-/// the square. A ray in the direction v must hit if (v.c)^2 >= (D^2 - r^2) v^2, and otherwise miss.
-/// Returns the measured share, divided by the expected one.
+/// projection of the sphere. Let c be the centre of the sphere, r its radius and D its distance.
+/// The share of rays that hit is pi r^2 sqrt(D^2 - r^2) / (c_z^2 - r^2)^(3/2), divided by the area
+/// of the square. A ray in the direction v must hit if (v.c)^2 >= (D^2 - r^2) v^2, and otherwise
+/// miss. Returns the measured share, divided by the expected one.
 fn check_silhouette(center: DVec3, radius: f64, rays: usize, seed: u64) -> f64 {
     let geometry = Aggregate::<Double>::new(&[Form::Sphere(SphereForm { center, radius })]);
     let distance = center.length();

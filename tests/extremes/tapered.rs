@@ -16,8 +16,8 @@ fn closest_hits<L: SimdFloat>(form: &Form, lines: &[Line]) -> Vec<Option<LineHit
     closest(&Aggregate::<L>::new(std::slice::from_ref(form)), lines)
 }
 
-/// Returns the distances at which a line enters and leaves a solid, found by one ray from each end
-/// of the line.
+/// Returns the distances at which a line enters and leaves a solid, found by two opposite rays. The
+/// rays start at the distance `far` before and behind the line's origin.
 fn ends(form: &Form, (p, d): Line, far: f64) -> Option<(f64, f64)> {
     let hits = closest_hits::<Double>(form, &[(p - d * far, d), (p + d * far, -d)]);
     Some((hits[0]?.t - far, far - hits[1]?.t))

@@ -263,9 +263,10 @@ fn largest_difference(side: f64) -> f64 {
     largest
 }
 
-/// Compares four sizes of the square lobe with the cone lobe. The square with the area of the cone
-/// differs least. The reference values are those of a flat disc, rounded. At this angle they differ
-/// from those of the cone by 0.002.
+/// Compares square lobes of four sizes with the cone lobe, by the largest difference of their
+/// responses to an edge. The square with the area of the cone differs least. The reference values
+/// are computed for a flat disc instead of the cone, and rounded; for a cone of radius 0.2 they
+/// differ by at most 0.002.
 #[test]
 fn closed_form_06_the_square_of_equal_area_is_nearest_to_the_cone() {
     let r = 0.2;

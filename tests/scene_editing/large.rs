@@ -80,8 +80,8 @@ fn edits_of_many_objects_are_written_in_linear_time() {
     check_growth(2_000, 8_f64.sqrt());
 }
 
-/// Checks edits of 100,000 objects: cargo test --test program scene_editing::large -- --ignored
-/// --nocapture
+/// Checks that the time of an edit is proportional to the number of objects, up to 100,000. Run
+/// with `cargo test --test program scene_editing::large -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes a minute, and needs an idle machine"]
 #[cfg(target_os = "linux")]

@@ -155,7 +155,8 @@ fn a_mesh_of_a_sphere() {
     assert!(error[1] < 0.05 && error[1] < 0.3 * error[0], "{error:?}");
 }
 
-/// Checks a part of a compound with its own material, whose texture is placed in the part's space.
+/// Checks that the texture of a part of a compound is placed in the space of the part, if the part
+/// has its own material.
 #[test]
 fn parts_of_compounds() {
     let desk = Desk::new();

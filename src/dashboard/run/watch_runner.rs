@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Longest wait for the first report on the watched files.
+/// Longest time that the program waits, when it starts, for the first report on the watched files.
 const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
 
 /// Executor of effects in `zerkalo watch`, which shows film files of other processes.

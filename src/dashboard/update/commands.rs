@@ -88,8 +88,8 @@ pub struct Command {
     /// `true` if the command itself handles a value that is being typed, as the commands of Enter
     /// and Esc do. For all other commands, the typed value is applied before they run.
     pub(super) while_typing: bool,
-    /// `true` if the command also runs in the viewer of exported images. All other keys close the
-    /// viewer.
+    /// `true` if the command also runs in the viewer of exported images. Keys without such a
+    /// command close the viewer.
     pub(super) over_image: bool,
     /// `true` if the command also runs in `zerkalo watch`, where nothing is edited or rendered.
     pub while_watching: bool,

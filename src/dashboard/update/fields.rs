@@ -1,4 +1,4 @@
-//! Commands on the properties in inspector and forms: moving the cursor, stepping and typing
+//! Commands on the properties in the inspector and in forms: moving the cursor, stepping and typing
 //! values.
 
 use crate::dashboard::editor::Editor;

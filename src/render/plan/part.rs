@@ -100,8 +100,8 @@ impl Part {
         self.plan.is_whole(&self.shards)
     }
 
-    /// Returns the numbers of the shards (parts of the render) that are missing or incomplete in
-    /// the film, such as `3, 5-7`. `None` if the film holds all.
+    /// Returns a list of the shards (parts of the render) that are missing or incomplete in the
+    /// film, by their numbers, such as `3, 5-7`. `None` if the film holds all.
     pub fn missing(&self) -> Option<String> {
         let complete = self.shards.iter().filter(|shard| shard.complete);
         let missing = self.plan.absent(&complete.map(|shard| shard.number).collect::<Vec<_>>());

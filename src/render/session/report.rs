@@ -27,7 +27,7 @@ pub enum State {
 /// Progress of the render of one scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
-    /// Generation of the scene (the number of its version), as returned by [`Session::set_scene`].
+    /// Version number of the scene, as returned by [`Session::set_scene`].
     ///
     /// [`Session::set_scene`]: crate::render::session::Session::set_scene
     pub generation: u64,

@@ -53,9 +53,9 @@ pub fn turn(scene: &Scene, subject: &Target, degrees: f64) -> Result<Edit, EditE
     Edit::checked(next, subject.clone(), label)
 }
 
-/// Rotates the object about the vertical through its centre, by the steps `rotate_y` and
-/// `translate` at the end of its transform. If the transform already ends with such steps, they are
-/// replaced. Steps without effect are removed.
+/// Rotates the object about the vertical through its centre. The rotation is written as the steps
+/// `rotate_y` and `translate` at the end of the object's transform. If the transform already ends
+/// with such steps, they are replaced. Steps without effect are removed.
 fn turn_by_steps(object: &mut Object, degrees: f64) {
     let (angle, shift, own_len) = match object.transform[..] {
         [.., TransformOp::RotateY(angle), TransformOp::Translate(shift)] => (angle, shift, 2),
