@@ -1,4 +1,4 @@
-//! Crash tests. 200 programs are ended at random moments while their scene is edited, saved and
+//! Crash tests. 100 programs are ended at random moments while their scene is edited, saved and
 //! exported. They are ended by SIGTERM, SIGHUP, SIGKILL, or a closed terminal. No file is damaged,
 //! and no edit is lost that was made at least a given time before the end. After SIGTERM and SIGHUP
 //! the terminal is restored.
@@ -24,8 +24,9 @@ use zerkalo::film::read_exr;
 use zerkalo::scene::Recovery;
 use zerkalo::terminal::{ENTER, LEAVE};
 
-/// Number of programs that are started and ended.
-const RUNS: usize = 200;
+/// Numbers of programs that are started and ended, in the test and in its long form.
+const RUNS: usize = 100;
+const MANY_RUNS: usize = 400;
 /// Number of concurrent programs per processor. It is limited because each program also traces with
 /// several threads, and must still process keys as fast as they are typed.
 const RUNS_PER_PROCESSOR: usize = 4;
@@ -291,7 +292,17 @@ fn recover(folder: &Path, kept: &str) -> Result<(), String> {
 #[test]
 fn random_ends_damage_no_file_and_lose_no_old_edit() {
     let only = std::env::var("ZERKALO_KILL").ok().map(|text| text.parse::<usize>().unwrap());
-    let numbers: Vec<_> = only.map_or_else(|| (0..RUNS).collect(), |number| vec![number]);
+    check_runs(only.map_or_else(|| (0..RUNS).collect(), |number| vec![number]));
+}
+
+#[test]
+#[ignore = "long: 400 runs"]
+fn many_random_ends_damage_no_file_and_lose_no_old_edit() {
+    check_runs((0..MANY_RUNS).collect());
+}
+
+/// Checks the runs with these numbers.
+fn check_runs(numbers: Vec<usize>) {
     let (next, over) = (AtomicUsize::new(0), AtomicBool::new(false));
     let results = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
