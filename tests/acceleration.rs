@@ -19,7 +19,7 @@ const SIZE: [u32; 2] = [53, 37];
 
 fn same(name: &str, scene: &Scene, precision: Precision, count: u32) {
     let expected = accelerated(scene, Acceleration::Auto, precision, count).film.bytes();
-    for acceleration in Acceleration::ALL {
+    for acceleration in Acceleration::ALL.into_iter().filter(|a| *a != Acceleration::Auto) {
         let found = accelerated(scene, acceleration, precision, count).film.bytes();
         assert!(found == expected, "{name} in {precision:?}: {} differs", acceleration.name());
     }

@@ -14,10 +14,14 @@ pub struct Leaf {
     pub pieces: Vec<Piece>,
     pub mesh: Option<Triangles>,
     pub canvas: Canvas,
-    /// Centre and radius of a ball around all pieces of the shape; `None` for an infinite shape or
-    /// a mesh.
+    /// Centre and radius of a ball around all pieces of the shape, in its own coordinates; `None`
+    /// for an infinite shape or a mesh.
     ball: Option<(DVec3, f64)>,
+    /// Centre and radius of a ball around all pieces of the shape, in scene coordinates.
+    scene_ball: Option<(DVec3, f64)>,
     own_from_scene: DAffine3,
+    /// `true` if the shape's own coordinates are those of the scene.
+    is_in_place: bool,
     /// Matrix that maps normals from the shape's own coordinates to those of the scene: the inverse
     /// transpose of the transform.
     scene_from_own_normals: DMat3,
@@ -44,30 +48,51 @@ pub struct Body {
 /// the length of the ray's direction.
 const ASIDE: f64 = 1e-7;
 
-/// Hit of a ray on an object: distance, normal, index of the simple shape, and index of the
+/// Hit of a ray on an object: distance, normal, index of the simple shape, and index of its piece or
 /// triangle.
-type Meeting = (f64, DVec3, usize, usize);
+pub type Meeting = (f64, DVec3, usize, usize);
 
 impl Leaf {
-    /// Returns all crossings of a line with the surface: distance, normal in the shape's own
-    /// coordinates, and index of the triangle.
-    fn crossings(
-        &self,
-        origin: DVec3,
-        direction: DVec3,
-    ) -> impl Iterator<Item = (f64, DVec3, usize)> {
-        let origin = self.own_from_scene.transform_point3(origin);
-        let direction = self.own_from_scene.transform_vector3(direction);
-        let missed = self.ball.is_some_and(|(center, radius)| {
-            // Squared distance of the line from the centre.
+    /// Returns `true` if the ball around the shape shows that a ray does not hit it before the
+    /// distance `end`.
+    fn is_beside(&self, origin: DVec3, direction: DVec3, end: f64) -> bool {
+        self.scene_ball.is_some_and(|(center, radius)| {
+            // Distance to the point of the ray that is nearest to the centre.
             let (a, f) = (direction.length_squared(), center - origin);
-            f.length_squared() - f.dot(direction).powi(2) / a > radius * radius
-        });
-        let pieces = if missed { &[][..] } else { &self.pieces[..] };
-        let hits = pieces.iter().flat_map(move |piece| piece.meet(origin, direction));
-        let hits = hits.flatten().map(|(t, n)| (t, n, 0));
-        let mesh_hits = self.mesh.iter().flat_map(move |mesh| mesh.meet(origin, direction));
-        hits.chain(mesh_hits)
+            let nearest = (f.dot(direction) / a).clamp(0.0, end);
+            (f - direction * nearest).length_squared() > radius * radius
+        })
+    }
+
+    /// Passes the crossings of a line with the surface to `take`: distance, and index of the piece
+    /// or triangle.
+    fn crossings(&self, origin: DVec3, direction: DVec3, mut take: impl FnMut(f64, usize)) {
+        let (origin, direction) = self.own(origin, direction);
+        for (i, piece) in self.pieces.iter().enumerate() {
+            piece.meet(origin, direction, |t| take(t, i));
+        }
+        if let Some(mesh) = &self.mesh {
+            mesh.meet(origin, direction, take);
+        }
+    }
+
+    /// Returns the normal in scene coordinates at the crossing of a line with piece or triangle `i`
+    /// at the distance `t`.
+    fn normal(&self, origin: DVec3, direction: DVec3, t: f64, i: usize) -> DVec3 {
+        let (origin, direction) = self.own(origin, direction);
+        self.scene_normal(match &self.mesh {
+            Some(mesh) => mesh.normal(i),
+            None => self.pieces[i].normal(origin, direction, t),
+        })
+    }
+
+    /// Converts origin and direction of a line to the shape's own coordinates.
+    fn own(&self, origin: DVec3, direction: DVec3) -> (DVec3, DVec3) {
+        let own = &self.own_from_scene;
+        if self.is_in_place {
+            return (origin, direction);
+        }
+        (own.transform_point3(origin), own.transform_vector3(direction))
     }
 
     /// Returns the interpolated normal of triangle `i` at `point`. Returns `None` for flat shading.
@@ -104,7 +129,9 @@ impl Leaf {
 
     fn contains(&self, point: DVec3) -> bool {
         let point = self.own_from_scene.transform_point3(point);
-        self.pieces.iter().all(|piece| piece.is_behind(point))
+        let outside =
+            |(center, radius): (DVec3, f64)| point.distance_squared(center) > radius * radius;
+        !self.ball.is_some_and(outside) && self.pieces.iter().all(|piece| piece.is_behind(point))
     }
 }
 
@@ -121,28 +148,39 @@ impl Body {
         Ok(Self { leaves, tree })
     }
 
-    /// Returns the closest hit of a ray beyond the distance `from`: distance, unit normal, index of
-    /// the simple shape, and index of the triangle. The normal points outwards on a solid, and to
-    /// the front on a flat shape or a mesh. Distances are in lengths of `direction`.
-    pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<Meeting> {
-        let mut nearest: Option<Meeting> = None;
+    /// Returns the closest hit of a ray between the distances `from` and `end`: distance, unit
+    /// normal, index of the simple shape, and index of the piece or triangle. The normal points
+    /// outwards on a solid, and to the front on a flat shape or a mesh. Distances are in lengths of
+    /// `direction`.
+    pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64, end: f64) -> Option<Meeting> {
+        let (mut end, mut nearest) = (end, None);
         for (i, leaf) in self.leaves.iter().enumerate() {
-            for (t, normal, facet) in leaf.crossings(origin, direction) {
-                if t <= from || nearest.is_some_and(|n| n.0 <= t) {
-                    continue;
-                }
-                let normal = leaf.scene_normal(normal);
-                if matches!(self.tree, Tree::Leaf(_)) {
-                    nearest = Some((t, normal, i, facet));
-                    continue;
+            if leaf.is_beside(origin, direction, end) {
+                continue;
+            }
+            let normal = |t, facet| leaf.normal(origin, direction, t, facet);
+            if matches!(self.tree, Tree::Leaf(_)) {
+                let mut found = None;
+                leaf.crossings(origin, direction, |t, facet| {
+                    if t > from && t < end {
+                        (end, found) = (t, Some(facet));
+                    }
+                });
+                return found.map(|facet| (end, normal(end, facet), i, facet));
+            }
+            leaf.crossings(origin, direction, |t, facet| {
+                if !(t > from && t < end) {
+                    return;
                 }
                 let inside = |t: f64| self.contains(&self.tree, origin + direction * t);
                 let (before, after) = (inside(t - ASIDE), inside(t + ASIDE));
                 if before != after {
+                    let normal = normal(t, facet);
                     let outward = after == (normal.dot(direction) < 0.0);
-                    nearest = Some((t, if outward { normal } else { -normal }, i, facet));
+                    (end, nearest) =
+                        (t, Some((t, if outward { normal } else { -normal }, i, facet)));
                 }
-            }
+            });
         }
         nearest
     }
@@ -156,12 +194,6 @@ impl Body {
     /// Returns `true` if the object is a mesh, which has no defined inside.
     pub fn is_mesh(&self) -> bool {
         self.leaves[0].mesh.is_some()
-    }
-
-    /// Returns `true` if one of the object's simple shapes is a torus.
-    pub fn has_torus(&self) -> bool {
-        let mut pieces = self.leaves.iter().flat_map(|leaf| &leaf.pieces);
-        pieces.any(|piece| matches!(piece, Piece::Torus(..)))
     }
 
     /// Returns `true` if the object is flat, so that it has no inside.
@@ -198,6 +230,14 @@ fn ball(pieces: &[Piece]) -> Option<(DVec3, f64)> {
     reaches.reduce(f64::max).map(|radius| (center, 1.001 * radius))
 }
 
+/// Returns an upper bound of the length to which a map stretches a unit vector: the square root of
+/// the largest sum of magnitudes in a row of M^T M. It is exact for a similarity.
+fn longest(map: &DMat3) -> f64 {
+    let square = map.transpose() * *map;
+    let rows = [square.x_axis, square.y_axis, square.z_axis];
+    rows.map(|row| row.abs().element_sum()).into_iter().fold(0.0, f64::max).sqrt()
+}
+
 fn grow(
     shape: &Shape,
     material: &str,
@@ -225,13 +265,20 @@ fn grow(
                 _ => None,
             };
             let pieces = if mesh.is_some() { Vec::new() } else { pieces(simple)? };
+            let ball = ball(&pieces);
+            let in_scene = |(center, radius): (DVec3, f64)| {
+                let center = scene_from_own.transform_point3(center);
+                (center, radius * longest(&scene_from_own.matrix3))
+            };
             let scene_from_own_normals = scene_from_own.matrix3.inverse().transpose();
             leaves.push(Leaf {
                 canvas: Canvas::new(simple, mesh.as_ref()),
-                ball: ball(&pieces),
+                ball,
+                scene_ball: ball.map(in_scene),
                 pieces,
                 mesh,
                 own_from_scene: scene_from_own.inverse(),
+                is_in_place: scene_from_own == DAffine3::IDENTITY,
                 scene_from_own_normals,
                 own_from_scene_normals: scene_from_own_normals.inverse(),
                 material: material.to_string(),

@@ -1,4 +1,5 @@
-//! Meshes of the reference tracer, without acceleration structure.
+//! Meshes of the reference tracer. Boxes around consecutive triangles are their only acceleration
+//! structure.
 
 use glam::{DVec2, DVec3};
 use std::collections::HashMap;
@@ -18,8 +19,26 @@ pub struct Triangles {
     colors: Vec<DVec3>,
     /// Texture coordinates of the corners of each triangle; empty if the file has none.
     uvs: Vec<[DVec2; 3]>,
-    low: DVec3,
-    high: DVec3,
+    /// Lowest and highest corner of the box around each [`GROUP`] consecutive triangles.
+    boxes: Vec<[DVec3; 2]>,
+    /// Lowest and highest corner of the box around all triangles.
+    bounds: [DVec3; 2],
+}
+
+/// Number of consecutive triangles in a box.
+const GROUP: usize = 16;
+
+/// Returns lowest and highest corner of the box around some triangles.
+fn bounds(triangles: &[[DVec3; 3]]) -> [DVec3; 2] {
+    let all = || triangles.iter().flatten().copied();
+    [all().fold(DVec3::INFINITY, DVec3::min), all().fold(DVec3::NEG_INFINITY, DVec3::max)]
+}
+
+/// Returns `true` if a line misses a box.
+fn misses([low, high]: &[DVec3; 2], origin: DVec3, direction: DVec3) -> bool {
+    let (a, b) = ((low - origin) / direction, (high - origin) / direction);
+    // If the line lies in the plane of a side of the box, a distance is NaN, which is ignored.
+    a.min(b).max_element() > a.max(b).min_element()
 }
 
 /// Returns the normals at the corners of all triangles. Each is the normalised sum of the unit
@@ -59,10 +78,9 @@ impl Triangles {
             .uvs
             .iter()
             .flat_map(|given| mesh.triangles.iter().map(|t| t.map(|i| pair(i, given))));
-        let all = || corners.iter().flatten().copied();
         Self {
-            low: all().fold(DVec3::INFINITY, DVec3::min),
-            high: all().fold(DVec3::NEG_INFINITY, DVec3::max),
+            boxes: corners.chunks(GROUP).map(bounds).collect(),
+            bounds: bounds(&corners),
             colors: (0..corners.len()).filter_map(|i| mesh.color(i)).map(vector).collect(),
             uvs: uvs.collect(),
             normals,
@@ -70,24 +88,35 @@ impl Triangles {
         }
     }
 
-    /// Returns distance, normal and index of every triangle that a line crosses.
-    pub fn meet(&self, origin: DVec3, direction: DVec3) -> Vec<(f64, DVec3, usize)> {
-        let (a, b) = ((self.low - origin) / direction, (self.high - origin) / direction);
-        // If the line lies in the plane of a side of the box, a distance is NaN, which is ignored.
-        if a.min(b).max_element() > a.max(b).min_element() {
-            return Vec::new();
+    /// Passes distance and index of every triangle that a line crosses to `take`.
+    pub fn meet(&self, origin: DVec3, direction: DVec3, mut take: impl FnMut(f64, usize)) {
+        if misses(&self.bounds, origin, direction) {
+            return;
         }
-        let each = self.corners.iter().enumerate().filter_map(|(i, [p, q, r])| {
-            let (u, v) = (q - p, r - p);
-            let across = direction.cross(v);
-            let volume = across.dot(u);
-            let f = across.dot(origin - p) / volume;
-            let aside = (origin - p).cross(u);
-            let g = aside.dot(direction) / volume;
-            let inside = f >= 0.0 && g >= 0.0 && f + g <= 1.0;
-            inside.then(|| (aside.dot(v) / volume, u.cross(v).normalize(), i))
-        });
-        each.collect()
+        for (group, bounds) in self.boxes.iter().enumerate() {
+            if misses(bounds, origin, direction) {
+                continue;
+            }
+            let first = group * GROUP;
+            let end = (first + GROUP).min(self.corners.len());
+            for (i, [p, q, r]) in (first..end).zip(&self.corners[first..end]) {
+                let (u, v) = (q - p, r - p);
+                let across = direction.cross(v);
+                let volume = across.dot(u);
+                let f = across.dot(origin - p) / volume;
+                let aside = (origin - p).cross(u);
+                let g = aside.dot(direction) / volume;
+                if f >= 0.0 && g >= 0.0 && f + g <= 1.0 {
+                    take(aside.dot(v) / volume, i);
+                }
+            }
+        }
+    }
+
+    /// Returns the normal of triangle `i`.
+    pub fn normal(&self, i: usize) -> DVec3 {
+        let [p, q, r] = self.corners[i];
+        (q - p).cross(r - p).normalize()
     }
 
     /// Returns the interpolated normal at a point of triangle `i`. Returns `None` for flat shading.

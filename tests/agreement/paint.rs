@@ -172,7 +172,7 @@ fn ends(leaf: &Leaf, along: DVec3) -> (f64, f64) {
         Piece::Disc(center, normal, radius) => {
             vec![(center.dot(along), radius * normal.cross(along).length())]
         }
-        Piece::Torus(center, axis, [ring, tube], _) => {
+        Piece::Torus(center, axis, [ring, tube]) => {
             vec![(center.dot(along), ring * axis.normalize().cross(along).length() + tube)]
         }
         // The discs at both ends of the cone's side are pieces, too. They contain its extreme
@@ -230,8 +230,8 @@ impl Spot<'_> {
                 }
             }
             // The image covers one turn around the ring (u) and one turn around the tube (v).
-            Mapping::Uv if matches!(self.leaf.pieces[..], [Piece::Torus(..), _]) => {
-                let Piece::Torus(_, _, [ring, _], _) = self.leaf.pieces[0] else { unreachable!() };
+            Mapping::Uv if matches!(self.leaf.pieces[..], [Piece::Torus(..)]) => {
+                let Piece::Torus(_, _, [ring, _]) = self.leaf.pieces[0] else { unreachable!() };
                 let beyond = from_middle.x.hypot(from_middle.z) - ring;
                 DVec2::new(turns, 0.5 + from_middle.y.atan2(beyond) / TAU)
             }

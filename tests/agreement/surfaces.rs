@@ -18,18 +18,14 @@ pub enum Piece {
     Disc(DVec3, DVec3, f64),
     /// Side of a cone: start of the axis, its direction, its length, and the radii at both ends.
     Side(DVec3, DVec3, f64, [f64; 2]),
-    /// Two of the up to four crossings of a torus with a line: the first two or the last two. The
-    /// values are the centre, the axis, the radii of ring and tube, and a number: 0 for the first
-    /// two crossings, 1 for the last two.
-    Torus(DVec3, DVec3, [f64; 2], usize),
+    /// Torus: centre, axis, and the radii of ring and tube.
+    Torus(DVec3, DVec3, [f64; 2]),
 }
 
-/// Crossing of a line with a piece: distance in multiples of the direction's length, and normal.
-/// `None` for a miss. Crossings behind the origin may be left out.
-type Meeting = Option<(f64, DVec3)>;
-
 impl Piece {
-    pub fn meet(&self, origin: DVec3, direction: DVec3) -> [Meeting; 2] {
+    /// Passes the distances at which a line crosses the piece to `take`, in lengths of the
+    /// direction. Crossings behind the origin may be left out.
+    pub fn meet(&self, origin: DVec3, direction: DVec3, mut take: impl FnMut(f64)) {
         match self {
             Self::Sphere(center, radius) => {
                 let f = origin - center;
@@ -37,16 +33,15 @@ impl Piece {
                 let b = f.dot(direction);
                 let c = f.dot(f) - radius * radius;
                 let root = b * b - a * c;
-                if root < 0.0 {
-                    return [None; 2];
+                if root >= 0.0 {
+                    take((-b - root.sqrt()) / a);
+                    take((-b + root.sqrt()) / a);
                 }
-                let normal = |t: f64| (origin + direction * t - center) / *radius;
-                let root_at = |sign: f64| (-b + sign * root.sqrt()) / a;
-                [root_at(-1.0), root_at(1.0)].map(|t| Some((t, normal(t))))
             }
             Self::Disc(center, normal, radius) => {
                 let hit = flat(*center, *normal, origin, direction);
-                [hit.filter(|(t, _)| (origin + direction * *t).distance(*center) <= *radius), None]
+                let inside = |t: &f64| (origin + direction * *t).distance(*center) <= *radius;
+                hit.filter(inside).map(take);
             }
             Self::Side(base, axis, height, [r0, r1]) => {
                 let across = |v: DVec3| v - *axis * v.dot(*axis);
@@ -58,39 +53,56 @@ impl Piece {
                 let b = p.dot(d) - r * widening;
                 let c = p.dot(p) - r * r;
                 let root = (b * b - a * c).sqrt();
-                let hit_at = |t: f64| {
-                    let from_axis = across(f + direction * t);
-                    let z = (f + direction * t).dot(*axis);
-                    let normal = (from_axis.normalize() - *axis * slope).normalize();
+                for t in [(-b - root) / a, (-b + root) / a] {
                     // Without a crossing, `t` and `z` are NaN, and both comparisons are false.
-                    (z >= 0.0 && z <= *height).then_some((t, normal))
-                };
-                [hit_at((-b - root) / a), hit_at((-b + root) / a)]
+                    let z = (f + direction * t).dot(*axis);
+                    if z >= 0.0 && z <= *height {
+                        take(t);
+                    }
+                }
             }
-            Self::Torus(center, axis, radii, half) => {
+            Self::Torus(center, axis, radii) => {
                 let height = |t: f64| above_torus(origin + direction * t - center, *axis, *radii);
-                let all = torus_crossings(origin - center, direction, radii[0] + radii[1], &height);
-                let normal = |t: f64| {
-                    let p = origin + direction * t - center;
-                    let across = p - *axis * p.dot(*axis);
-                    (p - across.normalize() * radii[0]).normalize()
-                };
-                [2 * half, 2 * half + 1].map(|i| all.get(i).map(|t| (*t, normal(*t))))
+                torus_crossings(origin - center, direction, radii[0] + radii[1], &height, take);
             }
-            Self::Plane(point, normal) => [flat(*point, *normal, origin, direction), None],
+            Self::Plane(point, normal) => {
+                flat(*point, *normal, origin, direction).map(take);
+            }
             Self::Polygon(corners, normal) => {
-                // The point is on the same side of all edges, in either orientation.
-                let inside = |p: DVec3| {
-                    let side = |i: usize| {
-                        let (a, b) = (corners[i], corners[(i + 1) % corners.len()]);
-                        (b - a).cross(p - a).dot(*normal)
-                    };
-                    let edges = || 0..corners.len();
-                    edges().all(|i| side(i) >= 0.0) || edges().all(|i| side(i) <= 0.0)
-                };
                 let hit = flat(corners[0], *normal, origin, direction);
-                [hit.filter(|(t, _)| *t > 0.0 && inside(origin + direction * *t)), None]
+                let Some(t) = hit.filter(|t| *t > 0.0) else { return };
+                let p = origin + direction * t;
+                // The point is on the same side of all edges, in either orientation.
+                let mut a = corners[corners.len() - 1];
+                let (mut left, mut right) = (true, true);
+                for b in corners {
+                    let side = (b - a).cross(p - a).dot(*normal);
+                    (left, right) = (left && side >= 0.0, right && side <= 0.0);
+                    if !left && !right {
+                        return;
+                    }
+                    a = *b;
+                }
+                take(t);
             }
+        }
+    }
+
+    /// Returns the normal at the crossing of a line with the piece at the distance `t`.
+    pub fn normal(&self, origin: DVec3, direction: DVec3, t: f64) -> DVec3 {
+        match self {
+            Self::Sphere(center, radius) => (origin + direction * t - center) / *radius,
+            Self::Side(base, axis, height, [r0, r1]) => {
+                let from_base = origin - base + direction * t;
+                let from_axis = from_base - *axis * from_base.dot(*axis);
+                (from_axis.normalize() - *axis * ((r1 - r0) / height)).normalize()
+            }
+            Self::Torus(center, axis, radii) => {
+                let p = origin + direction * t - center;
+                let across = p - *axis * p.dot(*axis);
+                (p - across.normalize() * radii[0]).normalize()
+            }
+            Self::Disc(_, normal, _) | Self::Plane(_, normal) | Self::Polygon(_, normal) => *normal,
         }
     }
 }
@@ -112,7 +124,7 @@ impl Piece {
             Self::Side(base, axis, height, [r0, r1]) => {
                 Some((*base + *axis * (0.5 * height), (0.5 * height).hypot(r0.max(*r1))))
             }
-            Self::Torus(center, _, [ring, tube], _) => Some((*center, ring + tube)),
+            Self::Torus(center, _, [ring, tube]) => Some((*center, ring + tube)),
         }
     }
 
@@ -122,9 +134,7 @@ impl Piece {
         match self {
             Self::Sphere(center, radius) => point.distance(*center) <= *radius,
             Self::Polygon(corners, normal) => normal.dot(point - corners[0]) <= 0.0,
-            Self::Torus(center, axis, radii, _) => {
-                above_torus(point - center, *axis, *radii) <= 0.0
-            }
+            Self::Torus(center, axis, radii) => above_torus(point - center, *axis, *radii) <= 0.0,
             Self::Plane(on, normal) | Self::Disc(on, normal, _) => normal.dot(point - on) <= 0.0,
             Self::Side(base, axis, height, [r0, r1]) => {
                 let z = axis.dot(point - base);
@@ -141,52 +151,77 @@ fn above_torus(p: DVec3, axis: DVec3, [ring, tube]: [f64; 2]) -> f64 {
     ((p - axis * along).length() - ring).hypot(along) - tube
 }
 
-/// Returns the distances at which a line crosses a torus. The line is sampled in small steps
-/// through a ball around the torus. Where `height` changes its sign, bisection finds the crossing.
+/// Passes the distances at which a line crosses a torus to `take`. The line is sampled in small
+/// steps through a ball around the torus. Where `height` changes its sign, [`root`] finds the
+/// crossing.
 fn torus_crossings(
     from_center: DVec3,
     direction: DVec3,
     reach: f64,
-    height: &dyn Fn(f64) -> f64,
-) -> Vec<f64> {
+    height: &impl Fn(f64) -> f64,
+    mut take: impl FnMut(f64),
+) {
     const STEPS: usize = 200;
     let length2 = direction.length_squared();
     let middle = -from_center.dot(direction) / length2;
     let nearest = (from_center + direction * middle).length_squared();
     let half = ((reach * reach - nearest) / length2).sqrt() * 1.001;
     if half.is_nan() {
-        return Vec::new();
+        return;
     }
     let place = |i: usize| middle + half * (2.0 * i as f64 / STEPS as f64 - 1.0);
     // The height is the distance from the torus. It keeps its sign while the point on the line
     // advances by less than this distance. `steps_per_height` converts a height to a number of
     // steps. The factor 0.999 covers rounding.
     let steps_per_height = 0.999 * STEPS as f64 / (2.0 * half * length2.sqrt());
-    let mut out = Vec::new();
     let mut before = height(place(0));
     let mut next = 1 + (before.abs() * steps_per_height) as usize;
-    for i in 1..=STEPS {
-        if i < next {
-            continue;
-        }
+    let mut i = next;
+    while i <= STEPS {
         let after = height(place(i));
-        next = i + 1 + (after.abs() * steps_per_height) as usize;
         if (before < 0.0) != (after < 0.0) {
-            let (mut low, mut high) = (place(i - 1), place(i));
-            for _ in 0..60 {
-                let t = 0.5 * (low + high);
-                if (height(t) < 0.0) == (before < 0.0) { low = t } else { high = t }
-            }
-            out.push(0.5 * (low + high));
+            let (start, end) = (place(i - 1), place(i));
+            take(root(height, [start, end], [height(start), after], 1e-15 * reach));
         }
-        before = after;
+        next = i + 1 + (after.abs() * steps_per_height) as usize;
+        (before, i) = (after, next);
     }
-    out
 }
 
-fn flat(point: DVec3, normal: DVec3, origin: DVec3, direction: DVec3) -> Meeting {
+/// Returns the place between `low` and `high` where the magnitude of `f` is at most `tolerance`, by
+/// the Illinois method: false position that halves the value at an end which stays a second time.
+/// `f_low` and `f_high` are the values at the ends, of different signs.
+fn root(
+    f: &impl Fn(f64) -> f64,
+    [mut low, mut high]: [f64; 2],
+    [mut f_low, mut f_high]: [f64; 2],
+    tolerance: f64,
+) -> f64 {
+    let (mut t, mut moved) = (low, 0);
+    // Rounding of `f` may be above the tolerance.
+    for _ in 0..60 {
+        t = low + (high - low) * (f_low / (f_low - f_high));
+        let value = f(t);
+        if value.abs() <= tolerance {
+            break;
+        }
+        if (value < 0.0) == (f_low < 0.0) {
+            (low, f_low) = (t, value);
+            f_high *= if moved == -1 { 0.5 } else { 1.0 };
+            moved = -1;
+        } else {
+            (high, f_high) = (t, value);
+            f_low *= if moved == 1 { 0.5 } else { 1.0 };
+            moved = 1;
+        }
+    }
+    t
+}
+
+/// Returns the distance at which a line crosses a plane, in lengths of the direction.
+fn flat(point: DVec3, normal: DVec3, origin: DVec3, direction: DVec3) -> Option<f64> {
     let speed = normal.dot(direction);
-    (speed != 0.0).then(|| (normal.dot(point - origin) / speed, normal))
+    (speed != 0.0).then(|| normal.dot(point - origin) / speed)
 }
 
 /// Returns the affine map of a step of an object's transform.
@@ -239,9 +274,7 @@ pub fn pieces(shape: &Shape) -> Result<Vec<Piece>, String> {
         Shape::TaperedCylinder(c) => round(v(c.base), v(c.top), [c.base_radius, c.top_radius]),
         Shape::UnitFrustum(c) => round(DVec3::ZERO, DVec3::Z, [1.0, c.s]),
         Shape::Torus(t) => {
-            let half =
-                |half| Piece::Torus(v(t.center), v(t.axis).normalize(), [t.ring, t.tube], half);
-            vec![half(0), half(1)]
+            vec![Piece::Torus(v(t.center), v(t.axis).normalize(), [t.ring, t.tube])]
         }
         Shape::Cuboid(b) => {
             let [x, y, z] = b.size;

@@ -1,7 +1,7 @@
 //! Reference path tracer in double precision. It traces one sample at a time and is optimised for
 //! readability.
 
-use crate::agreement::compounds::Body;
+use crate::agreement::compounds::{Body, Leaf, Meeting};
 use crate::agreement::emission::Shine;
 use crate::agreement::lamps::Lamp;
 use crate::agreement::meshes;
@@ -12,11 +12,12 @@ use crate::common::Numbers;
 use glam::DVec3;
 use std::collections::HashMap;
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 use zerkalo::camera::{Aperture, Focus, ViewAngle};
 use zerkalo::light::{Falloff, Light, Spot};
 use zerkalo::material::Material;
 use zerkalo::scene::{Filter, RayTypes, Scene};
-use zerkalo::value::TomlValue;
+use zerkalo::value::{Color, TomlValue};
 
 /// Deliberate error of the reference tracer that the comparison has to detect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,9 +84,15 @@ pub struct Tracer<'a> {
     pub media: Vec<Option<&'a Material>>,
     /// Images of textures and bump maps, by file name.
     pub images: HashMap<String, Pixels>,
-    plain: Material,
+    /// Materials of the simple shapes of each body.
+    materials: Vec<Vec<&'a Material>>,
+    /// `true` if some material absorbs light.
+    pub absorbs: bool,
     pub mutation: Mutation,
 }
+
+/// Material of objects that name none.
+static PLAIN: LazyLock<Material> = LazyLock::new(Material::default);
 
 /// Mean of one pixel's samples, and variance of this mean.
 #[derive(Clone, Copy, Default)]
@@ -119,11 +126,16 @@ impl<'a> Tracer<'a> {
     /// Names a feature of the scene that this tracer does not support.
     pub fn new(scene: &'a Scene, mutation: Mutation) -> Result<Self, String> {
         let bodies = scene.objects.iter().map(Body::new).collect::<Result<Vec<_>, _>>()?;
-        let (images, plain) = (HashMap::new(), Material::default());
+        let images = HashMap::new();
         let lamps = scene.lights.iter().map(Lamp::new).collect();
         let shines = bodies.iter().map(Shine::new).collect();
         let media = bodies.iter().map(|body| medium(scene, body)).collect();
-        let mut tracer = Self { scene, bodies, lamps, shines, media, images, plain, mutation };
+        let material = |leaf: &Leaf| scene.materials.get(&leaf.material).unwrap_or(&*PLAIN);
+        let materials =
+            bodies.iter().map(|body| body.leaves.iter().map(material).collect()).collect();
+        let absorbs = scene.materials.values().any(|m| m.attenuation_color != Color::WHITE);
+        let mut tracer =
+            Self { scene, bodies, lamps, shines, media, images, materials, absorbs, mutation };
         if scene.lights.iter().any(|l| l.environment.as_ref().is_some_and(|e| e.file().is_some())) {
             return Err("an image around the scene".to_string());
         }
@@ -131,8 +143,8 @@ impl<'a> Tracer<'a> {
             unknown_keys(material)?;
             tracer.open_images(material)?;
         }
-        for body in tracer.bodies.iter().filter(|body| body.is_mesh()) {
-            if tracer.material(&body.leaves[0].material).transmission > 0.0 {
+        for (body, materials) in tracer.bodies.iter().zip(&tracer.materials) {
+            if body.is_mesh() && materials[0].transmission > 0.0 {
                 return Err("a mesh that lets light through".to_string());
             }
         }
@@ -143,10 +155,10 @@ impl<'a> Tracer<'a> {
         Ok(tracer)
     }
 
-    /// Returns `true` if the scene is slow to trace: it has meshes, whose triangles are tested one
-    /// by one, or tori, whose crossings are found by bisection.
+    /// Returns `true` if the scene is slow to trace: it has meshes, whose boxes of triangles are
+    /// tested one by one.
     pub fn is_slow(&self) -> bool {
-        self.bodies.iter().any(|body| body.is_mesh() || body.has_torus())
+        self.bodies.iter().any(Body::is_mesh)
     }
 
     /// Estimates the radiance of the pixel in column `x` and row `y` from `samples` samples.
@@ -324,12 +336,14 @@ impl<'a> Tracer<'a> {
 
     fn meet(&self, origin: DVec3, direction: DVec3) -> Option<Hit<'_>> {
         let from = Self::clearance(origin);
-        let hits = self.bodies.iter().enumerate().filter_map(|(i, body)| {
-            let (t, normal, leaf, facet) = body.meet(origin, direction, from)?;
-            Some((t, normal, i, &body.leaves[leaf], facet))
-        });
-        let (t, normal, i, leaf, facet) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let material = self.material(&leaf.material);
+        let mut nearest: Option<(Meeting, usize)> = None;
+        for (i, body) in self.bodies.iter().enumerate() {
+            let end = nearest.map_or(f64::INFINITY, |((t, ..), _)| t);
+            nearest = body.meet(origin, direction, from, end).map(|hit| (hit, i)).or(nearest);
+        }
+        let ((t, normal, leaf, facet), i) = nearest?;
+        let material = self.materials[i][leaf];
+        let leaf = &self.bodies[i].leaves[leaf];
         let front = normal.dot(direction) < 0.0;
         let (point, normal) = (origin + direction * t, if front { normal } else { -normal });
         let smooth = leaf.smooth(facet, point);
@@ -350,10 +364,6 @@ impl<'a> Tracer<'a> {
             front,
             bare: !front && !material.two_sided,
         })
-    }
-
-    pub fn material(&self, name: &str) -> &Material {
-        self.scene.materials.get(name).unwrap_or(&self.plain)
     }
 
     /// Returns the radiance of the visible lamps that a ray reaches before the distance `end`.
@@ -464,9 +474,9 @@ impl<'a> Tracer<'a> {
             }
             sum += irradiance * (color * (m.diffuse * cos / PI) + shine);
         }
-        for (body, shine) in self.bodies.iter().zip(&self.shines) {
+        for (materials, shine) in self.materials.iter().zip(&self.shines) {
             let Some(shine) = shine else { continue };
-            let material = self.material(&body.leaves[0].material);
+            let material = materials[0];
             if !material.emits() {
                 continue;
             }
@@ -499,9 +509,8 @@ impl<'a> Tracer<'a> {
         }
         let offset = if self.mutation == Mutation::ShadowOffset { 1e-3 } else { 0.0 };
         let from = Self::clearance(point) + offset;
-        self.bodies.iter().any(|body| {
-            body.meet(point, towards, from).is_some_and(|(t, ..)| t < distance * (1.0 - 1e-12))
-        })
+        let end = distance * (1.0 - 1e-12);
+        self.bodies.iter().any(|body| body.meet(point, towards, from, end).is_some())
     }
 }
 

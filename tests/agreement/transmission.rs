@@ -11,7 +11,6 @@ use crate::common::Numbers;
 use glam::DVec3;
 use zerkalo::material::{Fresnel, Material};
 use zerkalo::scene::{BelowHorizon, RayTypes, Scene};
-use zerkalo::value::Color;
 
 /// Distance from a surface to the two tested points in front of it and behind it, in scene units.
 const ASIDE: f64 = 1e-6;
@@ -64,8 +63,7 @@ impl Tracer<'_> {
     /// Returns the share of light that is left on the way from `origin` to `end`. If `end` is
     /// `None`, the way extends to infinity along `direction`.
     pub fn transmittance(&self, origin: DVec3, end: Option<DVec3>, direction: DVec3) -> DVec3 {
-        let plain = |m: &Material| m.attenuation_color == Color::WHITE;
-        if self.scene.trace.ray_types < RayTypes::Full || self.scene.materials.values().all(plain) {
+        if self.scene.trace.ray_types < RayTypes::Full || !self.absorbs {
             return DVec3::ONE;
         }
         let middle = end.map_or(origin + direction * ASIDE, |end| 0.5 * (origin + end));

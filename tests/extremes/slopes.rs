@@ -16,7 +16,7 @@ const FIRST: u32 = 64;
 const LAST: u32 = 2048;
 /// Ratio of two sample counts: that of the reference, and the largest of the compared pictures,
 /// [`LAST`].
-const REFERENCE: u32 = 64;
+const REFERENCE: u32 = 16;
 
 /// Returns the slope of log RMSE against log samples, over several pictures with different seeds.
 fn slope(scene: &Scene, kind: SamplerKind, reference: &Reference) -> Slope {

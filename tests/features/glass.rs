@@ -35,7 +35,7 @@ fn d7_absorption() {
     let original = shipped("absorbing-glass.toml");
     row(
         "absorbing-glass.toml",
-        |tested| agrees(&original, tested, 192),
+        |tested| agrees(&original, tested, 256),
         &[
             ("clear glass", &|s| material(s, "green").attenuation_color = Color::WHITE),
             ("twice the distance", &|s| material(s, "green").attenuation_distance = 1.0),

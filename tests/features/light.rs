@@ -32,8 +32,8 @@ fn a7_material() {
     row(
         "material.toml",
         |tested| {
-            agrees(&original, tested, 96)?;
-            agrees(&close_up(&original), &close_up(tested), 96)
+            agrees(&original, tested, 128)?;
+            agrees(&close_up(&original), &close_up(tested), 128)
         },
         &[
             ("another colour", &|s| material(s, "matt").color = Color([0.7, 0.2, 0.15])),

@@ -12,12 +12,17 @@ use zerkalo::film::Replicates;
 use zerkalo::scene::{Filter, Scene};
 use zerkalo::world::Precision;
 
+/// Samples per pixel of each replicate (half of the samples) in the picture of a mutation.
+const MUTATION_SAMPLES: u32 = SAMPLES / 4;
+
 /// Compares the program's picture of `tested` statistically with the reference tracer's picture of
-/// `original`. The reference tracer traces `samples` samples per pixel.
+/// `original`. The reference tracer traces `samples` samples per pixel. The picture of a mutation
+/// has fewer samples than that of the original, because mutations deviate by many standard errors.
 pub fn agrees(original: &Scene, tested: &Scene, samples: u32) -> Verdict {
     let reference = reference(&small(original.clone()), samples, Mutation::None);
     let reference = reference.expect("the plain tracer supports the scene");
-    let verdict = Picture::new(&small(tested.clone()), SAMPLES / 2).beside(&reference, samples);
+    let of_picture = if tested == original { SAMPLES } else { MUTATION_SAMPLES };
+    let verdict = Picture::new(&small(tested.clone()), of_picture).beside(&reference, samples);
     if verdict.agree() { Ok(()) } else { Err(verdict.to_string()) }
 }
 

@@ -90,6 +90,11 @@ fn write(path: &Path, bytes: &[u8]) {
 /// Writes `bytes` to the mesh file `path` and reads it. Returns `true` if the file is accepted.
 fn mesh(path: &Path, bytes: &[u8]) -> bool {
     write(path, bytes);
+    accepts_mesh(path)
+}
+
+/// Reads the mesh file `path`. Returns `true` if it is accepted.
+fn accepts_mesh(path: &Path) -> bool {
     match Assets::default().mesh(path) {
         Ok(mesh) => {
             let mesh = mesh.mesh();
@@ -121,10 +126,13 @@ fn obj() {
 fn mtl() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.obj");
-    let obj = &files::obj()[0];
+    // A small mesh with both materials.
+    let obj =
+        b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\nusemtl grey\nf 3 2 1\n";
+    write(&path, obj);
     let accepted = read_mutations("mtl", &[files::MTL.into()], |bytes| {
         write(&folder.path().join("a.mtl"), bytes);
-        mesh(&path, obj)
+        accepts_mesh(&path)
     });
     assert_eq!(accepted, CASES, "colours that cannot be read are left out");
 }

@@ -58,7 +58,8 @@ impl Pty {
         let (shared, keys, ends) = (output.clone(), keyboard.clone(), closing.clone());
         let reader = std::thread::spawn(move || {
             let mut buffer = vec![0; 1 << 14];
-            let mut replied = 0;
+            // Start of the output that may still contain a request.
+            let mut unsearched = 0;
             loop {
                 let read = from.read(&mut buffer).unwrap_or(0);
                 if read == 0 || ends.load(Ordering::Acquire) {
@@ -67,12 +68,14 @@ impl Pty {
                 let mut bytes = shared.0.lock().unwrap();
                 bytes.extend_from_slice(&buffer[..read]);
                 shared.1.notify_all();
-                while let Some(offset) = find(&bytes[replied..], REQUEST.0) {
-                    replied += offset + REQUEST.0.len();
+                while let Some(offset) = find(&bytes[unsearched..], REQUEST.0) {
+                    unsearched += offset + REQUEST.0.len();
                     if let Some(keyboard) = &mut *keys.lock().unwrap() {
                         let _ = keyboard.write_all(REQUEST.1);
                     }
                 }
+                // The last bytes may be the beginning of a request.
+                unsearched = unsearched.max((bytes.len() + 1).saturating_sub(REQUEST.0.len()));
             }
             shared.1.notify_all();
         });

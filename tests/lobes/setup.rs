@@ -14,8 +14,13 @@ pub fn dot(a: Vector, b: Vector) -> f64 {
 }
 
 /// Returns the sum of vectors, each multiplied by a factor.
+#[inline]
 pub fn combine(terms: &[(f64, Vector)]) -> Vector {
-    std::array::from_fn(|i| terms.iter().map(|(k, v)| k * v[i]).sum())
+    let mut sum = [0.0; 3];
+    for (k, v) in terms {
+        sum = [sum[0] + k * v[0], sum[1] + k * v[1], sum[2] + k * v[2]];
+    }
+    sum
 }
 
 pub fn unit(v: Vector) -> Vector {

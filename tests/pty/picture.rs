@@ -98,9 +98,11 @@ fn shown_picture_matches_render() {
     let fixture = Fixture::with_room();
     let mut terminal = fixture.open(&["room.toml"], SIZE);
     wait_for_picture(&terminal);
-    restart_rendering(&mut terminal, 256);
-    let written = Picture::of_png(&fixture.rendered(&["room.toml", "--spp", "256"], "room.png"));
-    let error = terminal.wait_for("the picture of 256 samples", |screen| {
+    restart_rendering(&mut terminal, 64);
+    // The dashboard allocates samples by the displayed picture.
+    let args = ["room.toml", "--spp", "64", "--noise", "1e-9"];
+    let written = Picture::of_png(&fixture.rendered(&args, "room.png"));
+    let error = terminal.wait_for("the picture of 64 samples", |screen| {
         distance(screen, &room_layout(), &written).filter(|d| *d <= 0.01)
     });
     // A black picture, by contrast, has a large distance from the screen.

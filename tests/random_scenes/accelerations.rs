@@ -16,7 +16,7 @@ fn same_bytes(scene: &Scene) -> Verdict {
     for precision in [Precision::Single, Precision::Double] {
         let film = |acceleration| accelerated(scene, acceleration, precision, SAMPLES);
         let wanted = film(Acceleration::None);
-        for acceleration in Acceleration::ALL {
+        for acceleration in Acceleration::ALL.into_iter().filter(|a| *a != Acceleration::None) {
             let found = film(acceleration);
             if found.film.bytes() == wanted.film.bytes() {
                 continue;

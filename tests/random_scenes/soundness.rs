@@ -7,12 +7,20 @@ use crate::random_scenes::scene::seeds_of;
 use crate::support::{parsed, picture, pool, rendered, uniform, without_chance};
 use zerkalo::film::{Display, Replicates};
 use zerkalo::scene::Scene;
-use zerkalo::world::Precision;
+use zerkalo::world::{self, AnyWorld, Precision};
 
 const SAMPLES: u32 = 4;
 
+/// Returns the precision that `auto` selects, and double precision if that is another one.
+fn precisions(scene: &Scene) -> impl Iterator<Item = Precision> {
+    let is_double =
+        matches!(AnyWorld::compile(scene, &world::Options::default()), AnyWorld::Double(_));
+    let auto = (!is_double).then_some(Precision::Auto);
+    auto.into_iter().chain([Precision::Double])
+}
+
 fn sound(scene: &Scene) -> Verdict {
-    for precision in [Precision::Auto, Precision::Double] {
+    for precision in precisions(scene) {
         let mut rendering = rendered(scene, 1, precision, SAMPLES);
         // `rendered` traces few samples of each pixel, in packets of many pixels. These eight
         // samples of a pixel are traced in packets of one pixel.
@@ -44,7 +52,7 @@ fn sound(scene: &Scene) -> Verdict {
 fn replicates_are_equal(scene: &Scene) -> Verdict {
     let mut scene = scene.clone();
     without_chance(&mut scene);
-    for precision in [Precision::Auto, Precision::Double] {
+    for precision in precisions(&scene) {
         let rendering = rendered(&scene, 1, precision, SAMPLES);
         let [a, b] = [Replicates::A, Replicates::B].map(|part| picture(&rendering, part));
         if let Some(i) = (0..a.len()).find(|i| a[*i] != b[*i]) {
