@@ -110,7 +110,6 @@ const CRATES: &[(&str, &[&str])] = &[
     ("crossbeam_channel", &["render", "dashboard", "terminal"]),
     ("crossterm", &["terminal"]),
     ("csv", &["command"]),
-    ("epaint_default_fonts", &["measure"]),
     ("exr", &["asset", "film"]),
     ("gltf", &["asset"]),
     ("icy_sixel", &["terminal"]),

@@ -3,13 +3,16 @@
 
 use crate::measure::experiment::Experiment;
 use crate::measure::result::{Measured, Measurement, median};
-use epaint_default_fonts::UBUNTU_LIGHT;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontStyle, register_font};
 use std::error::Error;
 use std::ops::Range;
+
+/// Font of the text in plots, so that plots are the same on every machine: Ubuntu Light with the
+/// Latin, Greek and Cyrillic letters, figures and signs alone, without hints.
+const FONT: &[u8] = include_bytes!("font/light.ttf");
 
 /// Width and height of a panel of the plot, in pixels.
 const PANEL: (i32, i32) = (440, 374);
@@ -162,9 +165,8 @@ fn draw<B: DrawingBackend>(backend: B, measurement: &Measurement, title: &str) -
 where
     B::ErrorType: 'static,
 {
-    // The font is embedded, so that plots are the same on every machine. An error means that the
-    // font is registered already.
-    let _ = register_font("sans-serif", FontStyle::Normal, UBUNTU_LIGHT);
+    // An error means that the font is registered already.
+    let _ = register_font("sans-serif", FontStyle::Normal, FONT);
     let root = backend.into_drawing_area();
     root.fill(&WHITE)?;
     root.draw_text(title, &text(20, INK, HPos::Left, VPos::Top), (24, 14))?;
