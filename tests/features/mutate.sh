@@ -54,7 +54,7 @@ pub fn mutant(name: &str) -> bool {
 }
 RUST
 if [ "${1:-}" = --check ]; then
-    cargo check --quiet
+    cargo check --quiet -p zerkalo-render
     exit
 fi
 cargo test --quiet --test engine --no-run
