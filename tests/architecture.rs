@@ -116,7 +116,6 @@ const CRATES: &[(&str, &[&str])] = &[
     ("image", &["asset"]),
     ("indicatif", &["command"]),
     ("nucleo_matcher", &["dashboard"]),
-    ("obvhs", &["bvh"]),
     ("plotters", &["measure"]),
     ("ply_rs_bw", &["asset"]),
     ("png", &["film"]),

@@ -5,13 +5,10 @@
 //! primitives into a binary BVH and optimises this BVH by reinsertion. It then collapses the binary
 //! BVH into wide nodes with up to eight children.
 
+use crate::bvh::binary::{Aabb, BinaryBvh, BinaryNode};
 use crate::bvh::clustering::{SearchWindow, cluster};
 use crate::bvh::reinsertion::optimize;
 use glam::Vec3A;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::leaf_collapser::collapse;
-use obvhs::bvh2::node::Bvh2Node;
 
 /// Number of children of a node of the BVH.
 pub const BVH_WIDTH: usize = 8;
@@ -111,14 +108,14 @@ impl Bvh8 {
         quality: BuildQuality,
     ) -> Bvh8Build {
         let bounds_of = |i: usize| {
-            let [low, high] = corners(i).map(Vec3A::from_array);
-            Aabb::new(low, high)
+            let [min, max] = corners(i).map(Vec3A::from_array);
+            Aabb { min, max }
         };
         let bounds: Vec<Aabb> = (0..count).map(bounds_of).collect();
-        let mut binary = cluster(&bounds, quality.window);
+        let (mut binary, _) = cluster(&bounds, quality.window);
         drop(bounds);
         optimize(&mut binary, quality.reinsertion);
-        collapse(&mut binary, in_leaf as u32, quality.traversal_cost);
+        binary.merge_leaves(in_leaf as u32, quality.traversal_cost);
         optimize(&mut binary, quality.second_reinsertion);
         let mut built = Bvh8Build {
             bvh: Self { nodes: Vec::new(), depth: 0 },
@@ -126,7 +123,7 @@ impl Bvh8 {
             leaves: Vec::new(),
         };
         built.collapse(&binary);
-        built.order = binary.primitive_indices;
+        built.order = binary.order;
         built
     }
 
@@ -149,9 +146,9 @@ impl Bvh8 {
 impl Bvh8Build {
     /// Collapses the binary BVH `binary` into eight-wide nodes and leaves, which it appends to
     /// `self`.
-    fn collapse(&mut self, binary: &Bvh2) {
+    fn collapse(&mut self, binary: &BinaryBvh) {
         let binary_nodes = &binary.nodes;
-        let plan = CollapsePlan::new(binary_nodes);
+        let plan = CollapsePlan::new(binary);
         let mut todo = vec![(0usize, 0usize, 1usize)];
         let wide_nodes = &mut self.bvh.nodes;
         wide_nodes.push(EMPTY_NODE);
@@ -163,14 +160,14 @@ impl Bvh8Build {
             let mut new = EMPTY_NODE;
             for (i, child) in children.iter().enumerate() {
                 let n = &binary_nodes[*child];
-                let (low, high) = (n.aabb().min.to_array(), n.aabb().max.to_array());
+                let (low, high) = (n.aabb.min.to_array(), n.aabb.max.to_array());
                 for axis in 0..3 {
                     new.bounds[axis][i] = low[axis];
                     new.bounds[axis + 3][i] = high[axis];
                 }
                 if n.is_leaf() {
                     new.child[i] = LEAF_FLAG | self.leaves.len() as u32;
-                    self.leaves.push((n.first_index, n.prim_count));
+                    self.leaves.push((n.first, n.primitives));
                 } else {
                     new.child[i] = wide_nodes.len() as u32;
                     todo.push((*child, wide_nodes.len(), depth + 1));
@@ -196,29 +193,21 @@ struct CollapsePlan {
 }
 
 impl CollapsePlan {
-    fn new(nodes: &[Bvh2Node]) -> Self {
+    fn new(binary: &BinaryBvh) -> Self {
+        let nodes = &binary.nodes;
         let mut splits = vec![[[0; 2]; BVH_WIDTH]; nodes.len()];
         // For each binary node and each number of slots that its subtree may take: the smallest sum
         // of the areas of the wide nodes in this subtree.
         let mut costs = vec![[0.0f32; BVH_WIDTH]; nodes.len()];
         // This area is added to the area of each wide node, because otherwise a flat node without
         // area would have no cost.
-        let least_area = 1e-7 * nodes[0].aabb().half_area() + f32::MIN_POSITIVE;
-        let mut order = vec![0];
-        for position in 0.. {
-            let Some(node) = order.get(position) else { break };
-            let node: &Bvh2Node = &nodes[*node];
-            if !node.is_leaf() {
-                let first = node.first_index as usize;
-                order.extend([first, first + 1]);
-            }
-        }
-        for number in order.into_iter().rev() {
+        let least_area = 1e-7 * nodes[0].aabb.half_area() + f32::MIN_POSITIVE;
+        for number in binary.parents_first().into_iter().rev() {
             let node = &nodes[number];
             if node.is_leaf() {
                 continue;
             }
-            let first = node.first_index as usize;
+            let first = node.first as usize;
             let best_split = |slots: usize| {
                 let splits = (1..slots).map(|k| {
                     (costs[first][k - 1] + costs[first + 1][slots - k - 1], [k, slots - k])
@@ -229,7 +218,7 @@ impl CollapsePlan {
                 })
             };
             let (children_cost, split) = best_split(BVH_WIDTH);
-            let mut cost = [children_cost + node.aabb().half_area() + least_area; BVH_WIDTH];
+            let mut cost = [children_cost + node.aabb.half_area() + least_area; BVH_WIDTH];
             splits[number][0] = split;
             for slots in 2..=BVH_WIDTH {
                 let (split_cost, split) = best_split(slots);
@@ -243,10 +232,10 @@ impl CollapsePlan {
 
     /// Appends indices of binary nodes to `out`: the children of a wide node that replaces the
     /// binary node `node`.
-    fn children(&self, nodes: &[Bvh2Node], node: usize, out: &mut Vec<usize>) {
+    fn children(&self, nodes: &[BinaryNode], node: usize, out: &mut Vec<usize>) {
         let mut todo = Vec::with_capacity(BVH_WIDTH);
         let split = |todo: &mut Vec<(usize, u8)>, node: usize, [left, right]: [u8; 2]| {
-            let first = nodes[node].first_index as usize;
+            let first = nodes[node].first as usize;
             todo.extend([(first + 1, right), (first, left)]);
         };
         if nodes[node].is_leaf() {
@@ -352,8 +341,8 @@ mod tests {
 
     fn boxes(family: Family, count: usize) -> Vec<Aabb> {
         let aabb = |i: usize| {
-            let [low, high] = family(i).map(Vec3A::from_array);
-            Aabb::new(low, high)
+            let [min, max] = family(i).map(Vec3A::from_array);
+            Aabb { min, max }
         };
         (0..count).map(aabb).collect()
     }
@@ -365,10 +354,8 @@ mod tests {
     fn clustering_of_coincident_boxes_takes_few_passes() {
         for (name, family) in FAMILIES {
             for quality in [BuildQuality::FAST, BuildQuality::MEDIUM] {
-                let tree = cluster(&boxes(family, 4000), quality.window);
-                // `cluster` sets `max_depth` to the number of passes plus 1, but at least to 96.
-                // The value 96 thus means at most 95 passes.
-                assert_eq!(tree.max_depth, 96, "{name}: {} passes", tree.max_depth - 1);
+                let (_, passes) = cluster(&boxes(family, 4000), quality.window);
+                assert!(passes <= 95, "{name}: {passes} passes");
             }
         }
     }

@@ -7,11 +7,9 @@
 //! then be proportional to the number of boxes. Such slow passes therefore merge neighbours on the
 //! curve instead.
 
+use crate::bvh::binary::{Aabb, BinaryBvh, BinaryNode};
+use crate::bvh::morton::morton_code;
 use glam::{DVec3, Vec3A};
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::node::Bvh2Node;
-use obvhs::ploc::morton::morton_encode_u64_unorm;
 
 /// Number of node visits per primitive, over all passes so far, after which slow clustering passes
 /// (see [`SLOW`]) no longer merge nearest nodes. Instead they merge the 1st and 2nd node on the
@@ -40,13 +38,14 @@ pub struct SearchWindow {
 type Nearest = (f32, u32);
 
 /// Builds the binary BVH of primitives with the bounding boxes `bounds`, at least one, by
-/// clustering. Each leaf has one primitive. `window` limits the search for the nearest node.
-pub fn cluster(bounds: &[Aabb], window: SearchWindow) -> Bvh2 {
+/// clustering. Each leaf has one primitive. `window` limits the search for the nearest node. Also
+/// returns the number of passes.
+pub fn cluster(bounds: &[Aabb], window: SearchWindow) -> (BinaryBvh, usize) {
     let count = bounds.len();
     let mut nodes = sorted_leaves(bounds);
     let mut merged = Vec::with_capacity(count);
     let mut nearest_of = vec![(f32::INFINITY, NONE); count];
-    let mut tree = vec![Bvh2Node::default(); 2 * count - 1];
+    let mut tree = vec![BinaryNode::default(); 2 * count - 1];
     let (mut free, mut passes, mut visits) = (tree.len(), 0, 0);
     while nodes.len() > 1 {
         let distance = if passes < window.narrow_passes { 1 } else { window.distance };
@@ -64,7 +63,8 @@ pub fn cluster(bounds: &[Aabb], window: SearchWindow) -> Bvh2 {
                 let other = nodes[partner as usize];
                 free -= 2;
                 (tree[free], tree[free + 1]) = (*node, other);
-                merged.push(Bvh2Node::new(node.aabb().union(other.aabb()), 0, free as u32));
+                let aabb = node.aabb.union(&other.aabb);
+                merged.push(BinaryNode { aabb, primitives: 0, first: free as u32 });
             }
         }
         std::mem::swap(&mut nodes, &mut merged);
@@ -72,39 +72,35 @@ pub fn cluster(bounds: &[Aabb], window: SearchWindow) -> Bvh2 {
         passes += 1;
     }
     tree[0] = nodes[0];
-    let empty = Bvh2::default();
-    Bvh2 {
-        nodes: tree,
-        primitive_indices: (0..count as u32).collect(),
-        children_are_ordered_after_parents: true,
-        max_depth: empty.max_depth.max(passes + 1),
-        ..empty
-    }
+    (BinaryBvh { nodes: tree, order: (0..count as u32).collect() }, passes)
 }
 
 /// Returns a leaf for each box, in the order of the Morton codes of the boxes' centres.
-fn sorted_leaves(bounds: &[Aabb]) -> Vec<Bvh2Node> {
+fn sorted_leaves(bounds: &[Aabb]) -> Vec<BinaryNode> {
     let low = bounds.iter().map(|b| b.min).fold(Vec3A::INFINITY, Vec3A::min);
     let high = bounds.iter().map(|b| b.max).fold(Vec3A::NEG_INFINITY, Vec3A::max);
     let scale: DVec3 = 1.0 / (high - low).as_dvec3();
-    let offset = -low.as_dvec3() * scale;
-    let code = |aabb: &Aabb| morton_encode_u64_unorm(aabb.center().as_dvec3() * scale + offset);
+    let code = |aabb: &Aabb| {
+        let from_low = 0.5 * (aabb.min + aabb.max).as_dvec3() - low.as_dvec3();
+        morton_code((from_low * scale).to_array())
+    };
     let mut codes: Vec<(u64, u64)> =
         bounds.iter().enumerate().map(|(i, aabb)| (code(aabb), i as u64)).collect();
     codes.sort_unstable_by_key(|(code, _)| *code);
-    codes.iter().map(|(_, i)| Bvh2Node::new(bounds[*i as usize], 1, *i as u32)).collect()
+    let leaf = |i: u64| BinaryNode { aabb: bounds[i as usize], primitives: 1, first: i as u32 };
+    codes.iter().map(|(_, i)| leaf(*i)).collect()
 }
 
 /// Finds the nearest node of each node among the `distance` nodes before and after it, and writes
 /// it to `nearest`. The nearest node is the one for which the box around both nodes has the
 /// smallest surface area. If several nodes give the same area, the last of them is the nearest.
-fn find_nearest(nodes: &[Bvh2Node], distance: usize, nearest: &mut [Nearest]) {
+fn find_nearest(nodes: &[BinaryNode], distance: usize, nearest: &mut [Nearest]) {
     nearest.fill((f32::INFINITY, NONE));
     for (i, node) in nodes.iter().enumerate() {
         let end = nodes.len().min(i + distance + 1);
         let mut best = nearest[i];
         for j in i + 1..end {
-            let area = node.aabb().union(nodes[j].aabb()).half_area();
+            let area = node.aabb.union(&nodes[j].aabb).half_area();
             if area <= best.0 {
                 best = (area, j as u32);
             }

@@ -6,10 +6,7 @@
 //! skip any subtree and would visit all other nodes for each node. In this case the optimisation
 //! ends early, at the bound.
 
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::node::Bvh2Node;
-use obvhs::bvh2::reinsertion::reinsert_node;
+use crate::bvh::binary::{Aabb, BinaryBvh, BinaryNode, sibling};
 
 /// Largest total number of node visits of the optimisation by reinsertion, per node of the tree.
 /// The optimisation ends when this number is reached. Boxes at random positions need 1 to 3 visits
@@ -35,34 +32,87 @@ struct Search {
     stack: Vec<(f32, u32)>,
 }
 
+/// Nodes of a binary BVH, with links from children to parents.
+struct LinkedTree<'a> {
+    nodes: &'a mut [BinaryNode],
+    /// Index of the parent of each node; 0 for the root.
+    parents: Vec<u32>,
+}
+
+impl<'a> LinkedTree<'a> {
+    fn new(tree: &'a mut BinaryBvh) -> Self {
+        let mut parents = vec![0; tree.nodes.len()];
+        for (index, node) in tree.nodes.iter().enumerate().filter(|(_, node)| !node.is_leaf()) {
+            node.children().iter().for_each(|child| parents[*child] = index as u32);
+        }
+        Self { nodes: &mut tree.nodes, parents }
+    }
+
+    /// Stores `node` as the node with the index `index`.
+    fn put(&mut self, index: usize, node: BinaryNode) {
+        self.nodes[index] = node;
+        if !node.is_leaf() {
+            node.children().iter().for_each(|child| self.parents[*child] = index as u32);
+        }
+    }
+
+    /// Moves the subtree `from`, which becomes the sibling of the node `to`. The node `to` is
+    /// neither in the subtree nor its sibling or parent.
+    fn reinsert(&mut self, from: usize, to: usize) {
+        let (free, parent) = (sibling(from), self.parents[from] as usize);
+        // The sibling takes the place of the parent, and `to` the former place of the sibling. The
+        // former place of `to` then holds the common parent of `to` and `from`.
+        self.put(parent, self.nodes[free]);
+        self.put(free, self.nodes[to]);
+        let first = from.min(free) as u32;
+        self.put(to, BinaryNode { first, primitives: 0, ..self.nodes[to] });
+        self.refit(to);
+        if parent != 0 {
+            self.refit(self.parents[parent] as usize);
+        }
+    }
+
+    /// Computes the boxes of the inner node `node` and of its ancestors from those of their
+    /// children.
+    fn refit(&mut self, mut node: usize) {
+        loop {
+            let [left, right] = self.nodes[node].children().map(|child| self.nodes[child].aabb);
+            self.nodes[node].aabb = left.union(&right);
+            if node == 0 {
+                return;
+            }
+            node = self.parents[node] as usize;
+        }
+    }
+}
+
 /// Optimises a binary BVH by moving subtrees in 16 rounds. The first round considers the share
 /// `ratio` (0 to 1) of all nodes: large ones near the root. Round n considers 1/(2n - 1) times as
 /// many nodes as the first.
-pub fn optimize(tree: &mut Bvh2, ratio: f32) {
+pub fn optimize(tree: &mut BinaryBvh, ratio: f32) {
     if ratio <= 0.0 || tree.nodes[0].is_leaf() {
         return;
     }
-    tree.init_parents_if_uninit();
-    tree.children_are_ordered_after_parents = false;
+    let mut tree = LinkedTree::new(tree);
     let mut search =
         Search { visits_left: MAX_VISITS.saturating_mul(tree.nodes.len()), stack: Vec::new() };
     let mut touched = vec![false; tree.nodes.len()];
     for round in (1..32).step_by(2) {
         let share = ratio * tree.nodes.len() as f32;
         let count = ((share * (1.0 / round as f32)) as usize).clamp(1, tree.nodes.len() - 1);
-        let mut found: Vec<Reinsertion> = largest_nodes(tree, count)
+        let mut found: Vec<Reinsertion> = largest_nodes(tree.nodes, count)
             .into_iter()
-            .filter_map(|node| search.best_reinsertion(tree, node))
+            .filter_map(|node| search.best_reinsertion(&tree, node))
             .collect();
         found.sort_unstable_by(|a, b| b.saved.total_cmp(&a.saved));
         touched.fill(false);
         for Reinsertion { from, to, .. } in found {
             let [from, to] = [from as usize, to as usize];
             let parent = |node: usize| tree.parents[node] as usize;
-            let moved = [to, from, Bvh2Node::get_sibling_id(from), parent(to), parent(from)];
+            let moved = [to, from, sibling(from), parent(to), parent(from)];
             if moved.iter().all(|node| !touched[*node]) {
                 moved.iter().for_each(|node| touched[*node] = true);
-                reinsert_node(tree, from, to);
+                tree.reinsert(from, to);
             }
         }
         if search.visits_left == 0 {
@@ -73,9 +123,9 @@ pub fn optimize(tree: &mut Bvh2, ratio: f32) {
 
 /// Returns the indices of the `count` nodes with the largest surface areas among nodes 1 to `2 *
 /// count + 1`. Node 0 is the root; the nodes near it have the next indices.
-fn largest_nodes(tree: &Bvh2, count: usize) -> Vec<usize> {
-    let end = tree.nodes.len().min(2 * (count + 1));
-    let area = |node: usize| tree.nodes[node].aabb().half_area();
+fn largest_nodes(nodes: &[BinaryNode], count: usize) -> Vec<usize> {
+    let end = nodes.len().min(2 * (count + 1));
+    let area = |node: usize| nodes[node].aabb.half_area();
     let mut nodes: Vec<(f32, usize)> = (1..end).map(|node| (area(node), node)).collect();
     nodes.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     nodes.into_iter().take(count).map(|(_, node)| node).collect()
@@ -90,21 +140,21 @@ impl Search {
 
     /// Returns the best move of the subtree `node`, which is not the root. Returns `None` if no
     /// move saves surface area, or if the limit of node visits is reached.
-    fn best_reinsertion(&mut self, tree: &Bvh2, node: usize) -> Option<Reinsertion> {
-        let nodes = &tree.nodes;
+    fn best_reinsertion(&mut self, tree: &LinkedTree, node: usize) -> Option<Reinsertion> {
+        let nodes = &*tree.nodes;
         let area = |aabb: &Aabb| aabb.half_area();
-        let aabb = nodes[node].aabb();
+        let aabb = &nodes[node].aabb;
         let parent = tree.parents[node] as usize;
         let (mut best, mut best_saved) = (0, 0.0);
         // The removal of `node` deletes its parent and shrinks the ancestors up to `pivot`, whose
         // box is then `pivot_box`. `removed` is half of the surface area that this saves.
-        let mut removed = area(nodes[parent].aabb());
-        let mut sibling = Bvh2Node::get_sibling_id(node);
-        let mut pivot_box = *nodes[sibling].aabb();
+        let mut removed = area(&nodes[parent].aabb);
+        let mut beside = sibling(node);
+        let mut pivot_box = nodes[beside].aabb;
         let mut pivot = parent;
         loop {
             self.stack.clear();
-            self.stack.push((removed, sibling as u32));
+            self.stack.push((removed, beside as u32));
             while let Some((saved, place)) = self.stack.pop() {
                 if saved - area(aabb) <= best_saved {
                     continue;
@@ -113,18 +163,18 @@ impl Search {
                     return None;
                 }
                 let place_node = &nodes[place as usize];
-                let saved = saved - area(&place_node.aabb().union(aabb));
+                let saved = saved - area(&place_node.aabb.union(aabb));
                 if saved > best_saved {
                     (best, best_saved) = (place, saved);
                 }
                 if !place_node.is_leaf() {
-                    let below = saved + area(place_node.aabb());
-                    self.stack.extend([0, 1].map(|i| (below, place_node.first_index + i)));
+                    let below = saved + area(&place_node.aabb);
+                    self.stack.extend([0, 1].map(|i| (below, place_node.first + i)));
                 }
             }
             if pivot != parent {
-                pivot_box = pivot_box.union(nodes[sibling].aabb());
-                removed += area(nodes[pivot].aabb()) - area(&pivot_box);
+                pivot_box = pivot_box.union(&nodes[beside].aabb);
+                removed += area(&nodes[pivot].aabb) - area(&pivot_box);
             }
             if pivot == 0 {
                 break;
@@ -132,10 +182,10 @@ impl Search {
             if !self.visit() {
                 return None;
             }
-            sibling = Bvh2Node::get_sibling_id(pivot);
+            beside = sibling(pivot);
             pivot = tree.parents[pivot] as usize;
         }
-        let is_there = best as usize == Bvh2Node::get_sibling_id(node) || best as usize == parent;
+        let is_there = best as usize == sibling(node) || best as usize == parent;
         let moves = best_saved > 0.0 && !is_there;
         moves.then_some(Reinsertion { from: node as u32, to: best, saved: best_saved })
     }

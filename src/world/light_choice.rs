@@ -12,6 +12,7 @@
 //! The probabilities depend neither on the intensities of the lights nor on the surface point. All
 //! lights are in one light group, see [`LightGroups`](crate::world::LightGroups).
 
+use crate::bvh::morton_code;
 use crate::lanes::{Float, MAX_WIDTH, SimdFloat, Vec3, array_from_fn};
 use crate::light::DeltaLight;
 use crate::primitive::BoundingSphere;
@@ -242,14 +243,8 @@ fn ball(points: impl Iterator<Item = DVec3> + Clone) -> BoundingSphere {
     BoundingSphere { center, radius: radius * (1.0 + 1e-12) }
 }
 
-/// Number of bits of each coordinate on the Morton curve.
-const MORTON_BITS: u32 = 20;
-
 /// Returns the position of `point` on a Morton curve through the box from `low` to `high`.
 fn morton(point: DVec3, low: DVec3, high: DVec3) -> u64 {
     let extent = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
-    let cells = f64::from((1u32 << MORTON_BITS) - 1);
-    let [x, y, z] = ((point - low) / extent * cells).to_array().map(|x| x as u64);
-    let bits = |k: u32| (x >> k & 1) | (y >> k & 1) << 1 | (z >> k & 1) << 2;
-    (0..MORTON_BITS).map(|k| bits(k) << (3 * k)).sum()
+    morton_code(((point - low) / extent).to_array())
 }
