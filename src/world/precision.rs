@@ -110,10 +110,10 @@ struct Clearance {
 }
 
 impl Clearance {
-    /// Returns `true` if the width of the gap is in the range `narrow`, and the region where the
-    /// gap is so narrow is wider than a pixel. `pixel` returns the side of a pixel's footprint at a
-    /// point. A sphere on a floor, for example, is close to the floor only in a spot that is too
-    /// small to see.
+    /// Returns `true` if the smallest width of the gap is in the range `narrow`, and the region in
+    /// which the gap is narrower than the end of this range is wider than a pixel. `pixel` returns
+    /// the side of a pixel's footprint at a point. A sphere on a floor, for example, is close to
+    /// the floor only in a spot that is too small to see.
     fn is_seen(&self, narrow: &Range<f64>, pixel: &impl Fn(DVec3) -> f64) -> bool {
         let wide =
             |(place, radius): (DVec3, f64)| (2.0 * radius * narrow.end).sqrt() > 0.5 * pixel(place);
