@@ -243,8 +243,8 @@ impl<L: SimdFloat> Chord<L> {
 /// crosses the lateral surface where a t^2 + 2 b t + c = 0. The discriminant is computed as |r d' -
 /// k d_z p'|^2 - (p' x d')^2. Unlike b^2 - a c, it does not cancel; for a cylinder it compares the
 /// radius with the line's distance from the axis. The roots are computed as q / a and c / q. Here q
-/// is -(b + sign(b) D) with D the root of the discriminant. For a line parallel to a generator a is
-/// 0; c / q stays finite.
+/// is -(b + sign(b) D) with D the root of the discriminant. For a line parallel to a generator (a
+/// straight line on the lateral surface), a is 0; c / q stays finite.
 #[inline(always)]
 fn chord<L: SimdFloat>(s: &ConicalFrustum<L::Scalar>, ray: &Ray<L>) -> Option<Chord<L>> {
     let (zero, half) = (L::zero(), L::from_f64(0.5));
