@@ -227,9 +227,10 @@ impl BoundingVolume {
         self.slack + ray_error(point) + F32_RAY_ERROR * reach.max(offset)
     }
 
-    /// Returns `true` if the object is flat and the light and all points of the sphere `lit` are on
-    /// the same side of its plane. `above` gets this plane as unit normal and offset. It returns
-    /// two values: the height of the light above the plane, and the error of this height.
+    /// Returns `true` if the object is flat, and a light and all points of the sphere `lit` are on
+    /// the same side of the object's plane. `above` receives this plane as unit normal and offset.
+    /// `above` returns two values: the height of the light above the plane, and the error of this
+    /// height.
     fn is_beside(&self, lit: &BoundingSphere, above: impl Fn((DVec3, f64)) -> (f64, f64)) -> bool {
         let Some((normal, offset)) = self.plane else { return false };
         let height = normal.dot(lit.center) - offset;

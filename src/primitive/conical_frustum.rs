@@ -213,13 +213,13 @@ struct Chord<L: SimdFloat> {
     point: Vec3<L>,
     /// Direction of the line, of unit length in canonical space.
     direction: Vec3<L>,
-    /// Distance in the scene from the ray's origin to `point`.
+    /// Distance in the scene from the ray's origin to `point`, a point of the ray's line.
     start: L,
     /// Length in the scene of a step of length 1 in canonical space.
     scale: L,
-    /// Distance in canonical space from `point` to the entry of the chord.
+    /// Distance in canonical space from `point`, a point of the ray's line, to the chord's entry.
     enter: L,
-    /// Distance in canonical space from `point` to the exit of the chord.
+    /// Distance in canonical space from `point`, a point of the ray's line, to the chord's exit.
     leave: L,
     /// Lanes whose ray enters through the lateral surface. In other lanes it enters through the
     /// base or the cap.
