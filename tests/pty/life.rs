@@ -154,7 +154,8 @@ fn pasted_text_is_not_keys() {
 /// Environment variables of an SSH connection.
 const SSH: &[(&str, &str)] = &[("SSH_CONNECTION", "192.0.2.1 50000 192.0.2.2 22")];
 
-/// Opens the dashboard over SSH, in a terminal that replies to requests or does not.
+/// Opens the dashboard with the environment variables of an SSH connection. The terminal replies to
+/// requests if `replies` is `true`.
 fn open_over_ssh(fixture: &Fixture, replies: bool) -> Terminal {
     let (folder, size) = (fixture.0.path(), [120, 36]);
     let terminal = Terminal::start(&Start { command: &[PROGRAM], folder, size, env: SSH, replies });

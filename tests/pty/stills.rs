@@ -19,8 +19,8 @@ const COLORS: RequestReply = (b"\x1b[?1;1;0S", "\x1b[?1;0;256S");
 /// Bytes that remove an image from the screen in kitty's graphics protocol.
 const REMOVAL: &str = "\x1b_Gm=0,q=2;\x1b\\\x1b_Ga=d,d=I,i=163,q=2\x1b\\";
 
-/// Starts the dashboard in a terminal with `replies` and exports a picture. Returns the terminal
-/// and the picture.
+/// Starts the dashboard and exports a picture. `replies` are additional replies of the terminal to
+/// requests. Returns the terminal and the picture.
 fn with_picture(fixture: &Fixture, args: &[&str], replies: &[RequestReply]) -> (Terminal, Picture) {
     let command = [&[PROGRAM, "room.toml"], args].concat();
     let start =
@@ -36,7 +36,7 @@ fn with_picture(fixture: &Fixture, args: &[&str], replies: &[RequestReply]) -> (
     (terminal, file)
 }
 
-/// Waits until the output of the program contains `text`. Returns the output from there on.
+/// Waits until the output of the program contains `text`. Returns the output from `text` on.
 fn wait_for_bytes(terminal: &Terminal, text: &str) -> String {
     let mut all = String::new();
     terminal.wait_for(text, |_| {
