@@ -38,7 +38,7 @@ impl Restorer {
     /// Fails if there is no shell.
     pub fn start(modes_before: &Termios) -> io::Result<Self> {
         let mut shell = Command::new("/bin/sh")
-            .args(["-c", PROGRAM, LEAVE.as_str()])
+            .args(["-c", PROGRAM, LEAVE])
             .args(stty_arguments(modes_before))
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
