@@ -19,8 +19,7 @@ pub const ENTER: &str = "\x1b[?1049h\x1b[?25l\x1b[?2004h\x1b[?1002h\x1b[?1006h\x
 
 /// Bytes that restore the terminal. They first end a frame (synchronised update) that was cut off
 /// and reset colours and attributes. Then they undo the parts of [`ENTER`] in the opposite order.
-pub const LEAVE: &str =
-    "\x1b[?2026l\x1b[0m\x1b[?1006l\x1b[?1002l\x1b[?2004l\x1b[?25h\x1b[?1049l";
+pub const LEAVE: &str = "\x1b[?2026l\x1b[0m\x1b[?1006l\x1b[?1002l\x1b[?2004l\x1b[?25h\x1b[?1049l";
 
 /// Longest time for which restoration of the terminal waits for a slow terminal that is still
 /// reading a frame.

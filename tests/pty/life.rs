@@ -67,9 +67,8 @@ fn panic_message_follows_restored_terminal() {
     };
     let (status, bytes) = Terminal::start(&start).end();
     assert_eq!(status, 0, "{bytes}");
-    let [entered, left, message, after] =
-        [ENTER, LEAVE, "as the test wants it", "still alive"]
-            .map(|part| bytes.find(part).unwrap_or_else(|| panic!("no {part:?} in {bytes:?}")));
+    let [entered, left, message, after] = [ENTER, LEAVE, "as the test wants it", "still alive"]
+        .map(|part| bytes.find(part).unwrap_or_else(|| panic!("no {part:?} in {bytes:?}")));
     assert!(entered < left && left < message && message < after, "{bytes:?}");
     assert_eq!(bytes.matches(LEAVE).count(), 1);
 }

@@ -2,6 +2,7 @@
 
 use crate::dashboard::message::Message;
 use crate::dashboard::overlay::Overlay;
+use crate::dashboard::run::image_upload::ImageUpload;
 use crate::dashboard::run::{Dashboard, STATUS_INTERVAL};
 use crate::film::Display;
 use crate::terminal::image::{ImageViewport, Protocol, ViewerImage};
@@ -51,7 +52,7 @@ impl Dashboard {
     /// Reports the progress of an image transfer to the model, at most once per
     /// [`STATUS_INTERVAL`]. The end of the transfer is reported at once.
     pub(super) fn report_upload(&mut self, now: Duration) {
-        let Some(sent) = self.frames.uploaded() else { return };
+        let Some(sent) = self.frames.upload.as_ref().map(ImageUpload::share) else { return };
         let known = match &self.model.overlay {
             Some(Overlay::ViewerImage(viewed)) => viewed.sent,
             _ => return,

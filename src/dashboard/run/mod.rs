@@ -280,8 +280,9 @@ impl Dashboard {
                 },
                 recv(done) -> message => message.into_iter().for_each(|m| self.take_done(m)),
                 recv(written) -> frame => {
-                    if let Ok(frame) = frame {
-                        match self.frames.written_at(frame) {
+                    if let Ok(written) = frame {
+                        self.frames.record_written();
+                        match written {
                             Ok(at) => self.latency.written(at),
                             Err(_) => return Ok(Some(HUNG_UP)),
                         }
@@ -410,8 +411,10 @@ impl Dashboard {
     /// the last frame is still being written.
     fn wants_snapshot(&self) -> Option<Duration> {
         let now = self.began.elapsed();
-        let due = self.frames.snapshot_due(now, self.latency.replies(u64::MAX));
-        self.frames.ready().then(|| due.saturating_sub(now))
+        let flow = &self.frames.flow;
+        let may_send = flow.allowance(now, self.latency.replies(u64::MAX)).is_some();
+        let due = if may_send { now } else { flow.wakes_at(now, true) };
+        self.frames.writing_since.is_none().then(|| due.saturating_sub(now))
     }
 
     /// Sends [`Message::Tick`] to the model if the time of its next timeout has come.
@@ -443,14 +446,13 @@ impl Dashboard {
         self.report_upload(now);
         self.frames.follow(&self.model);
         let mut due = None;
-        if self.frames.ready() && !self.quit {
+        if self.frames.writing_since.is_none() && !self.quit {
             let answers = self.latency.replies(self.shown);
             due = self.frames.due(now, self.changed, answers);
             if due.is_some_and(|at| at <= now) {
                 let drawn =
                     self.frames.draw(&self.model, now, self.changed, answers, self.image_epoch);
-                let (waits, sent) = self.frames.load();
-                self.latency.line(now, waits, sent);
+                self.latency.line(now, self.frames.diff.pending().visible, self.frames.sent);
                 self.changed &= matches!(drawn, DrawOutcome::Nothing | DrawOutcome::Slice);
                 match drawn {
                     DrawOutcome::Nothing | DrawOutcome::Deferred | DrawOutcome::Slice => {}
@@ -465,10 +467,9 @@ impl Dashboard {
                     DrawOutcome::Picture => self.latency.sent(self.shown),
                 }
                 let answers = self.latency.replies(self.shown);
-                due = if self.frames.ready() {
-                    self.frames.due(now, self.changed, answers)
-                } else {
-                    None
+                due = match self.frames.writing_since {
+                    None => self.frames.due(now, self.changed, answers),
+                    Some(_) => None,
                 };
             }
         }
@@ -482,7 +483,7 @@ impl Dashboard {
     /// Returns the time at which rendering will be paused unless a reply arrives before. Returns
     /// `None` if rendering is paused for this reason already, or if no reply is expected.
     fn rest(&mut self, now: Duration) -> Option<Duration> {
-        let silent_at = self.frames.silent_at();
+        let silent_at = self.frames.flow.silent_at(self.frames.writing_since);
         let is_silent = silent_at.is_some_and(|at| at <= now);
         if std::mem::replace(&mut self.resting, is_silent) != is_silent && !self.model.paused {
             self.effects.rest(is_silent);
