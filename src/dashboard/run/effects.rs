@@ -3,7 +3,7 @@
 
 use crate::dashboard::message::{Effect, Format, Message};
 use crate::dashboard::run::autosave_worker::AutosaveJob;
-use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport, stem};
+use crate::dashboard::run::exporter::{ExportRequest, Exporter, ResizedExport};
 use crate::dashboard::run::file_worker::{Files, Job};
 use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
@@ -14,7 +14,7 @@ use crate::render::session::{Session, Snapshot};
 use crate::render::{Checkpoint, Options};
 use crate::scene::{Scene, SceneFile};
 use crate::terminal::Capabilities;
-use crossbeam_channel::{Receiver, Sender, unbounded};
+use crossbeam_channel::{Receiver, Sender};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -53,13 +53,6 @@ pub trait Effects {
     /// while the connection to the terminal is silent.
     fn rest(&self, resting: bool);
 
-    /// Returns the receiver of the results of effects, as messages. The caller must pass each
-    /// message to [`Effects::observe`] before it updates the model with the message.
-    fn done(&self) -> &Receiver<Message>;
-
-    /// Updates the executor after an effect, whose result is `message`.
-    fn observe(&mut self, message: &Message);
-
     /// Executes `effect`. Its results arrive as messages. `frames` is the output to the terminal,
     /// and `terminal` its capabilities.
     fn run(
@@ -77,13 +70,9 @@ pub trait Effects {
     /// `deadline` for the renderer and for pictures that are being written, or without limit if
     /// `deadline` is `None`.
     ///
-    /// Returns two values: the remaining messages, and the path of the recovery file. The path is
-    /// `None` if there are no unsaved edits. If unsaved edits are lost, an error with the reason
-    /// takes the place of the path.
-    fn finish(
-        self: Box<Self>,
-        deadline: Option<Instant>,
-    ) -> (Vec<Message>, Result<Option<PathBuf>, String>);
+    /// Returns the path of the recovery file, or `None` if there are no unsaved edits. If unsaved
+    /// edits are lost, returns an error with the reason.
+    fn finish(self: Box<Self>, deadline: Option<Instant>) -> Result<Option<PathBuf>, String>;
 }
 
 /// Executor of effects for a dashboard that edits and renders a scene. It owns the renderer, the
@@ -98,32 +87,27 @@ pub struct EffectRunner {
     options: Options,
     settings: Settings,
     results: Sender<Message>,
-    done: Receiver<Message>,
 }
 
 impl EffectRunner {
     /// Creates the executor and starts the threads that render, read and write. `file` is the scene
     /// file, or the path of a scene file that is unreadable. `state` is the folder for recovery
     /// files that cannot be written beside their scene file. `threads` is the number of threads
-    /// that trace rays.
+    /// that trace rays. The results of effects are sent to `results`.
     pub fn new(
         file: Result<SceneFile, PathBuf>,
         state: Option<PathBuf>,
         threads: usize,
         options: Options,
         settings: Settings,
+        results: Sender<Message>,
     ) -> io::Result<Self> {
-        let (results, done) = unbounded();
-        let stem = match &file {
-            Ok(file) => stem(file.path(), file.document().name()),
-            Err(path) => stem(Some(path), ""),
-        };
+        let unreadable_path = file.as_ref().err().cloned();
         let session = Session::new(threads, options.clone(), settings)?;
         let files = Files::new(file, state, results.clone())?;
         let exporter = Exporter {
             file: files.shared.clone(),
-            folder: PathBuf::new(),
-            stem,
+            unreadable_path,
             sampler: options.sampling.kind,
             adaptive: settings.adaptive,
         };
@@ -137,7 +121,6 @@ impl EffectRunner {
             options,
             settings,
             results,
-            done,
         })
     }
 
@@ -186,18 +169,6 @@ impl Effects for EffectRunner {
 
     fn rest(&self, resting: bool) {
         if resting { self.session.pause() } else { self.session.resume() }
-    }
-
-    fn done(&self) -> &Receiver<Message> {
-        &self.done
-    }
-
-    /// Derives the names of later exports from the new path, if `message` reports that the scene
-    /// was saved.
-    fn observe(&mut self, message: &Message) {
-        if let Message::Saved(_, Ok(path)) = message {
-            self.exporter.stem = stem(Some(path), "");
-        }
     }
 
     fn run(
@@ -276,12 +247,8 @@ impl Effects for EffectRunner {
         self.files.flush(patience);
     }
 
-    fn finish(
-        mut self: Box<Self>,
-        deadline: Option<Instant>,
-    ) -> (Vec<Message>, Result<Option<PathBuf>, String>) {
-        let resized = self.resized.take();
-        let Self { session, mut files, results, done, .. } = *self;
+    fn finish(self: Box<Self>, deadline: Option<Instant>) -> Result<Option<PathBuf>, String> {
+        let Self { session, mut files, resized, .. } = *self;
         let kept = files.finish();
         let end = move || {
             if let Some(resized) = resized {
@@ -290,7 +257,6 @@ impl Effects for EffectRunner {
             // The renderer's thread runs tasks in the order of their submission. When this empty
             // task runs, all exports that were requested before it have been written.
             session.with(|_, _| ());
-            drop((session, results));
         };
         let patience = deadline
             .map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()));
@@ -299,7 +265,7 @@ impl Effects for EffectRunner {
         if let Ok(ending) = Worker::spawn("end", end) {
             ending.join_within(patience);
         }
-        (done.try_iter().collect(), kept)
+        kept
     }
 }
 

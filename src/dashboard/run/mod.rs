@@ -33,7 +33,7 @@ use crate::terminal::{
     Capabilities, Environment, Event, InputReader, Reply, Screen, TimedEvent, query_capabilities,
     size,
 };
-use crossbeam_channel::{Receiver, after, never, select};
+use crossbeam_channel::{Receiver, after, never, select, unbounded};
 use effects::{EffectRunner, Effects, Outcome};
 use frames::{DrawOutcome, FramePipeline};
 use input::Input;
@@ -117,7 +117,8 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
         Ok(file) => (file.path().map(PathBuf::from), file.document().name().to_string()),
         Err(path) => (Some(path.clone()), String::new()),
     };
-    let mut effects = EffectRunner::new(file, state, threads, options, settings)?;
+    let (results, done) = unbounded();
+    let mut effects = EffectRunner::new(file, state, threads, options, settings, results)?;
     if let Ok(scene) = &scene {
         // Rendering starts while the terminal replies to the capability queries.
         match checkpoint {
@@ -127,22 +128,28 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     }
     let mut model = Model::new(path, &name, scene, settings.stop, threads);
     model.max_threads = std::thread::available_parallelism().map_or(threads, usize::from);
-    run_on_terminal(Box::new(effects), model, terminal, trace)
+    run_on_terminal(Box::new(effects), done, model, terminal, trace)
 }
 
 /// Shows `films`, which other processes write, until the user quits or a signal arrives. `threads`
 /// is the number of threads that compute noise estimates and pictures. No thread traces rays.
 pub fn watch(films: WatchedFilms, threads: usize, terminal: TerminalSetup) -> io::Result<Ended> {
     let model = Model::new(None, "", Ok(Arc::default()), Stop::default(), threads);
-    let effects = WatchRunner::new(films, threads)?;
-    run_on_terminal(Box::new(effects), model, terminal, None)
+    let (results, done) = unbounded();
+    let effects = WatchRunner::new(films, threads, results.clone())?;
+    // This waits for the first report, so that the first frame shows the table of films.
+    if let Ok(report) = done.recv_timeout(FIRST_REPORT_WITHIN) {
+        let _ = results.send(report);
+    }
+    run_on_terminal(Box::new(effects), done, model, terminal, None)
 }
 
-/// Runs a dashboard with the model `model`, whose effects are executed by `effects`. The screen
-/// size and the colours in `model` are replaced by those of the terminal. `trace` is the path of
-/// the file for input latencies.
+/// Runs a dashboard with the model `model`, whose effects are executed by `effects`. `done` receives
+/// the results of effects. The screen size and the colours in `model` are replaced by those of the
+/// terminal. `trace` is the path of the file for input latencies.
 fn run_on_terminal(
     effects: Box<dyn Effects>,
+    done: Receiver<Message>,
     mut model: Model,
     terminal: TerminalSetup,
     trace: Option<PathBuf>,
@@ -163,6 +170,7 @@ fn run_on_terminal(
     let mut dashboard = Dashboard {
         model,
         effects,
+        done,
         frames: FramePipeline::new(screen.tty(), &terminal, bandwidth)?,
         terminal,
         latency: LatencyRecorder::new(trace.is_some()),
@@ -176,8 +184,8 @@ fn run_on_terminal(
         suspend: false,
         quit: false,
     };
-    while let Ok(message) = dashboard.effects.done().try_recv() {
-        dashboard.take_done(message);
+    while let Ok(message) = dashboard.done.try_recv() {
+        dashboard.dispatch(message);
     }
     // This message also informs the renderer of the size of the picture in half cells (upper and
     // lower halves of terminal cells).
@@ -197,9 +205,9 @@ fn run_on_terminal(
     }
     // The screen is restored before the remaining files are written, which may take a while.
     drop(screen);
-    let (finished, kept) = dashboard.effects.finish(deadline);
+    let kept = dashboard.effects.finish(deadline);
     let mut ended = Ended::new(result?, kept);
-    for message in finished {
+    for message in dashboard.done.try_iter() {
         match message {
             Message::Exported(result) => ended.exported.push(result),
             Message::CheckpointWritten(result) => ended.checkpoints.push(result),
@@ -216,6 +224,8 @@ fn run_on_terminal(
 struct Dashboard {
     model: Model,
     effects: Box<dyn Effects>,
+    /// Receiver of the results of effects.
+    done: Receiver<Message>,
     frames: FramePipeline,
     /// Known capabilities of the terminal. Late replies of the terminal add to them.
     terminal: Capabilities,
@@ -245,7 +255,7 @@ impl Dashboard {
     /// loss of the terminal ends the program, and `None` if the user quits.
     fn watch(&mut self, terminal_io: &TerminalIo) -> io::Result<Option<u8>> {
         let wakeup = self.effects.wakeup().clone();
-        let done = self.effects.done().clone();
+        let done = self.done.clone();
         let written = self.frames.writer.written.clone();
         let silence = never();
         let mut waiting = Vec::new();
@@ -278,7 +288,9 @@ impl Dashboard {
                     // The renderer's panic has been reported already.
                     Err(_) => return Err(io::Error::other("the renderer has ended")),
                 },
-                recv(done) -> message => message.into_iter().for_each(|m| self.take_done(m)),
+                recv(done) -> message => if let Ok(message) = message {
+                    self.dispatch(message);
+                },
                 recv(written) -> frame => {
                     if let Ok(written) = frame {
                         self.frames.record_written();
@@ -305,7 +317,7 @@ impl Dashboard {
                 self.latency.event(at, scene);
             }
             while let Ok(message) = done.try_recv() {
-                self.take_done(message);
+                self.dispatch(message);
             }
             if std::mem::take(&mut self.suspend)
                 && let Some(status) = self.suspend(StopTarget::Group, terminal_io)
@@ -386,11 +398,6 @@ impl Dashboard {
         }
         self.changed = true;
         awaited
-    }
-
-    fn take_done(&mut self, message: Message) {
-        self.effects.observe(&message);
-        self.dispatch(message);
     }
 
     fn take_snapshot(&mut self) {
@@ -491,6 +498,9 @@ impl Dashboard {
         silent_at.filter(|_| !is_silent)
     }
 }
+
+/// Longest time that `zerkalo watch` waits, when it starts, for the first report on the files.
+const FIRST_REPORT_WITHIN: Duration = Duration::from_secs(2);
 
 /// Shortest interval between two updates of the displayed connection status, and between two
 /// updates of the displayed upload progress.
