@@ -73,6 +73,20 @@ enum Direction {
     Out,
 }
 
+impl Direction {
+    /// Returns the direction as a unit vector: to the right, upwards, forwards.
+    fn unit(self) -> [f64; 3] {
+        match self {
+            Self::Left => [-1.0, 0.0, 0.0],
+            Self::Right => [1.0, 0.0, 0.0],
+            Self::Down => [0.0, -1.0, 0.0],
+            Self::Up => [0.0, 1.0, 0.0],
+            Self::Out => [0.0, 0.0, -1.0],
+            Self::In => [0.0, 0.0, 1.0],
+        }
+    }
+}
+
 /// Size of the step by which a command changes a value.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum StepSize {
