@@ -4,6 +4,7 @@
 use crate::dashboard::editor::Editor;
 use crate::dashboard::hints::help;
 use crate::dashboard::layout::Focus;
+use crate::dashboard::message::Effect;
 use crate::dashboard::overlay::{Answer, CommandPalette, Overlay, PickFor, Question};
 use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
 use crate::dashboard::update::UpdateContext;
@@ -143,10 +144,6 @@ impl UpdateContext<'_> {
         }
     }
 
-    pub(super) fn open_overlay(&mut self, overlay: Overlay) {
-        self.model.overlay = Some(overlay);
-    }
-
     pub(super) fn open_command_palette(&mut self) {
         self.model.overlay = Some(Overlay::CommandPalette(CommandPalette {
             editor: Editor::default(),
@@ -173,7 +170,7 @@ impl UpdateContext<'_> {
         let mut buffer = Vec::new();
         let mut found: Vec<(u32, usize)> = offered
             .filter_map(|(i, row)| {
-                let line = format!("{} {}", row.label, row.chapter.title());
+                let line = format!("{} {}", row.label, row.chapter);
                 let score = pattern.score(Utf32Str::new(&line, &mut buffer), &mut matcher)?;
                 Some((score, i))
             })
@@ -217,8 +214,8 @@ impl UpdateContext<'_> {
                 self.model.quit_when_saved = true;
                 self.save();
             }
-            Answer::Quit => self.emit(crate::dashboard::update::Effect::Quit),
-            Answer::Load => self.emit(crate::dashboard::update::Effect::Load),
+            Answer::Quit => self.emit(Effect::Quit),
+            Answer::Load => self.emit(Effect::Load),
             Answer::Overwrite(path) => self.write(path, true),
             Answer::SaveAs => self.ask_path(),
             Answer::Recover => self.recover(),

@@ -138,7 +138,7 @@ impl Painter<'_> {
             let keys = command.all_keys(str::to_string);
             to.put_right(" ", 0, key).put_right(&keys, columns(command.label) + 2, key);
             to.put(command.label, name);
-            to.put_right("  ", 1, remainder).put_right(command.chapter.title(), 1, remainder);
+            to.put_right("  ", 1, remainder).put_right(command.chapter, 1, remainder);
         }
         cursor
     }
