@@ -238,7 +238,7 @@ pub static COMMANDS: &[Command] = &[
     command("panels", "field down", &[(Inspector, "Left"), (Overlay, "Left")], |c| c.step_field(-1.0)),
     command("panels", "field up, fine", &[(Inspector, "Shift-Right"), (Overlay, "Shift-Right")], |c| c.step_field(0.1)).hints(&[hint(&[H::In(Inspector)], 3, "Shift", "fine")]),
     command("panels", "field down, fine", &[(Inspector, "Shift-Left"), (Overlay, "Shift-Left")], |c| c.step_field(-0.1)),
-    command("panels", "reset the field to its default", &[(Inspector, "Backspace")], |c| c.clear_field()).hints(&[hint(&[H::In(Inspector)], 5, "Backspace", "default")]),
+    command("panels", "reset the field to its default", &[(Inspector, "Backspace")], |c| c.fill_field("")).hints(&[hint(&[H::In(Inspector)], 5, "Backspace", "default")]),
     command("panels", "only the picture", &[(Anywhere, "z")], |c| c.toggle_fullscreen()).while_watching(),
 
     command("file", "undo", &[(Anywhere, "u")], |c| c.undo()).hints(&[hint(&[H::In(Picture)], 9, "u", "undo")]),

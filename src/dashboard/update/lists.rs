@@ -5,13 +5,12 @@ use crate::dashboard::editor::Editor;
 use crate::dashboard::hints::help;
 use crate::dashboard::layout::Focus;
 use crate::dashboard::message::Effect;
-use crate::dashboard::overlay::{Answer, CommandPalette, Overlay, PickFor, Question};
+use crate::dashboard::overlay::{Answer, CommandPalette, Overlay, Question};
 use crate::dashboard::panel_lines::{OutlineLine, outline, outline_position, scrolled};
 use crate::dashboard::update::UpdateContext;
 use crate::dashboard::update::commands::{COMMANDS, Command};
 use crate::render::schedule::Stop;
 use crate::render::session::QUALITIES;
-use crate::scene::edit;
 use nucleo_matcher::pattern::{CaseMatching, Normalization, Pattern};
 use nucleo_matcher::{Config, Matcher, Utf32Str};
 
@@ -97,18 +96,9 @@ impl UpdateContext<'_> {
             }
             Some(Overlay::Pick(pick)) => {
                 let Some((name, _)) = pick.entries.get(pick.cursor).cloned() else { return };
-                let purpose = pick.purpose.clone();
+                let take = pick.take;
                 self.model.overlay = None;
-                match purpose {
-                    PickFor::Object => {
-                        self.open_form(&name, edit::add_object(self.scene(), &name, None));
-                    }
-                    PickFor::Light => {
-                        let added = edit::add_light(self.scene(), &name);
-                        self.open_form(&format!("{name} light"), added);
-                    }
-                    PickFor::Word(subject, key) => self.set_word(&subject, &key, &name),
-                }
+                take(self, &name);
             }
             Some(Overlay::Form(form)) => {
                 if form.fields.editor.is_none() {

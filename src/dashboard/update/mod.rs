@@ -49,7 +49,7 @@ pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect>
 }
 
 /// Context of one call of [`update`]: the model, the time, and the effects so far.
-struct UpdateContext<'a> {
+pub(super) struct UpdateContext<'a> {
     model: &'a mut Model,
     now: Duration,
     effects: Vec<Effect>,
