@@ -26,7 +26,7 @@ pub enum Overlay {
         scroll: usize,
     },
     /// List of noise targets (noise values at which rendering can stop) with the time to reach each
-    /// of them: [`Model::noise_targets`](crate::dashboard::model::Model::noise_targets).
+    /// of them: [`noise_targets`](crate::dashboard::noise_targets).
     NoiseTargets {
         /// Index of the noise target under the cursor.
         cursor: usize,

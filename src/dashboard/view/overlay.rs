@@ -2,7 +2,7 @@
 
 use crate::dashboard::hints::{HelpLine, help};
 use crate::dashboard::model::Model;
-use crate::dashboard::noise_targets::{ABOUT, Cost};
+use crate::dashboard::noise_targets::{ABOUT, Cost, LOOKS, cost};
 use crate::dashboard::overlay::{CommandPalette, Form, Overlay, Pick, Prompt, Question};
 use crate::dashboard::overlay_layout::OverlayLayout;
 use crate::dashboard::update::commands::COMMANDS;
@@ -10,6 +10,7 @@ use crate::dashboard::view::fields::{Fields, typed};
 use crate::dashboard::view::frame::{overlay, window};
 use crate::dashboard::view::text::{Row, columns, cut, duration, durations, paragraphs};
 use crate::dashboard::view::theme::Theme;
+use crate::render::session::QUALITIES;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Position;
 use ratatui::style::Style;
@@ -106,19 +107,21 @@ impl Painter<'_> {
     fn noise_targets(&mut self, model: &Model, cursor: usize) {
         self.frame("noise targets in 8-bit levels");
         let good = self.theme.good();
-        for (row, noise_target) in (0..self.place.list.height).zip(model.noise_targets()) {
-            let (mut to, [name, remainder, _]) = self.choice(row, usize::from(row) == cursor);
-            let cost = match noise_target.cost {
+        let report = model.snapshot.as_ref().map(|snapshot| &snapshot.report);
+        let cost_of = |i| report.map_or(Cost::Unknown, |r| cost(r, &model.convergence, i));
+        for (row, (i, noise_codes)) in (0..self.place.list.height).zip((0..).zip(QUALITIES)) {
+            let (mut to, [name, remainder, _]) = self.choice(row, i == cursor);
+            let cost = match cost_of(i) {
                 Cost::Reached(Some(seconds)) => format!("reached after {}", duration(seconds)),
                 Cost::Reached(None) => "reached".to_string(),
                 Cost::Left(from, to) => format!("{} more", durations(from, to)),
                 Cost::Unknown => "not known yet".to_string(),
             };
-            let mark = if noise_target.is_target { "→ " } else { "  " };
+            let mark = if model.stop.noise_codes == Some(noise_codes) { "→ " } else { "  " };
             to.put_right("  ", 0, remainder).put_right(&cost, 8, name);
             to.put_right("  ", 0, remainder).put(mark, good);
-            to.put_wide(&noise_target.noise_codes.to_string(), 5, name);
-            to.skip(2).put(noise_target.looks, remainder);
+            to.put_wide(&noise_codes.to_string(), 5, name);
+            to.skip(2).put(LOOKS[i], remainder);
         }
         self.say(ABOUT, self.theme.dim());
     }
