@@ -2,7 +2,7 @@
 
 use crate::dashboard::message::Message;
 use crate::dashboard::run::Dashboard;
-use crate::dashboard::run::signals::{HUNG_UP, SignalEvent, StopTarget, stop};
+use crate::dashboard::run::signals::{HUNG_UP, SignalEvent, stop_process};
 use crate::terminal::{TimedEvent, Tty, size};
 use crossbeam_channel::Receiver;
 use std::io;
@@ -65,22 +65,26 @@ impl Dashboard {
                 self.resizing.note(self.began.elapsed());
                 None
             }
-            SignalEvent::Stop => self.suspend(StopTarget::Itself, terminal_io),
+            SignalEvent::Stop => self.suspend(stop_process, terminal_io),
             // The process may have been stopped by SIGSTOP, which it cannot handle. The terminal is
             // therefore set up again.
             SignalEvent::Continue => self.resume(terminal_io),
         }
     }
 
-    /// Restores the terminal and stops the processes of `target`. Sets up the terminal again when
-    /// the shell continues them. Returns the exit status if the program is to end instead,
-    /// otherwise `None`.
-    pub(super) fn suspend(&mut self, target: StopTarget, terminal_io: &TerminalIo) -> Option<u8> {
+    /// Restores the terminal and stops the process by `stop`. Sets up the terminal again when the
+    /// shell continues it. Returns the exit status if the program is to end instead, otherwise
+    /// `None`.
+    pub(super) fn suspend(
+        &mut self,
+        stop: fn() -> rustix::io::Result<()>,
+        terminal_io: &TerminalIo,
+    ) -> Option<u8> {
         // Unsaved edits are written first, because the program may never be resumed.
         self.effects.flush(SECURED_WITHIN);
         self.await_answers(&terminal_io.input);
         terminal_io.tty.suspend();
-        let mut stopped = stop(target).is_ok();
+        let mut stopped = stop().is_ok();
         while stopped {
             match terminal_io.signals.recv_timeout(STOPS_WITHIN) {
                 Ok(SignalEvent::End(status)) => return Some(status),

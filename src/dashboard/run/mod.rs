@@ -39,7 +39,7 @@ use frames::{DrawOutcome, FramePipeline};
 use input::Input;
 use job_control::{ResizeDebounce, TerminalIo};
 use latency::LatencyRecorder;
-use signals::{HUNG_UP, StopTarget};
+use signals::{HUNG_UP, stop_group};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -320,7 +320,7 @@ impl Dashboard {
                 self.dispatch(message);
             }
             if std::mem::take(&mut self.suspend)
-                && let Some(status) = self.suspend(StopTarget::Group, terminal_io)
+                && let Some(status) = self.suspend(stop_group, terminal_io)
             {
                 return Ok(Some(status));
             }
