@@ -240,6 +240,12 @@ pub fn short_name(path: &Path) -> String {
     sanitized(&name.to_string_lossy())
 }
 
+/// Returns the first of `errors` as one line.
+pub(super) fn first_line(errors: &SceneErrors) -> String {
+    let first = errors.messages().first().map(ToString::to_string).unwrap_or_default();
+    first.lines().map(str::trim).collect::<Vec<_>>().join(" ")
+}
+
 impl Model {
     /// Creates the model of a dashboard that renders `scene` with `threads` threads until the
     /// criteria `stop` are reached. `scene` is an error if the scene file cannot be read. `path` is

@@ -9,10 +9,10 @@ use crate::dashboard::run::frames::FramePipeline;
 use crate::dashboard::run::worker::Worker;
 use crate::dashboard::run::{export_paths, image_viewer};
 use crate::film::LinearImage;
+use crate::render::Options;
 use crate::render::schedule::Settings;
 use crate::render::session::{Session, Snapshot};
-use crate::render::{Checkpoint, Options};
-use crate::scene::{Scene, SceneFile};
+use crate::scene::SceneFile;
 use crate::terminal::Capabilities;
 use crossbeam_channel::{Receiver, Sender};
 use std::io;
@@ -78,7 +78,8 @@ pub trait Effects {
 /// Executor of effects for a dashboard that edits and renders a scene. It owns the renderer, the
 /// thread of the scene file and the exports.
 pub struct EffectRunner {
-    session: Session,
+    /// Renderer of the scene.
+    pub session: Session,
     files: Files,
     exporter: Exporter,
     resized: Option<ResizedExport>,
@@ -124,17 +125,6 @@ impl EffectRunner {
         })
     }
 
-    /// Starts rendering `scene`. Returns the number of this version of the scene (its generation).
-    /// The renderer's reports repeat this number.
-    pub fn show(&mut self, scene: Arc<Scene>) -> u64 {
-        self.session.set_scene(scene)
-    }
-
-    /// Continues the render of `checkpoint`, and shows its samples as a picture of `scene`.
-    pub fn resume(&mut self, scene: Arc<Scene>, checkpoint: Checkpoint) {
-        self.session.continue_from(scene, checkpoint);
-    }
-
     fn export(&mut self, format: Format) {
         let (exporter, results) = (self.exporter.clone(), self.results.clone());
         self.session.submit(move |film| {
@@ -150,11 +140,6 @@ impl EffectRunner {
         // If the threads cannot be started, the old ones continue. No message is needed, because
         // the renderer's reports contain the number of threads.
         let _ = self.session.set_threads(self.threads, self.niceness);
-    }
-
-    fn refuse(&self, error: &io::Error) {
-        let why = format!("cannot start a rendering thread: {error}");
-        let _ = self.results.send(Message::Exported(Err(why)));
     }
 }
 
@@ -178,7 +163,7 @@ impl Effects for EffectRunner {
         terminal: &Capabilities,
     ) -> Outcome {
         match effect {
-            Effect::Show(scene) => return Outcome::Rendering(self.show(scene)),
+            Effect::Show(scene) => return Outcome::Rendering(self.session.set_scene(scene)),
             Effect::Restart => return Outcome::Rendering(self.session.restart()),
             Effect::Display(display) => {
                 self.options.display = display;
@@ -186,8 +171,7 @@ impl Effects for EffectRunner {
             }
             Effect::Stop(stop) => self.session.set_stop(stop),
             Effect::View(view) => self.session.set_view(view),
-            Effect::Pause(true) => self.session.pause(),
-            Effect::Pause(false) => self.session.resume(),
+            Effect::Pause(paused) => self.rest(paused),
             Effect::Threads(threads) => {
                 self.threads = threads;
                 self.set_threads();
@@ -227,7 +211,10 @@ impl Effects for EffectRunner {
                     ResizedExport::start(request, self.exporter.clone(), self.results.clone());
                 match started {
                     Ok(resized) => self.resized = Some(resized),
-                    Err(error) => self.refuse(&error),
+                    Err(error) => {
+                        let why = format!("cannot start a rendering thread: {error}");
+                        let _ = self.results.send(Message::Exported(Err(why)));
+                    }
                 }
             }
             Effect::CancelExport => {

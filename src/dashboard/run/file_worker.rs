@@ -78,7 +78,7 @@ impl Files {
         let seen = path.as_deref().filter(|_| file.is_none()).and_then(stamp);
         let name = file.as_ref().map_or("", |file| file.document().name());
         let autosave = Autosave::new(path.as_deref(), name, state.clone());
-        let shared = SharedFile::new(autosave.elsewhere());
+        let shared = SharedFile::new(autosave.recovery.elsewhere());
         file.iter().for_each(|file| shared.put(file));
         let autosave_worker = AutosaveWorker {
             autosave,

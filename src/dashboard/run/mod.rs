@@ -122,9 +122,9 @@ pub fn run(setup: Setup) -> io::Result<Ended> {
     if let Ok(scene) = &scene {
         // Rendering starts while the terminal replies to the capability queries.
         match checkpoint {
-            Some(checkpoint) => effects.resume(Arc::clone(scene), checkpoint),
-            None => drop(effects.show(Arc::clone(scene))),
-        }
+            Some(checkpoint) => effects.session.continue_from(Arc::clone(scene), checkpoint),
+            None => effects.session.set_scene(Arc::clone(scene)),
+        };
     }
     let mut model = Model::new(path, &name, scene, settings.stop, threads);
     model.max_threads = std::thread::available_parallelism().map_or(threads, usize::from);

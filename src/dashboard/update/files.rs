@@ -2,10 +2,10 @@
 //! exports.
 
 use crate::dashboard::message::{Effect, Exported};
-use crate::dashboard::model::{Tone, short_name};
+use crate::dashboard::model::{Tone, first_line, short_name};
 use crate::dashboard::overlay::Answer;
 use crate::dashboard::update::UpdateContext;
-use crate::scene::edit::Target;
+use crate::scene::edit::{Target, outline};
 use crate::scene::{SaveError, Scene, SceneErrors};
 use crate::value::sanitized;
 use std::path::PathBuf;
@@ -132,18 +132,15 @@ impl UpdateContext<'_> {
                 self.model.file.broken = None;
                 self.model.file.unreadable = false;
                 self.model.history.restart(scene);
-                let outline = crate::scene::edit::outline(self.scene());
-                let same = |(_, subject): &(_, Target)| subject.title(self.scene()) == title;
-                let found = outline.iter().find(|entry| same(entry));
-                let found = found.map_or(Target::Camera, |(_, subject)| subject.clone());
+                let mut subjects = outline(self.scene()).into_iter().map(|(_, subject)| subject);
+                let found = subjects.find(|subject| subject.title(self.scene()) == title);
                 self.model.inspector.editor = None;
-                self.select(found);
+                self.select(found.unwrap_or(Target::Camera));
                 self.show();
                 self.say(format!("read {}", self.model.file.name));
             }
             Err(errors) => {
-                let first = errors.messages().first().map(ToString::to_string).unwrap_or_default();
-                let text = first.lines().map(str::trim).collect::<Vec<_>>().join(" ");
+                let text = first_line(&errors);
                 self.model.file.broken = Some(errors);
                 if !self.model.file.unreadable {
                     self.notify(Tone::Bad, text, None);
