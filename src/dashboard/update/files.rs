@@ -174,10 +174,7 @@ impl UpdateContext<'_> {
         match result {
             Ok(Exported { path, size: [width, height], spp, noise_codes, scp }) => {
                 // If the image has the size of the export in the background, this export has ended.
-                if self.model.export.is_some_and(|e| e.size.map(|n| n as usize) == [width, height])
-                {
-                    self.model.export = None;
-                }
+                self.model.export.take_if(|e| e.size.map(|n| n as usize) == [width, height]);
                 let noise = noise_codes.map_or(String::new(), |n| format!("  noise {n:.2}"));
                 let text = format!(
                     "{}  {width}x{height}  {spp:.0} spp{noise}  ·  o shows it, y copies the path  ·  scp {scp} .",

@@ -42,7 +42,7 @@ const REPEAT_WINDOW: Duration = Duration::from_millis(700);
 /// fixed origin.
 pub fn update(model: &mut Model, message: Message, now: Duration) -> Vec<Effect> {
     let mut context = UpdateContext { model, now, effects: Vec::new(), follow: true, typed: None };
-    context.expire_notice();
+    context.model.notice.take_if(|notice| notice.until.is_some_and(|until| until <= now));
     context.handle(message);
     context.normalize();
     context.effects
@@ -287,14 +287,6 @@ impl UpdateContext<'_> {
             form.problem = Some(sanitized(text));
         } else {
             self.notify(Tone::Bad, text, Some(5.0));
-        }
-    }
-
-    /// Removes the notice if its time has passed.
-    fn expire_notice(&mut self) {
-        let over = |notice: &Notice| notice.until.is_some_and(|until| until <= self.now);
-        if self.model.notice.as_ref().is_some_and(over) {
-            self.model.notice = None;
         }
     }
 
