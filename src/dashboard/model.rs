@@ -4,7 +4,7 @@ use crate::dashboard::convergence::Convergence;
 use crate::dashboard::editor::Editor;
 use crate::dashboard::key_context::KeyContext;
 use crate::dashboard::layout::{Focus, Layout, Request, layout};
-use crate::dashboard::message::{DisplayChannel, Format, OrphanedEdits};
+use crate::dashboard::message::{DisplayChannel, OrphanedEdits};
 use crate::dashboard::overlay::Overlay;
 use crate::dashboard::overlay_layout::wrapped;
 use crate::film::{Display, LinearImage, PixelProbe};
@@ -126,8 +126,6 @@ pub struct WatchTable {
 pub struct RunningExport {
     /// Width and height of the exported image in pixels.
     pub size: [u32; 2],
-    /// File format of the exported image.
-    pub format: Format,
     /// Progress of the export's render, 0..=1.
     pub progress: f64,
 }

@@ -2,7 +2,7 @@
 
 use crate::dashboard::editor::Editor;
 use crate::dashboard::layout::Focus;
-use crate::dashboard::message::{DisplayChannel, Format, Message, OrphanedEdits};
+use crate::dashboard::message::{DisplayChannel, Message, OrphanedEdits};
 use crate::dashboard::model::{CompareView, FieldList, Mode, Model, Notice, RunningExport, Tone};
 use crate::dashboard::overlay::{Answer, CommandPalette, Form, Overlay, Pick, Prompt, Question};
 use crate::dashboard::panel_lines::{PanelLine, scrolled};
@@ -234,7 +234,7 @@ pub const STATES: &[Named] = &[
         m.display.tone = crate::film::Tone::Neutral;
         m.low_priority = true;
         let size = [1920, 1080];
-        m.export = Some(RunningExport { size, format: Format::Png, progress: 0.43 });
+        m.export = Some(RunningExport { size, progress: 0.43 });
     }),
     ("outline", |m| {
         m.focus = Focus::Outline;
