@@ -49,9 +49,9 @@ pub trait Effects {
     /// it has been taken already.
     fn take_snapshot(&self) -> Option<Snapshot>;
 
-    /// Pauses rendering if `resting` is `true`, otherwise resumes it. The event loop pauses it
-    /// while the connection to the terminal is silent.
-    fn rest(&self, resting: bool);
+    /// Pauses rendering if the argument is `true`, otherwise resumes it. The event loop pauses it
+    /// while the connection to the terminal is silent. Does nothing without a renderer.
+    fn rest(&self, _resting: bool) {}
 
     /// Executes `effect`. Its results arrive as messages. `frames` is the output to the terminal,
     /// and `terminal` its capabilities.
@@ -64,7 +64,7 @@ pub trait Effects {
 
     /// Writes unsaved edits to the recovery file at once, without the usual delay until a pause in
     /// editing. Blocks until the edits are written, at most for `patience`.
-    fn flush(&self, patience: Duration);
+    fn flush(&self, _patience: Duration) {}
 
     /// Completes pending writes and ends the threads. First writes unsaved edits. Then waits until
     /// `deadline` for the renderer and for pictures that are being written, or without limit if

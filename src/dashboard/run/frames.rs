@@ -231,12 +231,11 @@ impl FramePipeline {
         if changed {
             self.redraw(model);
         }
-        let (picture, uncovered) = self.view.place();
         let target = TargetFrame {
             cells: &self.target,
             cursor: self.cursor,
-            picture,
-            uncovered,
+            picture: self.view.place,
+            uncovered: &self.view.uncovered,
             subject: image_epoch,
             version: model.picture_version,
             samples: model.snapshot.as_ref().map_or(0.0, |s| s.report.spp.mean),

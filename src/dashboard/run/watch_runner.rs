@@ -15,7 +15,7 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Executor of effects in `zerkalo watch`, which shows film files of other processes.
 pub struct WatchRunner {
@@ -79,8 +79,6 @@ impl Effects for WatchRunner {
         self.session.take()
     }
 
-    fn rest(&self, _: bool) {}
-
     fn run(
         &mut self,
         effect: Effect,
@@ -104,8 +102,6 @@ impl Effects for WatchRunner {
         }
         Outcome::Done
     }
-
-    fn flush(&self, _: Duration) {}
 
     fn finish(self: Box<Self>, deadline: Option<Instant>) -> Result<Option<PathBuf>, String> {
         // The session runs exports in the order of their requests. If its thread panics, it drops

@@ -171,14 +171,14 @@ pub fn typed(editor: &Editor, to: &mut Row, theme: &Theme) -> Option<Position> {
     if width == 0 {
         return None;
     }
-    let hidden = editor.scroll_columns(width);
+    let hidden = editor.input.visual_scroll(width);
     let style = Style::new().add_modifier(Modifier::UNDERLINED).patch(match editor.problem {
         Some(_) => theme.bad(),
         None => theme.accent(),
     });
-    let (x, y) = (to.x(), to.y());
+    let (x, y) = (to.x, to.y);
     to.put_wide(skip(editor.text(), hidden), width, style);
-    let column = editor.cursor_columns().saturating_sub(hidden).min(width) as u16;
+    let column = editor.input.visual_cursor().saturating_sub(hidden).min(width) as u16;
     Some(Position { x: x + column, y })
 }
 
