@@ -158,7 +158,8 @@ fn expected(property: &Property) -> String {
     }
 }
 
-fn heading(mut to: Row, title: &str, theme: &Theme) {
+/// Draws the heading `title` with a line up to the last column but one of the row `to`.
+pub fn heading(mut to: Row, title: &str, theme: &Theme) {
     to.put(" ", theme.heading()).put(title, theme.heading()).put(" ", theme.heading());
     let left = to.left().saturating_sub(1);
     to.put(&"─".repeat(left), theme.border(false));

@@ -6,7 +6,7 @@ use crate::dashboard::noise_targets::{ABOUT, Cost, LOOKS, cost};
 use crate::dashboard::overlay::{CommandPalette, Form, Overlay, Pick, Prompt, Question};
 use crate::dashboard::overlay_layout::OverlayLayout;
 use crate::dashboard::update::commands::COMMANDS;
-use crate::dashboard::view::fields::{Fields, typed};
+use crate::dashboard::view::fields::{Fields, heading, typed};
 use crate::dashboard::view::frame::{overlay, window};
 use crate::dashboard::view::text::{Row, columns, cut, duration, durations, paragraphs};
 use crate::dashboard::view::theme::Theme;
@@ -80,11 +80,7 @@ impl Painter<'_> {
         for (row, i) in self.window(scroll, lines.len()) {
             let mut to = Row::new(self.buffer, self.place.list, row);
             match &lines[i] {
-                HelpLine::Heading(title) => {
-                    to.put(&format!(" {title} "), theme.heading());
-                    let left = to.left().saturating_sub(1);
-                    to.put(&"─".repeat(left), theme.border(false));
-                }
+                HelpLine::Heading(title) => heading(to, title, theme),
                 HelpLine::Keys(keys, label) => {
                     // A long list of keys is truncated so that it does not shorten the label.
                     let room = to.left().saturating_sub(3 + columns(label) + 2 + 1);
