@@ -480,6 +480,12 @@ impl FlowControl {
     }
 
     fn has_room(&self, now: Duration, answers: bool) -> bool {
+        let is_active = now < self.active_until;
+        // The first frame that shows the effect of input does not wait for frames sent before the
+        // input. `last` is the time at which the last of these was sent.
+        let is_first = |last: Option<Duration>| {
+            is_active && answers && last.is_some_and(|at| at < self.active_since)
+        };
         match self.mode {
             PacingMode::Unlimited => true,
             PacingMode::AckClocked(_) if self.free_at > now => false,
@@ -487,7 +493,6 @@ impl FlowControl {
                 if self.needs_round_trip(now) {
                     return self.in_flight.is_empty();
                 }
-                let is_active = now < self.active_until;
                 // While the user is active and the connection is busy, at most one frame is in
                 // flight, or two if the second shows the effect of input. The effect of an input
                 // then waits for at most one frame, the one in transmission.
@@ -495,25 +500,15 @@ impl FlowControl {
                     true => 1 + usize::from(answers),
                     false => self.target_in_flight(),
                 };
-                // The first frame that shows the effect of input does not wait for frames sent
-                // before the input.
-                let newest = self.in_flight.back();
-                let is_first = is_active
-                    && answers
-                    && newest.is_some_and(|frame| frame.sent < self.active_since);
-                is_first || self.in_flight.iter().filter(|frame| frame.picture).count() < limit
+                let pictures = self.in_flight.iter().filter(|frame| frame.picture).count();
+                is_first(self.in_flight.back().map(|frame| frame.sent)) || pictures < limit
             }
             PacingMode::SendQueue if self.needs_round_trip(now) => self.send_queue.bytes == 0.0,
             PacingMode::SendQueue => {
-                // The first frame that shows the effect of input does not wait for frames sent
-                // before the input.
-                let is_first = now < self.active_until
-                    && answers
-                    && self.last_frame.is_some_and(|at| at < self.active_since);
-                let extra = if is_first { self.budget() as f64 } else { 0.0 };
+                let extra = if is_first(self.last_frame) { self.budget() as f64 } else { 0.0 };
                 // While the user is active, the limit is lower by half of a frame, so that the
                 // effect of an input waits for fewer bytes.
-                let spare = if now < self.active_until { self.budget() as f64 / 2.0 } else { 0.0 };
+                let spare = if is_active { self.budget() as f64 / 2.0 } else { 0.0 };
                 self.send_queue.bytes < self.max_queue() + extra - spare
             }
             PacingMode::FixedRate => {
