@@ -24,7 +24,8 @@ impl UpdateContext<'_> {
     /// Returns the line under the cursor of the open form, or of the inspector if no form is open.
     /// Returns `None` if the line shows no property, such as a heading.
     pub(super) fn field(&self) -> Option<FieldLine> {
-        self.model.field_lines().get(self.model.field_list().cursor)?.field().cloned()
+        let lines = self.model.field_lines();
+        Some(*lines.get(self.model.field_list().cursor)?.entry()?.clone())
     }
 
     /// Starts the input of a value for the property under the cursor. `typed` is the character that

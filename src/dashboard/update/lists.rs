@@ -71,10 +71,10 @@ impl UpdateContext<'_> {
     fn move_outline_cursor(&mut self, steps: isize) {
         let lines = outline(self.scene());
         let before = outline_position(&lines, &self.model.selection).unwrap_or(0);
-        let position = lines[..before].iter().filter_map(OutlineLine::subject).count();
-        let subjects: Vec<_> = lines.iter().filter_map(OutlineLine::subject).collect();
-        if let Some(subject) = subjects.get(moved(position, steps, subjects.len())) {
-            self.select((*subject).clone());
+        let position = lines[..before].iter().filter_map(OutlineLine::entry).count();
+        let entries: Vec<_> = lines.iter().filter_map(OutlineLine::entry).collect();
+        if let Some(entry) = entries.get(moved(position, steps, entries.len())) {
+            self.select(entry.subject.clone());
         }
     }
 

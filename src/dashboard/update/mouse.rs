@@ -82,7 +82,7 @@ impl UpdateContext<'_> {
         // change the layout.
         let lines = outline(self.scene());
         let line = line_at(rows, self.model.outline_scroll, mouse).and_then(|i| lines.get(i));
-        let subject = line.and_then(OutlineLine::subject).cloned();
+        let subject = line.and_then(OutlineLine::entry).map(|entry| entry.subject.clone());
         let again =
             self.model.focus == Focus::Outline && subject.as_ref() == Some(&self.model.selection);
         self.set_focus(Focus::Outline);
@@ -101,7 +101,7 @@ impl UpdateContext<'_> {
         let (cursor, line) = (*cursor, line_at(rows, *scroll, mouse));
         let opens = focused && editor.is_none();
         let lines = self.model.field_lines();
-        match line.filter(|line| lines.get(*line).and_then(PanelLine::field).is_some()) {
+        match line.filter(|line| lines.get(*line).and_then(PanelLine::entry).is_some()) {
             Some(line) if opens && line == cursor => self.open_field(None),
             Some(line) if self.apply_field() => self.model.field_list_mut().cursor = line,
             _ => {}

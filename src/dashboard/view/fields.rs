@@ -60,7 +60,7 @@ impl Fields<'_> {
     /// cursor is hidden.
     pub fn draw(&self, theme: &Theme, buffer: &mut Buffer) -> Option<Position> {
         let label = |line: &PanelLine| {
-            line.field().map_or(0, |f| 1 + 2 * f.property.depth + columns(&f.label))
+            line.entry().map_or(0, |f| 1 + 2 * f.property.depth + columns(&f.label))
         };
         let widest = self.lines.iter().map(label).max().unwrap_or(0);
         let labels = widest.min(usize::from(self.list.width) * 9 / 20);
@@ -70,7 +70,7 @@ impl Fields<'_> {
             let to = Row::new(buffer, self.list, row);
             match &self.lines[i] {
                 PanelLine::Heading(title) => heading(to, title, theme),
-                PanelLine::Field(field) => {
+                PanelLine::Entry(field) => {
                     let position = self.field(field, i == self.state.cursor, labels, to, theme);
                     typing = typing.or(position);
                 }
@@ -130,7 +130,7 @@ impl Fields<'_> {
     /// help is the reason. Otherwise it is the property's description and a description of its
     /// valid values.
     fn say(&self, theme: &Theme, buffer: &mut Buffer) {
-        let Some(field) = self.lines.get(self.state.cursor).and_then(PanelLine::field) else {
+        let Some(field) = self.lines.get(self.state.cursor).and_then(PanelLine::entry) else {
             return;
         };
         let problem =

@@ -89,7 +89,7 @@ fn select_first(model: &mut Model) {
 }
 
 fn field(model: &Model, key: &str) -> usize {
-    let is = |line: &PanelLine| line.field().is_some_and(|field| field.property.key == key);
+    let is = |line: &PanelLine| line.entry().is_some_and(|field| field.property.key == key);
     model.field_lines().iter().position(is).unwrap_or_else(|| panic!("a field {key}"))
 }
 
