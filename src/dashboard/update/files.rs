@@ -14,6 +14,7 @@ use std::sync::Arc;
 const KEEP_FILE: (char, &str, Answer) = ('k', "keep the file on disk", Answer::Nothing);
 const KEEP_EDITS: (char, &str, Answer) = ('k', "keep my edits", Answer::Nothing);
 const OVERWRITE: (char, &str, Answer) = ('o', "overwrite it", Answer::Overwrite(None));
+const STAY: (char, &str, Answer) = ('c', "stay", Answer::Nothing);
 const SAVE_AS: (char, &str, Answer) = ('s', "save under another name", Answer::SaveAs);
 
 impl UpdateContext<'_> {
@@ -152,19 +153,11 @@ impl UpdateContext<'_> {
     pub(super) fn quit(&mut self) {
         if self.model.is_unsaved() && !self.model.file.unreadable {
             let text = format!("{} has unsaved edits.", self.model.file.name);
-            self.ask(
-                text,
-                &[
-                    ('s', "save and quit", Answer::SaveAndQuit),
-                    ('d', "discard them and quit", Answer::Quit),
-                    ('c', "stay", Answer::Nothing),
-                ],
-            );
+            let discard = ('d', "discard them and quit", Answer::Quit);
+            self.ask(text, &[('s', "save and quit", Answer::SaveAndQuit), discard, STAY]);
         } else if self.model.export.is_some() {
-            self.ask(
-                "A picture is still being rendered.".to_string(),
-                &[('c', "stay", Answer::Nothing), ('q', "quit without it", Answer::Quit)],
-            );
+            let text = "A picture is still being rendered.".to_string();
+            self.ask(text, &[STAY, ('q', "quit without it", Answer::Quit)]);
         } else {
             self.emit(Effect::Quit);
         }
