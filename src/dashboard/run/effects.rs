@@ -13,7 +13,6 @@ use crate::render::Options;
 use crate::render::schedule::Settings;
 use crate::render::session::{Session, Snapshot};
 use crate::scene::SceneFile;
-use crate::terminal::Capabilities;
 use crossbeam_channel::{Receiver, Sender};
 use std::io;
 use std::path::PathBuf;
@@ -53,14 +52,8 @@ pub trait Effects {
     /// while the connection to the terminal is silent. Does nothing without a renderer.
     fn rest(&self, _resting: bool) {}
 
-    /// Executes `effect`. Its results arrive as messages. `frames` is the output to the terminal,
-    /// and `terminal` its capabilities.
-    fn run(
-        &mut self,
-        effect: Effect,
-        frames: &mut FramePipeline,
-        terminal: &Capabilities,
-    ) -> Outcome;
+    /// Executes `effect`. Its results arrive as messages. `frames` is the output to the terminal.
+    fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome;
 
     /// Writes unsaved edits to the recovery file at once, without the usual delay until a pause in
     /// editing. Blocks until the edits are written, at most for `patience`.
@@ -156,12 +149,7 @@ impl Effects for EffectRunner {
         if resting { self.session.pause() } else { self.session.resume() }
     }
 
-    fn run(
-        &mut self,
-        effect: Effect,
-        frames: &mut FramePipeline,
-        terminal: &Capabilities,
-    ) -> Outcome {
+    fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome {
         match effect {
             Effect::Show(scene) => return Outcome::Rendering(self.session.set_scene(scene)),
             Effect::Restart => return Outcome::Rendering(self.session.restart()),
@@ -225,7 +213,7 @@ impl Effects for EffectRunner {
             Effect::Autosave(scene) => self.files.autosave(scene),
             Effect::Recover => self.files.give_autosave(AutosaveJob::Recover),
             Effect::Discard => self.files.give_autosave(AutosaveJob::Discard),
-            effect => return run_on_terminal(effect, frames, terminal, &self.results),
+            effect => return run_on_terminal(effect, frames, &self.results),
         }
         Outcome::Done
     }
@@ -257,19 +245,16 @@ impl Effects for EffectRunner {
 }
 
 /// Executes an effect that concerns the terminal: view an image file, copy a path, suspend, or
-/// quit. Other effects are ignored. `frames` is the output to the terminal, and `terminal` its
-/// capabilities. A separate thread reads and encodes an image file and sends the result to
-/// `results`.
+/// quit. Other effects are ignored. `frames` is the output to the terminal. A separate thread reads
+/// and encodes an image file and sends the result to `results`.
 pub fn run_on_terminal(
     effect: Effect,
     frames: &mut FramePipeline,
-    terminal: &Capabilities,
     results: &Sender<Message>,
 ) -> Outcome {
     match effect {
         Effect::ViewImage { path, display, screen } => {
-            let line_rate = frames.flow.reading().map(|link| link.rate);
-            let viewport = image_viewer::viewport(terminal, screen, line_rate);
+            let viewport = image_viewer::viewport(frames, screen);
             image_viewer::prepare(path, display, viewport, results.clone());
         }
         Effect::Copy(path) => frames.copy(&export_paths::full(&path)),

@@ -31,8 +31,8 @@ pub struct FramePipeline {
     pub flow: FlowControl,
     /// Send queue of the SSH connection in the kernel; `None` if it cannot be read.
     queue: Option<TcpSendQueue>,
-    /// `true` if the terminal supports synchronised updates, which it displays as a whole.
-    synchronised: bool,
+    /// Known capabilities of the terminal. Late replies of the terminal add to them.
+    pub terminal: Capabilities,
     /// Thread that writes frames to the terminal. The caller must report each of its results to
     /// [`FramePipeline::record_written`].
     pub writer: Writer,
@@ -79,14 +79,14 @@ pub enum DrawOutcome {
 impl FramePipeline {
     /// Creates a pipeline for an empty screen. `bandwidth` is a fixed rate in bytes per second;
     /// `None` adapts the rate to the connection.
-    pub fn new(tty: Arc<Tty>, terminal: &Capabilities, bandwidth: Option<f64>) -> io::Result<Self> {
+    pub fn new(tty: Arc<Tty>, terminal: Capabilities, bandwidth: Option<f64>) -> io::Result<Self> {
         let queue = terminal.environment.ssh.as_deref().and_then(TcpSendQueue::find);
         Ok(Self {
             view: View::default(),
             diff: FrameDiff::default(),
-            flow: FlowControl::new(InitialLink::of(terminal, queue.is_some(), bandwidth)),
+            flow: FlowControl::new(InitialLink::of(&terminal, queue.is_some(), bandwidth)),
             queue,
-            synchronised: terminal.synchronised,
+            terminal,
             writer: writer::start(Arc::clone(&tty))?,
             writing_since: None,
             sent: 0,
@@ -242,7 +242,7 @@ impl FramePipeline {
             settled: is_settled(model),
         };
         let mut bytes = self.removal.clone();
-        if self.synchronised {
+        if self.terminal.synchronised {
             bytes.extend(SYNCHRONISED[0]);
         }
         let empty = bytes.len();
@@ -259,7 +259,7 @@ impl FramePipeline {
             }
             return if pending.visible { DrawOutcome::Deferred } else { DrawOutcome::Same };
         }
-        if self.synchronised {
+        if self.terminal.synchronised {
             bytes.extend(SYNCHRONISED[1]);
         }
         self.removing |= !std::mem::take(&mut self.removal).is_empty();

@@ -30,8 +30,7 @@ use crate::render::{Checkpoint, Options};
 use crate::scene::{SceneErrors, SceneFile};
 use crate::terminal::flow::LinkStatus;
 use crate::terminal::{
-    Capabilities, Environment, Event, InputReader, Reply, Screen, TimedEvent, query_capabilities,
-    size,
+    Environment, Event, InputReader, Reply, Screen, TimedEvent, query_capabilities, size,
 };
 use crossbeam_channel::{Receiver, after, never, select, unbounded};
 use effects::{EffectRunner, Effects, Outcome};
@@ -171,8 +170,7 @@ fn run_on_terminal(
         model,
         effects,
         done,
-        frames: FramePipeline::new(screen.tty(), &terminal, bandwidth)?,
-        terminal,
+        frames: FramePipeline::new(screen.tty(), terminal, bandwidth)?,
         latency: LatencyRecorder::new(trace.is_some()),
         began: Instant::now(),
         shown: 0,
@@ -227,8 +225,6 @@ struct Dashboard {
     /// Receiver of the results of effects.
     done: Receiver<Message>,
     frames: FramePipeline,
-    /// Known capabilities of the terminal. Late replies of the terminal add to them.
-    terminal: Capabilities,
     latency: LatencyRecorder,
     began: Instant,
     /// Generation of the visible picture: the version number of the scene that it shows.
@@ -341,7 +337,7 @@ impl Dashboard {
             Event::Reply(reply @ (Reply::Graphics(true) | Reply::Version(_))) => {
                 // A terminal behind a multiplexer may reply only after the capability query has
                 // ended.
-                self.terminal.learn(&reply);
+                self.frames.terminal.learn(&reply);
                 return;
             }
             Event::Reply(_) => return,
@@ -376,7 +372,7 @@ impl Dashboard {
                 Effect::Show(scene) => Some(Arc::clone(scene)),
                 _ => None,
             };
-            match self.effects.run(effect, &mut self.frames, &self.terminal) {
+            match self.effects.run(effect, &mut self.frames) {
                 Outcome::Done => {}
                 Outcome::Rendering(generation) => {
                     // A change of lights alone needs no newly rendered picture: the current

@@ -10,7 +10,6 @@ use crate::film::file::FilmFileHeader;
 use crate::film::{Depth, Film, ImageOutput, LinearImage};
 use crate::render::plan::WatchedFilms;
 use crate::render::session::{Report, Snapshot, WatchSession};
-use crate::terminal::Capabilities;
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -79,12 +78,7 @@ impl Effects for WatchRunner {
         self.session.take()
     }
 
-    fn run(
-        &mut self,
-        effect: Effect,
-        frames: &mut FramePipeline,
-        terminal: &Capabilities,
-    ) -> Outcome {
+    fn run(&mut self, effect: Effect, frames: &mut FramePipeline) -> Outcome {
         match effect {
             Effect::View(view) => self.session.set_view(view),
             Effect::Display(display) => self.session.set_display(display),
@@ -98,7 +92,7 @@ impl Effects for WatchRunner {
                 });
             }
             Effect::Export(format) => self.export(format),
-            effect => return run_on_terminal(effect, frames, terminal, &self.results),
+            effect => return run_on_terminal(effect, frames, &self.results),
         }
         Outcome::Done
     }
