@@ -166,10 +166,14 @@ fn run_on_terminal(
     };
     model.screen = screen_size;
     model.colors = colors.unwrap_or(terminal.colors);
+    let input = input::read(input)?;
+    let terminal_io =
+        TerminalIo { tty: screen.tty(), input, signals: signals.events, left: screen.left.clone() };
     let mut dashboard = Dashboard {
         model,
         effects,
         done,
+        terminal_io,
         frames: FramePipeline::new(screen.tty(), terminal, bandwidth)?,
         latency: LatencyRecorder::new(trace.is_some()),
         began: Instant::now(),
@@ -188,10 +192,7 @@ fn run_on_terminal(
     // This message also informs the renderer of the size of the picture in half cells (upper and
     // lower halves of terminal cells).
     dashboard.dispatch(Message::Resize(dashboard.model.screen));
-    let input = input::read(input)?;
-    let terminal_io =
-        TerminalIo { tty: screen.tty(), input, signals: signals.events, left: screen.left.clone() };
-    let result = dashboard.watch(&terminal_io);
+    let result = dashboard.watch();
     // If the user quits, the program waits without limit for pictures that are being written. If a
     // signal or the loss of the terminal ends it, the wait is limited.
     let deadline = (!matches!(result, Ok(None))).then(|| Instant::now() + signals::ENDED_WITHIN);
@@ -199,7 +200,7 @@ fn run_on_terminal(
     // timeout of 0, the call does not wait for the write.
     dashboard.effects.flush(Duration::ZERO);
     if matches!(&result, Ok(status) if *status != Some(HUNG_UP)) {
-        dashboard.await_answers(&terminal_io.input);
+        dashboard.await_answers();
     }
     // The screen is restored before the remaining files are written, which may take a while.
     drop(screen);
@@ -224,6 +225,7 @@ struct Dashboard {
     effects: Box<dyn Effects>,
     /// Receiver of the results of effects.
     done: Receiver<Message>,
+    terminal_io: TerminalIo,
     frames: FramePipeline,
     latency: LatencyRecorder,
     began: Instant,
@@ -249,15 +251,16 @@ struct Dashboard {
 impl Dashboard {
     /// Runs the event loop until the program is to end. Returns the exit status if a signal or the
     /// loss of the terminal ends the program, and `None` if the user quits.
-    fn watch(&mut self, terminal_io: &TerminalIo) -> io::Result<Option<u8>> {
+    fn watch(&mut self) -> io::Result<Option<u8>> {
+        let TerminalIo { input, signals, left, .. } = self.terminal_io.clone();
         let wakeup = self.effects.wakeup().clone();
         let done = self.done.clone();
         let written = self.frames.writer.written.clone();
         let silence = never();
         let mut waiting = Vec::new();
         // Signals that arrived during the capability query are handled before the first frame.
-        while let Ok(event) = terminal_io.signals.try_recv() {
-            if let Some(status) = self.handle_signal(event, terminal_io) {
+        while let Ok(event) = signals.try_recv() {
+            if let Some(status) = self.handle_signal(event) {
                 return Ok(Some(status));
             }
         }
@@ -274,7 +277,7 @@ impl Dashboard {
                 None => never(),
             };
             select! {
-                recv(terminal_io.input) -> event => match event {
+                recv(input) -> event => match event {
                     Ok(Ok(event)) => self.enqueue(event, &mut waiting),
                     // The terminal is gone.
                     Ok(Err(_)) | Err(_) => return Ok(Some(HUNG_UP)),
@@ -296,15 +299,15 @@ impl Dashboard {
                         }
                     }
                 }
-                recv(terminal_io.signals) -> event => {
-                    if let Some(status) = event.ok().and_then(|event| self.handle_signal(event, terminal_io)) {
+                recv(signals) -> event => {
+                    if let Some(status) = event.ok().and_then(|event| self.handle_signal(event)) {
                         return Ok(Some(status));
                     }
                 }
-                recv(terminal_io.left) -> _ => return Err(io::Error::other("the dashboard has failed")),
+                recv(left) -> _ => return Err(io::Error::other("the dashboard has failed")),
                 recv(timer) -> _ => self.wake(),
             }
-            while let Ok(Ok(event)) = terminal_io.input.try_recv() {
+            while let Ok(Ok(event)) = input.try_recv() {
                 self.enqueue(event, &mut waiting);
             }
             for Input { at, message } in waiting.drain(..) {
@@ -316,7 +319,7 @@ impl Dashboard {
                 self.dispatch(message);
             }
             if std::mem::take(&mut self.suspend)
-                && let Some(status) = self.suspend(stop_group, terminal_io)
+                && let Some(status) = self.suspend(stop_group)
             {
                 return Ok(Some(status));
             }
@@ -347,10 +350,10 @@ impl Dashboard {
 
     /// Waits for outstanding replies of the terminal, before the terminal is restored. Otherwise
     /// the shell would read the replies as input.
-    fn await_answers(&mut self, input: &Receiver<io::Result<TimedEvent>>) {
+    fn await_answers(&mut self) {
         let end = self.frames.flow.awaits().map(|wait| Instant::now() + wait);
         while let Some(left) = end.map(|end| end.saturating_duration_since(Instant::now())) {
-            match input.recv_timeout(left) {
+            match self.terminal_io.input.recv_timeout(left) {
                 Ok(Ok(event)) => self.enqueue(event, &mut Vec::new()),
                 _ => break,
             }
