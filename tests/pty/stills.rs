@@ -96,7 +96,7 @@ fn kitty_protocol_shows_the_exported_file() {
     terminal.send("q");
     let (status, bytes) = terminal.end();
     assert_eq!((status, bytes.matches(REMOVAL).count()), (0, 1), "nothing is left to remove");
-    assert!(bytes.ends_with(LEAVE.as_str()));
+    assert!(bytes.ends_with(LEAVE));
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn signal_removes_the_image() {
     let (status, bytes) = terminal.end();
     assert_eq!(status, 143);
     assert!(
-        bytes.ends_with(&format!("\x1b\\{REMOVAL}{LEAVE}", LEAVE = *LEAVE)),
+        bytes.ends_with(&format!("\x1b\\{REMOVAL}{LEAVE}")),
         "{:?}",
         &bytes[bytes.len() - 200..]
     );
@@ -176,7 +176,7 @@ fn sixel_shows_the_exported_file_in_strips() {
         let (strips, after) = bytes.rsplit_once("\x1bP").unwrap();
         assert!(strips.contains("\x1bP") || is_interrupted);
         let (_, after) = after.split_once("\x1b\\").unwrap();
-        assert!(after.contains("\x1b[2J") && after.ends_with(LEAVE.as_str()));
+        assert!(after.contains("\x1b[2J") && after.ends_with(LEAVE));
         assert_eq!(status, 0);
     }
 }

@@ -28,7 +28,7 @@ fn radius(desk: &Desk) -> f64 {
 fn at_radius() -> Desk {
     let desk = desk(BALL, "Enter Down Down Down Down Down Down");
     let lines = desk.model.field_lines();
-    assert_eq!(lines[desk.model.inspector.cursor].field().unwrap().label, "radius");
+    assert_eq!(lines[desk.model.inspector.cursor].entry().unwrap().label, "radius");
     desk
 }
 
